@@ -395,7 +395,7 @@ CONTACT = Granular(normal=Hooke(), damping=RestitutionDamping(), tangential=Line
 STEEL = {"steel": Material(stiffness=1e5, restitution=0.1, friction=0.5)}
 
 
-def chain(*effects, **more):
+def chain(*effects, materials=None, **more):
     """Five grains in a row along z that just touch."""
     place = np.array([[0, 0, 2.0 * k] for k in range(5)])
     return scene(
@@ -406,8 +406,22 @@ def chain(*effects, **more):
         mass=1.0,
         stepper=fixed(1e-4),
         duration=4.0,
-        materials=STEEL,
+        materials=materials or STEEL,
         **more,
+    )
+
+
+ONCE = {"susceptibility": 1e3, "sweeps": 0, "cutoff": 6.0, "shifted": True}
+"""One sweep a step."""
+
+
+def swept_once(stiffness=1e5, saturation=1.7e6, **more):
+    """The chain, of grains whose contacts have a stiffness (N/m), and which saturate at so much (A/m)."""
+    return chain(
+        MagneticField(constant=(0, 0, 1e-3)),
+        MutualFroehlichMoment(saturation=saturation, **ONCE, **more),
+        TruncatedDipoleDipole(cutoff=6.0, shifted=True),
+        materials={"steel": STEEL["steel"].model_copy(update={"stiffness": stiffness})},
     )
 
 
@@ -418,11 +432,7 @@ CHAINS = {
         MutualInducedMoment(susceptibility=1e3, cutoff=6.0),
         TruncatedDipoleDipole(cutoff=6.0),
     ),
-    "mutual, one sweep a step": lambda: chain(
-        MagneticField(constant=(0, 0, 1e-3)),
-        MutualFroehlichMoment(susceptibility=1e3, saturation=1.7e6, sweeps=0, cutoff=6.0, shifted=True),
-        TruncatedDipoleDipole(cutoff=6.0, shifted=True),
-    ),
+    "mutual, one sweep a step": swept_once,
 }
 
 
@@ -451,6 +461,19 @@ def test_a_chain_at_rest_holds(name):
         assert spring == pytest.approx(pull[: k + 1, k + 1 :].sum(), rel=1e-4)
     np.testing.assert_allclose(r[:, :2], 0.0, atol=1e-12)
     np.testing.assert_allclose(m[:, :2], 0.0, atol=1e-9 * np.abs(m).max())
+
+
+@pytest.mark.slow
+def test_grains_so_soft_that_they_draw_each_other_in_stop_by_name():
+    """One sweep a step, and no saturation to speak of: unguarded, moments grow by a factor in each step,
+    until the grains fly apart."""
+    (result,) = simulate([swept_once(stiffness=1.0, saturation=1e12)], capacity=32)
+    assert "does not converge: a sweep multiplies the change by" in result.status.reason
+    assert "by effects.mutual_froehlich_moment, at particle" in result.status.reason
+    assert np.abs(result.state["velocity"]).max() < 100
+    (result,) = simulate([swept_once(stiffness=1.0, saturation=1e12, largest_change=2.0)], capacity=32)
+    assert result.status.ok
+    assert np.abs(result.state["velocity"]).max() > 1e6
 
 
 def colloids():

@@ -24,6 +24,8 @@ from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 
+MOST_SWEEPS = 100
+"""A step makes at most so many where it usually makes one."""
 ROUNDING_UNITS = 4.0
 """Changes of so many units in the last place count as none: sweeps in f32 may go on with them for ever."""
 
@@ -32,8 +34,8 @@ class SelfConsistentSolver(DerivedSolver):
     """A self-consistent solver finds a quantity that particles give each other: the values of the next sweep,
     and whether there is one.
 
-    changes : the largest of a particle in this sweep, the last, and the one before. mixed : whether sweeps
-    are mixed with the last (sweep_mixing.py).
+    changes : the largest of a particle in this sweep, the last, and the one before. once : whether a step
+    makes one sweep while that suffices. mixed : whether sweeps are mixed with the last (sweep_mixing.py).
     """
 
     def __init__(
@@ -47,7 +49,8 @@ class SelfConsistentSolver(DerivedSolver):
         self.domain, self.pairs = domain, pairs
         listed = pairs is not None and effect.data.short_ranged
         self.exported = ExportedTerms(pairs, self.components) if pairs and listed else None
-        self.mixed = effect.data.acceleration == "anderson" and effect.data.sweeps > 0
+        self.once, self.most = effect.data.sweeps == 0, effect.data.sweeps or MOST_SWEEPS
+        self.mixed = effect.data.acceleration == "anderson"
         self.next, *memory = (self.column() for _ in range(3 if self.mixed else 1))
         self.pending, self.sweeps, self.unconverged = (ti.field(ti.i32) for _ in range(3))
         self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
@@ -99,14 +102,12 @@ class BeginSweeps(OnOccasion, PerParticle):
 class SweepUntilConverged(Repeat):
     """This item repeats sweeps of a world until it has converged."""
 
-    usual = 2
-
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         far = solver.effect.sum.phases() if isinstance(solver.effect.data, LongRange) else ()
         sweep = (*far, *sum_phases(JacobiSweep(solver, trial), solver.exported))
         mixing = (CompareSweeps(solver), ChooseMixing(solver)) if solver.mixed else ()
         super().__init__((*sweep, *mixing, ReplaceValues(solver, trial), CheckConvergence(solver)))
-        self.solver = solver
+        self.solver, self.usual = solver, 1 if solver.once else 2
 
     @ti.func
     def pending(self, w):
@@ -152,8 +153,12 @@ class JacobiSweep(PairSum):
         new = self.effect.response(self.s, w, i, a.unpacked(total), t)
         a.next[w, i] = (1.0 - part) * a.value[w, i] + part * new
         size = a.size(new)
-        if size > a.largest[w]:
-            ti.atomic_max(a.largest[w], size)
+        largest = size
+        if ti.static(a.once):
+            # Where a field has been switched off, what was is the measure of what is left.
+            largest = ti.max(size, a.size(a.value[w, i]))
+        if largest > a.largest[w]:
+            ti.atomic_max(a.largest[w], largest)
         if ti.static(not self.trial):
             self.check(w, i, size)
 
@@ -190,17 +195,24 @@ class ReplaceValues(PerParticle):
             unsolvable = a.unsolvable[w] > 0
         if change > a.changes[0][w]:
             ti.atomic_max(a.changes[0][w], change)
-        if ti.static(self.effect.sweeps > 0):
-            tolerance = ti.max(self.effect.relaxation(w) * self.effect.tolerance(w), self.least)
-            on = change > tolerance * a.largest[w]
-            if on and not unsolvable and a.sweeps[w] + 1 < self.effect.sweeps:
-                ti.atomic_max(a.unconverged[w], 1)
-            elif on or unsolvable:
-                if ti.static(self.trial):
-                    # Forces that are not finite: the step is given up.
-                    a.value[w, i] *= ti.math.nan
-                else:
-                    fail_to_converge(self.s, w, i, self.effect)
+        on = change > ti.max(self.effect.relaxation(w) * self.tolerance(w), self.least) * a.largest[w]
+        if on and not unsolvable and a.sweeps[w] + 1 < a.most:
+            ti.atomic_max(a.unconverged[w], 1)
+        elif on or unsolvable:
+            if ti.static(self.trial):
+                # Forces that are not finite: the step is given up.
+                a.value[w, i] *= ti.math.nan
+            else:
+                fail_to_converge(self.s, w, i, self.effect)
+
+    @ti.func
+    def tolerance(self, w):
+        """Return the change, over the largest value, up to which there is no other sweep."""
+        tolerance = self.effect.tolerance(w)
+        if ti.static(self.solver.once):
+            first = self.solver.sweeps[w] == 0
+            tolerance = ti.select(first, self.effect.largest_change(w), tolerance)
+        return tolerance
 
 
 @ti.func
@@ -223,10 +235,13 @@ class CheckConvergence(Phase):
         if before[w] > 0.0 and finite(now[w]):
             # Of two sweeps: where others act as much along as against, changes grow by turns.
             s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
+        s.sweep_change[w] = now[w] / ti.select(a.largest[w] > 0.0, a.largest[w], 1.0)
         before[w], last[w], now[w] = last[w], now[w], 0.0
         a.sweeps[w] += 1
         a.pending[w] = a.unconverged[w]
-        a.unconverged[w], a.largest[w] = 0, 0.0
+        a.unconverged[w] = 0
+        if ti.static(not a.once):
+            a.largest[w] = 0.0
 
 
 def solver(

@@ -37,26 +37,30 @@ SEEN = 1e4
 
 
 class CompareSweeps(PerBlock):
-    """This phase sums what tells how a sweep differs from the last."""
+    """This phase sums what tells how a sweep differs from the last, where there was one."""
+
+    conditional = True
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         super().__init__(solver.sums)
         self.solver, self.effect = solver, solver.effect
 
     @ti.func
+    def when(self, w):
+        return ti.cast(self.solver.sweeps[w] > 0, ti.i32)
+
+    @ti.func
     def each(self, w, i):
-        a, total = self.solver, ti.Vector.zero(ti.f64, MIXING_TERMS)
-        if a.sweeps[w] > 0:
-            x, f = ti.cast(a.packed(a.value[w, i]), ti.f64), ti.cast(a.packed(a.next[w, i]), ti.f64)
-            f_last = ti.cast(a.packed(a.last[w, i]), ti.f64)
-            r_last = ti.cast(a.packed(a.residual[w, i]), ti.f64)
-            r = f - x
-            change, moved = r - r_last, x - (f_last - r_last)
-            weight = ti.cast(self.effect.weight(self.s, w, i), ti.f64)
-            total = weight * ti.Vector(
-                [r.dot(change), change.norm_sqr(), moved.dot(change), moved.norm_sqr(), f.norm_sqr()]
-            )
-        return total
+        a = self.solver
+        x, f = ti.cast(a.packed(a.value[w, i]), ti.f64), ti.cast(a.packed(a.next[w, i]), ti.f64)
+        f_last = ti.cast(a.packed(a.last[w, i]), ti.f64)
+        r_last = ti.cast(a.packed(a.residual[w, i]), ti.f64)
+        r = f - x
+        change, moved = r - r_last, x - (f_last - r_last)
+        weight = ti.cast(self.effect.weight(self.s, w, i), ti.f64)
+        return weight * ti.Vector(
+            [r.dot(change), change.norm_sqr(), moved.dot(change), moved.norm_sqr(), f.norm_sqr()]
+        )
 
 
 class ChooseMixing(Phase):
@@ -69,8 +73,14 @@ class ChooseMixing(Phase):
 
     @ti.func
     def run(self, w, _k):
-        a, total = self.solver, self.solver.sums.total(w)
+        a = self.solver
         a.theta[w], a.unsolvable[w] = 0.0, 0
+        if a.sweeps[w] > 0:
+            self.compare(w, a.sums.total(w))
+
+    @ti.func
+    def compare(self, w, total):
+        a = self.solver
         # Where residuals grow along the way there is nothing to extrapolate to, but what plain sweeps leave.
         if total[1] > 0.0 and total[2] <= 0.0 and finite(total[0]) and finite(total[1]):
             a.theta[w] = total[0] / total[1]

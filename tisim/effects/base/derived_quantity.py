@@ -35,8 +35,12 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
 
     It is found by sweeps over all particles at once (the method of Jacobi), each starting from the last
     values, also those of the last step, until no particle changes by more than ``tolerance`` times the
-    largest value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so; with
-    ``sweeps`` of 0 there is one sweep per step and no such test.
+    largest value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so.
+
+    With ``sweeps`` of 0 a step makes one, and more only where that one changes a particle by more than
+    ``largest_change`` times the largest value: at the start, from nothing, where particles are put in or a
+    field is switched on, and where values grow without end. It then goes on to ``tolerance``, in at most
+    100 sweeps, or the world fails. A ``largest_change`` of 2 has one sweep a step whatever comes of it.
 
     Where the others act by a linear law, with real eigenvalues L, plain sweeps with a ``relaxation`` of a
     converge if 1 - 2/a < L < 1 for all of them. Mixed by the method of Anderson they are fewer, and converge
@@ -44,7 +48,9 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     what a mixed sweep would then find is none, so a ``linear`` law stops its world as soon as sweeps show
     such an L.
 
-    ``sweep_factor`` of a world is what sweeps multiply the change by, from the last three; of plain ones
+    ``sweep_change`` of a world is the change in the last sweep, over the largest value: where there is one
+    sweep a step, it times L / (1 - L) is about how far values are from those that they should have.
+    ``sweep_factor`` is what sweeps multiply the change by, from the last three of a step; of plain ones
     without end it tends to the largest |1 - a + a L|. Where a world stops as L exceeds 1 it is a bound of L
     from below.
 
@@ -57,18 +63,26 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     contract: ClassVar[bool] = True
     within_bodies: ClassVar[bool] = True
     counters = ("mutual_sweeps",)
-    world_quantities = ("sweep_factor",)
+    world_quantities = ("sweep_factor", "sweep_change")
     linear: ClassVar[bool] = False
 
     tolerance: float = parameter(
         "", "change in a sweep, over the largest value, at which the solution counts as converged", 1e-8, gt=0
     )
-    sweeps: int = option("sweeps over all particles at most; 0 for one a step without a test", 100, ge=0)
+    sweeps: int = option(
+        "sweeps over all particles at most; 0 for one a step, while that suffices", 100, ge=0
+    )
+    largest_change: float = parameter(
+        "",
+        "beside sweeps = 0, change over the largest value above which a step makes more than one",
+        1e-2,
+        gt=0,
+    )
     relaxation: float = parameter(
         "", "part a of its way that a sweep goes, q = (1 - a) q + a response", 1.0, gt=0, le=1
     )
     acceleration: Literal["anderson", "none"] = option(
-        "how sweeps are mixed with the last, where there are several a step", "anderson"
+        "how sweeps are mixed with the last, where a step makes several", "anderson"
     )
 
     accuracy_parameters = (AccuracyParameter(tolerance=1),)
