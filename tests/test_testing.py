@@ -9,6 +9,7 @@ from tests.throwaway import SoftShell
 from tisim import InputError, Scene
 from tisim.backend.taichi import ti
 from tisim.effects import (
+    DipoleDipole,
     EwaldDipoleDipole,
     EwaldFroehlichMoment,
     EwaldInducedMoment,
@@ -20,6 +21,7 @@ from tisim.effects import (
     PrescribedMotion,
     RigidClumps,
     Tether,
+    TruncatedDipoleDipole,
     Virial,
     option,
 )
@@ -243,8 +245,11 @@ SHORT = [kind for kind in known_effects() if is_short_ranged(kind)]
 
 @pytest.mark.slow
 def test_every_law_is_zero_beyond_its_reach():
-    """All in one scene; only friction and bonds have nothing to do there before particles have moved."""
-    most = assert_reach(joined(SHORT))
+    """All in one scene but what is summed otherwise; only friction and bonds have nothing to do there before
+    particles have moved."""
+    most = assert_reach(joined([kind for kind in SHORT if kind not in (*IMAGED, *DIPOLES)]))
+    for apart in (IMAGED, DIPOLES):
+        most |= assert_reach(joined([kind for kind in SHORT if kind in apart]))
     assert most.keys() == {kind.kind() for kind in SHORT}
     assert {name for name, size in most.items() if size == 0} <= {"contact_friction", "parallel_bond"}
 
@@ -341,18 +346,26 @@ def test_a_field_that_only_others_declare_is_reported():
 
 # Capture, constraints and the virial exclude impacts. No law of its own, and a series that takes long to
 # compile, has the cylinder. What passes is weighed before it is taken out, and permanent moments exclude soft
-# ones. Gravity by a tree has no images, which Ewald sums need.
+# ones. Gravity by a tree has no images, which Ewald sums need. Forces of dipoles go with mutual moments of
+# one cut-off alone.
 HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
-APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING, *IMAGED)
+DIPOLES = [DipoleDipole, TruncatedDipoleDipole]
+APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING, *IMAGED, *DIPOLES)
 TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     "kinds",
-    [TOGETHER, [Capture, Virial], HOLDING, [PermanentMoment], pytest.param(IMAGED, marks=pytest.mark.slow)],
-    ids=["all that go together", "capture", "constraints", "permanent moments", "Ewald sums"],
+    [
+        TOGETHER,
+        [Capture, Virial],
+        HOLDING,
+        [PermanentMoment],
+        *(pytest.param(kinds, marks=pytest.mark.slow) for kinds in (DIPOLES, IMAGED)),
+    ],
+    ids=["all that go together", "capture", "constraints", "permanent moments", "dipoles", "Ewald sums"],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))

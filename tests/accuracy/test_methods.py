@@ -12,7 +12,7 @@ from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
 from tests.scenes import scene
 from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
-from tisim import Box, InputError, Material, MaterialPair, RunError
+from tisim import Box, InputError, Material, MaterialPair, RunError, Scene
 from tisim.accuracy import Quantity, Row, Study
 from tisim.accuracy.formatting import expression, options
 from tisim.accuracy.plot import picture
@@ -30,6 +30,9 @@ from tisim.effects import (
     JKR,
     SJKR,
     ConstantDamping,
+    DipoleDipole,
+    EwaldDipoleDipole,
+    EwaldInducedMoment,
     Granular,
     HertzMaterial,
     Hooke,
@@ -44,10 +47,12 @@ from tisim.effects import (
     SelfGravity,
     Tether,
     TreeGravity,
+    TruncatedDipoleDipole,
     TruncatedNearField,
     TwistingSDS,
     ViscoelasticDamping,
     Walls,
+    ewald_settings,
 )
 from tisim.geometry import Plane
 from tisim.sources import MagneticField
@@ -206,6 +211,48 @@ def test_what_is_mutual_is_tried_without_the_others_and_with_one_sweep_a_step():
     arguments = options(scene, alone.scene)
     assert arguments[:2] == ["--without", "mutual_induced_moment"]
     assert arguments[2:] == ["--set", "effects.induced_moment={susceptibility = 2.0}"]
+
+
+def test_moments_are_cut_off_with_the_forces_and_are_swept_to_a_tolerance_where_they_are_not():
+    """Else a scene with the law in question would be refused."""
+    every = (MagneticField(), MutualInducedMoment(susceptibility=2.0), DipoleDipole())
+    cut = {"cutoff": 2.0, "gap": 4.0}
+    near = (
+        MagneticField(),
+        MutualInducedMoment(susceptibility=2.0, sweeps=0, **cut),
+        TruncatedDipoleDipole(**cut),
+    )
+    known = {}
+    for effects in (every, near):
+        known = methods_of(oscillator().model_copy(update={"effects": effects}))
+        settings = known["TruncatedDipoleDipole"].settings
+        assert len(settings) > 1
+        for setting in settings:
+            _, moments, forces = setting.scene.effects
+            assert (moments.cutoff, moments.gap) == (forces.cutoff, forces.gap)
+            Scene(**dict(setting.scene))
+    several = known["InducedMoment"].settings[-1]
+    assert several.description == "sweeps=100"
+    assert "mutual_induced_moment: tolerance" not in known
+    assert "mutual_induced_moment: largest_change" in known
+
+
+def test_the_accuracy_of_an_ewald_sum_is_turned_for_forces_and_moments_as_far_as_there_are_waves():
+    box = Box(low=(-4, -4, -4), high=(4, 4, 4))
+    settings = ewald_settings(box, 100, 1e-3)
+    effects = (
+        MagneticField(),
+        EwaldInducedMoment(susceptibility=2.0, **settings),
+        EwaldDipoleDipole(**settings),
+    )
+    known = methods_of(oscillator().model_copy(update={"effects": effects, "domain": box}))
+    for name in ("ewald_dipole_dipole: accuracy", "ewald_induced_moment: accuracy"):
+        numbers = []
+        for setting in known[name].settings:
+            _, moments, forces = setting.scene.effects
+            assert moments.accuracy == forces.accuracy
+            numbers.append(forces.accuracy)
+        assert numbers == [1e-1, 1e-2, 1e-3]
 
 
 def grains(**properties):

@@ -27,12 +27,13 @@ def within(path: str, part: Component) -> Iterator[tuple[str, Component]]:
 
 
 def exchanged(scene: Scene, path: str, part: Component) -> Scene:
-    """Return a copy of a scene with another part in the place with this dotted name."""
+    """Return a copy of a scene with another part in the place with this dotted name, and with the settings in
+    other effects that must be those of this one."""
     first, *rest = path.split(".")
     if first == "effects":
         own = next(effect for effect in scene.effects if effect.label == rest[0])
         new = _put(own, rest[1:], part)
-        effects = tuple(new if effect is own else effect for effect in scene.effects)
+        effects = tuple(new if effect is own else effect.beside(new) for effect in scene.effects)
         return scene.model_copy(update={"effects": effects})
     return scene.model_copy(update={first: _put(getattr(scene, first), rest, part)})
 

@@ -170,6 +170,8 @@ def _turning(
             changed = turned(scene, path, accuracy_parameter, decades)
         except InputError:
             continue  # The part cannot be set so, such as to a shortest step above the longest.
+        if not _stands(changed):
+            continue  # It does not suit the domain, such as waves for which there is no room.
         part = dict(parts(changed))[path]
         description = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
         settings.append(Setting(changed, description, numbers[0], starts, numbers[1]))

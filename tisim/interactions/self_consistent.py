@@ -10,6 +10,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, LongRange, SelfConsistentQuantity
+from tisim.effects.base.derived_quantity import SWEEPS
 from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.listed_pairs import ExportedTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
@@ -24,8 +25,6 @@ from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 
-MOST_SWEEPS = 100
-"""A step makes at most so many where it usually makes one."""
 ROUNDING_UNITS = 4.0
 """Changes of so many units in the last place count as none: sweeps in f32 may go on with them for ever."""
 
@@ -49,7 +48,7 @@ class SelfConsistentSolver(DerivedSolver):
         self.domain, self.pairs = domain, pairs
         listed = pairs is not None and effect.data.short_ranged
         self.exported = ExportedTerms(pairs, self.components) if pairs and listed else None
-        self.once, self.most = effect.data.sweeps == 0, effect.data.sweeps or MOST_SWEEPS
+        self.once, self.most = effect.data.sweeps == 0, effect.data.sweeps or SWEEPS
         self.mixed = effect.data.acceleration == "anderson"
         self.next, *memory = (self.column() for _ in range(3 if self.mixed else 1))
         self.pending, self.sweeps, self.unconverged = (ti.field(ti.i32) for _ in range(3))

@@ -103,6 +103,7 @@ class Scene(Component):
         self._check_materials()
         for effect in self.effects:
             effect.suits(self.domain)
+            effect.suits_others(self.effects)
         self.stepper.suits(self.effects, self.domain)
         self.stepper.fewest(self.effects, self.duration)
         rule = "at least one, or put in by an effect such as insertion_by_flux"

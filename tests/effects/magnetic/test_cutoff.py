@@ -7,8 +7,11 @@ from scipy.spatial.transform import Rotation
 from tests.effects.contact.loads import WORLDS, balanced, close, loads, vector
 from tests.effects.magnetic.magnets import MU_0, Quadrupole, dipole_field, flux_density
 from tests.scenes import by_id, fixed, scene, simulate
-from tisim import InputError
+from tisim import Box, InputError
 from tisim.effects import (
+    DipoleDipole,
+    EwaldDipoleDipole,
+    EwaldInducedMoment,
     InducedMoment,
     Magnetophoresis,
     MutualInducedMoment,
@@ -17,6 +20,7 @@ from tisim.effects import (
 )
 from tisim.sources import MagneticField
 
+EWALD = {"cutoff": 3.0, "waves": (15, 15, 15)}
 NUMBERS = ({"cutoff": 6.0}, {"cutoff": 2.0, "gap": 2.0}, {"cutoff": 3.0, "gap": 1.0})
 """Of cut-offs: over the mean radius, by a gap between surfaces, and both."""
 
@@ -201,6 +205,49 @@ def test_where_there_is_no_cutoff_all_pairs_count():
     assert law.structure() != MutualInducedMoment(susceptibility=1.0).structure()
     assert law.structure() == MutualInducedMoment(susceptibility=3.0, cutoff=2.0, gap=1.0).structure()
     assert law.approximations(1.0)[0] == InducedMoment(susceptibility=1.0)
+
+
+DISAGREE = {
+    "effects.mutual_induced_moment.cutoff must be that of the forces, 6.0 in "
+    "effects.truncated_dipole_dipole; received 2.1": (
+        MutualInducedMoment(susceptibility=1.0, cutoff=2.1),
+        TruncatedDipoleDipole(cutoff=6.0),
+    ),
+    "effects.mutual_induced_moment.cutoff must be that of the forces, 0 in effects.dipole_dipole; received "
+    "2.1": (MutualInducedMoment(susceptibility=1.0, cutoff=2.1), DipoleDipole()),
+    "effects.mutual_induced_moment.shifted must be that of the forces, True in "
+    "effects.truncated_dipole_dipole; received False": (
+        MutualInducedMoment(susceptibility=1.0, cutoff=6.0),
+        TruncatedDipoleDipole(cutoff=6.0, shifted=True),
+    ),
+    "effects.mutual_induced_moment must be used with forces by the same sum; received "
+    "'ewald_dipole_dipole'": (
+        MutualInducedMoment(susceptibility=1.0),
+        EwaldDipoleDipole(**EWALD),
+    ),
+    "effects.ewald_induced_moment.accuracy must be that of the forces, 0.0001 in "
+    "effects.ewald_dipole_dipole; received 0.01": (
+        EwaldInducedMoment(susceptibility=1.0, accuracy=1e-2, **EWALD),
+        EwaldDipoleDipole(**EWALD),
+    ),
+    "effects.ewald_induced_moment.demagnetising_factors must be that of the forces, (0.0, 0.0, 1.0) in "
+    "effects.ewald_dipole_dipole; received (0.0, 0.0, 0.0)": (
+        EwaldInducedMoment(susceptibility=1.0, **EWALD),
+        EwaldDipoleDipole(demagnetising_factors=(0, 0, 1), **EWALD),
+    ),
+}
+
+
+@pytest.mark.parametrize("message", DISAGREE)
+def test_moments_follow_the_fields_of_the_same_sum_as_forces(message):
+    """In either order; with other forces, and moments that are not mutual, nothing need agree."""
+    box = Box(low=(0, 0, 0), high=(8.0,) * 3)
+    for laws in (DISAGREE[message], DISAGREE[message][::-1]):
+        with pytest.raises(InputError) as fault:
+            scene([[0, 0, 0]], [[0, 0, 0]], (MagneticField(constant=(0, 0, 1)), *laws), domain=box)
+        assert str(fault.value) == message
+    apart = InducedMoment(susceptibility=1.0), TruncatedDipoleDipole(cutoff=6.0)
+    scene([[0, 0, 0]], [[0, 0, 0]], (MagneticField(constant=(0, 0, 1)), *apart), domain=box)
 
 
 WRONG = {

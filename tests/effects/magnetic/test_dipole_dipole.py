@@ -234,7 +234,11 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
     assert [type(cut) for cut in cuts] == [TruncatedDipoleDipole] * len(cuts)
     assert 30.0 in [cut.cutoff for cut in cuts]
     assert TruncatedDipoleDipole().cutoff == 30.0
-    assert TruncatedDipoleDipole().approximations(1.0) == ()
+    nearer = TruncatedDipoleDipole(cutoff=2.0, gap=8e-6).approximations(1.0)
+    assert [(one.cutoff, one.gap) for one in nearer] == [(2.0, 4e-6), (2.0, 5.6e-6)]
+    assert [one.cutoff for one in TruncatedDipoleDipole().approximations(1.0)] == [16.0, 21.6]
+    (_, several) = law.model_copy(update={"sweeps": 0}).approximations(1.0)
+    assert several.sweeps == 100
 
 
 def test_only_what_is_needed_is_allocated():
@@ -245,5 +249,5 @@ def test_only_what_is_needed_is_allocated():
 def test_what_is_wrong_is_named():
     with pytest.raises(InputError) as fault:
         TruncatedDipoleDipole(cutoff=2)
-    rule = "greater than 2, or 2 beside a gap, or 0 without a gap for all pairs"
+    rule = "greater than 2, or 2 beside a gap"
     assert str(fault.value) == f"truncated_dipole_dipole.cutoff must be {rule}; received 2.0"

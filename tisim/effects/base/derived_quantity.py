@@ -10,6 +10,9 @@ from tisim.components.component import option, parameter
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pairwise import Pairwise
 
+SWEEPS = 100
+"""There are at most so many sweeps unless it is said how many."""
+
 
 class DerivedQuantity(Effect):
     """A derived quantity of each particle follows from the rest of the state, such as a magnetic moment.
@@ -70,7 +73,7 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
         "", "change in a sweep, over the largest value, at which the solution counts as converged", 1e-8, gt=0
     )
     sweeps: int = option(
-        "sweeps over all particles at most; 0 for one a step, while that suffices", 100, ge=0
+        "sweeps over all particles at most; 0 for one a step, while that suffices", SWEEPS, ge=0
     )
     largest_change: float = parameter(
         "",
@@ -85,10 +88,16 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
         "how sweeps are mixed with the last, where a step makes several", "anderson"
     )
 
-    accuracy_parameters = (AccuracyParameter(tolerance=1),)
+    @property
+    def accuracy_parameters(self) -> tuple[AccuracyParameter, ...]:  # type: ignore[override]
+        return self.sweep_parameters()
+
+    def sweep_parameters(self) -> tuple[AccuracyParameter, ...]:
+        """Return the setting that says when there is another sweep."""
+        return (AccuracyParameter(tolerance=1) if self.sweeps else AccuracyParameter(largest_change=1),)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        return (self.model_copy(update={"sweeps": 0}),) if self.sweeps else ()
+        return (self.model_copy(update={"sweeps": 0 if self.sweeps else SWEEPS}),)
 
     @ti.func
     def weight(self, s, w, i):

@@ -21,9 +21,9 @@ class Effect(LawHints, Component):
     """An effect is anything physical that a scene can call for: the contract of all of them.
 
     Laws are made after one of its kinds: ``Force``, ``PairForce``, ``PairEvent``, ``DerivedQuantity``,
-    ``SelfConsistentQuantity``, ``Constraint``, ``Source`` or ``Operator``. A scene has each name once, so
-    that it can hold two of a kind where they make sense: each acts with its own parameters, and what both
-    count is added up.
+    ``SelfConsistentQuantity``, ``LongRange``, ``Constraint``, ``Source`` or ``Operator``. A scene has each
+    name once, so that it can hold two of a kind where they make sense: each acts with its own parameters, and
+    what both count is added up.
 
     fields : the particle fields that it reads or writes, by name or as a ``Field``. depends_on_velocity :
     whether it reads or changes velocities or spins. homogeneous : whether it would be the same for particles
@@ -68,6 +68,15 @@ class Effect(LawHints, Component):
 
     def suits(self, domain: Domain) -> None:
         """Raise InputError where it cannot act in a domain; by default it can in any."""
+
+    def suits_others(self, effects: Sequence[Effect]) -> None:
+        """Raise InputError where it cannot act beside the effects of a scene, as they are set; by default it
+        can beside any."""
+
+    def beside(self, other: Effect) -> Self:
+        """Return it as it is to be beside an effect that takes the place of another, where both must have the
+        same settings; by default itself."""
+        return self
 
     def keeps(self, what: str) -> tuple[str, ...]:
         """Return the names of the ``counters``, ``world_quantities``, ``totals``, ``flags`` (i32) or

@@ -8,17 +8,20 @@ from typing import Any
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import three_digits
 from tisim.effects.base import Effect, PairForce, parameter
-from tisim.effects.magnetic.dipole_pairs import DipolePairs, dipole_field
+from tisim.effects.magnetic.dipole_pairs import DipolePairs, Dipoles, dipole_field
 from tisim.effects.magnetic.moment import MOMENT
 from tisim.effects.magnetic.permanent_moment import PermanentMoment
 from tisim.worlds.bound import Peers
 
 CUTOFFS = (10.0, 20.0, 30.0, 60.0)
 """These cut-offs, in radii, are worth a try."""
+NEARER = (0.5, 0.7)
+"""Of a law with a cut-off those are that reach so much of the way beyond contact."""
 
 
-class DipoleDipole(PairForce):
+class DipoleDipole(Dipoles, PairForce):
     """Magnetic moments attract and repel each other as dipoles, over all pairs, and turn permanent ones.
 
         F_i = -grad_i U,    U = -mu_0 / (4 pi) (3 (m_i.n)(m_j.n) - m_i.m_j) / d^3
@@ -103,8 +106,16 @@ class TruncatedDipoleDipole(DipolePairs, DipoleDipole):
         "", "cut-off distance of the centres, over the mean radius of the two", 30.0, ge=2
     )
 
+    every_pair = False
+
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        return ()
+        beyond = self.cutoff - 2
+        return tuple(
+            self.model_copy(
+                update={"cutoff": three_digits(2 + part * beyond), "gap": three_digits(part * self.gap)}
+            )
+            for part in NEARER
+        )
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import option, parameter
+from tisim.effects.base import Effect, PairForce, SelfConsistentQuantity, option, parameter
 from tisim.effects.base.pairwise import Pairwise
 from tisim.errors import must
 
@@ -24,7 +25,42 @@ def dipole_field(moment, separation, distance):
     return mu_0 / (4.0 * ti.math.pi) * (3.0 * m.dot(n) * n - m)
 
 
-class DipolePairs(Pairwise):
+class Dipoles(Pairwise):
+    """This is the contract of what dipoles do to each other: forces, and fields that magnetise.
+
+    Forces are minus the gradient of an energy only where moments follow the fields of the same sum; moments
+    are refused beside forces of another one.
+
+    alike : names of the settings that say what is summed.
+    """
+
+    contract: ClassVar[bool] = True
+    within_bodies: ClassVar[bool] = True
+    alike: ClassVar[tuple[str, ...]] = ("cutoff", "gap", "shifted")
+
+    def summed(self) -> dict[str, Any]:
+        """Return the settings that say what is summed, by name."""
+        return {name: getattr(self, name, 0) for name in self.alike}
+
+    def suits_others(self, effects: Sequence[Effect]) -> None:
+        if not isinstance(self, SelfConsistentQuantity):
+            return
+        forces = [one for one in effects if isinstance(one, Dipoles) and isinstance(one, PairForce)]
+        for other in forces:
+            where, theirs = f"effects.{self.label}", other.summed()
+            must(self.alike == other.alike, where, "used with forces by the same sum", other.label)
+            for name, own in self.summed().items():
+                rule = f"that of the forces, {theirs[name]} in effects.{other.label}"
+                must(own == theirs[name], f"{where}.{name}", rule, own)
+
+    def beside(self, other: Effect) -> Self:
+        if not isinstance(other, Dipoles) or other.alike != self.alike:
+            return self
+        own = type(self).model_fields
+        return self.model_copy(update={name: one for name, one in other.summed().items() if name in own})
+
+
+class DipolePairs(Dipoles):
     """This is the contract of what dipoles do to each other over all pairs, or up to a cut-off.
 
         d_c = cutoff (R_i + R_j)/2 + gap,    x = d/d_c,    f(x) = 1 plain, 1 - 4 x^3 + 3 x^4 shifted
@@ -35,10 +71,12 @@ class DipolePairs(Pairwise):
 
     Source: the shift is that of M. Orsi, D. Y. Haubertin, W. E. Sanderson, J. W. Essex, J. Phys. Chem. B 112
     (2008) 802, which is lj/sf/dipole/sf in LAMMPS.
+
+    every_pair : whether it may be without a cut-off.
     """
 
     contract: ClassVar[bool] = True
-    within_bodies: ClassVar[bool] = True
+    every_pair: ClassVar[bool] = True
 
     cutoff: float = parameter(
         "", "cut-off distance of the centres, over the mean radius of the two; 0 for all pairs", 0.0, ge=0
@@ -50,9 +88,10 @@ class DipolePairs(Pairwise):
 
     @model_validator(mode="after")
     def _beyond_contact(self) -> Self:
-        rule = "greater than 2, or 2 beside a gap, or 0 without a gap for all pairs"
         apart = self.cutoff > 2 or (self.cutoff == 2 and self.gap > 0)
-        must(apart or self.cutoff == self.gap == 0, f"{self.label}.cutoff", rule, self.cutoff)
+        rule, every = "greater than 2, or 2 beside a gap", self.every_pair and self.cutoff == self.gap == 0
+        rule += ", or 0 without a gap for all pairs" if self.every_pair else ""
+        must(apart or every, f"{self.label}.cutoff", rule, self.cutoff)
         must(self.short_ranged or not self.shifted, f"{self.label}.shifted", "false without a cutoff", True)
         return self
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.effects.base import Effect, SelfConsistentQuantity
 from tisim.effects.magnetic.ewald_pairs import EwaldPairs
 from tisim.effects.magnetic.moment import FroehlichMoment, InducedMoment, LangevinMoment, Moment
@@ -30,6 +31,10 @@ class EwaldMoment(EwaldPairs, SelfConsistentQuantity, Moment):
     contract: ClassVar[bool] = True
     independent_law: ClassVar[type[Moment]]
     """This law is that of a particle that the others do not magnetise."""
+
+    @property
+    def accuracy_parameters(self) -> tuple[AccuracyParameter, ...]:  # type: ignore[override]
+        return (*EwaldPairs.accuracy_parameters, *self.sweep_parameters())
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return (independent(self, self.independent_law), *super().approximations(extent))

@@ -10,9 +10,10 @@ from pydantic import model_validator
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.domain import Domain
 from tisim.effects.base import LongRange, Vector, option, parameter
-from tisim.effects.base.pairwise import Pairwise
+from tisim.effects.magnetic.dipole_pairs import Dipoles
 from tisim.effects.magnetic.ewald_accuracy import WIDEST_DECAY, most_waves, screening_for, waves_for
 from tisim.errors import must
 from tisim.numerics import elementary
@@ -21,7 +22,7 @@ from tisim.numerics.error_function import erfcx
 TWO_OVER_ROOT_PI = 2.0 / math.sqrt(math.pi)
 
 
-class EwaldPairs(LongRange, Pairwise):
+class EwaldPairs(LongRange, Dipoles):
     """This is the contract of what dipoles do to each other with all their images, summed after Ewald.
 
         U = U_pairs + U_waves - mu_0 alpha^3 / (6 pi^(3/2)) sum m_i^2 + mu_0 / (2 V) sum_a N_a M_a^2
@@ -49,7 +50,9 @@ class EwaldPairs(LongRange, Pairwise):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
-    within_bodies: ClassVar[bool] = True
+    # A finer one needs more waves, for which there is room or not.
+    accuracy_parameters = (AccuracyParameter(accuracy=1, converges=False),)
+    alike = ("cutoff", "accuracy", "screening", "wave_cutoff", "demagnetising_factors", "slab_factor")
 
     cutoff: float = parameter("m", "cut-off distance r_c of the centres of pairs", examples=[1e-4], gt=0)
     waves: tuple[int, int, int] = option(
