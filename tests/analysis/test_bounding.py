@@ -120,6 +120,22 @@ def test_voronoi_cells_fill_a_periodic_box(rng, time):
     assert voronoi_volumes(few, (3, 4, 5)).sum() == pytest.approx(60.0, rel=1e-12)
 
 
+def test_voronoi_cells_fill_boxes_that_are_long_or_crowded(rng):
+    """Cells reach across several images of the narrow sides; in a plane there are none."""
+    apart = np.column_stack([rng.uniform(size=(30, 2)), rng.uniform(4, 6, 30)])
+    volumes = voronoi_volumes(apart, (1, 1, 10))
+    assert volumes.sum() == pytest.approx(10.0, rel=1e-12)
+    assert volumes.max() > 1
+    layers = np.column_stack([rng.uniform(size=(18, 2)), 5 + 1e-3 * (np.arange(18) % 2)])
+    assert voronoi_volumes(layers, (1, 1, 10)).sum() == pytest.approx(10.0, rel=1e-9)
+    # One layer, of which images are two; and in a box that leans.
+    leaning = periodic_sides(ShearedBox(low=(0, 0, 0), high=(1, 10, 1), rate=0.1), 4.3)
+    for sides, plane in (((1, 1, 10), apart * (1, 1, 0) + (0, 0, 3)), (leaning, apart[:, [0, 2, 1]])):
+        assert voronoi_volumes(plane, sides).sum() == pytest.approx(10.0, rel=1e-12)
+    with pytest.raises(InputError, match=r"^particles must be points not all in a plane; received points$"):
+        voronoi_volumes(apart * (1, 1, 0))
+
+
 def test_voronoi_cells_of_a_lattice_and_those_that_are_open():
     sites = np.stack(np.meshgrid(*3 * [np.arange(5.0)], indexing="ij"), -1).reshape(-1, 3)
     sites += 1e-6 * np.random.default_rng(1).normal(size=sites.shape)

@@ -66,6 +66,11 @@ def test_orientations(rng):
     np.testing.assert_allclose(orientation_tensor(n), np.eye(3) / 3, atol=0.01)
     assert alignment(n, (1, 1, 0)) == pytest.approx(0.0, abs=0.02)
     assert alignment(np.eye(3)[:2], (0, 0, 5)) == pytest.approx(-0.5)
+    # Of nothing there is no order, and none that is across.
+    none = np.zeros((0, 3))
+    assert np.isnan(alignment(none, (0, 0, 5)))
+    assert np.isnan(orientation_tensor(np.eye(3), np.zeros(3))).all()
+    assert np.isnan(fabric_tensor(np.eye(3), np.zeros((0, 2), int))).all()
     assert alignment(np.eye(3)[:2], (1, 0, 0), np.array([3.0, 1.0])) == pytest.approx(0.75 - 0.125)
     # A random cosine has a mean square of a third; above c it is (1 - c^3) / (3 (1 - c)).
     cap = n[np.abs(n[:, 2]) > 0.5]

@@ -90,27 +90,30 @@ def orientation_tensor(direction: np.ndarray, weights: np.ndarray | None = None)
     """Return the mean of n (x) n over unit vectors n of shape (n, 3), symmetric, of trace 1; shape (3, 3).
 
     Of directions at random it is a third of the unit matrix; its largest eigenvalue is 1 where all are one.
+    Of no directions, or where none counts, it is NaN.
     weights : how much each counts, shape (n,); alike unless given, such as by the size of a chain.
 
     Source: S. G. Advani, C. L. Tucker, J. Rheol. 31 (1987) 751.
     """
     n = np.asarray(direction, float)
-    share = np.full(len(n), 1 / max(len(n), 1)) if weights is None else weights / np.sum(weights)
-    return np.asarray(np.einsum("n,na,nb->ab", share, n, n))
+    counts = np.ones(len(n)) if weights is None else np.asarray(weights, float)
+    if not counts.sum() > 0:
+        return np.full((3, 3), np.nan)
+    return np.asarray(np.einsum("n,na,nb->ab", counts / counts.sum(), n, n))
 
 
 def alignment(
     direction: np.ndarray, axis: tuple[float, float, float], weights: np.ndarray | None = None
 ) -> float:
     """Return the mean of (3 cos^2 - 1) / 2 of the angles of unit vectors (n, 3) to an axis: 1 along it, 0 at
-    random, -1/2 across it."""
+    random, -1/2 across it, NaN of none."""
     e = np.asarray(axis, float) / np.linalg.norm(axis)
     return float((3 * e @ orientation_tensor(direction, weights) @ e - 1) / 2)
 
 
 def fabric_tensor(position: np.ndarray, pairs: np.ndarray, sides: Sides = None) -> np.ndarray:
     """Return the fabric tensor of contacts, the ``orientation_tensor`` of the directions from centre to
-    centre of ``pairs`` (n, 2); shape (3, 3).
+    centre of ``pairs`` (n, 2), NaN of none; shape (3, 3).
 
     Source: M. Oda, Soils Found. 12 (1972) 17; M. Satake, IUTAM Conf. on Deformation and Failure of Granular
     Materials (1982) 63.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import Voronoi
+from scipy.spatial import QhullError, Voronoi
 
 from tisim.analysis.bounding_ellipsoid import Ellipsoid
 from tisim.analysis.separations import Sides, vectors_of, with_images
-from tisim.errors import must
+from tisim.errors import InputError, must
 
 SHELL = 4.0
 """Images are taken from this many mean distances of particles beyond the faces of a periodic box."""
@@ -28,8 +28,9 @@ def voronoi_volumes(position: np.ndarray, sides: Sides = None) -> np.ndarray:
     """Return the volume (m^3) of the Voronoi cell of each position (n, 3), m; NaN of one that goes on without
     end, as at the surface of a sample in open space; shape (n,).
 
-    sides : those of a box that is periodic, as ``near`` takes them; then the cells fill it. Sizes of
-    particles do not count: a face is half-way between two centres.
+    sides : those of a box that is periodic, as ``near`` takes them; then the cells fill it, however long or
+    crowded it is. Sizes of particles do not count: a face is half-way between two centres. InputError is
+    raised for particles in a plane, and where cells do not fill the box, such as of a lattice to all bits.
 
     Source: G. Voronoi, J. Reine Angew. Math. 134 (1908) 198.
     """
@@ -62,18 +63,55 @@ def voronoi_by_shell(position: np.ndarray, ellipsoid: Ellipsoid, shells: int) ->
 def _cells(r: np.ndarray, sides: Sides) -> tuple[np.ndarray, Voronoi]:
     """Return the volumes of cells and their diagram, in which particles come first."""
     must(len(r) > 4, "particles", "more than 4", len(r))
-    diagram, periodic = Voronoi(r), np.diag(vectors_of(sides))
-    periodic = periodic[periodic > 0]
-    if len(periodic):
-        longest = float(periodic.min())
-        reach = min(SHELL * float(np.cbrt(np.prod(periodic) ** (3 / len(periodic)) / len(r))), longest)
-        diagram = Voronoi(with_images(r, reach, sides)[0])
-        # An image that was left out is farther away than that, and has no part in cells half as wide; with
-        # more images they are no wider.
-        needed = 2 * _width(diagram, len(r))
-        if needed > reach:
-            diagram = Voronoi(with_images(r, min(needed, longest), sides)[0])
-    return _volumes(diagram)[: len(r)], diagram
+    try:
+        diagram = _diagram(r, vectors_of(sides))
+    except QhullError:
+        raise InputError("particles must be points not all in a plane; received points") from None
+    volumes, box = _volumes(diagram)[: len(r)], float(np.prod(np.diag(vectors_of(sides))))
+    filled = not box or np.isclose(volumes.sum(), box, rtol=1e-6)
+    must(filled, "the sum of the cells", f"the volume of the box, {box:g} m^3", volumes.sum())
+    return volumes, diagram
+
+
+def _diagram(r: np.ndarray, vectors: np.ndarray) -> Voronoi:
+    """Return the diagram of particles and as many of their images as have a part in their cells."""
+    periodic = np.diag(vectors)[np.diag(vectors) > 0]
+    if not len(periodic):
+        return Voronoi(r)
+    reach = SHELL * float(np.cbrt(np.prod(periodic) ** (3 / len(periodic)) / len(r)))
+    # Along an axis without images cells at the surface are open, however many images there are.
+    widest = np.inf if len(periodic) == 3 else float(periodic.max())
+    while True:
+        reach = min(reach, widest)
+        try:
+            diagram = Voronoi(_with_layers(r, reach, vectors))
+            # An image that was left out is farther away than that, and has no part in cells half as wide;
+            # with more images they are no wider.
+            needed = 2 * _width(diagram, len(r))
+            if needed <= reach or reach == widest:
+                return diagram
+        except QhullError:
+            # All in a plane, of which there are images.
+            if reach >= periodic.max():
+                raise
+            needed = np.inf
+        reach = min(needed, 2 * max(reach, float(periodic.min())))
+
+
+def _with_layers(position: np.ndarray, reach: float, vectors: np.ndarray) -> np.ndarray:
+    """Return positions (m) inside the periodic box, then those of all images at most ``reach`` (m) outside:
+    of as many layers along each axis as it takes."""
+    sides = np.diag(vectors)
+    places = with_images(position, 0.0, vectors)[0][: len(position)]
+    layers = np.ceil(np.divide(reach, sides, out=np.zeros(3), where=sides > 0))
+    # A box that leans carries its layers along another axis.
+    lean = np.abs(vectors - np.diag(sides)).T @ layers
+    layers += np.ceil(np.divide(lean, sides, out=np.zeros(3), where=sides > 0))
+    turns = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in layers), indexing="ij"), -1).reshape(-1, 3)
+    images = [places + turn @ vectors for turn in turns if turn.any()]
+    outside = np.concatenate([places[:0], *images])
+    near = ((outside >= -reach) & (outside <= sides + reach)) | (sides == 0)
+    return np.vstack([places, outside[near.all(axis=1)]])
 
 
 def _width(diagram: Voronoi, number: int) -> float:

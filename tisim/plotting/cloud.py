@@ -211,8 +211,8 @@ def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: f
     for (x, y, z), r, rgb in zip(
         projected * scale, np.maximum(radius * scale, SMALLEST), colour, strict=True
     ):
-        i0, i1 = max(int(y - r), 0), min(int(y + r) + 2, PIXELS)
-        j0, j1 = max(int(x - r), 0), min(int(x + r) + 2, PIXELS)
+        # One beyond the square has no pixels: nothing from an end to that end.
+        (i0, i1), (j0, j1) = (np.clip([int(a - r), int(a + r) + 2], 0, PIXELS) for a in (y, x))
         v, u = np.mgrid[i0:i1, j0:j1] + 0.5
         u, v = (u - x) / r, (v - y) / r
         w2 = 1.0 - u * u - v * v

@@ -24,10 +24,10 @@ class EwaldDipoleDipole(EwaldPairs, Force, PairForce):
 
         F_i = -grad_i U,    T_i = m_i x B_i,    B_i = -dU / dm_i
 
-    U is the energy of all dipoles of a periodic box with their images; permanent ones are turned
-    (``ewald_settings`` has what it takes to be good to an
-    ``accuracy``), m the ``moment`` of each that another effect has set, held fixed. It is to
-    ``dipole_dipole``, in which only nearest images act, what lj/cut/dipole/long with ewald/disp is in LAMMPS.
+    U is the energy of all dipoles of a periodic box with their images, m the ``moment`` of each that another
+    effect has set, held fixed. The torques T are given to permanent moments. ``ewald_settings`` returns the
+    settings with which forces are good to an ``accuracy``. It is to ``dipole_dipole``, in which only nearest
+    images act, what lj/cut/dipole/long with ewald/disp is in LAMMPS.
     Momentum is conserved to rounding, as each wave does to one what it does to the others, energy to the
     jumps at the cut-off, which are of the accuracy.
 

@@ -25,8 +25,8 @@ class MagneticMaterial:
     source: str
 
     def parameters(self, susceptibility: float | None = None) -> dict[str, float]:
-        """Return the parameters that ``FroehlichMoment`` and ``MutualFroehlichMoment`` have of it; with a
-        susceptibility of one's own, where one is given."""
+        """Return the parameters that ``FroehlichMoment``, ``MutualFroehlichMoment`` and
+        ``EwaldFroehlichMoment`` have of it; with a susceptibility of one's own, where one is given."""
         own = self.susceptibility if susceptibility is None else susceptibility
         if own is None:
             rule = "given, as it goes by how it was made"
