@@ -9,7 +9,7 @@ import pytest
 from tests.effects.contact.loads import close, loads, vector
 from tests.effects.magnetic.ewald import EwaldSum, ball_of_images
 from tests.effects.magnetic.magnets import MU_0, Quadrupole, flux_density
-from tests.scenes import scene
+from tests.scenes import scene, simulate
 from tisim import Box, InputError, Open
 from tisim.effects import (
     EwaldDipoleDipole,
@@ -59,7 +59,8 @@ def test_sums_do_not_depend_on_how_they_are_split_and_forces_are_gradients_of_th
 
     def law(accuracy, cutoff):
         settings = ewald_settings(domain, len(r), accuracy, cutoff=cutoff)
-        return EwaldDipoleDipole(**settings, demagnetising_factors=(0.1, 0.2, 0.0))
+        factors = (0.1, 0.2, 0.0) if all(periodic) else (0.0,) * 3
+        return EwaldDipoleDipole(**settings, demagnetising_factors=factors)
 
     here, there = (EwaldSum(law(1e-8, cutoff), domain, r, m) for cutoff in (1.6, 1.9))
     close(here.field(), there.field(), 1e-8)
@@ -123,7 +124,7 @@ def test_forces_and_torques_are_those_in_numpy(periodic, rng):
             cutoff=float(rng.uniform(1.4, 1.65)),
             accuracy=10.0 ** -rng.uniform(2, 3),
             waves=tuple(n if here else 2 * n for n, here in zip(WAVES, periodic, strict=True)),
-            demagnetising_factors=(0.0, 0.0, 0.0) if k == 0 else (0.2, 0.3, 0.4),
+            demagnetising_factors=(0.2, 0.3, 0.4) if k > 0 and all(periodic) else (0.0, 0.0, 0.0),
             slab_factor=float(rng.uniform(2, 2.2)),
         )
         scenes.append(magnets(rng, law, box(SIDES * rng.uniform(0.9, 1.0, 3), periodic)))
@@ -132,6 +133,23 @@ def test_forces_and_torques_are_those_in_numpy(periodic, rng):
         close(state["force"], expected.force(), 1e-11)
         close(state["torque"], np.cross(state["moment"], expected.field()), 1e-11)
         assert np.linalg.norm(state["force"].sum(axis=0)) < 1e-12 * np.abs(state["force"]).sum()
+
+
+@pytest.mark.slow
+def test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name(rng):
+    """There the gap to the next layer would be less than is made sure of. Along the layer it may go on."""
+    law = EwaldDipoleDipole(cutoff=1.6, accuracy=1e-2, waves=(*WAVES[:2], 24), slab_factor=2.0)
+    domain = box(periodic=(True, True, False))
+    scenes = []
+    for velocity in ((0, 0, 1.0), (1.0, 0, 0)):
+        one = magnets(rng, law, domain, n=2, dt=0.1, steps=60)
+        start = {"position": ((0, 1, 1), (1, 3, 3)), "velocity": (velocity, (0, 0, 0)), "mass": (1e9, 1e9)}
+        scenes.append(one.model_copy(update={"particles": one.particles.model_copy(update=start)}))
+    gone, stayed = simulate(scenes, worlds=2, capacity=16)
+    assert "effects.ewald_dipole_dipole" in gone.status.reason
+    assert "particle 0" in gone.status.reason
+    assert 3.8 < gone.time < 4.0
+    assert stayed.status.ok, stayed.status.reason
 
 
 def cubes(n, side):
@@ -265,6 +283,11 @@ WRONG = {
     ),
     "ewald_dipole_dipole.demagnetising_factors must be from 0 on, and at most 1 together; received "
     "(0.5, 0.5, 0.5)": ({**FINE, "demagnetising_factors": (0.5, 0.5, 0.5)}, {}),
+    "effects.ewald_dipole_dipole.demagnetising_factors must be 0 in a box with an open axis, along which it "
+    "is 1; received (0.0, 0.0, 0.1)": (
+        {"cutoff": 1.6, "waves": (11, 13, 40), "demagnetising_factors": (0, 0, 0.1)},
+        {"periodic": (True, True, False)},
+    ),
     "ewald_dipole_dipole.waves must be at least 0 each; received (-1, 3, 3)": (
         {**FINE, "waves": (-1, 3, 3)},
         {},

@@ -41,7 +41,8 @@ class EwaldPairs(LongRange, Dipoles):
 
     Along one axis the box may be open, as between plates. The sum then is that of plates of its images, at a
     distance of ``slab_factor`` sides, with N = 1 across them, which takes away what plates do to each other
-    by their moments as a whole; the rest falls as exp(-2 pi gap / side).
+    by their moments as a whole; the rest falls as exp(-2 pi gap / side). A world in which the centre of a
+    particle leaves the box there, so that the gap is less than that, stops: its field counts as not finite.
 
     Source: S. W. de Leeuw, J. W. Perram, E. R. Smith, Proc. R. Soc. Lond. A 373 (1980) 27; Z. Wang, C. Holm,
     J. Chem. Phys. 115 (2001) 6351; for plates I.-C. Yeh, M. L. Berkowitz, J. Chem. Phys. 111 (1999) 3155, and
@@ -100,6 +101,8 @@ class EwaldPairs(LongRange, Dipoles):
         joined, where = domain.imaged(), f"effects.{self.label}"
         rule = f"one in which particles see images of each other along two axes or three, with {where}"
         must(sum(joined) >= 2 and not domain.shears(), domain.label, rule, joined)
+        poles, rule = any(self.demagnetising_factors), "0 in a box with an open axis, along which it is 1"
+        must(all(joined) or not poles, f"{where}.demagnetising_factors", rule, self.demagnetising_factors)
         limit = self.at_start(np.empty(0)).wave_cutoff or 0.0
         needed = most_waves(domain, self.slab_factor, limit)
         enough = all(there >= need for there, need in zip(self.waves, needed, strict=True))

@@ -83,6 +83,15 @@ class WaveSum(LongRangeSum):
         return period[0] * period[1] * period[2]
 
     @ti.func
+    def is_inside(self, w, i):
+        """Return whether a particle is between the faces of the box along an open axis."""
+        inside, place, side = True, self.s.position[w, i] - self.domain.origin(w), self.domain.side(w)
+        for a in ti.static(range(3)):
+            if ti.static(not self.joined[a]):
+                inside = inside and place[a] >= 0.0 and place[a] <= side[a]
+        return inside
+
+    @ti.func
     def wave_numbers(self, column):
         """Return n_x and n_y of a column."""
         return (self.centre + column) // self.row - self.waves[0], (
@@ -216,6 +225,9 @@ class Waves(OnOccasion, PerParticle):
                 field -= (turn[0] * wave[0] + turn[1] * wave[1]) * k
                 if ti.static(a.forces):
                     force += (turn[1] * wave[0] - turn[0] * wave[1]) * k.dot(m) * k
+        if not a.is_inside(w, i):
+            # Left to who feels it to show, as the state may be one that is to be given up.
+            field, force = ti.math.nan * field, ti.math.nan * force
         a.field[w, i] = field
         if ti.static(a.forces):
             a.force[w, i] = force
