@@ -128,10 +128,8 @@ def test_voronoi_cells_fill_boxes_that_are_long_or_crowded(rng):
     assert volumes.max() > 1
     layers = np.column_stack([rng.uniform(size=(18, 2)), 5 + 1e-3 * (np.arange(18) % 2)])
     assert voronoi_volumes(layers, (1, 1, 10)).sum() == pytest.approx(10.0, rel=1e-9)
-    # One layer, of which images are two; and in a box that leans.
     leaning = periodic_sides(ShearedBox(low=(0, 0, 0), high=(1, 10, 1), rate=0.1), 4.3)
-    for sides, plane in (((1, 1, 10), apart * (1, 1, 0) + (0, 0, 3)), (leaning, apart[:, [0, 2, 1]])):
-        assert voronoi_volumes(plane, sides).sum() == pytest.approx(10.0, rel=1e-12)
+    assert voronoi_volumes(apart[:, [0, 2, 1]], leaning).sum() == pytest.approx(10.0, rel=1e-12)
     with pytest.raises(InputError, match=r"^particles must be points not all in a plane; received points$"):
         voronoi_volumes(apart * (1, 1, 0))
 

@@ -38,6 +38,9 @@ def test_a_circular_pair_is_in_balance_and_turns_with_the_momentum_of_its_reduce
     position = np.array([[1.5, 0, 0], [-0.5, 0, 0]]) + np.array([3.0, 4.0, 5.0])
     velocity = np.array([[0, 1.5 * w, 0], [0, -0.5 * w, 0]]) + np.array([7.0, -8.0, 9.0])
     assert virial_ratio(position, velocity, mass) == pytest.approx(1.0, rel=1e-12)
+    less = gravitational_energy(position, mass, 0.3) / gravitational_energy(position, mass)
+    assert less < 0.99
+    assert virial_ratio(position, velocity, mass, 0.3) == pytest.approx(1 / less, rel=1e-12)
     momentum = angular_momentum(position, velocity, mass)
     np.testing.assert_allclose(momentum, [0, 0, 0.75e9 * d**2 * w], rtol=1e-12, atol=1e-3)
 

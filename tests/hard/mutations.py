@@ -203,4 +203,56 @@ SHARED = {
     ),
 }  # fmt: skip
 """The same of what several laws share."""
-EVERY = {**MUTATIONS, **SHARED}
+MAGNETIC = "tisim/effects/magnetic"
+DIPOLES = "tests/effects/magnetic/test_"
+SUMS = {
+    "dipoles": (
+        f"{MAGNETIC}/dipole_dipole.py", "(5.0 * along_a * along_b - a.dot(b)) * n",
+        "(4.9 * along_a * along_b - a.dot(b)) * n",
+        f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
+    ),
+    "dipoles_within_bodies": (
+        "tisim/neighbours/half_list.py", "if ti.static(not self.within_bodies):", "if ti.static(True):",
+        f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
+    ),
+    "contacts_within_bodies": (
+        "tisim/interactions/force_sum.py", "apart = not self.half_list.joined(w, i, j)", "apart = True",
+        f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
+    ),
+    "shifted_cut_off": (
+        f"{MAGNETIC}/dipole_pairs.py", "slope = 12.0 * x", "slope = 11.9 * x",
+        f"{DIPOLES}cutoff.py::test_forces_and_torques_are_minus_the_gradient_of_the_energy[True]",
+    ),
+    "mutual_moments": (
+        f"{MAGNETIC}/mutual_moment.py", "field *= part", "field *= 0.99 * part",
+        f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
+    ),
+    "moments_without_end": (
+        "tisim/interactions/self_consistent.py", "ti.select(first, self.effect.largest_change(w), tolerance)",
+        "ti.select(first, 1e300, tolerance)",
+        f"{DIPOLES}sweeps.py::test_two_that_are_pressed_into_each_other_stop_where_their_moments_lose_their_end",
+    ),
+    "ewald_pairs": (
+        f"{MAGNETIC}/ewald_pairs.py", "c = 3.0 * b + 2.0 * square", "c = 3.0 * b + 1.9 * square",
+        f"{DIPOLES}ewald.py::test_forces_and_torques_are_those_in_numpy[periodic0]",
+    ),
+    "ewald_waves": (
+        f"{MAGNETIC}/wave_sum.py", "-0.25 * square / (alpha * alpha)", "-0.26 * square / (alpha * alpha)",
+        f"{DIPOLES}ewald.py::test_forces_and_torques_are_those_in_numpy[periodic0]",
+    ),
+    "ewald_layers": (
+        f"{MAGNETIC}/wave_sum.py", "if not a.is_inside(w, i):", "if False:",
+        f"{DIPOLES}ewald.py::test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name",
+    ),
+    "virial": (
+        "tisim/interactions/force_sum.py", "= -0.5 * separation[a]", "= 0.5 * separation[a]",
+        "tests/effects/pair/test_virial.py::test_contacts_in_shear_have_the_virial_of_their_twin",
+    ),
+    "gravity_by_a_tree": (
+        "tisim/effects/gravitation/tree_gravity.py", "return s.mass[w, i] * self.sum",
+        "return 1.01 * s.mass[w, i] * self.sum",
+        "tests/effects/gravitation/test_tree_gravity.py::test_with_all_cells_opened_it_is_the_sum_over_pairs[0.2]",
+    ),
+}  # fmt: skip
+"""The same of sums over many: of dipoles up to a cut-off and with all images, of their virial, by a tree."""
+EVERY = {**MUTATIONS, **SHARED, **SUMS}

@@ -30,17 +30,20 @@ def gravitational_energy(position: np.ndarray, mass: np.ndarray, softening_lengt
     return total
 
 
-def virial_ratio(position: np.ndarray, velocity: np.ndarray, mass: np.ndarray) -> float:
+def virial_ratio(
+    position: np.ndarray, velocity: np.ndarray, mass: np.ndarray, softening_length: float = 0.0
+) -> float:
     """Return 2 K / |U| of particles held together by their gravity alone: 1 in the mean over time where they
     neither contract nor expand, 0 at rest, and above 2 where they are not bound.
 
     K is the kinetic energy relative to the centre of mass, U that of ``gravitational_energy``. position : m,
-    velocity : m/s, each of shape (n, 3). mass : kg, shape (n,).
+    velocity : m/s, each of shape (n, 3). mass : kg, shape (n,). softening_length : m, as the scene has it;
+    with one the mean is 1 only as far as few are nearer to each other.
     """
     mass = np.asarray(mass, float)
     relative = np.asarray(velocity, float) - np.average(velocity, axis=0, weights=mass)
     kinetic = 0.5 * float(mass @ (relative**2).sum(axis=1))
-    return 2 * kinetic / abs(gravitational_energy(position, mass))
+    return 2 * kinetic / abs(gravitational_energy(position, mass, softening_length))
 
 
 def angular_momentum(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import QhullError, Voronoi
+from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from tisim.analysis.bounding_ellipsoid import Ellipsoid
 from tisim.analysis.separations import Sides, vectors_of, with_images
@@ -78,24 +78,20 @@ def _diagram(r: np.ndarray, vectors: np.ndarray) -> Voronoi:
     periodic = np.diag(vectors)[np.diag(vectors) > 0]
     if not len(periodic):
         return Voronoi(r)
-    reach = SHELL * float(np.cbrt(np.prod(periodic) ** (3 / len(periodic)) / len(r)))
     # Along an axis without images cells at the surface are open, however many images there are.
-    widest = np.inf if len(periodic) == 3 else float(periodic.max())
+    if len(periodic) < 3:
+        return Voronoi(_with_layers(r, float(periodic.max()), vectors))
+    reach = SHELL * float(np.cbrt(np.prod(periodic) / len(r)))
     while True:
-        reach = min(reach, widest)
         try:
             diagram = Voronoi(_with_layers(r, reach, vectors))
-            # An image that was left out is farther away than that, and has no part in cells half as wide;
-            # with more images they are no wider.
-            needed = 2 * _width(diagram, len(r))
-            if needed <= reach or reach == widest:
+            if _is_whole(diagram, r, vectors):
                 return diagram
         except QhullError:
-            # All in a plane, of which there are images.
+            # All in a plane, of which there may be images farther away.
             if reach >= periodic.max():
                 raise
-            needed = np.inf
-        reach = min(needed, 2 * max(reach, float(periodic.min())))
+        reach *= 2
 
 
 def _with_layers(position: np.ndarray, reach: float, vectors: np.ndarray) -> np.ndarray:
@@ -114,17 +110,23 @@ def _with_layers(position: np.ndarray, reach: float, vectors: np.ndarray) -> np.
     return np.vstack([places, outside[near.all(axis=1)]])
 
 
-def _width(diagram: Voronoi, number: int) -> float:
-    """Return the distance (m) of the farthest corner of a cell of the first particles from its centre."""
+def _is_whole(diagram: Voronoi, r: np.ndarray, vectors: np.ndarray) -> bool:
+    """Return whether no image that was left out has a part in the cells of the first particles: none is
+    nearer to a corner of theirs than they are."""
     corners, ridge = _flat(diagram)
-    ends = diagram.ridge_points[ridge]
-    ends = np.where(ends < number, ends, -1)
-    open_ = corners < 0
-    apart = [np.linalg.norm(diagram.vertices[corners] - diagram.points[end], axis=1) for end in ends.T]
-    apart = [
-        np.where(end < 0, 0.0, np.where(open_, np.inf, way)) for end, way in zip(ends.T, apart, strict=True)
-    ]
-    return float(np.max(apart))
+    ends = diagram.ridge_points[ridge].min(axis=1)
+    corners, ends = corners[ends < len(r)], ends[ends < len(r)]
+    if (corners < 0).any():
+        return False
+    places = diagram.vertices[corners]
+    apart = np.linalg.norm(places - diagram.points[ends], axis=1)
+    # Nothing is farther than this from an image of any particle.
+    farthest = float(np.linalg.norm(np.abs(vectors).sum(axis=0)))
+    if apart.max() > farthest:
+        return False
+    tree = cKDTree(_with_layers(r, float(apart.max()), vectors))
+    nearest = tree.query(with_images(places, 0.0, vectors)[0][: len(places)])[0]
+    return bool((nearest >= apart * (1 - 1e-9)).all())
 
 
 def _volumes(diagram: Voronoi) -> np.ndarray:

@@ -36,8 +36,8 @@ def force(m):
 
 def test_each_sweep_takes_moments_as_far_as_in_numpy():
     """A sweep a step, from nothing: after k + 1 of them the error is that of k sweeps of moments along the
-    field. L21 prints -23.6, -22.9 and 17.0 %, then -0.66, -0.49 and 1.0 %, which no susceptibility or order
-    of sweeps that was tried gives: each sweep leaves 0.27 to 0.31 of the error, not 0.03."""
+    field. L21 prints -23.6, -22.9 and 17.0 %, then -0.66, -0.49 and 1.0 %, which these are not: each sweep
+    leaves 0.27 to 0.31 of the error, not 0.03."""
     law = MutualInducedMoment(susceptibility=1e12, sweeps=0, largest_change=2.0)
     simulation = compiled(induced(L, (0, 0, 1.0), law), capacity=4)
     simulation.load([induced(L, (0, 0, 1.0), law, steps=8, dt=1e-9)])
