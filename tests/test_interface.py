@@ -40,6 +40,7 @@ def test_a_family_has_all_of_its_parts(family):
         "AtIntervals",
         "BehindPlanes",
         "DipolePairs",
+        "Dipoles",
         "EwaldPairs",
         "FilledPart",
         "FilledRegion",
