@@ -15,11 +15,11 @@ from tisim.components.ranges import check_resolved
 from tisim.errors import InputError, must
 from tisim.packing.placement import Placement
 
-DENSEST = 0.5
+MOST_FILLED = 0.5
 """Spheres fill at most this part of a duct: near a random close packing none can be pushed aside."""
-MAX_ROUNDS = 2000
+MOST_PUSHES = 2000
 """Spheres are pushed apart so many times at most."""
-SPARE = 0.01
+CLEARANCE = 0.01
 """They are pushed this part of their radii farther than apart, so that the last overlaps vanish soon."""
 
 
@@ -61,8 +61,8 @@ class RandomInDuct(Placement):
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
         length, largest = self.heights[-1], float(radii.max())
         fraction = float((4 / 3 * np.pi * radii**3).sum()) / self.volume()
-        rule = f"at most {DENSEST:g} in a duct in which they can be pushed apart"
-        must(fraction <= DENSEST, "volume fraction", rule, float(f"{fraction:.4g}"))
+        rule = f"at most {MOST_FILLED:g} in a duct in which they can be pushed apart"
+        must(fraction <= MOST_FILLED, "volume fraction", rule, float(f"{fraction:.4g}"))
         must(
             min(self.radii) > largest, "duct", f"wider than a sphere, {2 * largest:g} m", 2 * min(self.radii)
         )
@@ -72,11 +72,11 @@ class RandomInDuct(Placement):
             side, rule = float(domain.edges(0.0)[2, 2]), "that of the box along z, which is periodic"
             must(abs(side - length) <= 1e-9 * side, "length of the duct", f"{side:g} m, {rule}", length)
         generator = np.random.default_rng([seed, 0x64756374])
-        places, wider = self._anywhere(len(radii), generator), radii * (1 + SPARE)
-        for _ in range(MAX_ROUNDS):
+        places, wider = self._anywhere(len(radii), generator), radii * (1 + CLEARANCE)
+        for _ in range(MOST_PUSHES):
             if not self._push_apart(places, radii, wider, endless):
                 return places + np.asarray(self.centre)
-        rule = f"one at which spheres can be pushed apart in {MAX_ROUNDS} rounds"
+        rule = f"one at which spheres can be pushed apart in {MOST_PUSHES} rounds"
         raise InputError(f"volume fraction must be {rule}; received {fraction:.4g}")
 
     def _anywhere(self, number: int, generator: np.random.Generator) -> np.ndarray:
