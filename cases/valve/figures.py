@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 
 from cases.valve.measures import clusters, drag_pressure, duct_of, held_pressure
 from cases.valve.runs import ARRESTED, Flow, left
+from cases.valve.sizes import THROATS, D
 from cases.valve.studies import ValveRuns, by_field, by_throat
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain
 
-STARTS = 3
+STARTS = 6
 """Each setting is run from so many starts."""
 COLOURS = ("#4477aa", "#ccbb44", "#cc6677", "#228833")
 """Those of the valves, from narrow to wide, and of fine grains."""
@@ -55,12 +56,12 @@ def flow_figure(throats: Sequence[ValveRuns], fields: Sequence[ValveRuns]) -> Fi
     rates.axvline(throats[0].flows[0].switched / MILLI, color="0.5", lw=0.8, ls=":")
     rates.set(xlabel="time (ms)", ylabel="mass flow rate over that without field", ylim=(-0.1, 1.6))
     rates.set_title("field on at the dotted line")
-    for throat in dict.fromkeys(one.throat for one in fields):
-        line = [one for one in fields if one.throat == throat]
+    for throat, colour in zip((THROATS[0], THROATS[-1]), (COLOURS[0], COLOURS[2]), strict=True):
+        line = [one for one in (*fields, *throats) if (one.throat, one.diameter) == (throat, D)]
+        line.sort(key=lambda one: one.flux)
         means = [left(one.flows) for one in line]
         sweep.errorbar([one.flux for one in line], [one.value for one in means], [one.half for one in means],
-                       fmt="o-", ms=4, capsize=3, color=COLOURS[len(sweep.containers)],
-                       label=line[0].name)  # fmt: skip
+                       fmt="o-", ms=4, capsize=3, color=colour, label=line[0].name)  # fmt: skip
     sweep.axhline(ARRESTED, color="0.5", lw=0.8, ls=":")
     sweep.set(xlabel="flux density (T)", ylabel="part of the flow rate that is left", title="by field")
     for axis in (rates, sweep):

@@ -1,5 +1,4 @@
-"""Runs of valves: settings side by side, each from the same random starts, all as one batch; and how much
-flowed when."""
+"""Runs of valves, and how much flowed when."""
 
 from __future__ import annotations
 
@@ -11,13 +10,12 @@ import numpy as np
 
 from cases.statistics import Mean
 from cases.valve.measures import duct_of, rate
-from cases.valve.scene import scene
 from tisim import Observer, Result, RunError, Scene, Simulation
 from tisim.engine.batches import Progress
 from tisim.sources import MagneticField
 
 Settings = Mapping[str, Any]
-"""Settings are those of ``scene`` that differ."""
+"""Settings are those of a scene that differ."""
 FLOW_LOOKS = 100
 """The flow rate is noted so many times in a run."""
 LATE = 0.2
@@ -99,14 +97,6 @@ def flows(scenes: Sequence[Scene], progress: Progress = lambda part: None) -> li
         if not result.status.ok:
             raise RunError(f"{result.scene.name}: {result.status.reason}")
     return [Flow(result, *np.array(rows).T) for result, rows in zip(results, series.rows, strict=True)]
-
-
-def valves(
-    settings: Sequence[Settings], starts: int, progress: Progress = lambda part: None
-) -> list[list[Flow]]:
-    """Return the flows of valves with each of some settings, from so many starts."""
-    all_flows = flows([scene(**one, seed=seed) for one in settings for seed in range(starts)], progress)
-    return [all_flows[k : k + starts] for k in range(0, len(all_flows), starts)]
 
 
 def left(group: Sequence[Flow]) -> Mean:

@@ -38,7 +38,7 @@ from tisim.steppers import FixedStep, Verlet
 
 TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"
 
-FLOWING, LASTING = 0.1e-3, 0.4e-3
+FLOWING, LASTING = 0.1e-3, 0.5e-3
 """Grains flow so long without a field, and so long in it, s."""
 CUTOFF = 4.4
 """Grains magnetise and attract each other up to so many radii: as far, in diameters, as L21 has it in its

@@ -15,7 +15,7 @@ FINE_DIAMETER = D / 2
 """Diameter of the fine grains, m."""
 COARSE, FINE_GRAINS = equal(D / 2, 1.0), equal(FINE_DIAMETER / 2, 1.0)
 """Grains of one size: the largest of L21, and half as large."""
-THROATS = (4 * D, 5 * D, 6 * D)
+THROATS = (4 * D, 5 * D, 6.5 * D)
 """Diameters of the constrictions, m."""
 BORE, LENGTH = 8 * D, 8 * D
 """Diameter and length of the duct, m."""
@@ -27,7 +27,7 @@ its 100 kPa."""
 GRADIENT = published.PRESSURE / L21_LENGTH
 """The drag on grains at rest in a unit of volume of the duct, Pa/m: that of L21."""
 
-SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 3e-4}
+SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 4e-4}
 """What a search runs of each design: the field is on from the first."""
 SEARCH_SETTINGS = {
     "generations": 4, "options": {"population": 12},

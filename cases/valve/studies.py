@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from cases.mrf_shear.scene import equal
-from cases.valve.runs import Flow, valves
-from cases.valve.scene import FIELD
+from cases.valve import published
+from cases.valve.runs import Flow, Settings, flows
+from cases.valve.scene import FIELD, scene
 from cases.valve.sizes import FINE_DIAMETER, THROATS, D
 from tisim.engine.batches import Progress
 
-FLUXES = (0.2, 0.25, 0.35)
+FLUXES = (0.15, published.FLUX, 0.4)
 """Flux densities beside FIELD, T."""
 
 
@@ -43,27 +46,41 @@ class ValveRuns:
         return sum(flow.arrested for flow in self.flows)
 
 
-Valve = tuple[float, float, float]
-"""Diameters of the constriction and of the grains, m, and flux density, T."""
+@dataclass(frozen=True)
+class Wanted:
+    """What valve is wanted: diameters of the constriction and of the grains, m, flux density, T, and how many
+    starts."""
+
+    throat: float
+    diameter: float
+    flux: float
+    starts: int
+
+    def settings(self) -> list[Settings]:
+        """Return the settings of its scenes, one for each start."""
+        grains = equal(self.diameter / 2, 1.0)
+        one = {"throat": self.throat, "grains": grains, "flux": self.flux}
+        return [{**one, "seed": seed} for seed in range(self.starts)]
 
 
-def studies(wanted: Sequence[Valve], starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return valves from so many starts each, run as one batch."""
-    settings = [
-        {"throat": throat, "grains": equal(diameter / 2, 1.0), "flux": flux}
-        for throat, diameter, flux in wanted
+def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) -> list[ValveRuns]:
+    """Return the runs of valves, all of them one batch."""
+    done = flows([scene(**one) for each in wanted for one in each.settings()], progress)
+    ends = np.cumsum([each.starts for each in wanted])
+    return [
+        ValveRuns(each.throat, each.diameter, each.flux, done[end - each.starts : end])
+        for each, end in zip(wanted, ends, strict=True)
     ]
-    groups = valves(settings, starts, progress)
-    return [ValveRuns(*valve, flows) for valve, flows in zip(wanted, groups, strict=True)]
 
 
 def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return coarse grains in each constriction, and fine ones in the narrowest."""
-    coarse = [(throat, D, FIELD) for throat in THROATS]
-    return studies([*coarse, (THROATS[0], FINE_DIAMETER, FIELD)], starts, progress)
+    """Return coarse grains in each constriction, and fine ones in the narrowest, which take eight times as
+    many grains, from half as many starts."""
+    coarse = [Wanted(throat, D, FIELD, starts) for throat in THROATS]
+    return run_all([*coarse, Wanted(THROATS[0], FINE_DIAMETER, FIELD, starts // 2)], progress)
 
 
 def by_field(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
     """Return coarse grains in the narrowest and the widest constriction, in other fields."""
     ends = (THROATS[0], THROATS[-1])
-    return studies([(throat, D, flux) for throat in ends for flux in FLUXES], starts, progress)
+    return run_all([Wanted(throat, D, flux, starts) for throat in ends for flux in FLUXES], progress)
