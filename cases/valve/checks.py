@@ -28,12 +28,12 @@ def check(starts: int = STARTS) -> Iterator[Check | Claim]:
     yield from going_on(fine, "L21: fine grains yield")
 
 
-def flowing(studies: Sequence[ValveRuns]) -> Iterator[Claim]:
+def flowing(valves: Sequence[ValveRuns]) -> Iterator[Claim]:
     """Yield that grains flow without a field."""
-    for study in studies:
-        parts = [flow.open_rate / unhindered(flow) for flow in study.flows]
+    for valve in valves:
+        parts = [flow.open_rate / unhindered(flow) for flow in valve.flows]
         yield Claim(
-            f"{study.name}, no field: flow over that of grains that go along", Mean.of(parts), 0.5, 1.1
+            f"{valve.name}, no field: flow over that of grains that go along", Mean.of(parts), 0.5, 1.1
         )
 
 
@@ -42,10 +42,10 @@ def unhindered(flow: Flow) -> float:
     return unhindered_rate(flow.result.scene, float(flow.result.state["mass"].sum()))
 
 
-def arrested(study: ValveRuns) -> Iterator[Check | Claim]:
+def arrested(valve: ValveRuns) -> Iterator[Check | Claim]:
     """Yield that a flow is arrested by arches across, and that the walls bear the drag on it."""
-    results = [flow.result for flow in study.flows]
-    yield Claim(f"{study.name}: flow left in the field (L21: 20x, 30x jam)", left(study.flows), most=ARRESTED)
+    results = [flow.result for flow in valve.flows]
+    yield Claim(f"{valve.name}: flow left in the field (L21: 20x, 30x jam)", left(valve.flows), most=ARRESTED)
     bridged = [clusters(one.state, one.scene).bridged for one in results]
     yield Check("the same: starts with grains in contact from wall to wall", sum(bridged), len(bridged), 0.0)
     borne = np.mean([held_pressure(one) / drag_pressure(one) for one in results])
@@ -55,6 +55,6 @@ def arrested(study: ValveRuns) -> Iterator[Check | Claim]:
     yield Claim(name, Mean.of(pressures), 0.8, 1.3)
 
 
-def going_on(study: ValveRuns, says: str) -> Iterator[Claim]:
+def going_on(valve: ValveRuns, says: str) -> Iterator[Claim]:
     """Yield that a flow goes on in the field."""
-    yield Claim(f"{study.name}: flow left in the field ({says})", left(study.flows), ARRESTED)
+    yield Claim(f"{valve.name}: flow left in the field ({says})", left(valve.flows), ARRESTED)

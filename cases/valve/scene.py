@@ -22,7 +22,6 @@ from cases.valve import published
 from cases.valve.duct import Duct
 from cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
 from tisim import Box, Cloud, GrainClass, Material, Scene
-from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import (
     Granular,
     HertzMaterial,
@@ -70,9 +69,9 @@ def mean_radius(grains: Sequence[GrainClass]) -> float:
 
 def step(radius: float, young: float) -> float:
     """Return a step (s) for grains of which the smallest have a radius (m), of a Young's modulus (Pa): that
-    of L21, which goes as the duration of an impact after Hertz."""
+    of L21, which goes as the duration of an impact after Hertz, to two digits."""
     smaller = 2 * radius / (VALVE_GRAINS[-1][0] * published.MICRO)
-    return float(three_digits(published.STEP * smaller * (published.YOUNG / young) ** 0.4))
+    return float(f"{published.STEP * smaller * (published.YOUNG / young) ** 0.4:.2g}")
 
 
 def speed_of(pressure: float, duct: Duct, grains: Sequence[GrainClass], fraction: float) -> float:

@@ -15,7 +15,7 @@ FINE_DIAMETER = D / 2
 """Diameter of the fine grains, m."""
 COARSE, FINE_GRAINS = equal(D / 2, 1.0), equal(FINE_DIAMETER / 2, 1.0)
 """Grains of one size: the largest of L21, and half as large."""
-THROATS = (4 * D, 5 * D, 6.5 * D)
+THROATS = (4 * D, 6.5 * D)
 """Diameters of the constrictions, m."""
 BORE, LENGTH = 8 * D, 8 * D
 """Diameter and length of the duct, m."""

@@ -14,7 +14,7 @@ from cases.valve.scene import FIELD, scene
 from cases.valve.sizes import FINE_DIAMETER, THROATS, D
 from tisim.engine.batches import Progress
 
-FLUXES = (0.15, published.FLUX, 0.4)
+FLUXES = (published.FLUX, 0.27)
 """Flux densities beside FIELD, T."""
 
 
@@ -74,13 +74,12 @@ def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) ->
 
 
 def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return coarse grains in each constriction, and fine ones in the narrowest, which take eight times as
+    """Return coarse grains in each constriction, and fine ones in the narrow one, which take eight times as
     many grains, from half as many starts."""
     coarse = [Wanted(throat, D, FIELD, starts) for throat in THROATS]
     return run_all([*coarse, Wanted(THROATS[0], FINE_DIAMETER, FIELD, starts // 2)], progress)
 
 
 def by_field(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return coarse grains in the narrowest and the widest constriction, in other fields."""
-    ends = (THROATS[0], THROATS[-1])
-    return run_all([Wanted(throat, D, flux, starts) for throat in ends for flux in FLUXES], progress)
+    """Return coarse grains in each constriction, in other fields."""
+    return run_all([Wanted(throat, D, flux, starts) for throat in THROATS for flux in FLUXES], progress)
