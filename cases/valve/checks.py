@@ -18,13 +18,18 @@ STARTS = 6
 BALANCE = 0.05
 """Walls bear the drag on an arrested flow to this part."""
 
+STEADY = 0.5
+"""Without a field at least this part of the flow at first is left as long after."""
+
 
 def check(starts: int = STARTS) -> Iterator[Check | Claim]:
     """Yield each number as it is known."""
-    *coarse, fine = by_throat(starts)
-    yield from flowing([*coarse, fine])
-    yield from arrested(coarse[0])
-    yield from going_on(coarse[-1], "L21: 40x does not jam")
+    narrow, wide, fine, without = by_throat(starts)
+    yield from flowing([narrow, wide, fine])
+    name = f"{without.name}: flow in the end over that before"
+    yield Claim(name, left(without.flows), STEADY)
+    yield from arrested(narrow)
+    yield from going_on(wide, "L21: 40x does not jam")
     yield from going_on(fine, "L21: fine grains yield")
 
 
@@ -33,7 +38,10 @@ def flowing(valves: Sequence[ValveRuns]) -> Iterator[Claim]:
     for valve in valves:
         parts = [flow.open_rate / unhindered(flow) for flow in valve.flows]
         yield Claim(
-            f"{valve.name}, no field: flow over that of grains that go along", Mean.of(parts), 0.5, 1.1
+            f"{valve.name}, before the field: flow over that of grains that go along",
+            Mean.of(parts),
+            0.5,
+            1.1,
         )
 
 

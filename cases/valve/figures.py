@@ -21,8 +21,8 @@ from tisim.plotting.style import empty, letters, plain
 
 STARTS = 6
 """Each setting is run from so many starts."""
-COLOURS = ("#4477aa", "#cc6677", "#228833")
-"""Those of the narrow and of the wide constriction, and of fine grains."""
+COLOURS = ("#4477aa", "#cc6677", "#228833", "#aaaaaa")
+"""Those of the narrow and of the wide constriction, of fine grains, and without a field."""
 FASTEST = 0.6
 """Colours of speed end at this part of the speed of the oil in the duct."""
 MILLI = 1e-3
@@ -38,7 +38,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     return {
         "flow.png": flow_figure(throats, fields),
         "flow.csv": table([*throats, *fields]),
-        "cut.png": cut_figure(throats),
+        "cut.png": cut_figure([one for one in throats if one.flux > 0]),
     }
 
 
@@ -55,7 +55,7 @@ def flow_figure(throats: Sequence[ValveRuns], fields: Sequence[ValveRuns]) -> Fi
     rates.axvline(throats[0].flows[0].switched / MILLI, color="0.5", lw=0.8, ls=":")
     rates.set(xlabel="time (ms)", ylabel="mass flow rate over that without field", ylim=(-0.1, 1.6))
     rates.set_title("field on at the dotted line")
-    for throat, colour in zip(THROATS, COLOURS, strict=False):
+    for throat, colour in zip(THROATS, COLOURS[:2], strict=True):
         line = [one for one in (*fields, *throats) if (one.throat, one.diameter) == (throat, D)]
         line.sort(key=lambda one: one.flux)
         means = [left(one.flows) for one in line]

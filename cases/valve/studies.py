@@ -38,7 +38,8 @@ class ValveRuns:
     @property
     def name(self) -> str:
         """Return what it is, for people."""
-        return f"{self.width:.3g} grains of {1e6 * self.diameter:.3g} µm"
+        name = f"{self.width:.3g} grains of {1e6 * self.diameter:.3g} µm"
+        return name if self.flux > 0 else f"{name}, no field"
 
     @property
     def jammed(self) -> int:
@@ -74,10 +75,12 @@ def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) ->
 
 
 def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return coarse grains in each constriction, and fine ones in the narrow one, which take eight times as
-    many grains, from half as many starts."""
+    """Return coarse grains in each constriction; fine ones in the narrow one, which are eight times as many,
+    from half as many starts; and coarse ones there for as long without a field."""
+    narrow = THROATS[0]
     coarse = [Wanted(throat, D, FIELD, starts) for throat in THROATS]
-    return run_all([*coarse, Wanted(THROATS[0], FINE_DIAMETER, FIELD, starts // 2)], progress)
+    fine, without = Wanted(narrow, FINE_DIAMETER, FIELD, starts // 2), Wanted(narrow, D, 0.0, starts)
+    return run_all([*coarse, fine, without], progress)
 
 
 def by_field(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
