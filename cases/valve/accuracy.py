@@ -3,7 +3,7 @@ overlap."""
 
 from __future__ import annotations
 
-from cases.valve.measures import flow_rate, largest_overlap
+from cases.valve.measures import flow_rate, overlap
 from tisim import Scene
 from tisim.accuracy import Quantity
 
@@ -12,5 +12,5 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Paths of grains are chaotic; what counts is what flows."""
     return (
         Quantity("mass flow rate at the end", flow_rate, random=True),
-        Quantity("largest overlap", largest_overlap, random=True),
+        Quantity("largest overlap", overlap, random=True),
     )

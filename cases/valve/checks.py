@@ -18,7 +18,7 @@ STARTS = 6
 BALANCE = 0.05
 """Walls bear the drag on an arrested flow to this part."""
 
-STEADY = 0.5
+STILL_FLOWS = 0.5
 """Without a field at least this part of the flow at first is left as long after."""
 
 
@@ -27,7 +27,7 @@ def check(starts: int = STARTS) -> Iterator[Check | Claim]:
     narrow, wide, fine, without = by_throat(starts)
     yield from flowing([narrow, wide, fine])
     name = f"{without.name}: flow in the end over that before"
-    yield Claim(name, left(without.flows), STEADY)
+    yield Claim(name, left(without.flows), STILL_FLOWS)
     yield from arrested(narrow)
     yield from going_on(wide, "L21: 40x does not jam")
     yield from going_on(fine, "L21: fine grains yield")

@@ -11,8 +11,7 @@ from cases.mrf_shear.measures import CHAINED
 from cases.valve import published
 from cases.valve.duct import Duct
 from tisim import Result, Scene
-from tisim.analysis import contacts, nearest_image, periodic_sides
-from tisim.analysis.clusters import labels
+from tisim.analysis import contacts, labels, largest_overlap, periodic_sides
 from tisim.effects import Walls
 from tisim.scene.initial_state import Arrays
 from tisim.sources import ConstrictionFlow
@@ -112,13 +111,10 @@ def inclination(duct: Duct) -> float:
     return float(duct.taper / np.hypot(duct.taper, narrower))
 
 
-def largest_overlap(result: Result) -> float:
+def overlap(result: Result) -> float:
     """Return the largest overlap of two grains at the end, over the mean radius of all."""
     position, radius = result.state["position"], result.state["radius"]
-    sides = periodic_sides(result.scene.domain)
-    i, j = contacts(position, radius, sides=sides).T
-    apart = np.linalg.norm(nearest_image(position[j] - position[i], sides), axis=1)
-    return float((radius[i] + radius[j] - apart).max(initial=0.0) / radius.mean())
+    return largest_overlap(position, radius, periodic_sides(result.scene.domain)) / float(radius.mean())
 
 
 def attraction(radius: float, flux: float) -> float:

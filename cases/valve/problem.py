@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cases.case import size_named
-from cases.mrf_shear.scene import equal
+from cases.mrf_shear.grains import equal
 from cases.valve import published
 from cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
 from cases.valve.open_flow import open_flow

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from cases.runs import sound
 from cases.statistics import Mean
 from cases.valve.measures import duct_of, rate
-from tisim import Observer, Result, RunError, Scene, Simulation
+from tisim import Observer, Result, Scene, Simulation
 from tisim.engine.batches import Progress
 from tisim.sources import MagneticField
 
@@ -93,9 +94,7 @@ def flows(scenes: Sequence[Scene], progress: Progress = lambda part: None) -> li
     simulation.run(observers=[series, lambda simulation: progress(simulation.fraction())])
     results = simulation.results()
     simulation.close()
-    for result in results:
-        if not result.status.ok:
-            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    sound(results)
     return [Flow(result, *np.array(rows).T) for result, rows in zip(results, series.rows, strict=True)]
 
 

@@ -17,7 +17,8 @@ import numpy as np
 from cases.case import size_named
 from cases.mixtures import VALVE_GRAINS
 from cases.mrf_shear import published as shear
-from cases.mrf_shear.scene import LINEAR, SUSCEPTIBILITY, number_of, smallest
+from cases.mrf_shear.grains import number_of, smallest
+from cases.mrf_shear.scene import SUSCEPTIBILITY
 from cases.valve import published
 from cases.valve.duct import Duct
 from cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
@@ -39,6 +40,8 @@ TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and
 
 FLOWING, LASTING = 0.1e-3, 0.5e-3
 """Grains flow so long without a field, and so long in it, s."""
+LINEAR = 1e12
+"""Grains whose magnetisation saturates at so much (A/m) do not saturate: those of L21."""
 CUTOFF = 4.4
 """Grains magnetise and attract each other up to so many radii: as far, in diameters, as L21 has it in its
 cell (section 2.4.3), a gap of 8 um between grains of 6.7 um."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from cases.case import Size
 from cases.mixtures import FINE_VALVE_GRAINS, VALVE_GRAINS, classes
-from cases.mrf_shear.scene import equal
+from cases.mrf_shear.grains import equal
 from cases.valve import published
 
 D = published.LARGEST

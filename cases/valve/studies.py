@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cases.mrf_shear.scene import equal
+from cases.mrf_shear.grains import equal
 from cases.valve import published
 from cases.valve.runs import Flow, Settings, flows
 from cases.valve.scene import FIELD, scene

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cases.valve.measures import clusters, drag_pressure, held_pressure, largest_overlap, unhindered_rate
+from cases.valve.measures import clusters, drag_pressure, held_pressure, overlap, unhindered_rate
 from cases.valve.runs import FLOW_LOOKS, flows
 from cases.valve.scene import scene
 
@@ -34,4 +34,4 @@ def test_a_field_arrests_it_and_walls_bear_the_drag(three):
     assert strong.arrested
     assert clusters(strong.result.state, strong.result.scene).bridged
     assert held_pressure(strong.result) == pytest.approx(drag_pressure(strong.result), rel=0.1)
-    assert 0 < largest_overlap(strong.result) < 0.15
+    assert 0 < overlap(strong.result) < 0.15

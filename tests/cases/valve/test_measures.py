@@ -11,9 +11,9 @@ from cases.valve.measures import (
     duct_of,
     flow_rate,
     held_pressure,
-    largest_overlap,
     mason_number,
     oil_of,
+    overlap,
     unhindered_rate,
 )
 from cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
@@ -80,7 +80,7 @@ def test_a_grain_touches_a_cone_by_its_distance_from_it():
 
 def test_overlaps_across_the_ends():
     result = result_of(VALVE, [[0, 0, -200 * UM], [0, 0, 200 * UM]])
-    assert largest_overlap(result) == pytest.approx(4 / 22)
+    assert overlap(result) == pytest.approx(4 / 22)
 
 
 def test_attraction_and_mason_number():

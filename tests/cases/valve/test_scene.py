@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from cases.case import every
-from cases.mrf_shear.scene import equal
+from cases.mrf_shear.grains import equal
 from cases.valve import published
 from cases.valve.duct import Duct
 from cases.valve.measures import drag_pressure, duct_of, oil_of
