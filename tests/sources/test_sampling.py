@@ -56,3 +56,12 @@ def test_fields_of_sources_go_when_the_kernel_fails(monkeypatch):
         sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [[0.0, 0, 0]])
     assert len(memory.in_use()) == before
     assert error_info.value
+
+
+def test_a_uniform_field_is_switched_on_at_a_time():
+    """Its oscillation has the phase that it would have had without."""
+    field = MagneticField(constant=(1.0, 0, 0), amplitude=(0.0, 2.0, 0), omega=(0, np.pi, 0), begin=0.5)
+    for t, expected in ((0.4999, [0.0, 0, 0]), (0.5, [1.0, 2.0, 0.0]), (0.75, [1.0, np.sqrt(2.0), 0.0])):
+        value, gradient = sample((field,), "magnetic_flux_density", [[0.3, 0, 0]], t)
+        np.testing.assert_allclose(value[0], expected, rtol=0, atol=1e-6)
+        assert (gradient == 0).all()

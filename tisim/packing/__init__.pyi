@@ -1,6 +1,7 @@
 from .around_cylinder import RandomAroundCylinder as RandomAroundCylinder
 from .clump import Clump as Clump
 from .grains import GrainClass as GrainClass
+from .in_duct import RandomInDuct as RandomInDuct
 from .placement import (
     Lattice as Lattice,
 )

@@ -13,7 +13,8 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class Uniform(Source):
-    """This is the contract of a field constant + amplitude sin(omega t + phase), each component by itself."""
+    """This is the contract of a field constant + amplitude sin(omega t + phase), each component by itself,
+    from a time on."""
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = True
@@ -27,13 +28,15 @@ class Uniform(Source):
             amplitude, angle = self.amplitude(w), self.omega(w) * t + self.phase(w)
             for k in ti.static(range(3)):
                 value[k] += amplitude[k] * ti.cast(elementary.sin(angle[k]), float)
-        return value
+        return ti.select(t >= self.begin(w), 1.0, 0.0) * value
 
 
 class ElectricField(Uniform):
     """A uniform electric field is constant, oscillates, or both.
 
         E = E_0 + E_1 sin(omega t + phase),    each component by itself
+
+    There is none before ``begin``, whatever its phase then.
 
     Source: Z13 Eqs (3)-(5), (16).
     """
@@ -43,6 +46,7 @@ class ElectricField(Uniform):
     amplitude: Vector = parameter("V/m", "amplitude E_1 of the oscillating part", STILL)
     omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
     phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)
+    begin: float = parameter("s", "time from which on the field is there", 0.0, ge=0)
 
 
 class MagneticField(Uniform):
@@ -50,8 +54,8 @@ class MagneticField(Uniform):
 
         B = B_0 + B_1 sin(omega t + phase),    each component by itself
 
-    The electric field that goes with a changing B (Faraday's law) is left out, as in the paper, where B is
-    constant.
+    There is none before ``begin``, whatever its phase then. The electric field that goes with a changing B
+    (Faraday's law) is left out, as in the paper, where B is constant.
 
     Source: Z13 Eqs (3)-(5).
     """
@@ -61,3 +65,4 @@ class MagneticField(Uniform):
     amplitude: Vector = parameter("T", "amplitude B_1 of the oscillating part", STILL)
     omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
     phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)
+    begin: float = parameter("s", "time from which on the field is there", 0.0, ge=0)

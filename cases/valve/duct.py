@@ -1,0 +1,98 @@
+"""The duct of a valve and its constriction: shape, walls, and the oil that is driven through it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tisim.effects import Walls
+from tisim.geometry import ConicalSurface, CylindricalSurface
+from tisim.packing import RandomInDuct
+from tisim.sources import ConstrictionFlow
+
+SLICES = 400
+"""Integrals over the duct are sums over so many slices of each of its parts."""
+
+
+@dataclass(frozen=True)
+class Duct:
+    """A round duct along z with a constriction in its middle, m.
+
+    throat, bore : diameters of the constriction and of the duct. straight : length of the constriction.
+    taper : length of the cones before and after it. length : of all, after which the duct begins anew.
+    """
+
+    throat: float
+    bore: float
+    straight: float
+    taper: float
+    length: float
+
+    @property
+    def area(self) -> float:
+        """Return the cross-section of the duct, m^2."""
+        return np.pi * self.bore**2 / 4
+
+    def profile(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return places along the duct, from its lower end up, and its radius there, m."""
+        near, far = self.straight / 2, self.straight / 2 + self.taper
+        wide, narrow = self.bore / 2, self.throat / 2
+        place = np.array([-self.length / 2, -far, -near, near, far, self.length / 2])
+        return place + self.length / 2, np.array([wide, wide, narrow, narrow, wide, wide])
+
+    def filling(self) -> RandomInDuct:
+        """Return where grains begin: anywhere in the duct."""
+        heights, radii = self.profile()
+        return RandomInDuct(
+            centre=(0.0, 0.0, -self.length / 2), heights=tuple(heights.tolist()), radii=tuple(radii.tolist())
+        )
+
+    def walls(self) -> Walls:
+        """Return the walls; those of the duct reach a bore beyond both of its ends, so that they have no
+        rims where it begins anew."""
+        near, far, end = self.straight / 2, self.straight / 2 + self.taper, self.length / 2 + self.bore
+
+        def at(z: float) -> tuple[float, float, float]:
+            return (0.0, 0.0, z)
+
+        wide, narrow = self.bore / 2, self.throat / 2
+        return Walls(
+            name="valve",
+            cylinders=[
+                CylindricalSurface(start=at(-end), end=at(-far), radius=wide),
+                CylindricalSurface(start=at(-near), end=at(near), radius=narrow),
+                CylindricalSurface(start=at(far), end=at(end), radius=wide),
+            ],
+            cones=[
+                ConicalSurface(start=at(-far), end=at(-near), start_radius=wide, end_radius=narrow),
+                ConicalSurface(start=at(near), end=at(far), start_radius=narrow, end_radius=wide),
+            ],
+        )
+
+    def oil(self, speed: float) -> ConstrictionFlow:
+        """Return the flow of the oil of a speed along the duct, m/s, that of L21: it is faster at once where
+        the constriction is straight."""
+        return ConstrictionFlow(
+            speed=speed, throat_radius=self.throat / 2, duct_radius=self.bore / 2, length=self.straight
+        )
+
+    def oil_speed(self, rho: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the speed of the oil over that along the duct at distances from the axis, and places along
+        it, m: what ``oil`` makes."""
+        wide, narrow = self.bore / 2, self.throat / 2
+        faster = np.where(np.abs(z) <= self.straight / 2, (wide / narrow) ** 2, 1.0)
+        return np.where(rho <= narrow, faster, np.clip((wide - rho) / (wide - narrow), 0.0, 1.0))
+
+    def oil_through(self) -> float:
+        """Return the integral of ``oil_speed`` over the duct, m^3."""
+        heights, radii = self.profile()
+        part = (np.arange(SLICES) + 0.5) / SLICES
+        total, narrow, wide = 0.0, self.throat / 2, self.bore / 2
+        for low, high, first, last in zip(heights[:-1], heights[1:], radii[:-1], radii[1:], strict=True):
+            z, b = low + part * (high - low) - self.length / 2, first + part * (last - first)
+            core = np.pi * narrow**2 * self.oil_speed(np.zeros(SLICES), z)
+            # From the radius of the constriction out to the wall.
+            ring = 2 * np.pi * (wide * (b**2 - narrow**2) / 2 - (b**3 - narrow**3) / 3) / (wide - narrow)
+            total += float((core + ring).mean() * (high - low))
+        return total

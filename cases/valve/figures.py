@@ -1,0 +1,131 @@
+"""Figures of the case valve: flow rate by time, what is left of it by field, and grains in a cut."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+
+from cases.valve.measures import clusters, drag_pressure, duct_of, held_pressure, oil_of
+from cases.valve.runs import ARRESTED, Flow, left
+from cases.valve.sizes import THROATS, D
+from cases.valve.studies import ValveRuns, by_field, by_throat
+from tisim.engine.batches import Progress, progress_of_part
+from tisim.errors import must
+from tisim.plotting.style import empty, letters, plain
+
+STARTS = 6
+"""Each setting is run from so many starts."""
+COLOURS = ("#4477aa", "#cc6677", "#228833", "#aaaaaa")
+"""Those of the narrow and of the wide constriction, of fine grains, and without a field."""
+FASTEST = 0.6
+"""Colours of speed end at this part of the speed of the oil in the duct."""
+MILLI = 1e-3
+"""A millisecond, s, and a millimetre, m."""
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """flow.png, flow.csv: flow rate by time, by constriction and grain size, and what is left of it by field;
+    cut.png: grains in the field, by speed."""
+    must(size == "default", "size", "default, which is run", size)
+    throats = by_throat(STARTS, progress_of_part(progress, 0, 2))
+    fields = by_field(STARTS, progress_of_part(progress, 1, 2))
+    return {
+        "flow.png": flow_figure(throats, fields),
+        "flow.csv": table([*throats, *fields]),
+        "cut.png": cut_figure([one for one in throats if one.flux > 0]),
+    }
+
+
+def flow_figure(throats: Sequence[ValveRuns], fields: Sequence[ValveRuns]) -> Figure:
+    """Draw flow rates by time, thin lines for starts, and what is left of them by field."""
+    figure = empty(12.0, 4.0)
+    rates, sweep = figure.subplots(1, 2)
+    for valve, colour in zip(throats, COLOURS, strict=True):
+        flows = valve.flows
+        for flow in flows:
+            rates.plot(flow.times / MILLI, flow.rates / flow.open_rate, color=colour, lw=0.5, alpha=0.6)
+        mean = np.mean([flow.rates / flow.open_rate for flow in flows], axis=0)
+        rates.plot(flows[0].times / MILLI, mean, color=colour, lw=1.8, label=valve.name)
+    rates.axvline(throats[0].flows[0].switched / MILLI, color="0.5", lw=0.8, ls=":")
+    rates.set(xlabel="time (ms)", ylabel="mass flow rate over that without field", ylim=(-0.1, 1.6))
+    rates.set_title("field on at the dotted line")
+    for throat, colour in zip(THROATS, COLOURS[:2], strict=True):
+        line = [one for one in (*fields, *throats) if (one.throat, one.diameter) == (throat, D)]
+        line.sort(key=lambda one: one.flux)
+        means = [left(one.flows) for one in line]
+        sweep.errorbar([one.flux for one in line], [one.value for one in means], [one.half for one in means],
+                       fmt="o-", ms=4, capsize=3, color=colour, label=line[0].name)  # fmt: skip
+    sweep.axhline(ARRESTED, color="0.5", lw=0.8, ls=":")
+    sweep.set(xlabel="flux density (T)", ylabel="part of the flow rate that is left", title="by field")
+    for axis in (rates, sweep):
+        axis.legend(frameon=False, fontsize=8)
+        plain(axis)
+    letters((rates, sweep))
+    return figure
+
+
+def cut_figure(valves: Sequence[ValveRuns]) -> Figure:
+    """Draw the grains along the plane of axis and field of the first start of each valve, at the end, by
+    speed."""
+    figure = empty(3.3 * len(valves) + 0.8, 3.4, pad=0.1)
+    axes = figure.subplots(1, len(valves), sharey=True)
+    for axis, valve in zip(axes, valves, strict=True):
+        circles = cut(axis, valve.flows[0])
+        axis.set_title(f"{valve.name}: {'arrested' if valve.flows[0].arrested else 'flows'}")
+    axes[0].set_ylabel("along the flow, downwards (mm)")
+    letters(axes, 9)
+    figure.colorbar(circles, ax=axes, label="speed over that of the oil in the duct")
+    return figure
+
+
+def cut(axis: Axes, flow: Flow) -> EllipseCollection:
+    """Draw the walls, and the grains of a flow at its end that are at most a radius away from the plane of
+    axis and field; return the grains."""
+    state, scene = flow.result.state, flow.result.scene
+    duct, place = duct_of(scene), state["position"]
+    near = np.flatnonzero(np.abs(place[:, 1]) <= state["radius"])
+    near = near[np.argsort(-place[near, 1])]
+    width = 2 * state["radius"][near] / MILLI
+    circles = EllipseCollection(
+        width, width, np.zeros(len(near)), units="xy", offsets=place[near][:, [0, 2]] / MILLI,
+        offset_transform=axis.transData, edgecolors="white", linewidths=0.3, cmap="viridis",
+    )  # fmt: skip
+    circles.set_array(state["velocity"][near, 2] / oil_of(scene).speed)
+    circles.set_clim(0.0, FASTEST)
+    axis.add_collection(circles)
+    heights, radii = duct.profile()
+    for side in (-1, 1):
+        axis.plot(side * radii / MILLI, (heights - duct.length / 2) / MILLI, color="0.2", lw=1.5)
+    axis.set(aspect="equal", xlabel="along the field (mm)")
+    axis.set_ylim(duct.length / 2 / MILLI, -duct.length / 2 / MILLI)
+    plain(axis)
+    axis.grid(visible=False)
+    return circles
+
+
+def table(valves: Sequence[ValveRuns]) -> str:
+    """Return what each start of each valve has come to, as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(
+        [
+            "throat_m", "grain_diameter_m", "flux_density_T", "seed", "open_rate_kg_per_s", "part_left",
+            "drag_pressure_Pa", "held_pressure_Pa", "largest_cluster", "bridged",
+        ]
+    )  # fmt: skip
+    for valve in valves:
+        for flow in valve.flows:
+            found = clusters(flow.result.state, flow.result.scene)
+            numbers = (flow.open_rate, flow.left, drag_pressure(flow.result), held_pressure(flow.result))
+            writer.writerow(
+                [f"{valve.throat:.4g}", f"{valve.diameter:.4g}", valve.flux, flow.result.scene.seed]
+                + [f"{one:.4g}" for one in (*numbers, found.largest)]
+                + [int(found.bridged)]
+            )
+    return text.getvalue()

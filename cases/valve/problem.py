@@ -1,0 +1,145 @@
+"""The inverse problem of valve: which constriction and grains jam in the least field, or never?
+
+A design is the diameter of the constriction, that of the grains, and the field. A wide constriction lets more
+through while the field is off, and takes more field to jam. Whether it jams is simulated, from one start, in
+a field that is on from the first. What flows without one is that of ``open_flow``, which is no simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cases.case import size_named
+from cases.mrf_shear.grains import equal
+from cases.valve import published
+from cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
+from cases.valve.open_flow import open_flow
+from cases.valve.runs import ARRESTED
+from cases.valve.scene import TITLE, scene
+from cases.valve.sizes import SEARCHED, SIZES, D
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.objective import Objective
+from optimize.problem.problem import Problem
+from tisim import Result, Scene
+from tisim.errors import must
+from tisim.plotting.cloud import cloud
+from tisim.sources import MagneticField
+
+VARIANTS = ("front", "field", "never")
+STRONGEST = 0.4
+"""The field may be so strong, T; L21 has 0.23, and 0.56 between inserts of iron (section 3.4.3)."""
+THROAT_GENE, DIAMETER_GENE = Gene("throat", "m", 3.5 * D, 6 * D), Gene("diameter", "m", 0.7 * D, D)
+FLUX_GENE = Gene("flux", "T", 0.02, STRONGEST)
+GENES = {
+    "front": (THROAT_GENE, DIAMETER_GENE, FLUX_GENE),
+    "field": (THROAT_GENE, DIAMETER_GENE, FLUX_GENE),
+    "never": (THROAT_GENE, DIAMETER_GENE),
+}
+BOUND = 60e-9
+"""An open flow is to be at least so large where it is bounded, m^3/s."""
+WANTED = {
+    "front": "the front of the field that arrests the flow and of what flows without it",
+    "field": f"the least field that arrests the flow, of valves of {1e9 * BOUND:g} mm^3/s without",
+    "never": f"the fewest grains across a constriction that a field of {STRONGEST:g} T never arrests",
+}
+"""What each variant of the problem looks for."""
+MEANINGS = {
+    "field": "flux density that arrests the flow",
+    "open flow": "volume that flows without field, after Hagen, Poiseuille, Krieger and Dougherty",
+    "width": "diameter of the constriction over that of the grains",
+    "throat": "diameter of the constriction",
+    "diameter": "diameter of the grains",
+}
+
+
+def part_left(result: Result) -> float:
+    """Return the mass flow rate at the end over that of grains that go with the oil."""
+    return flow_rate(result) / unhindered_rate(result.scene, float(result.state["mass"].sum()))
+
+
+def arrested(result: Result) -> bool:
+    """Return whether the flow is arrested at the end."""
+    return part_left(result) < ARRESTED
+
+
+def flux(result: Result) -> float:
+    """Return the flux density of the field, T."""
+    return float(next(e for e in result.scene.effects if isinstance(e, MagneticField)).constant[0])
+
+
+def width(result: Result) -> float:
+    """Return the diameter of the constriction over that of the grains."""
+    return duct_of(result.scene).throat / (2 * float(result.state["radius"].mean()))
+
+
+def volume_rate(result: Result) -> float:
+    """Return the volume flow rate of the valve of a run without field, m^3/s, at L21's pressure."""
+    return open_flow(duct_of(result.scene), published.PRESSURE, published.FRACTION)
+
+
+def arresting_field(result: Result) -> float:
+    """Return the field where it arrests the flow, T; infinite where it does not."""
+    return flux(result) if arrested(result) else np.inf
+
+
+def arresting_flow(result: Result) -> float:
+    """Return what flows without the field where this arrests it, m^3/s; NaN where it does not."""
+    return volume_rate(result) if arrested(result) else np.nan
+
+
+def flowing_width(result: Result) -> float:
+    """Return how many grains are side by side in the constriction where the flow goes on; infinite where it
+    is arrested."""
+    return np.inf if arrested(result) else width(result)
+
+
+LEAST_FIELD = Objective("field", arresting_field, "T")
+OBJECTIVES = {
+    "front": (LEAST_FIELD, Objective("open flow", arresting_flow, "m^3/s", maximise=True)),
+    "field": (LEAST_FIELD,),
+    "never": (Objective("width", flowing_width),),
+}
+
+
+def problem(size: str = "default", variant: str = "front") -> Problem:
+    """Return the search for valves; by variant the front of field and open flow, the least field at a bounded
+    open flow, or the narrowest that never jam."""
+    must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
+    settings = {**size_named(size, SIZES).scene, **SEARCHED}
+
+    def designed(design: Mapping[str, float], seed: int) -> Scene:
+        one = scene(
+            throat=design["throat"],
+            grains=equal(design["diameter"] / 2, 1.0),
+            flux=design.get("flux", STRONGEST),
+            seed=seed,
+            **settings,
+        )
+        let = open_flow(duct_of(one), published.PRESSURE, published.FRACTION)
+        must(variant != "field" or let >= BOUND, "open flow of the design", f"at least {BOUND:g} m^3/s", let)
+        return one
+
+    return Problem(
+        name=f"valve-{variant}" + ("" if size == "default" else f"-{size}"),
+        title=TITLE,
+        description=WANTED[variant],
+        genome=Genome(GENES[variant]),
+        scene=designed,
+        objective=OBJECTIVES[variant],
+        meanings=MEANINGS,
+        picture=lambda scene, result: cloud(result),
+        details=details,
+    )
+
+
+def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
+    """Return what else is known of the valve of a design."""
+    return {
+        "grains": float(len(result.state["radius"])),
+        "grains across the constriction": width(result),
+        "part of the flow that is left": part_left(result),
+        "pressure that the walls hold, kPa": 1e-3 * held_pressure(result),
+        "open flow, mm^3/s": 1e9 * volume_rate(result),
+    }

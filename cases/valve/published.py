@@ -1,0 +1,44 @@
+"""What L21 says of its valve: the numbers of section 3.4.4, and which valves jam (table 3.2).
+
+L21 states neither the inner diameter of the duct, nor any length along it, nor the taper of the constriction
+(its figure 3.7 has no scale), nor Poisson's ratio, restitution and rolling friction, for which those of its
+table 2.1 are taken, as it says that the module is the same; nor the cohesion, which is left out, nor the
+cut-off of the magnetic forces ("close neighbors").
+"""
+
+from __future__ import annotations
+
+MICRO = 1e-6
+"""A micrometre, m."""
+
+LARGEST, FINE_LARGEST = 44 * MICRO, 10 * MICRO
+"""Diameters of the largest grains of the coarse and of the fine mixture, m."""
+CONSTRICTIONS = {20: 0.88e-3, 30: 1.32e-3, 40: 1.76e-3}
+"""Diameters of the constrictions, m, by how many of the largest grains they are wide."""
+FRACTION = 0.345
+"""Volume fraction of the grains."""
+YOUNG = 1e9
+"""Young's modulus, Pa, in place of the 200 GPa of iron."""
+FRICTION = 0.4
+"""Coefficient of friction."""
+OIL_VISCOSITY = 0.16
+"""Dynamic viscosity of the oil, Pa s."""
+OIL_SPEED = 0.273
+"""Speed of the oil within the diameter of the constriction, along the duct, m/s."""
+PRESSURE = 100e3
+"""The drag on an arrested flow is about that of so much pressure, Pa."""
+STEP, FINE_STEP = 20e-9, 5e-9
+"""A step with coarse and with fine grains, s."""
+UNMAGNETISED = 1e-3
+"""The grains flow so long without a field, s."""
+FLUX = 0.23
+"""Flux density across the valve, T."""
+
+JAMS = {20: True, 30: True, 40: False}
+"""Which constrictions jam with the coarse mixture, simulated as measured (mix 2 of table 3.2)."""
+FINE_JAMS = {30: False}
+"""The same of the fine mixture."""
+SPONTANEOUS = 5.0
+"""Without a field, throats narrower than so many diameters jam by themselves (section 3.2.5, after [106])."""
+MEASURED_PRESSURE = 105e3
+"""Valves were tested at this pressure, Pa (table 3.2)."""

@@ -1,0 +1,103 @@
+"""Runs of valves, and how much flowed when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cases.runs import sound
+from cases.statistics import Mean
+from cases.valve.measures import duct_of, rate
+from tisim import Observer, Result, Scene, Simulation
+from tisim.engine.batches import Progress
+from tisim.sources import MagneticField
+
+Settings = Mapping[str, Any]
+"""Settings are those of a scene that differ."""
+FLOW_LOOKS = 100
+"""The flow rate is noted so many times in a run."""
+LATE = 0.2
+"""Flow rates without a field and in it are means over this last part of the time of either."""
+ARRESTED = 0.05
+"""A flow is arrested where less than this part of what flowed without a field is left."""
+
+
+class FlowSeries(Observer):
+    """The mass flow rate of each world is noted at equal times, FLOW_LOOKS in all of its duration.
+
+    ``rows[w]`` are pairs of time (s) and rate (kg/s) of world w.
+    """
+
+    def __init__(self, scenes: Sequence[Scene]) -> None:
+        self.lengths = [duct_of(one).length for one in scenes]
+        self.intervals = np.array([one.duration / FLOW_LOOKS for one in scenes])
+        self.rows: list[list[tuple[float, float]]] = [[] for _ in scenes]
+
+    def pause(self, simulation: Simulation) -> np.ndarray:
+        return np.array([len(rows) for rows in self.rows]) * self.intervals
+
+    def observe(self, simulation: Simulation) -> None:
+        for rows, due, length, state in zip(
+            self.rows, self.pause(simulation), self.lengths, simulation.states, strict=True
+        ):
+            if state.time >= due:
+                rows.append((state.time, rate(state["mass"], state["velocity"], length)))
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A flow has its result, and the mass flow rate (kg/s) at times (s)."""
+
+    result: Result
+    times: np.ndarray
+    rates: np.ndarray
+
+    @property
+    def switched(self) -> float:
+        """Return when the field was switched on, s."""
+        return next(one for one in self.result.scene.effects if isinstance(one, MagneticField)).begin
+
+    @property
+    def open_rate(self) -> float:
+        """Return the mass flow rate before the field is switched on, kg/s."""
+        return self.mean(0.0, self.switched)
+
+    @property
+    def closed_rate(self) -> float:
+        """Return the mass flow rate at the end, kg/s."""
+        return self.mean(self.switched, float(self.times[-1]))
+
+    @property
+    def left(self) -> float:
+        """Return the part of the flow rate that is left in the field."""
+        return self.closed_rate / self.open_rate
+
+    @property
+    def arrested(self) -> bool:
+        """Return whether the field has arrested the flow."""
+        return self.left < ARRESTED
+
+    def mean(self, begin: float, end: float) -> float:
+        """Return the mean rate over the last part of the time from ``begin`` to ``end``, s."""
+        chosen = (self.times > end - LATE * (end - begin)) & (self.times <= end)
+        return float(self.rates[chosen].mean())
+
+
+def flows(scenes: Sequence[Scene], progress: Progress = lambda part: None) -> list[Flow]:
+    """Return the flows of scenes, run as one batch; RunError where one fails."""
+    simulation = Simulation(scenes[0], len(scenes), max(one.capacity() for one in scenes))
+    simulation.load(list(scenes))
+    series = FlowSeries(scenes)
+    simulation.run(observers=[series, lambda simulation: progress(simulation.fraction())])
+    results = simulation.results()
+    simulation.close()
+    sound(results)
+    return [Flow(result, *np.array(rows).T) for result, rows in zip(results, series.rows, strict=True)]
+
+
+def left(group: Sequence[Flow]) -> Mean:
+    """Return the part of the flow rate that is left in the field, a mean over starts."""
+    return Mean.of([one.left for one in group])

@@ -1,0 +1,160 @@
+"""A valve of a magnetorheological fluid: a constriction that iron grains jam in a field (L21 section 3.4.4).
+
+Grains are dragged through a constriction of a round duct by oil whose velocity is given. After a while a
+field across the duct is switched on, which makes chains of them: they arrest, or yield and go on. The duct is
+periodic along the flow: what leaves it below comes in above.
+
+It is the simulation of L21 section 3.4.4. What differs at the sizes that a laptop runs is in ``sizes`` and in
+the page of the case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cases.case import size_named
+from cases.mixtures import VALVE_GRAINS
+from cases.mrf_shear import published as shear
+from cases.mrf_shear.grains import number_of, smallest
+from cases.mrf_shear.scene import SUSCEPTIBILITY
+from cases.valve import published
+from cases.valve.duct import Duct
+from cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
+from tisim import Box, Cloud, GrainClass, Material, Scene
+from tisim.effects import (
+    Granular,
+    HertzMaterial,
+    MindlinForce,
+    MutualFroehlichMoment,
+    RestitutionDamping,
+    RollingEPSD,
+    StokesDrag,
+    TruncatedDipoleDipole,
+)
+from tisim.sources import MagneticField
+from tisim.steppers import FixedStep, Verlet
+
+TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"
+
+FLOWING, LASTING = 0.1e-3, 0.5e-3
+"""Grains flow so long without a field, and so long in it, s."""
+LINEAR = 1e12
+"""Grains whose magnetisation saturates at so much (A/m) do not saturate: those of L21."""
+CUTOFF = 4.4
+"""Grains magnetise and attract each other up to so many radii: as far, in diameters, as L21 has it in its
+cell (section 2.4.3), a gap of 8 um between grains of 6.7 um."""
+FIELD = 0.3
+"""Flux density of the field, T."""
+SLOPE = 1.0
+"""Length of a cone of the constriction over how much narrower it is."""
+CONTACT = Granular(
+    normal=HertzMaterial(),
+    damping=RestitutionDamping(),
+    tangential=MindlinForce(),
+    rolling=RollingEPSD(damping_ratio=shear.ROLLING_DAMPING),
+)
+"""The law of contact of L21 section 2.2.1, without cohesion."""
+
+
+def duct(throat: float, bore: float, straight: float, slope: float, length: float) -> Duct:
+    """Return the duct of a valve; m, and the length of a cone over how much narrower it is."""
+    return Duct(throat, bore, straight, slope * (bore - throat) / 2, length)
+
+
+def mean_radius(grains: Sequence[GrainClass]) -> float:
+    """Return the mean radius of the grains of a mixture, over their number, m."""
+    numbers = np.array([one.number() for one in grains])
+    radii = np.array([one.sizes.nodes()[0].mean() for one in grains])
+    return float(numbers @ radii / numbers.sum())
+
+
+def step(radius: float, young: float) -> float:
+    """Return a step (s) for grains of which the smallest have a radius (m), of a Young's modulus (Pa): that
+    of L21, which goes as the duration of an impact after Hertz, to two digits."""
+    smaller = 2 * radius / (VALVE_GRAINS[-1][0] * published.MICRO)
+    return float(f"{published.STEP * smaller * (published.YOUNG / young) ** 0.4:.2g}")
+
+
+def speed_of(pressure: float, duct: Duct, grains: Sequence[GrainClass], fraction: float) -> float:
+    """Return the speed of the oil along the duct (m/s) at which the drag on grains at rest, evenly over the
+    duct, is that of a pressure (Pa) on its cross-section."""
+    volume = duct.filling().volume()
+    density = number_of(grains, fraction, volume) / volume
+    drag = 6 * np.pi * published.OIL_VISCOSITY * mean_radius(grains) * density * duct.oil_through()
+    return float(pressure * duct.area / drag)
+
+
+def scene(
+    throat: float = THROATS[0],
+    grains: Sequence[GrainClass] = COARSE,
+    flux: float = FIELD,
+    pressure: float | None = None,
+    speed: float | None = None,
+    fraction: float = published.FRACTION,
+    seed: int = 0,
+    bore: float = BORE,
+    straight: float | None = None,
+    slope: float = SLOPE,
+    length: float = LENGTH,
+    flowing: float = FLOWING,
+    lasting: float = LASTING,
+    young: float = published.YOUNG,
+    dt: float | None = None,
+    friction: float = published.FRICTION,
+    saturation: float = LINEAR,
+) -> Scene:
+    """Return the scene of a valve.
+
+    throat, bore : diameters of the constriction and of the duct, m. grains : the mixture. flux : density of
+    the field along x, T. pressure : what the drag on grains at rest amounts to, Pa, by the gradient of L21
+    unless given; speed : of the oil along the duct in its place, m/s. fraction : of the volume that grains
+    fill. straight : length of the constriction, m, a quarter of its diameter unless given; slope : length of
+    the cones before and after it over how much narrower it is; length : of the duct, m. flowing, lasting :
+    how long grains flow without a field, and how long there is one, s. young : Pa. dt : s; unless given that
+    of L21 for grains of this size and modulus. friction : coefficient of sliding friction. saturation :
+    magnetisation at which grains saturate, A/m. All are values of one structure: valves that differ in them
+    run as one batch.
+    """
+    shape = duct(throat, bore, throat / 4 if straight is None else straight, slope, length)
+    iron = Material(
+        young=young,
+        poisson=shear.POISSON,
+        restitution=shear.RESTITUTION,
+        friction=friction,
+        rolling_friction=shear.ROLLING_FRICTION,
+    )
+    if speed is None:
+        speed = speed_of(GRADIENT * length if pressure is None else pressure, shape, grains, fraction)
+    half = (bore / 2, bore / 2, length / 2)
+    return Scene(
+        name="valve",
+        particles=Cloud(
+            number=number_of(grains, fraction, shape.filling().volume()),
+            grains=tuple(grains),
+            placement=shape.filling(),
+        ),
+        materials={"iron": iron},
+        domain=Box(low=(-half[0], -half[1], -half[2]), high=half, periodic=(False, False, True)),
+        effects=(
+            MagneticField(constant=(flux, 0.0, 0.0), begin=flowing),
+            # One sweep a step, as L21 has it (section 2.2.3).
+            MutualFroehlichMoment(
+                susceptibility=SUSCEPTIBILITY, saturation=saturation, sweeps=0, cutoff=CUTOFF
+            ),
+            TruncatedDipoleDipole(cutoff=CUTOFF),
+            CONTACT,
+            shape.walls(),
+            shape.oil(speed),
+            StokesDrag(viscosity=published.OIL_VISCOSITY),
+        ),
+        stepper=Verlet(control=FixedStep(dt=dt or step(smallest(grains), young))),
+        duration=flowing + lasting,
+        seed=seed,
+    )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """Return the scene of a size."""
+    return scene(seed=seed, **size_named(size, SIZES).scene)

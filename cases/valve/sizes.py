@@ -1,0 +1,66 @@
+"""The sizes of the case: valves for a laptop, what a search runs, and those of L21."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cases.case import Size
+from cases.mixtures import FINE_VALVE_GRAINS, VALVE_GRAINS, classes
+from cases.mrf_shear.grains import equal
+from cases.valve import published
+
+D = published.LARGEST
+"""Diameter of the coarse grains, m: that of the largest of L21."""
+FINE_DIAMETER = D / 2
+"""Diameter of the fine grains, m."""
+COARSE, FINE_GRAINS = equal(D / 2, 1.0), equal(FINE_DIAMETER / 2, 1.0)
+"""Grains of one size: the largest of L21, and half as large."""
+THROATS = (4 * D, 6.5 * D)
+"""Diameters of the constrictions, m."""
+BORE, LENGTH = 8 * D, 8 * D
+"""Diameter and length of the duct, m."""
+
+L21_BORE, L21_LENGTH = 3.2e-3, 0.9e-3
+"""Diameter of the duct of L21, m, which it does not state: an eighth of an inch, which leaves 0.4 mm of wall
+in a valve that is 4 mm wide (its table 3.1); and the length at which its oil drags grains at rest with about
+its 100 kPa."""
+GRADIENT = published.PRESSURE / L21_LENGTH
+"""The drag on grains at rest in a unit of volume of the duct, Pa/m: that of L21."""
+
+SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 4e-4}
+"""What a search runs of each design: the field is on from the first."""
+SEARCH_SETTINGS = {
+    "generations": 4, "options": {"population": 12},
+    "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1, "confirm": 0},
+}  # fmt: skip
+
+
+def l21(ratio: int, **more: Any) -> dict[str, Any]:
+    """Return the settings of L21's valve with a constriction of so many grains."""
+    throat = published.CONSTRICTIONS[ratio]
+    return {
+        "throat": throat, "bore": L21_BORE, "straight": throat / 4, "slope": 0.25, "length": L21_LENGTH,
+        "grains": classes(VALVE_GRAINS, "mass"), "speed": published.OIL_SPEED, "dt": published.STEP,
+        "flux": published.FLUX, "flowing": published.UNMAGNETISED, "lasting": 4e-3, **more,
+    }  # fmt: skip
+
+
+SIZES = {
+    "default": Size(
+        "185 grains of 44 um, a constriction of 4 diameters in a duct of 8 by 8", {}, SEARCH_SETTINGS
+    ),
+    "l21_20": Size("L21's own: a constriction of 0.88 mm, its coarse mixture", l21(20)),
+    "l21_30": Size("the same, 1.32 mm", l21(30)),
+    "l21_40": Size("the same, 1.76 mm", l21(40)),
+    "l21_fine": Size(
+        "1.32 mm, L21's fine mixture, in a shorter duct with a shorter constriction",
+        l21(
+            30,
+            grains=classes(FINE_VALVE_GRAINS, "mass"),
+            dt=published.FINE_STEP,
+            straight=0.1e-3,
+            slope=0.1,
+            length=0.4e-3,
+        ),
+    ),
+}

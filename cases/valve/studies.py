@@ -1,0 +1,88 @@
+"""What is compared: constrictions, grain sizes and fields, each from several starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cases.mrf_shear.grains import equal
+from cases.valve import published
+from cases.valve.runs import Flow, Settings, flows
+from cases.valve.scene import FIELD, scene
+from cases.valve.sizes import FINE_DIAMETER, THROATS, D
+from tisim.engine.batches import Progress
+
+FLUXES = (published.FLUX, 0.27)
+"""Flux densities beside FIELD, T."""
+
+
+@dataclass(frozen=True)
+class ValveRuns:
+    """The runs of a valve are flows from several starts.
+
+    throat, diameter : of the constriction and of the grains, m. flux : flux density, T.
+    """
+
+    throat: float
+    diameter: float
+    flux: float
+    flows: Sequence[Flow]
+
+    @property
+    def width(self) -> float:
+        """Return how many grains are side by side in the constriction."""
+        return self.throat / self.diameter
+
+    @property
+    def name(self) -> str:
+        """Return what it is, for people."""
+        name = f"{self.width:.3g} grains of {1e6 * self.diameter:.3g} µm"
+        return name if self.flux > 0 else f"{name}, no field"
+
+    @property
+    def jammed(self) -> int:
+        """Return how many of the flows are arrested."""
+        return sum(flow.arrested for flow in self.flows)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What valve is wanted: diameters of the constriction and of the grains, m, flux density, T, and how many
+    starts."""
+
+    throat: float
+    diameter: float
+    flux: float
+    starts: int
+
+    def settings(self) -> list[Settings]:
+        """Return the settings of its scenes, one for each start."""
+        grains = equal(self.diameter / 2, 1.0)
+        one = {"throat": self.throat, "grains": grains, "flux": self.flux}
+        return [{**one, "seed": seed} for seed in range(self.starts)]
+
+
+def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) -> list[ValveRuns]:
+    """Return the runs of valves, all of them one batch."""
+    done = flows([scene(**one) for each in wanted for one in each.settings()], progress)
+    ends = np.cumsum([each.starts for each in wanted])
+    return [
+        ValveRuns(each.throat, each.diameter, each.flux, done[end - each.starts : end])
+        for each, end in zip(wanted, ends, strict=True)
+    ]
+
+
+def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
+    """Return coarse grains in each constriction; fine ones in the narrow one, which are eight times as many,
+    from half as many starts; and coarse ones there for as long without a field."""
+    narrow = THROATS[0]
+    coarse = [Wanted(throat, D, FIELD, starts) for throat in THROATS]
+    fine, without = Wanted(narrow, FINE_DIAMETER, FIELD, starts // 2), Wanted(narrow, D, 0.0, starts)
+    return run_all([*coarse, fine, without], progress)
+
+
+def by_field(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
+    """Return coarse grains in each constriction, in other fields."""
+    return run_all([Wanted(throat, D, flux, starts) for throat in THROATS for flux in FLUXES], progress)

@@ -1,0 +1,22 @@
+"""States of valves that tests make up."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+
+def at_rest(made):
+    """The start of a scene as a result, at rest."""
+    return result_of(made, **made.start())
+
+
+def result_of(made, position, velocity=None, radius=22e-6, mass=1.0, measures=None, **_):
+    """A result of a scene with the grains given."""
+    n = len(position)
+    state = {
+        "position": np.asarray(position, float),
+        "velocity": np.zeros((n, 3)) if velocity is None else np.asarray(velocity, float),
+        "radius": np.broadcast_to(radius, n).astype(float),
+        "mass": np.broadcast_to(mass, n).astype(float),
+    }
+    return SimpleNamespace(scene=made, state=state, measures=measures or {})

@@ -1,0 +1,37 @@
+"""A small valve that is run: grains flow, a field arrests them, and walls hold what drags them."""
+
+import numpy as np
+import pytest
+
+from cases.valve.measures import clusters, drag_pressure, held_pressure, overlap, unhindered_rate
+from cases.valve.runs import FLOW_LOOKS, flows
+from cases.valve.scene import scene
+
+UM = 1e-6
+SMALL_VALVE = {"throat": 176 * UM, "bore": 308 * UM, "length": 400 * UM, "flowing": 6e-5, "lasting": 3e-4}
+
+
+@pytest.fixture(scope="module")
+def three():
+    return flows([scene(**SMALL_VALVE, flux=flux, pressure=40e3) for flux in (0.0, 0.1, 0.5)])
+
+
+@pytest.mark.slow
+def test_grains_flow_without_a_field(three):
+    """No slower than half of what goes with the oil; and when the field comes, all else is the same."""
+    for flow in three:
+        mass = flow.result.state["mass"].sum()
+        assert 0.5 < flow.open_rate / unhindered_rate(flow.result.scene, mass) < 1.1
+        assert len(flow.times) in (FLOW_LOOKS, FLOW_LOOKS + 1)
+        np.testing.assert_array_equal(flow.rates[:16], three[0].rates[:16])
+    assert three[0].left > 0.5
+
+
+@pytest.mark.slow
+def test_a_field_arrests_it_and_walls_bear_the_drag(three):
+    weak, strong = three[1:]
+    assert strong.left < weak.left
+    assert strong.arrested
+    assert clusters(strong.result.state, strong.result.scene).bridged
+    assert held_pressure(strong.result) == pytest.approx(drag_pressure(strong.result), rel=0.1)
+    assert 0 < overlap(strong.result) < 0.15

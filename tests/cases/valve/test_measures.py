@@ -1,0 +1,107 @@
+"""What is taken of a valve: flow rates, pressures, clusters, and when a flow is arrested."""
+
+import numpy as np
+import pytest
+from scipy.constants import mu_0
+
+from cases.valve.measures import (
+    attraction,
+    clusters,
+    drag,
+    duct_of,
+    flow_rate,
+    held_pressure,
+    mason_number,
+    oil_of,
+    overlap,
+    unhindered_rate,
+)
+from cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
+from cases.valve.scene import scene
+from tests.cases.valve.states import at_rest, result_of
+
+R, UM = 22e-6, 1e-6
+VALVE = scene(throat=176 * UM, bore=352 * UM, straight=44 * UM, length=440 * UM, flowing=1e-4, lasting=3e-4)
+
+
+def test_the_flow_rate_is_the_momentum_over_the_length():
+    velocity = [[1.0, 2.0, 0.5], [0.0, 0.0, -0.1]]
+    result = result_of(VALVE, np.zeros((2, 3)), velocity, mass=[2e-9, 1e-9])
+    assert flow_rate(result) == pytest.approx((2e-9 * 0.5 - 1e-9 * 0.1) / 440e-6)
+
+
+def test_grains_that_go_with_the_oil_flow_unhindered():
+    result = at_rest(VALVE)
+    state, duct, oil = result.state, duct_of(VALVE), oil_of(VALVE)
+    rho = np.hypot(*state["position"][:, :2].T)
+    state["velocity"] = np.zeros((len(rho), 3))
+    state["velocity"][:, 2] = oil.speed * duct.oil_speed(rho, state["position"][:, 2])
+    assert flow_rate(result) == pytest.approx(unhindered_rate(VALVE, state["mass"].sum()), rel=0.1)
+    assert drag(result) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_the_drag_on_grains_in_the_duct_and_in_the_constriction():
+    oil = oil_of(VALVE).speed
+    result = result_of(VALVE, [[0, 0, 200 * UM], [50 * UM, 0, 20 * UM], [0, 132 * UM, 200 * UM]])
+    # In the core, four times as fast in the constriction, and half as fast half-way to the wall.
+    assert drag(result) == pytest.approx(6 * np.pi * 0.16 * R * oil * (1 + 4 + 0.5))
+    held = result_of(VALVE, np.zeros((1, 3)), measures={"valve_force_z": 3e-3})
+    assert held_pressure(held) == pytest.approx(3e-3 / (np.pi * (176e-6) ** 2))
+
+
+def test_an_arch_across_the_constriction_and_grains_elsewhere():
+    """Four grains from wall to wall, three in a row along the duct that goes on across its ends, and one."""
+    arch = [[x * UM, 0, 0] for x in (-66, -22, 22, 66)]
+    row = [[0, 0, z * UM] for z in (-216, 216, 172)]
+    alone = [[100 * UM, 100 * UM, 150 * UM]]
+    found = clusters(result_of(VALVE, arch + row + alone).state, VALVE)
+    assert found.largest == pytest.approx(4 / 8)
+    assert found.bridged
+    assert len(set(found.label[:4])) == 1
+    assert len(set(found.label[4:7])) == 1
+    assert len(set(found.label)) == 3
+    # Without one of its grains it is no arch; in the duct one across is none.
+    assert not clusters(result_of(VALVE, arch[:3] + row).state, VALVE).bridged
+    higher = [[x * UM, 0, 190 * UM] for x in (-154, -110, -66, -22, 22, 66, 110, 154)]
+    assert not clusters(result_of(VALVE, higher).state, VALVE).bridged
+
+
+def test_a_grain_touches_a_cone_by_its_distance_from_it():
+    """Halfway up a cone of 45 degrees, where the duct is 132 um wide."""
+    z, wall = (22 + 44) * UM, 132 * UM
+    near = (wall - R * np.sqrt(2)) / UM
+    xs = np.arange(-near, near + 1, 2 * near / 5)
+    chain = [[x * UM, 0, z] for x in xs]
+    assert 2 * near / 5 < 44
+    assert clusters(result_of(VALVE, chain).state, VALVE).bridged
+    shorter = [[x * UM * 0.96, 0, z] for x in xs]
+    assert not clusters(result_of(VALVE, shorter).state, VALVE).bridged
+
+
+def test_overlaps_across_the_ends():
+    result = result_of(VALVE, [[0, 0, -200 * UM], [0, 0, 200 * UM]])
+    assert overlap(result) == pytest.approx(4 / 22)
+
+
+def test_attraction_and_mason_number():
+    """16/9 of that of two with the moments that they have alone."""
+    alone = 4 * np.pi * R**3 * 0.23 / mu_0
+    assert attraction(R, 0.23) == pytest.approx(16 / 9 * 3 * mu_0 * alone**2 / (2 * np.pi * (2 * R) ** 4))
+    drag_there = 6 * np.pi * 0.16 * R * 4 * oil_of(VALVE).speed
+    assert mason_number(VALVE, R, 0.23) == pytest.approx(drag_there / attraction(R, 0.23))
+
+
+def flow_of(before, after):
+    """A flow at one rate, and in the field at another at last."""
+    times = np.arange(FLOW_LOOKS) * 4e-4 / FLOW_LOOKS
+    rates = np.where(times <= 1e-4, before, np.where(times > 3.2e-4, after, 9.0))
+    return Flow(result_of(VALVE, np.zeros((1, 3))), times, rates)
+
+
+def test_a_flow_is_arrested_where_little_of_it_is_left():
+    assert flow_of(2.0, 0.5).left == pytest.approx(0.25)
+    assert not flow_of(2.0, 0.5).arrested
+    assert flow_of(2.0, 1.9 * ARRESTED).arrested
+    mean = left([flow_of(2.0, 0.5), flow_of(2.0, 0.7)])
+    assert mean.value == pytest.approx(0.3)
+    assert mean.half > 0

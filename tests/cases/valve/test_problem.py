@@ -1,0 +1,66 @@
+"""The search: what a design makes, what it is judged by, and which designs are not allowed."""
+
+import numpy as np
+import pytest
+
+from cases.case import every
+from cases.valve.measures import duct_of, unhindered_rate
+from cases.valve.open_flow import open_flow
+from cases.valve.problem import BOUND, STRONGEST, arrested, flux, part_left, problem, volume_rate, width
+from cases.valve.runs import ARRESTED
+from tests.cases.valve.states import result_of
+from tisim import InputError
+from tisim.sources import MagneticField
+
+DESIGN = {"throat": 200e-6, "diameter": 40e-6, "flux": 0.15}
+
+
+def moving(made, part):
+    """A result of a scene in which grains flow at a part of the rate at which they go with the oil."""
+    mass = made.particles.masses(0)
+    speed = part * unhindered_rate(made, mass.sum()) * duct_of(made).length / mass.sum()
+    n = len(mass)
+    return result_of(made, np.zeros((n, 3)), [[0, 0, speed]] * n, radius=20e-6, mass=mass)
+
+
+def test_a_design_is_the_valve_it_says():
+    made = problem().scene(DESIGN, 3)
+    assert made.seed == 3
+    result = moving(made, 0.5)
+    assert (flux(result), width(result)) == (0.15, pytest.approx(5.0))
+    assert part_left(result) == pytest.approx(0.5)
+    (field,) = [effect for effect in made.effects if isinstance(effect, MagneticField)]
+    assert field.begin == 0.0
+    assert volume_rate(result) == open_flow(duct_of(made), 100e3, 0.345)
+    wider = problem().scene({**DESIGN, "throat": 260e-6}, 0)
+    assert volume_rate(moving(wider, 1.0)) > 1.5 * volume_rate(result)
+
+
+@pytest.mark.parametrize("part", [0.9 * ARRESTED, 1.1 * ARRESTED])
+def test_fields_count_where_they_arrest_and_widths_where_they_do_not(part):
+    jams = part < ARRESTED
+    result = moving(problem().scene(DESIGN, 0), part)
+    assert arrested(result) == jams
+    field, let = (one.of(result) for one in problem(variant="front").objectives)
+    assert (field == 0.15, np.isfinite(let)) == (jams, jams)
+    assert np.isfinite(problem(variant="field").objectives[0].of(result)) == jams
+    never = problem(variant="never").objectives[0].of(result)
+    assert never == (np.inf if jams else pytest.approx(5.0))
+
+
+def test_a_valve_that_lets_little_through_is_refused_where_that_is_bounded():
+    narrow = {**DESIGN, "throat": 160e-6}
+    made = problem(variant="front").scene(narrow, 0)
+    assert open_flow(duct_of(made), 100e3, 0.345) < BOUND
+    with pytest.raises(InputError, match=r"open flow of the design must be at least .* m\^3/s; received"):
+        problem(variant="field").scene(narrow, 0)
+
+
+def test_variants():
+    assert problem(variant="never").scene({"throat": 200e-6, "diameter": 44e-6}, 0).effects[0].constant == (
+        STRONGEST, 0.0, 0.0,
+    )  # fmt: skip
+    assert [one.maximise for one in problem(variant="front").objectives] == [False, True]
+    assert not problem(variant="field").several
+    _, settings = every()["valve"].inverse("default", None)
+    assert settings["generations"] > 0

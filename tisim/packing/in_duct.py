@@ -1,0 +1,142 @@
+"""Where particles lie at the start in a duct whose width changes along it."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Self
+
+import numpy as np
+from pydantic import model_validator
+from scipy.spatial import cKDTree
+
+from tisim.components.component import Vector, parameter
+from tisim.components.domain import Domain
+from tisim.components.ranges import check_resolved
+from tisim.errors import InputError, must
+from tisim.packing.placement import Placement
+
+MOST_FILLED = 0.5
+"""Spheres fill at most this part of a duct: near a random close packing none can be pushed aside."""
+MOST_PUSHES = 2000
+"""Spheres are pushed apart so many times at most."""
+CLEARANCE = 0.01
+"""They are pushed this part of their radii farther than apart, so that the last overlaps vanish soon."""
+
+
+class RandomInDuct(Placement):
+    """Spheres lie at random and wholly inside an upright round duct whose radius changes along it.
+
+    They fill at most half of it. The duct has ``radii`` at ``heights`` above its lower end, and is conical
+    between them; its axis is along z. Where the domain is periodic along z, its length is that of the domain,
+    and it goes on across the faces; else spheres lie within its ends. Places are drawn evenly, and then
+    overlaps with each other and with the wall are pushed apart until there are none. It is no random
+    sequential addition, which ends below 0.38, and earlier beside walls.
+    """
+
+    centre: Vector = parameter("m", "middle of the lower end", (0.0, 0.0, 0.0))
+    heights: tuple[float, ...] = parameter(
+        "m", "heights at which the radius is given, rising from 0", examples=[(0.0, 0.01, 0.03)]
+    )
+    radii: tuple[float, ...] = parameter("m", "radius at each of them", examples=[(0.005, 0.01, 0.01)])
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        where, n = self.label, len(self.heights)
+        must(n > 1, f"{where}.heights", "two or more", n)
+        rising = self.heights[0] == 0 and bool((np.diff(self.heights) > 0).all())
+        must(rising, f"{where}.heights", "rising from 0", self.heights)
+        must(len(self.radii) == n, f"{where}.radii", f"{n}, one for each height", len(self.radii))
+        must(min(self.radii) > 0, f"{where}.radii", "above 0", self.radii)
+        return self
+
+    def volume(self) -> float:
+        """Return the volume of the duct, m^3: that of truncated cones."""
+        a, b = np.array(self.radii[:-1]), np.array(self.radii[1:])
+        return float((np.pi / 3 * np.diff(self.heights) * (a * a + a * b + b * b)).sum())
+
+    def radius_at(self, height: np.ndarray) -> np.ndarray:
+        """Return the radius of the duct (m) at heights above its lower end (m)."""
+        return np.interp(height, self.heights, self.radii)
+
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        length, largest = self.heights[-1], float(radii.max())
+        fraction = float((4 / 3 * np.pi * radii**3).sum()) / self.volume()
+        rule = f"at most {MOST_FILLED:g} in a duct in which they can be pushed apart"
+        must(fraction <= MOST_FILLED, "volume fraction", rule, float(f"{fraction:.4g}"))
+        must(
+            min(self.radii) > largest, "duct", f"wider than a sphere, {2 * largest:g} m", 2 * min(self.radii)
+        )
+        check_resolved("places in the duct", np.abs(self.centre) + length, float(radii.min()))
+        endless = domain.imaged()[2]
+        if endless:
+            side, rule = float(domain.edges(0.0)[2, 2]), "that of the box along z, which is periodic"
+            must(abs(side - length) <= 1e-9 * side, "length of the duct", f"{side:g} m, {rule}", length)
+        generator = np.random.default_rng([seed, 0x64756374])
+        places, wider = self._anywhere(len(radii), generator), radii * (1 + CLEARANCE)
+        for _ in range(MOST_PUSHES):
+            if not self._push_apart(places, radii, wider, endless):
+                return places + np.asarray(self.centre)
+        rule = f"one at which spheres can be pushed apart in {MOST_PUSHES} rounds"
+        raise InputError(f"volume fraction must be {rule}; received {fraction:.4g}")
+
+    def _anywhere(self, number: int, generator: np.random.Generator) -> np.ndarray:
+        """Return places (m), even over the duct."""
+        widest, kept = max(self.radii), np.empty((0, 3))
+        while len(kept) < number:
+            tried = generator.uniform(
+                (-widest, -widest, 0.0), (widest, widest, self.heights[-1]), (number, 3)
+            )
+            inside = np.hypot(tried[:, 0], tried[:, 1]) < self.radius_at(tried[:, 2])
+            kept = np.vstack([kept, tried[inside]])
+        return kept[:number]
+
+    def _push_apart(self, places: np.ndarray, radii: np.ndarray, wider: np.ndarray, endless: bool) -> bool:
+        """Push spheres that overlap, as wide as ``wider`` (m), apart and off the wall; return whether any of
+        them overlapped or was in the wall."""
+        length = self.heights[-1]
+        tree = cKDTree(places, boxsize=[0.0, 0.0, length] if endless else None)
+        i, j = tree.query_pairs(2 * float(wider.max()), output_type="ndarray").T
+        apart = places[j] - places[i]
+        if endless:
+            apart[:, 2] -= length * np.rint(apart[:, 2] / length)
+        distance = np.linalg.norm(apart, axis=1)
+        overlapped = bool((distance < radii[i] + radii[j]).any())
+        lacking = np.maximum(wider[i] + wider[j] - distance, 0.0)
+        push = (0.5 * lacking / np.maximum(distance, 1e-9 * wider[i]))[:, None] * apart
+        overlapped |= bool((self._off_wall(places, endless)[1] < radii).any())
+        if overlapped:
+            np.subtract.at(places, i, push)
+            np.add.at(places, j, push)
+            inward, depth = self._off_wall(places, endless)
+            places += np.maximum(wider - depth, 0.0)[:, None] * inward
+            # Rounding can put a place on the upper end, which a periodic tree refuses.
+            places[:, 2] = np.where(endless, places[:, 2] % length % length, places[:, 2])
+        return overlapped
+
+    def _off_wall(self, places: np.ndarray, endless: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Return the direction away from the nearest place of the wall, and how far inside the wall places
+        are (m), negative outside; the ends are part of it unless the duct is endless."""
+        rho = np.hypot(places[:, 0], places[:, 1])
+        here = np.stack([rho, places[:, 2]], axis=1)
+        corners = np.stack([self.radii, self.heights], axis=1)
+        if endless:
+            up = np.array([0.0, self.heights[-1]])
+            corners = np.vstack([corners[-2:-1] - up, corners, corners[1:2] + up])
+        else:
+            corners = np.vstack([[0.0, 0.0], corners, [0.0, self.heights[-1]]])
+        best = np.full(len(places), np.inf)
+        out = np.zeros_like(here)
+        for a, b in itertools.pairwise(corners):
+            part = np.clip((here - a) @ (b - a) / max((b - a) @ (b - a), np.finfo(float).tiny), 0.0, 1.0)
+            away = here - (a + part[:, None] * (b - a))
+            distance = np.linalg.norm(away, axis=1)
+            nearer = distance < best
+            best[nearer], out[nearer] = distance[nearer], away[nearer]
+        inside = rho < self.radius_at(places[:, 2])
+        if not endless:
+            inside &= (places[:, 2] > 0) & (places[:, 2] < self.heights[-1])
+        sign = np.where(inside, 1.0, -1.0)
+        flat = (sign / np.maximum(best, np.finfo(float).tiny))[:, None] * out
+        radial = np.where(rho > 0, flat[:, 0] / np.maximum(rho, np.finfo(float).tiny), 0.0)
+        inward = np.column_stack([radial * places[:, 0], radial * places[:, 1], flat[:, 1]])
+        return inward, sign * best
