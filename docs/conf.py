@@ -15,7 +15,15 @@ html_theme = "furo"
 html_title = f"tisim {release}"
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
-HIDDEN = ("model_config", "contract", "structure", "requires", "accuracy_parameters", "incompatible_controls")
+HIDDEN = (
+    "model_config",
+    "contract",
+    "structure",
+    "requires",
+    "accuracy_parameters",
+    "sweep_parameters",
+    "incompatible_controls",
+)
 autodoc_default_options = {"exclude-members": ", ".join(HIDDEN)}
 smartquotes = False
 python_use_unqualified_type_names = True
