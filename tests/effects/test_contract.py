@@ -87,7 +87,7 @@ def test_every_parameter_may_differ_per_world():
     assert np.abs(together[0].state["position"] - together[1].state["position"]).max() > 0.1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_no_effect_needs_is_not_allocated():
     """A scene pays for the fields, the bytes, the counters and the phases of its own effects only."""
     core = {"position", "velocity", "mass", "radius", "id"}

@@ -255,8 +255,8 @@ def falling_together(steps=40, dt=1e-4, radius=1e-4):
     )
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_rows_that_overflow_grow_and_change_no_bit(schedule):
     """Beside a world that looks at all pairs; grains of 20 times the size of others among them."""
     start = falling_together()
