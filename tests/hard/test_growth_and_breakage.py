@@ -71,7 +71,7 @@ class Optimist(Fragmentation):
         return 64
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_more_fragments_than_room_is_a_clear_failure():
     """The world stops, says so, names the grain, and keeps the last good state; others of the batch go on."""
     effects = (

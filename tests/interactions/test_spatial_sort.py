@@ -127,6 +127,7 @@ def alike(found, expected):
         np.testing.assert_allclose(*values, rtol=0, atol=1e-9 * scale, err_msg=name)
 
 
+@pytest.mark.slow
 def test_they_are_those_of_an_unsorted_run_but_for_rounding(unsorted, usual):
     assert unsorted.sort is None
     alike(usual[0], ends(unsorted, [bed(1)])[0])

@@ -36,7 +36,7 @@ def against_one_that_is_fixed(gap, velocity, spin, dt, steps):
                  materials={"grain": Material(stiffness=STIFFNESS, restitution=0.5)})  # fmt: skip
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_is_fixed_is_like_a_wall():
     """An impact has its restitution, and a bond that is stretched and twisted its damping ratio."""
     step = np.pi * np.sqrt(MASS / STIFFNESS) / 400

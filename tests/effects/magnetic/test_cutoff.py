@@ -110,8 +110,8 @@ def at_the_cutoff(law, state):
     return energy(law, state["position"] - ago * state["velocity"], m, state["radius"])
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("shifted", [True, False])
 def test_energy_is_conserved_through_a_shifted_cutoff_and_jumps_at_a_plain_one(shifted):
     """A shifted one keeps it to the order of Verlet; a plain one loses what the pair has at the cut-off."""
     law, gains = TruncatedDipoleDipole(cutoff=3.6, shifted=shifted), []

@@ -133,7 +133,7 @@ def test_a_comparison_that_cannot_be_leaves_the_files_of_before(tmp_path, monkey
     assert (tmp_path / "compare.h5").read_bytes() == content
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {CASE.name: CASE})
