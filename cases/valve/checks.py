@@ -17,7 +17,6 @@ STARTS = 6
 """Each valve is run from so many starts, that of fine grains from half as many."""
 BALANCE = 0.05
 """Walls bear the drag on an arrested flow to this part."""
-
 STILL_FLOWS = 0.5
 """Without a field at least this part of the flow at first is left as long after."""
 

@@ -37,7 +37,7 @@ FLUX = 0.23
 JAMS = {20: True, 30: True, 40: False}
 """Which constrictions jam with the coarse mixture, simulated as measured (mix 2 of table 3.2)."""
 FINE_JAMS = {30: False}
-"""The same of the fine mixture."""
+"""Which constrictions jam with the fine mixture, simulated as measured."""
 SPONTANEOUS = 5.0
 """Without a field, throats narrower than so many diameters jam by themselves (section 3.2.5, after [106])."""
 MEASURED_PRESSURE = 105e3

@@ -18,7 +18,7 @@ from tisim.worlds.bound import Peers
 CUTOFFS = (10.0, 20.0, 30.0, 60.0)
 """These cut-offs, in radii, are worth a try."""
 NEARER = (0.5, 0.7)
-"""Of a law with a cut-off those are that reach so much of the way beyond contact."""
+"""A law with a cut-off is compared with those whose cut-off lies at these parts of its way beyond contact."""
 
 
 class DipoleDipole(Dipoles, PairForce):
