@@ -27,7 +27,7 @@ from tisim.effects import (
     Granular,
     HertzMaterial,
     MindlinForce,
-    MutualFroehlichMoment,
+    MutualInducedMoment,
     RestitutionDamping,
     RollingEPSD,
     StokesDrag,
@@ -40,8 +40,6 @@ TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and
 
 FLOWING, LASTING = 0.1e-3, 0.5e-3
 """Grains flow so long without a field, and so long in it, s."""
-LINEAR = 1e12
-"""Grains whose magnetisation saturates at so much (A/m) do not saturate: those of L21."""
 CUTOFF = 4.4
 """Grains magnetise and attract each other up to so many radii: as far, in diameters, as L21 has it in its
 cell (section 2.4.3), a gap of 8 um between grains of 6.7 um."""
@@ -103,7 +101,6 @@ def scene(
     young: float = published.YOUNG,
     dt: float | None = None,
     friction: float = published.FRICTION,
-    saturation: float = LINEAR,
 ) -> Scene:
     """Return the scene of a valve.
 
@@ -113,9 +110,8 @@ def scene(
     fill. straight : length of the constriction, m, a quarter of its diameter unless given; slope : length of
     the cones before and after it over how much narrower it is; length : of the duct, m. flowing, lasting :
     how long grains flow without a field, and how long there is one, s. young : Pa. dt : s; unless given that
-    of L21 for grains of this size and modulus. friction : coefficient of sliding friction. saturation :
-    magnetisation at which grains saturate, A/m. All are values of one structure: valves that differ in them
-    run as one batch.
+    of L21 for grains of this size and modulus. friction : coefficient of sliding friction. All are values of
+    one structure: valves that differ in them run as one batch.
     """
     shape = duct(throat, bore, throat / 4 if straight is None else straight, slope, length)
     iron = Material(
@@ -140,9 +136,7 @@ def scene(
         effects=(
             MagneticField(constant=(flux, 0.0, 0.0), begin=flowing),
             # One sweep a step, as L21 has it (section 2.2.3).
-            MutualFroehlichMoment(
-                susceptibility=SUSCEPTIBILITY, saturation=saturation, sweeps=0, cutoff=CUTOFF
-            ),
+            MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, cutoff=CUTOFF),
             TruncatedDipoleDipole(cutoff=CUTOFF),
             CONTACT,
             shape.walls(),

@@ -14,7 +14,7 @@ from cases.valve.measures import drag_pressure, duct_of, oil_of
 from cases.valve.scene import mean_radius, scene, speed_of
 from cases.valve.sizes import COARSE, FINE_GRAINS, THROATS
 from tests.cases.valve.states import at_rest
-from tisim.effects import MutualFroehlichMoment, StokesDrag, TruncatedDipoleDipole
+from tisim.effects import MutualInducedMoment, StokesDrag, TruncatedDipoleDipole
 from tisim.sources import MagneticField, sample
 
 DUCT = Duct(throat=2.0, bore=5.0, straight=1.5, taper=1.0, length=8.0)
@@ -122,6 +122,6 @@ def test_what_is_compared_is_one_structure():
 
 def test_magnetic_laws_have_one_cut_off():
     made = scene()
-    moment, force = part(made, MutualFroehlichMoment), part(made, TruncatedDipoleDipole)
+    moment, force = part(made, MutualInducedMoment), part(made, TruncatedDipoleDipole)
     assert (moment.cutoff, moment.gap) == (force.cutoff, force.gap)
     assert moment.sweeps == 0
