@@ -39,13 +39,16 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_configure(config):
-    """A shell starts jobs in the background with Ctrl-C ignored, and what is ignored stays so in tisim.
+    """A shell starts jobs in the background with Ctrl-C ignored, and nohup with SIGHUP; what is ignored stays
+    so in tisim.
 
     Tests take two thirds of the time, nearly all of which is compiling, without the compiler's passes ahead
     of LLVM. No bit depends on these: the process of ``elsewhere`` has them.
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
     for compiler in ("TI", "QD"):
         os.environ.setdefault(f"{compiler}_ADVANCED_OPTIMIZATION", "0")
 
