@@ -9,9 +9,11 @@ from tests.scenes import compiled, fixed, simulate
 from tisim import Box, Clump, GrainClass, InputError, Material, Particles, Scene
 from tisim.analysis import clump_bodies
 from tisim.effects import (
+    DMT,
     Granular,
     Gravity,
     HertzMaterial,
+    Hooke,
     Impact,
     MindlinForce,
     RestitutionDamping,
@@ -214,6 +216,40 @@ def test_a_dumbbell_hits_the_floor_as_the_impulse_says():
     # With y turned by +lean the end at +x is below: what pushes it up turns the body the other way.
     np.testing.assert_allclose(eccentric.angular_velocity[0, 1], -impulse * arm / body.moments[1], rtol=2e-3)
     assert upright.velocity[0, 2] == pytest.approx(0.6 * speed, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_an_end_that_sticks_to_the_floor_swings_on_within_the_limit_of_its_lever():
+    """The guard of a contact takes the body for a sphere of its mass: its steps are below 2 sqrt(M/k). At a
+    lever l they must be below that over sqrt(1 + M l^2/I), or what sticks shakes itself off, unseen."""
+    body, lean, stiffness, surface_energy = DUMBBELL.body, 0.3, 1000.0, 0.5
+    arm = R * np.cos(lean)
+    lever = np.sqrt(1 + body.mass * arm**2 / body.moments[1])
+    held = 4 * np.pi * surface_energy * R / stiffness
+    law = Granular(normal=Hooke(), cohesion=DMT())
+    floor = Walls(planes=[Plane(normal=(0, 0, 1))])
+    material = Material(stiffness=stiffness, surface_energy=surface_energy)
+    scenes = [
+        clumps(
+            DUMBBELL,
+            # Its end at +x is below, and drawn into the floor by a tenth less than at rest.
+            [(0, 0, R * (1 + np.sin(lean)) - 0.9 * held)],
+            (law, floor),
+            orientation=np.roll(Turn.from_rotvec([0, lean, 0]).as_quat(), 1),
+            dt=part * 2 * np.sqrt(body.mass / stiffness),
+            steps=400,
+            materials={"grain": material},
+        )
+        for part in (0.9 / lever, 1.02 / lever, 1.02)
+    ]
+    sticks, shakes, stops = simulate(scenes, worlds=4, capacity=8)
+    assert sticks.status.ok, sticks.status.reason
+    assert shakes.status.ok, shakes.status.reason
+    assert "a step is too long" in stops.status.reason
+    low, lost = (result.state["position"][:, 2].min() for result in (sticks, shakes))
+    assert abs(R - low - held) < 0.5 * held
+    assert lost > R
+    assert clump_bodies(shakes.state).energy[0] > 50 * stiffness * (0.1 * held) ** 2 / 2
 
 
 def tumbling(seed=1, steps=3000):
