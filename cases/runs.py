@@ -1,10 +1,11 @@
-"""Results of runs of a case, of which none has failed."""
+"""Results of runs of a case: that none has failed, and how deep grains overlap."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from tisim import Result, RunError
+from tisim.analysis import largest_overlap, periodic_sides
 
 
 def sound(results: Sequence[Result]) -> list[Result]:
@@ -14,3 +15,9 @@ def sound(results: Sequence[Result]) -> list[Result]:
         if not result.status.ok and result.status.reason != "running":
             raise RunError(f"{result.scene.name}: {result.status.reason}")
     return list(results)
+
+
+def overlap(result: Result) -> float:
+    """Return the largest overlap of two grains at the end, over the mean radius of all."""
+    position, radius = result.state["position"], result.state["radius"]
+    return largest_overlap(position, radius, periodic_sides(result.scene.domain)) / float(radius.mean())

@@ -10,6 +10,7 @@ from scipy.constants import mu_0
 from scipy.linalg import eigvalsh
 
 from cases.avalanche.scene import CUTOFF, DENSITY, FLUX, GRAVITY, SUSCEPTIBILITY
+from cases.dipoles import attraction_in_line
 from tisim.analysis import nearest_image
 from tisim.scene.initial_state import Arrays
 
@@ -23,11 +24,10 @@ def moment(diameter: float, field: float = FLUX) -> float:
 
 
 def attraction(diameter: float, field: float = FLUX, mutual: bool = True) -> float:
-    """Return the force (N) with which two grains in contact along the field attract each other: 3 mu_0 m^2 /
-    (2 pi d^4), with moments that are 1 / (1 - 2 a) as large where grains magnetise each other, a = chi /
-    (3 + chi) / 8."""
+    """Return the force (N) with which two grains in contact along the field attract each other, with
+    moments that are 1 / (1 - 2 a) as large where grains magnetise each other, a = chi / (3 + chi) / 8."""
     grown = 1 / (1 - CONTRAST / 4) if mutual else 1.0
-    return 3 * mu_0 * (grown * moment(diameter, field)) ** 2 / (2 * math.pi * diameter**4)
+    return attraction_in_line(grown * moment(diameter, field), diameter)
 
 
 def weight(diameter: float) -> float:

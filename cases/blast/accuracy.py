@@ -1,4 +1,5 @@
-"""What accuracy is of in the blast of Z16: where the particles are; where they touch, the cloud's shape."""
+"""The quantities whose accuracy ``tisim cost`` measures in the blast of Z16: where the particles are; where
+they touch, the cloud's shape."""
 
 from __future__ import annotations
 

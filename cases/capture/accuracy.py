@@ -1,4 +1,5 @@
-"""What accuracy is of in capture: how many particles are caught, over random starts."""
+"""The quantities whose accuracy ``tisim cost`` measures in capture: how many particles are caught, over
+random starts."""
 
 from __future__ import annotations
 

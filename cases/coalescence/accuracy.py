@@ -1,5 +1,5 @@
-"""What accuracy is of in a cloud that falls together: the part that has agglomerated, and how dense the
-asteroid is, over random starts."""
+"""The quantities whose accuracy ``tisim cost`` measures in a cloud that falls together: the part that has
+agglomerated, and how dense the asteroid is, over random starts."""
 
 from __future__ import annotations
 

@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import math
 
-from scipy.constants import G, mu_0
+from scipy.constants import G
+
+from cases.dipoles import attraction_in_line
 
 PACKED = 0.6
 """Grains of a pile fill about this part of it."""
@@ -47,9 +49,8 @@ def spin_when_packed(rotation: float, diameter: float, spacing: float) -> float:
 
 
 def attraction(diameter: float, magnetisation: float) -> float:
-    """Return the force (N) of two magnets in contact, one behind the other: 3 mu_0 m^2 / (2 pi d^4)."""
-    moment = magnetisation * math.pi / 6 * diameter**3
-    return 3 * mu_0 * moment**2 / (2 * math.pi * diameter**4)
+    """Return the force (N) of two magnets in contact, one behind the other."""
+    return attraction_in_line(magnetisation * math.pi / 6 * diameter**3, diameter)
 
 
 def surface_weight(diameter: float, density: float, acceleration: float) -> float:

@@ -1,4 +1,5 @@
-"""What accuracy is of in concentrated samples: chains, and where particles are, over random starts."""
+"""The quantities whose accuracy ``tisim cost`` measures in concentrated samples: chains, and where particles
+are, over random starts."""
 
 from __future__ import annotations
 

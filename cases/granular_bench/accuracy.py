@@ -1,9 +1,11 @@
-"""What accuracy is of in a draw-down test and in a bed, over random starts."""
+"""The quantities whose accuracy ``tisim cost`` measures in a draw-down test and in a bed, over random
+starts."""
 
 from __future__ import annotations
 
-from cases.granular_bench.bed import centre_height, overlap, side_load
+from cases.granular_bench.bed import centre_height, side_load
 from cases.granular_bench.measures import discharge, repose
+from cases.runs import overlap
 from tisim import Scene
 from tisim.accuracy import Quantity
 from tisim.operators import Passage

@@ -20,7 +20,6 @@ from cases.granular_bench.scene import (
     grains,
 )
 from tisim import Result, Scene
-from tisim.analysis import largest_overlap
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import Gravity, Walls
 from tisim.geometry import CylindricalSurface, Plane
@@ -84,12 +83,6 @@ def bed(
         duration=duration,
         seed=seed,
     )
-
-
-def overlap(result: Result) -> float:
-    """Return the largest overlap of two grains at the end, over the mean radius."""
-    position, radius = result.state["position"], result.state["radius"]
-    return largest_overlap(position, radius) / float(radius.mean())
 
 
 def side_load(result: Result) -> float:

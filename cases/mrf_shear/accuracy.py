@@ -1,8 +1,10 @@
-"""What accuracy is of in a sheared cell, over random starts: shear stress, and how deep grains overlap."""
+"""The quantities whose accuracy ``tisim cost`` measures in a sheared cell, over random starts: shear stress,
+and how deep grains overlap."""
 
 from __future__ import annotations
 
-from cases.mrf_shear.measures import overlap, shear_stress
+from cases.mrf_shear.measures import shear_stress
+from cases.runs import overlap
 from tisim import Scene
 from tisim.accuracy import Quantity
 

@@ -9,10 +9,11 @@ import numpy as np
 from cases.case import Check
 from cases.mrf_shear import published
 from cases.mrf_shear.flow_curve import COMPARED, VARIATIONS, Curve
-from cases.mrf_shear.measures import magnetised_part, order, overlap, raft_force
+from cases.mrf_shear.measures import magnetised_part, order, raft_force
 from cases.mrf_shear.regime import regime
 from cases.mrf_shear.runs import cells, paired
 from cases.mrf_shear.scene import LOWER, RATES, UPPER
+from cases.runs import overlap
 from cases.statistics import Claim, Mean, Shown
 from tisim import Result
 

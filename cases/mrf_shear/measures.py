@@ -1,4 +1,4 @@
-"""What a sheared cell measures: shear stress, how grains are ordered, overlap, and how much is magnetised."""
+"""What a sheared cell measures: shear stress, how grains are ordered, and how much is magnetised."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from tisim.analysis import (
     cluster_shapes,
     contacts,
     fabric_tensor,
-    largest_overlap,
     mean_coordination,
     periodic_sides,
 )
@@ -98,12 +97,6 @@ def order(state: Arrays, domain: Domain) -> Order:
         alignment=float(3 * along - 1) / 2,
         contacts=mean_coordination(len(radius), pairs),
     )
-
-
-def overlap(result: Result) -> float:
-    """Return the largest overlap of two grains at the end, over the mean radius of all."""
-    position, radius = result.state["position"], result.state["radius"]
-    return largest_overlap(position, radius, periodic_sides(result.scene.domain)) / float(radius.mean())
 
 
 def magnetised_part(result: Result) -> float:

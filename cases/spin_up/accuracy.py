@@ -1,4 +1,5 @@
-"""What accuracy is of in a pile that is to be spun up: how it is packed, over random starts."""
+"""The quantities whose accuracy ``tisim cost`` measures in a pile that is to be spun up: how it is packed,
+over random starts."""
 
 from __future__ import annotations
 

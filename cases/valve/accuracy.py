@@ -1,9 +1,10 @@
-"""What accuracy is of in a valve, over random starts: how much still flows in the field, and how deep grains
-overlap."""
+"""The quantities whose accuracy ``tisim cost`` measures in a valve, over random starts: how much still flows
+in the field, and how deep grains overlap."""
 
 from __future__ import annotations
 
-from cases.valve.measures import flow_rate, overlap
+from cases.runs import overlap
+from cases.valve.measures import flow_rate
 from tisim import Scene
 from tisim.accuracy import Quantity
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.constants import mu_0
 
+from cases.dipoles import attraction_in_line
 from cases.mrf_shear.measures import CHAINED
 from cases.valve import published
 from cases.valve.duct import Duct
 from tisim import Result, Scene
-from tisim.analysis import contacts, labels, largest_overlap, periodic_sides
+from tisim.analysis import contacts, labels, periodic_sides
 from tisim.effects import Walls
 from tisim.scene.initial_state import Arrays
 from tisim.sources import ConstrictionFlow
@@ -111,18 +112,11 @@ def inclination(duct: Duct) -> float:
     return float(duct.taper / np.hypot(duct.taper, narrower))
 
 
-def overlap(result: Result) -> float:
-    """Return the largest overlap of two grains at the end, over the mean radius of all."""
-    position, radius = result.state["position"], result.state["radius"]
-    return largest_overlap(position, radius, periodic_sides(result.scene.domain)) / float(radius.mean())
-
-
 def attraction(radius: float, flux: float) -> float:
     """Return the force (N) with which two grains of a radius (m) that touch along a field (T) attract each
-    other: 3 mu_0 m^2 / (2 pi d^4) with the moments of spheres without end of permeability that magnetise each
-    other, 4/3 of 4 pi R^3 B / mu_0."""
-    moment = 4 / 3 * 4 * np.pi * radius**3 * flux / mu_0
-    return float(3 * mu_0 * moment**2 / (2 * np.pi * (2 * radius) ** 4))
+    other, with the moments of spheres without end of permeability that magnetise each other, 4/3 of 4 pi R^3
+    B / mu_0."""
+    return attraction_in_line(4 / 3 * 4 * np.pi * radius**3 * flux / mu_0, 2 * radius)
 
 
 def mason_number(scene: Scene, radius: float, flux: float) -> float:

@@ -1,4 +1,5 @@
-"""What accuracy is of in the array of Z13: where its particles are, and its centre of gravity.
+"""The quantities whose accuracy ``tisim cost`` measures in the array of Z13: where its particles are, and its
+centre of gravity.
 
 The centre of gravity of any such array, and every particle that feels no other, follow
 ``closed_forms.response``.

@@ -1,11 +1,13 @@
-"""Results of runs, of which none has failed."""
+"""Results of runs: that none has failed, and how deep grains overlap."""
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from cases.runs import sound
-from tisim import RunError
+from cases.runs import overlap, sound
+from tisim import Box, RunError
+from tisim.components.domain import Open
 from tisim.engine.result import Status
 
 
@@ -18,3 +20,14 @@ def test_results_are_of_worlds_that_end_or_go_on():
     assert sound(fine) == fine
     with pytest.raises(RunError, match="a scene: a force is not a number"):
         sound([*fine, result_with(False, "a force is not a number")])
+
+
+@pytest.mark.parametrize(("periodic", "deepest"), [(True, 0.5), (False, 0.25)])
+def test_the_largest_overlap_is_over_the_mean_radius_and_across_faces(periodic, deepest):
+    """Two of radius 1 and 3 that overlap by 0.5, and by 1 across the face of a periodic box."""
+    box = Box(low=(0.0,) * 3, high=(6.5, 9.0, 9.0), periodic=(periodic, False, False))
+    state = {"position": np.array([[0.5, 4.0, 4.0], [4.0, 4.0, 4.0]]), "radius": np.array([1.0, 3.0])}
+    result = SimpleNamespace(scene=SimpleNamespace(domain=box), state=state)
+    assert overlap(result) == pytest.approx(deepest)
+    result.scene.domain = Open()
+    assert overlap(result) == pytest.approx(0.25)

@@ -7,15 +7,9 @@ import pytest
 
 import tisim
 from cases.granular_bench.accuracy import quantities
-from cases.granular_bench.bed import (
-    bed,
-    centre_height,
-    impact_time,
-    linear_stiffness,
-    overlap,
-    side_load,
-)
+from cases.granular_bench.bed import bed, centre_height, impact_time, linear_stiffness, side_load
 from cases.granular_bench.sizes import scene_for
+from cases.runs import overlap
 
 
 def test_quantities_of_a_bed():
@@ -27,7 +21,7 @@ def test_quantities_of_a_bed():
         "position": position, "radius": np.full(4, 1.3e-3), "mass": np.array([1.0, 1.0, 1.0, 2.0]),
         "side_loads": loads,
     }  # fmt: skip
-    result = SimpleNamespace(state=state)
+    result = SimpleNamespace(scene=bed(), state=state)
     assert centre_height(result) == pytest.approx(2.6e-3)
     assert side_load(result) == pytest.approx(5.0 / (5.0 * 9.80665))
     apart = np.hypot(2.5e-3, 0.2e-3)

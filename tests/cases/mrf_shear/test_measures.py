@@ -13,7 +13,6 @@ from cases.mrf_shear.measures import (
     area,
     magnetised_part,
     order,
-    overlap,
     raft_force,
     shear_rate,
     shear_stress,
@@ -22,6 +21,7 @@ from cases.mrf_shear.measures import (
 from cases.mrf_shear.regime import approach_time, magnetisation, mason_number, regime, stokes_time
 from cases.mrf_shear.runs import paired
 from cases.mrf_shear.scene import LOWER, UPPER, scene
+from cases.runs import overlap
 from cases.statistics import Mean
 
 R, UM = LARGE_RADIUS, 1e-6

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cases.valve.measures import clusters, drag_pressure, held_pressure, overlap, unhindered_rate
+from cases.runs import overlap
+from cases.valve.measures import clusters, drag_pressure, held_pressure, unhindered_rate
 from cases.valve.runs import FLOW_LOOKS, flows
 from cases.valve.scene import scene
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import mu_0
 
+from cases.runs import overlap
 from cases.valve.measures import (
     attraction,
     clusters,
@@ -13,7 +14,6 @@ from cases.valve.measures import (
     held_pressure,
     mason_number,
     oil_of,
-    overlap,
     unhindered_rate,
 )
 from cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
