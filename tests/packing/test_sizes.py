@@ -47,6 +47,7 @@ def test_sizes_are_distributed_as_scipy_has_it(name, by):
     other, _ = truth(law, 3 if by == "number" else 0)
     assert stats.kstest(radius, other).statistic > 20 * distance
     assert sizes.mean_cube() == pytest.approx(mean(3), rel=1e-5)
+    assert sizes.mean_radius() == pytest.approx(mean(1), rel=1e-5)
     uniform = np.array([0.01, 0.1, 0.5, 0.9, 0.99])
     np.testing.assert_allclose(cumulative(sizes.radii(uniform)), uniform, atol=1e-5)
 

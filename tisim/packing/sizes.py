@@ -52,6 +52,15 @@ class SizeDistribution(Component):
         part = np.clip((uniform - first) / np.where(last > first, last - first, 1.0), 0.0, 1.0)
         return a + part * (b - a) if self.by == "number" else a / np.sqrt(1 - part * (1 - (a / b) ** 2))
 
+    def mean_radius(self) -> float:
+        """Return the mean radius over the number of grains, m."""
+        radius, passing = self.nodes()
+        a, b, part = radius[:-1], radius[1:], np.diff(passing)
+        if self.by == "number":
+            return float((part * (a + b) / 2).sum())
+        # The means between two nodes of r/r^3, and of 1/r^3.
+        return float((part / (a * b)).sum() / (part * self._counts_per_part(radius)).sum())
+
     def mean_cube(self) -> float:
         """Return the mean of r^3 over the number of grains, m^3."""
         radius, passing = self.nodes()
