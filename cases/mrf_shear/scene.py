@@ -126,14 +126,16 @@ CONTACT = Granular(
 """The law of contact of L21 section 2.2.1."""
 
 
-def iron(young: float, rolling: float, cohesion: float) -> Material:
-    """Return what grains are made of, by table 2.1 but for Young's modulus (Pa), the coefficient of rolling
-    friction and the cohesion energy density (J/m^3)."""
+def iron(
+    young: float, rolling: float, cohesion: float | None, friction: float = published.FRICTION
+) -> Material:
+    """Return what grains are made of, by table 2.1 but for Young's modulus (Pa), the coefficients of rolling
+    and of sliding friction, and the cohesion energy density (J/m^3; None for a law without cohesion)."""
     return Material(
         young=young,
         poisson=published.POISSON,
         restitution=published.RESTITUTION,
-        friction=published.FRICTION,
+        friction=friction,
         rolling_friction=rolling,
         cohesion_energy_density=cohesion,
     )
@@ -141,7 +143,7 @@ def iron(young: float, rolling: float, cohesion: float) -> Material:
 
 def smooth(young: float) -> Material:
     """Return what the plates below and above are made of, along which grains slide freely; young : Pa."""
-    return iron(young, 0.0, 0.0).model_copy(update={"friction": 0.0})
+    return iron(young, 0.0, 0.0, friction=0.0)
 
 
 def scene(
@@ -194,7 +196,7 @@ def scene(
             StokesDrag(viscosity=published.OIL_VISCOSITY),
             *sheared(rate, sides[2], raft, magnetising, before, still),
         ),
-        stepper=Verlet(control=FixedStep(dt=dt or impact_step(smallest(grains), young))),
+        stepper=Verlet(control=FixedStep(dt=impact_step(smallest(grains), young) if dt is None else dt)),
         duration=magnetising + strain / rate,
         seed=seed,
     )

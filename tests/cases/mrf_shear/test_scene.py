@@ -16,6 +16,7 @@ from cases.mrf_shear.grains import (
 )
 from cases.mrf_shear.runs import magnetised
 from cases.mrf_shear.scene import MAGNETISING_TIME, RATES, SIDES, impact_step, scene
+from tisim import InputError
 from tisim.effects import PrescribedMotion
 from tisim.operators import JoinGroup
 from tisim.sources import CouetteFlow, MagneticField
@@ -107,3 +108,8 @@ def test_a_cell_of_many_sizes_is_wider_than_its_grains_reach():
     assert made.domain.high[0] > 2 * (24.44e-6 + published.NEIGHBOUR_GAP)
     assert 1.46e-6 / 2 <= radius.min() < radius.max() <= 24.44e-6 / 2
     assert made.stepper.control.dt == pytest.approx(impact_step(0.73e-6, 1e9))
+
+
+def test_a_step_of_nothing_is_refused():
+    with pytest.raises(InputError, match=r"dt must be at least .*; received 0\.0"):
+        scene(dt=0.0)
