@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cases.case import Check
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim, Mean, Shown
 from cases.valve.measures import clusters, drag_pressure, held_pressure, unhindered_rate
 from cases.valve.runs import ARRESTED, Flow, left
 from cases.valve.sizes import GRADIENT, LENGTH
@@ -21,7 +21,7 @@ STILL_FLOWS = 0.5
 """Without a field at least this part of the flow at first is left as long after."""
 
 
-def check(starts: int = STARTS) -> Iterator[Check | Claim]:
+def check(starts: int = STARTS) -> Iterator[Check | Claim | Shown]:
     """Yield each number as it is known."""
     narrow, wide, fine, without = by_throat(starts)
     yield from flowing([narrow, wide, fine])
@@ -49,12 +49,11 @@ def unhindered(flow: Flow) -> float:
     return unhindered_rate(flow.result.scene, float(flow.result.state["mass"].sum()))
 
 
-def arrested(valve: ValveRuns) -> Iterator[Check | Claim]:
-    """Yield that a flow is arrested by arches across, and that the walls bear the drag on it."""
+def arrested(valve: ValveRuns) -> Iterator[Check | Claim | Shown]:
+    """Yield that a flow is arrested, how many arches there are, and that the walls bear the drag on it."""
     results = [flow.result for flow in valve.flows]
     yield Claim(f"{valve.name}: flow left in the field (L21: 20x, 30x jam)", left(valve.flows), most=ARRESTED)
-    bridged = [clusters(one.state, one.scene).bridged for one in results]
-    yield Check("the same: starts with grains in contact from wall to wall", sum(bridged), len(bridged), 0.0)
+    yield arches(valve)
     borne = np.mean([held_pressure(one) / drag_pressure(one) for one in results])
     yield Check("the same: force on the walls over drag", float(borne), 1.0, BALANCE)
     pressures = [drag_pressure(one) / (GRADIENT * LENGTH) for one in results]
@@ -62,6 +61,16 @@ def arrested(valve: ValveRuns) -> Iterator[Check | Claim]:
     yield Claim(name, Mean.of(pressures), 0.8, 1.3)
 
 
-def going_on(valve: ValveRuns, says: str) -> Iterator[Claim]:
-    """Yield that a flow goes on in the field."""
+def going_on(valve: ValveRuns, says: str) -> Iterator[Claim | Shown]:
+    """Yield that a flow goes on in the field, and how many arches there are."""
     yield Claim(f"{valve.name}: flow left in the field ({says})", left(valve.flows), ARRESTED)
+    yield arches(valve)
+
+
+def arches(valve: ValveRuns) -> Shown:
+    """Return how many starts end with grains in contact from wall to wall. It is shown of valves that flow,
+    too: there such an arch is one that yields."""
+    results = [flow.result for flow in valve.flows]
+    bridged = sum(clusters(one.state, one.scene).bridged for one in results)
+    name = f"{valve.name}: starts with grains in contact from wall to wall"
+    return Shown(name, bridged, f"of {len(results)}")

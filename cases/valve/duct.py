@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from tisim.effects import Walls
+from tisim.errors import must
 from tisim.geometry import ConicalSurface, CylindricalSurface
 from tisim.packing import RandomInDuct
 from tisim.sources import ConstrictionFlow
@@ -29,6 +31,15 @@ class Duct:
     taper: float
     length: float
 
+    def __post_init__(self) -> None:
+        rule = f"above 0 and below {self.bore:g} m, the bore"
+        must(0 < self.throat < self.bore, "diameter of the constriction", rule, self.throat)
+        must(self.straight > 0, "length of the constriction", "above 0", self.straight)
+        must(self.taper > 0, "length of a cone", "above 0", self.taper)
+        least = self.straight + 2 * self.taper
+        rule = f"above {least:g} m, that of the constriction with its cones"
+        must(self.length > least, "length of the duct", rule, self.length)
+
     @property
     def area(self) -> float:
         """Return the cross-section of the duct, m^2."""
@@ -40,6 +51,16 @@ class Duct:
         wide, narrow = self.bore / 2, self.throat / 2
         place = np.array([-self.length / 2, -far, -near, near, far, self.length / 2])
         return place + self.length / 2, np.array([wide, wide, narrow, narrow, wide, wide])
+
+    def depth(self, rho: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return how far places inside, at distances from the axis and along it (m), are from the wall, m."""
+        heights, radii = self.profile()
+        corners, places = np.column_stack([radii, heights - self.length / 2]), np.column_stack([rho, z])
+        nearest = np.full(len(places), np.inf)
+        for a, b in itertools.pairwise(corners):
+            part = np.clip((places - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+            nearest = np.minimum(nearest, np.linalg.norm(places - a - part[:, None] * (b - a), axis=1))
+        return nearest
 
     def filling(self) -> RandomInDuct:
         """Return where grains begin: anywhere in the duct."""

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.constants import mu_0
 
 from cases.dipoles import attraction_in_line
-from cases.mrf_shear.measures import CHAINED
 from cases.valve import published
 from cases.valve.duct import Duct
-from tisim import Result, Scene
+from cases.valve.scene import mean_radius
+from tisim import Cloud, Result, Scene
 from tisim.analysis import contacts, labels, periodic_sides
 from tisim.effects import Walls
 from tisim.scene.initial_state import Arrays
@@ -68,6 +68,15 @@ def drag_pressure(result: Result) -> float:
     return drag(result) / duct_of(result.scene).area
 
 
+def pressure_at_rest(scene: Scene) -> float:
+    """Return the drag on the grains of a scene, were they at rest and evenly over the duct, over the
+    cross-section, Pa."""
+    cloud, duct = scene.particles, duct_of(scene)
+    assert isinstance(cloud, Cloud)
+    each = 6 * np.pi * published.OIL_VISCOSITY * mean_radius(cloud.grains) * oil_of(scene).speed
+    return float(each * cloud.count() * duct.oil_through() / duct.filling().volume() / duct.area)
+
+
 def held_pressure(result: Result) -> float:
     """Return the force of the grains on the walls along the duct at the end, over its cross-section, Pa."""
     return result.measures["valve_force_z"] / duct_of(result.scene).area
@@ -77,12 +86,12 @@ def held_pressure(result: Result) -> float:
 class Clusters:
     """The clusters of grains that touch.
 
-    label : that of each grain's. largest : the part of all grains that are in the largest. bridged : whether
-    grains within the cones and the constriction that are bound to each other there touch the wall on both
-    sides of the axis, along the field: an arch or a chain across.
+    largest : the part of all grains that are in the largest. bridged : whether grains within the cones and
+    the constriction that are bound to each other there touch opposite quarters of the wall, those around the
+    direction of the field: an arch or a chain across. They are quarters, as chains stand along the field, and
+    as two neighbours where halves of the wall meet would be an arch, one on either side.
     """
 
-    label: np.ndarray
     largest: float
     bridged: bool
 
@@ -90,26 +99,15 @@ class Clusters:
 def clusters(state: Arrays, scene: Scene) -> Clusters:
     """Return the clusters of a state."""
     position, radius, duct = state["position"], state["radius"], duct_of(scene)
-    gap = CHAINED * float(radius.mean())
-    pairs = contacts(position, radius, gap, periodic_sides(scene.domain))
-    label = labels(len(radius), pairs)
+    pairs = contacts(position, radius, sides=periodic_sides(scene.domain))
+    size = np.bincount(labels(len(radius), pairs)).max()
+    x, y, z = position.T
+    inside = np.abs(z) <= duct.straight / 2 + duct.taper
     # Bound to each other within the constriction alone.
-    inside = np.abs(position[:, 2]) <= duct.straight / 2 + duct.taper
     there = labels(len(radius), pairs[inside[pairs].all(axis=1)])
-    heights, radii = duct.profile()
-    wall = np.interp(position[:, 2] + duct.length / 2, heights, radii)
-    rho = np.hypot(position[:, 0], position[:, 1])
-    # To a cone it is nearer than to its radius at this height, by the cosine of its inclination.
-    slant = np.where(np.abs(position[:, 2]) > duct.straight / 2, inclination(duct), 1.0)
-    touches = inside & ((wall - rho) * slant <= radius + gap)
-    sides = [set(there[touches & (sign * position[:, 0] > 0)].tolist()) for sign in (-1, 1)]
-    return Clusters(label, float(np.bincount(label).max() / len(label)), bool(sides[0] & sides[1]))
-
-
-def inclination(duct: Duct) -> float:
-    """Return the cosine of the angle of the cones to the axis."""
-    narrower = (duct.bore - duct.throat) / 2
-    return float(duct.taper / np.hypot(duct.taper, narrower))
+    touches = inside & (duct.depth(np.hypot(x, y), z) <= radius) & (np.abs(x) > np.abs(y))
+    quarters = [set(there[touches & (sign * x > 0)].tolist()) for sign in (-1, 1)]
+    return Clusters(float(size / len(radius)), bool(quarters[0] & quarters[1]))
 
 
 def attraction(radius: float, flux: float) -> float:

@@ -1,4 +1,4 @@
-"""What L21 says of its valve: the numbers of section 3.4.4, and which valves jam (table 3.2).
+"""What L21 says of its valve: the numbers of section 3.4.4.
 
 L21 states neither the inner diameter of the duct, nor any length along it, nor the taper of the constriction
 (its figure 3.7 has no scale), nor Poisson's ratio, restitution and rolling friction, for which those of its
@@ -33,12 +33,3 @@ UNMAGNETISED = 1e-3
 """The grains flow so long without a field, s."""
 FLUX = 0.23
 """Flux density across the valve, T."""
-
-JAMS = {20: True, 30: True, 40: False}
-"""Which constrictions jam with the coarse mixture, simulated as measured (mix 2 of table 3.2)."""
-FINE_JAMS = {30: False}
-"""Which constrictions jam with the fine mixture, simulated as measured."""
-SPONTANEOUS = 5.0
-"""Without a field, throats narrower than so many diameters jam by themselves (section 3.2.5, after [106])."""
-MEASURED_PRESSURE = 105e3
-"""Valves were tested at this pressure, Pa (table 3.2)."""

@@ -18,11 +18,11 @@ from cases.case import size_named
 from cases.mixtures import VALVE_GRAINS
 from cases.mrf_shear import published as shear
 from cases.mrf_shear.grains import number_of, smallest
-from cases.mrf_shear.scene import SUSCEPTIBILITY
+from cases.mrf_shear.scene import SUSCEPTIBILITY, iron
 from cases.valve import published
 from cases.valve.duct import Duct
 from cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
-from tisim import Box, Cloud, GrainClass, Material, Scene
+from tisim import Box, Cloud, GrainClass, Scene
 from tisim.effects import (
     Granular,
     HertzMaterial,
@@ -33,6 +33,7 @@ from tisim.effects import (
     StokesDrag,
     TruncatedDipoleDipole,
 )
+from tisim.errors import must
 from tisim.sources import MagneticField
 from tisim.steppers import FixedStep, Verlet
 
@@ -64,7 +65,7 @@ def duct(throat: float, bore: float, straight: float, slope: float, length: floa
 def mean_radius(grains: Sequence[GrainClass]) -> float:
     """Return the mean radius of the grains of a mixture, over their number, m."""
     numbers = np.array([one.number() for one in grains])
-    radii = np.array([one.sizes.nodes()[0].mean() for one in grains])
+    radii = np.array([one.sizes.mean_radius() for one in grains])
     return float(numbers @ radii / numbers.sum())
 
 
@@ -114,13 +115,7 @@ def scene(
     one structure: valves that differ in them run as one batch.
     """
     shape = duct(throat, bore, throat / 4 if straight is None else straight, slope, length)
-    iron = Material(
-        young=young,
-        poisson=shear.POISSON,
-        restitution=shear.RESTITUTION,
-        friction=friction,
-        rolling_friction=shear.ROLLING_FRICTION,
-    )
+    must(pressure is None or speed is None, "pressure", "left out where the speed is given", pressure)
     if speed is None:
         speed = speed_of(GRADIENT * length if pressure is None else pressure, shape, grains, fraction)
     half = (bore / 2, bore / 2, length / 2)
@@ -131,7 +126,7 @@ def scene(
             grains=tuple(grains),
             placement=shape.filling(),
         ),
-        materials={"iron": iron},
+        materials={"iron": iron(young, shear.ROLLING_FRICTION, None, friction)},
         domain=Box(low=(-half[0], -half[1], -half[2]), high=half, periodic=(False, False, True)),
         effects=(
             MagneticField(constant=(flux, 0.0, 0.0), begin=flowing),
@@ -143,7 +138,7 @@ def scene(
             shape.oil(speed),
             StokesDrag(viscosity=published.OIL_VISCOSITY),
         ),
-        stepper=Verlet(control=FixedStep(dt=dt or step(smallest(grains), young))),
+        stepper=Verlet(control=FixedStep(dt=step(smallest(grains), young) if dt is None else dt)),
         duration=flowing + lasting,
         seed=seed,
     )

@@ -1,4 +1,4 @@
-"""The sizes of the case: valves for a laptop, what a search runs, and those of L21."""
+"""The sizes of the case: valves for a laptop, what a search runs, and those with the numbers of L21."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ BORE, LENGTH = 8 * D, 8 * D
 
 L21_BORE, L21_LENGTH = 3.2e-3, 0.9e-3
 """Diameter of the duct of L21, m, which it does not state: an eighth of an inch, which leaves 0.4 mm of wall
-in a valve that is 4 mm wide (its table 3.1); and the length at which its oil drags grains at rest with about
-its 100 kPa."""
+in a valve that is 4 mm wide (its table 3.1); and the length, in which its oil drags grains at rest with 90,
+117 and 141 kPa where the constriction is 20, 30 and 40 grains wide, around its 100 kPa."""
 GRADIENT = published.PRESSURE / L21_LENGTH
-"""The drag on grains at rest in a unit of volume of the duct, Pa/m: that of L21."""
+"""The drag on grains at rest in a unit of volume of the duct, Pa/m: L21's 100 kPa over that length."""
 
 SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 4e-4}
 """What a search runs of each design: the field is on from the first."""
@@ -49,11 +49,11 @@ SIZES = {
     "default": Size(
         "185 grains of 44 um, a constriction of 4 diameters in a duct of 8 by 8", {}, SEARCH_SETTINGS
     ),
-    "l21_20": Size("L21's own: a constriction of 0.88 mm, its coarse mixture", l21(20)),
-    "l21_30": Size("the same, 1.32 mm", l21(30)),
-    "l21_40": Size("the same, 1.76 mm", l21(40)),
+    "l21_20": Size("L21's numbers: a constriction of 0.88 mm, 44,668 grains of its coarse mixture", l21(20)),
+    "l21_30": Size("the same, 1.32 mm, 47,782 grains", l21(30)),
+    "l21_40": Size("the same, 1.76 mm, 53,848 grains", l21(40)),
     "l21_fine": Size(
-        "1.32 mm, L21's fine mixture, in a shorter duct with a shorter constriction",
+        "1.32 mm, 1,498,645 grains of L21's fine mixture, in a shorter duct with a shorter constriction",
         l21(
             30,
             grains=classes(FINE_VALVE_GRAINS, "mass"),

@@ -41,11 +41,6 @@ class ValveRuns:
         name = f"{self.width:.3g} grains of {1e6 * self.diameter:.3g} µm"
         return name if self.flux > 0 else f"{name}, no field"
 
-    @property
-    def jammed(self) -> int:
-        """Return how many of the flows are arrested."""
-        return sum(flow.arrested for flow in self.flows)
-
 
 @dataclass(frozen=True)
 class Wanted:

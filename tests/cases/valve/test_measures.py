@@ -18,6 +18,7 @@ from cases.valve.measures import (
 )
 from cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
 from cases.valve.scene import scene
+from cases.valve.sizes import THROATS
 from tests.cases.valve.states import at_rest, result_of
 
 R, UM = 22e-6, 1e-6
@@ -49,33 +50,60 @@ def test_the_drag_on_grains_in_the_duct_and_in_the_constriction():
     assert held_pressure(held) == pytest.approx(3e-3 / (np.pi * (176e-6) ** 2))
 
 
+ARCH = [[x, 0, 0] for x in (-66, -22, 22, 66)]
+"""Four grains across the constriction, um: they just touch each other and the wall."""
+PRESSED = 22.05
+"""Radius of grains that are pressed together there, um."""
+
+
+def found(places, radius=PRESSED):
+    """The clusters of grains at some places, um."""
+    return clusters(result_of(VALVE, np.array(places) * UM, radius=radius * UM).state, VALVE)
+
+
 def test_an_arch_across_the_constriction_and_grains_elsewhere():
     """Four grains from wall to wall, three in a row along the duct that goes on across its ends, and one."""
-    arch = [[x * UM, 0, 0] for x in (-66, -22, 22, 66)]
-    row = [[0, 0, z * UM] for z in (-216, 216, 172)]
-    alone = [[100 * UM, 100 * UM, 150 * UM]]
-    found = clusters(result_of(VALVE, arch + row + alone).state, VALVE)
-    assert found.largest == pytest.approx(4 / 8)
-    assert found.bridged
-    assert len(set(found.label[:4])) == 1
-    assert len(set(found.label[4:7])) == 1
-    assert len(set(found.label)) == 3
-    # Without one of its grains it is no arch; in the duct one across is none.
-    assert not clusters(result_of(VALVE, arch[:3] + row).state, VALVE).bridged
-    higher = [[x * UM, 0, 190 * UM] for x in (-154, -110, -66, -22, 22, 66, 110, 154)]
-    assert not clusters(result_of(VALVE, higher).state, VALVE).bridged
+    row, alone = [[0, 0, z] for z in (-216, 216, 172)], [[100, 100, 150]]
+    assert found(ARCH + row + alone).largest == pytest.approx(4 / 8)
+    assert found(ARCH + row + alone).bridged
+    # It is none without one of its grains, nor where two are near and do not touch, nor in the duct.
+    assert not found(ARCH[:3] + row).bridged
+    assert not found([[-66, 0, 0], [-22.3, 0, 0], [22.3, 0, 0], [66, 0, 0]]).bridged
+    assert not found(ARCH, radius=21.9).bridged
+    higher = [[x, 0, 190] for x in (-154, -110, -66, -22, 22, 66, 110, 154)]
+    assert found(higher).largest == 1
+    assert not found(higher).bridged
+
+
+def test_two_neighbours_at_the_wall_are_no_arch():
+    """They touch it on either side of the axis, side by side across the field."""
+    y = np.sqrt(66**2 - 22**2)
+    pair = [[-22, y, 0], [22, y, 0]]
+    assert found(pair).largest == 1
+    assert not found(pair).bridged
+
+
+@pytest.mark.parametrize(("degrees", "along"), [(0, True), (40, True), (50, False), (90, False)])
+def test_an_arch_stands_along_the_field(degrees, along):
+    a = np.radians(degrees)
+    assert found([[x * np.cos(a), x * np.sin(a), 0] for x, _, _ in ARCH]).bridged == along
+
+
+@pytest.mark.parametrize("throat", THROATS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_random_start_is_no_arch(throat, seed):
+    made = scene(throat=throat, seed=seed)
+    assert not clusters(made.start(), made).bridged
 
 
 def test_a_grain_touches_a_cone_by_its_distance_from_it():
     """Halfway up a cone of 45 degrees, where the duct is 132 um wide."""
-    z, wall = (22 + 44) * UM, 132 * UM
-    near = (wall - R * np.sqrt(2)) / UM
-    xs = np.arange(-near, near + 1, 2 * near / 5)
-    chain = [[x * UM, 0, z] for x in xs]
+    z, wall = 22 + 44, 132
+    near = wall - 21.99 * np.sqrt(2)
+    chain = [[x, 0, z] for x in np.linspace(-near, near, 6)]
     assert 2 * near / 5 < 44
-    assert clusters(result_of(VALVE, chain).state, VALVE).bridged
-    shorter = [[x * UM * 0.96, 0, z] for x in xs]
-    assert not clusters(result_of(VALVE, shorter).state, VALVE).bridged
+    assert found(chain, 22).bridged
+    assert not found([[0.99 * x, 0, z] for x, _, _ in chain], 22).bridged
 
 
 def test_overlaps_across_the_ends():

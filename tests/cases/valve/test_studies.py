@@ -47,7 +47,7 @@ def test_each_valve_has_its_starts():
         assert all(flow.result.scene.effects[0].constant[0] == one.flux for flow in one.flows)
         for flow in one.flows:
             assert 2 * float(flow.result.state["radius"].mean()) == pytest.approx(one.diameter)
-    assert [one.jammed for one in valves] == [4, 0, 0, 0]
+    assert [sum(flow.arrested for flow in one.flows) for one in valves] == [4, 0, 0, 0]
     assert valves[-1].name == "4 grains of 44 µm, no field"
 
 
@@ -57,6 +57,9 @@ def test_claims_are_of_the_valves_they_name():
     assert [one.mean.value for one in arrested] == [pytest.approx(0.01 + 1.5e-4)]
     assert arrested[0].ok
     assert all(one.ok for name, one in found.items() if "40x" in name or "fine grains yield" in name)
+    # The starts are random, in which no grains touch.
+    shown = [one for name, one in found.items() if "from wall to wall" in name]
+    assert [(one.value, one.beside, one.ok) for one in shown] == [(0, "of 4", None)] * 2 + [(0, "of 2", None)]
     without = next(one for name, one in found.items() if "in the end over that before" in name)
     assert not without.ok, "a third is less than half"
 
