@@ -11,14 +11,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cases.case import size_named
 from cases.mrf_shear.grains import equal
 from cases.valve import published
 from cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
 from cases.valve.open_flow import open_flow
 from cases.valve.runs import ARRESTED
 from cases.valve.scene import TITLE, scene
-from cases.valve.sizes import SEARCHED, SIZES, D
+from cases.valve.sizes import GRADIENT, SEARCHED, SIZES, D
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
@@ -37,7 +36,7 @@ GENES = {
     "field": (THROAT_GENE, DIAMETER_GENE, FLUX_GENE),
     "never": (THROAT_GENE, DIAMETER_GENE),
 }
-BOUND = 60e-9
+BOUND = 23.5e-9
 """An open flow is to be at least so large where it is bounded, m^3/s."""
 WANTED = {
     "front": "the front of the field that arrests the flow and of what flows without it",
@@ -60,7 +59,8 @@ def part_left(result: Result) -> float:
 
 
 def arrested(result: Result) -> bool:
-    """Return whether the flow is arrested at the end."""
+    """Return whether the flow is arrested at the end: less than ARRESTED of what goes with the oil flows, at
+    one instant, as there is no time without a field to compare with."""
     return part_left(result) < ARRESTED
 
 
@@ -74,9 +74,11 @@ def width(result: Result) -> float:
     return duct_of(result.scene).throat / (2 * float(result.state["radius"].mean()))
 
 
-def volume_rate(result: Result) -> float:
-    """Return the volume flow rate of the valve of a run without field, m^3/s, at L21's pressure."""
-    return open_flow(duct_of(result.scene), published.PRESSURE, published.FRACTION)
+def volume_rate(scene: Scene) -> float:
+    """Return the volume flow rate of a valve without field, m^3/s, at the pressure that is to jam it: that of
+    L21's gradient over its length."""
+    duct = duct_of(scene)
+    return open_flow(duct, GRADIENT * duct.length, published.FRACTION)
 
 
 def arresting_field(result: Result) -> float:
@@ -86,7 +88,7 @@ def arresting_field(result: Result) -> float:
 
 def arresting_flow(result: Result) -> float:
     """Return what flows without the field where this arrests it, m^3/s; NaN where it does not."""
-    return volume_rate(result) if arrested(result) else np.nan
+    return volume_rate(result.scene) if arrested(result) else np.nan
 
 
 def flowing_width(result: Result) -> float:
@@ -107,7 +109,9 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
     """Return the search for valves; by variant the front of field and open flow, the least field at a bounded
     open flow, or the narrowest that never jam."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
-    settings = {**size_named(size, SIZES).scene, **SEARCHED}
+    searched = [name for name, one in SIZES.items() if one.search is not None]
+    must(size in searched, "size", f"one of {', '.join(searched)} for the inverse problem", size)
+    settings = {**SIZES[size].scene, **SEARCHED}
 
     def designed(design: Mapping[str, float], seed: int) -> Scene:
         one = scene(
@@ -117,7 +121,7 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
             seed=seed,
             **settings,
         )
-        let = open_flow(duct_of(one), published.PRESSURE, published.FRACTION)
+        let = volume_rate(one)
         must(variant != "field" or let >= BOUND, "open flow of the design", f"at least {BOUND:g} m^3/s", let)
         return one
 
@@ -141,5 +145,5 @@ def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
         "grains across the constriction": width(result),
         "part of the flow that is left": part_left(result),
         "pressure that the walls hold, kPa": 1e-3 * held_pressure(result),
-        "open flow, mm^3/s": 1e9 * volume_rate(result),
+        "open flow, mm^3/s": 1e9 * volume_rate(result.scene),
     }
