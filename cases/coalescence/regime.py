@@ -48,7 +48,7 @@ def rotation_over_gravity(rotation: float, density: float) -> float:
 
 def virial_ratio_of_cloud(diameter: float, number: int = NUMBER) -> float:
     """Return twice the thermal energy of L21's cloud of grains of a diameter (m), without its seed, over that
-    of its gravity, 3/5 G M^2 / R: above 1 it is not held together by gravity."""
+    of its gravity, 3/5 G M^2 / R: above 1 it expands at first, and above 2 it is not bound by gravity."""
     mass = number * sphere_mass(diameter, DENSITY)
     radius = (3 * number / (4 * np.pi)) ** (1 / 3) * SPACING
     square = 3 * float(thermal_speed(diameter, np.array(mass / number))) ** 2
