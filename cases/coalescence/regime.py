@@ -93,6 +93,7 @@ def of_clouds(d: float) -> Iterator[Shown]:
     )
     yield Shown(f"{name}: density of the cloud, kg/m^3", density)
     yield Shown(f"{name}: free fall, s", FALLS[d])
+    yield Shown(f"{name}: spin that parts the cloud, urad/s", 1e6 * critical_spin(density))
     for rotation in ROTATIONS:
         turns, end = f"{name}, {1e6 * rotation:g} urad/s", spin_when_packed(rotation, d, SPACING) / packed
         yield Shown(f"{turns}: over what parts the cloud", rotation / critical_spin(density))
