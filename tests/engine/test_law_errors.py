@@ -7,6 +7,7 @@ from tests.scenes import scene
 from tisim import InputError
 from tisim.cli.main import main
 from tisim.files import python_file
+from tisim.steppers import Collocation, Trapezoid
 
 LAWS = """
 from tisim.backend.taichi import ti
@@ -41,6 +42,10 @@ class Reads(Force):
 
 class Again(Force):
     world_quantities = ("status",)
+
+
+class OfStepper(Force):
+    counters = ("rejections",)
 """
 SAID = {
     "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be what Taichi can compile; .*'kk'",
@@ -57,6 +62,15 @@ def test_in_python(own_file, name):
     with pytest.raises(InputError, match=SAID[name]) as error_info:
         tisim.run(scene([[0, 0, 0]], [[0, 0, 0]], (getattr(laws, name)(),)))
     assert "\n" not in str(error_info.value)
+
+
+@pytest.mark.parametrize("stepper", [Trapezoid(), Collocation()])
+def test_what_a_stepper_keeps_is_not_that_of_an_effect(own_file, stepper):
+    """Both would write one number."""
+    own = python_file.load(own_file("laws.py", LAWS)).OfStepper()
+    rule = r"^name of .* must be a name of no other use on a state; received 'rejections'$"
+    with pytest.raises(InputError, match=rule):
+        tisim.run(scene([[0, 0, 0]], [[0, 0, 0]], (own,), stepper=stepper))
 
 
 def test_on_the_command_line(own_file, capsys):

@@ -68,11 +68,14 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
 
 def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[str, ...]:
     """Return the names of the ``counters``, ``world_quantities``, ``clocks``, ``flags`` or ``totals`` that
-    the parts of a scene declare, each once."""
-    kept = [name for effect in effects for name in effect.keeps(what)]
-    for part in (stepper, stepper.control):
-        kept += getattr(part, what, ())
-    return tuple(dict.fromkeys(kept))
+    the parts of a scene declare, each once.
+
+    Effects may share one; one of theirs that the stepper declares too is there twice, for ``check_names`` to
+    refuse.
+    """
+    shared = [name for effect in effects for name in effect.keeps(what)]
+    own = [name for part in (stepper, stepper.control) for name in getattr(part, what, ())]
+    return (*dict.fromkeys(shared), *dict.fromkeys(own))
 
 
 def measured(effects: Sequence[Effect]) -> dict[str, str]:

@@ -3,12 +3,14 @@ whose moments come to have no end."""
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from tests.effects.contact.loads import close
 from tests.effects.magnetic.magnets import MU_0, dipole_field
 from tests.effects.magnetic.test_dipole_dipole import induced
-from tests.scenes import by_id, compiled
+from tests.scenes import by_id, compiled, simulate
 from tisim.effects import MutualInducedMoment
+from tisim.steppers import Boris, Collocation, ErrorControl, FixedStep, Trapezoid, Verlet
 
 L = np.array([[0, 0, 2.0], [0, 0, 0], [2.0, 0, 0]])
 """P1, P2 and P3 of L21, table 4.3: P2 touches P1, along the field, and P3, across it."""
@@ -23,11 +25,11 @@ ERRORS = [
 itself, for mu_r without end; computed with NumPy in plain loops."""
 
 
-def force(m):
+def force(m, place=L):
     """On each of the three, over 3 mu_0 / (4 pi)."""
     total = np.zeros((3, 3))
     for i, j in np.argwhere(~np.eye(3, dtype=bool)):
-        d = L[j] - L[i]
+        d = place[j] - place[i]
         n = d / np.linalg.norm(d)
         a, b = m[i] @ n, m[j] @ n
         total[i] -= (a * m[j] + b * m[i] + (m[i] @ m[j] - 5 * a * b) * n) / np.linalg.norm(d) ** 4
@@ -103,3 +105,51 @@ def test_two_that_are_pressed_into_each_other_stop_where_their_moments_lose_thei
     result = run(pair(1.35, steps=1000, closing=0.1, largest_change=1e300))
     assert result.status.ok
     assert np.abs(by_id(result)["position"]).max() > 100
+
+
+COLLOIDS, RADIUS, MASS, FIELD = 2e-6 * L, 1e-6, 8e-15, (0.003, 0, 0.01)
+"""Places (m), radius (m), mass (kg) and the field (T) of three that can be magnetised without end."""
+TIME = 1.8e-5
+"""s, in which they go up to half a radius, and none touch."""
+
+
+def colloids():
+    """Their places after TIME, from rest, with moments by a linear solve at each moment; m."""
+    gain, alone = 4 * np.pi / MU_0 * RADIUS**3, 4 * np.pi / MU_0 * RADIUS**3 * np.tile(FIELD, 3)
+
+    def rates(_t, y):
+        place = y[:9].reshape(3, 3)
+        matrix = np.eye(9) - gain * dipole_field(place).transpose(0, 2, 1, 3).reshape(9, 9)
+        m = np.linalg.solve(matrix, alone).reshape(3, 3)
+        return np.append(y[9:], 3 * MU_0 / (4 * np.pi) / MASS * force(m, place))
+
+    start = np.append(COLLOIDS, np.zeros((3, 3)))
+    return solve_ivp(rates, (0, TIME), start, method="DOP853", rtol=1e-10, atol=1e-18).y[:9, -1].reshape(3, 3)
+
+
+STEPPERS = [
+    pytest.param(Collocation(), 12, id="collocation"),
+    pytest.param(Verlet(control=FixedStep(dt=1e-7)), 180, id="verlet", marks=pytest.mark.slow),
+    pytest.param(Boris(control=FixedStep(dt=1e-7)), 180, id="boris", marks=pytest.mark.slow),
+    pytest.param(
+        Trapezoid(control=ErrorControl(error=1e-5, tolerance=1e-8)),
+        200,
+        id="trapezoid",
+        marks=pytest.mark.slow,
+    ),
+]
+
+
+@pytest.mark.parametrize(("stepper", "most"), STEPPERS)
+def test_every_stepper_takes_moments_by_sweeps(stepper, most):
+    """What a stepper keeps of its own sweeps is not what those of moments come to, relative to these."""
+    law = MutualInducedMoment(susceptibility=1e12, tolerance=1e-12)
+    setup = induced(COLLOIDS, FIELD, law, radius=RADIUS, stepper=stepper, duration=TIME)
+    heavy = setup.particles.model_copy(update={"mass": MASS})
+    (result,) = simulate([setup.model_copy(update={"particles": heavy})], capacity=4)
+    assert result.status.ok, result.status.reason
+    moved = colloids() - COLLOIDS
+    assert np.abs(moved).max() > 0.3 * RADIUS
+    np.testing.assert_allclose(by_id(result)["position"] - COLLOIDS, moved, rtol=0, atol=3e-5 * RADIUS)
+    assert result.work["steps"] <= most
+    assert result.measures["sweep_change"] <= 1e-12

@@ -56,7 +56,7 @@ class Collocation(Stepper):
     counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     world_quantities: ClassVar = (
         *("time_before", "next_dt", "last_dt", "measured_dt"),
-        *("sweep_change", "last_change", "contraction"),
+        *("stage_change", "last_change", "contraction"),
     )
     flags: ClassVar = ("attempting", "verdict", "sweeping", "sweep", "stage", "out_of_range")
 

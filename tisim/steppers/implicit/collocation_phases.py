@@ -36,7 +36,7 @@ class ChooseCollocationStep(Phase):
         s.dt[w] = dt
         self.stages.extrapolate(w, ti.select(s.last_dt[w] > 0.0, dt / s.last_dt[w], 0.0))
         s.sweeping[w], s.sweep[w], s.stage[w] = 1, 1, 1
-        s.sweep_change[w], s.last_change[w], s.out_of_range[w] = 0.0, 0.0, 0
+        s.stage_change[w], s.last_change[w], s.out_of_range[w] = 0.0, 0.0, 0
         s.time[w] = s.time_before[w] + dt * self.stages.c[1]
 
 

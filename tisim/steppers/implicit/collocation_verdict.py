@@ -29,13 +29,13 @@ class JudgeStages(Phase):
         # A maximum would lose NaN.
         if not finite(total[0]) or s.out_of_range[w] > 0:
             total[0] = infinity(s.count[w])
-        s.sweep_change[w] = ti.max(s.sweep_change[w], total[0])
+        s.stage_change[w] = ti.max(s.stage_change[w], total[0])
         stage = s.stage[w]
-        if stage < last and finite(s.sweep_change[w]):
+        if stage < last and finite(s.stage_change[w]):
             s.stage[w] = stage + 1
         else:
             self.judge(w, total)
-            s.stage[w], s.sweep_change[w] = 1, 0.0
+            s.stage[w], s.stage_change[w] = 1, 0.0
             s.sweep[w] += 1
             s.solver_iterations[w] += 1
         here = self.stages.c[s.stage[w]]
@@ -45,7 +45,7 @@ class JudgeStages(Phase):
     def judge(self, w, total):
         """Judge a sweep at its end."""
         s = self.s
-        change, error = s.sweep_change[w], ti.cast(0.0, ti.f64)
+        change, error = s.stage_change[w], ti.cast(0.0, ti.f64)
         # Nothing moves where nothing changes: 0/0 is no error.
         if change > 0.0:
             change /= total[2]
