@@ -8,17 +8,19 @@ from tisim.analysis import contacts
 from tisim.packing import EqualSizes, RandomInDuct
 
 DUCT = {"heights": (0.0, 3.0, 5.0, 6.0, 7.5, 10.0), "radii": (3.0, 3.0, 1.2, 1.2, 3.0, 3.0)}
+SHORT = {"heights": (0.0, 0.02, 0.6, 9.0, 10.0), "radii": (3.0, 3.0, 0.8, 0.8, 3.0)}
+"""One whose first part is so short that spheres at the upper face reach beyond it."""
 LOW = (0.5, -0.5, -2.0)
 AROUND = Box(low=(-4.0, -4.0, -2.0), high=(4.0, 4.0, 8.0), periodic=(False, False, True))
 
 
-def off_wall(points, ends):
+def off_wall(points, ends, duct=DUCT):
     """How far points are from the lines of the profile, by samples of these, and whether they are inside."""
     rho = np.hypot(points[:, 0] - LOW[0], points[:, 1] - LOW[1])
     z = points[:, 2] - LOW[2]
     places = np.linspace(-10.0, 20.0, 120001)
-    heights = np.array(DUCT["heights"])
-    wall = np.interp(places % 10.0, heights, DUCT["radii"])
+    heights = np.array(duct["heights"])
+    wall = np.interp(places % 10.0, heights, duct["radii"])
     lines = np.stack([wall, places], axis=1)
     if ends:
         inside = (places >= 0) & (places <= 10)
@@ -27,7 +29,7 @@ def off_wall(points, ends):
         for height in (0.0, 10.0):
             lines = np.vstack([lines, np.stack([across, np.full(len(across), height)], axis=1)])
     distance = [np.hypot(*(lines - [a, b]).T).min() for a, b in zip(rho, z, strict=True)]
-    return np.array(distance), rho < np.interp(z, heights, DUCT["radii"])
+    return np.array(distance), rho < np.interp(z, heights, duct["radii"])
 
 
 @pytest.mark.parametrize("domain", [AROUND, Open()])
@@ -51,6 +53,15 @@ def test_spheres_lie_wholly_in_the_duct_and_overlap_none(domain, fraction):
     again = placement.centres(radii, domain, 3)
     assert (again == points).all()
     assert (placement.centres(radii, domain, 4) != points).any()
+
+
+def test_spheres_are_off_the_wall_beyond_a_short_part_at_the_face():
+    radii = np.full(12, 0.5)
+    for seed in range(6):
+        points = RandomInDuct(centre=LOW, **SHORT).centres(radii, AROUND, seed)
+        distance, inside = off_wall(points, False, SHORT)
+        assert inside.all()
+        assert (distance >= radii - 1e-6).all()
 
 
 def test_few_small_spheres_are_even_over_the_duct():
@@ -110,5 +121,10 @@ def test_what_finds_no_room_is_refused():
         InputError, match=r"length of the duct must be 11 m, that of the box along z, which is"
     ):
         placement.centres(np.full(1, 0.3), taller, 0)
+    stepped = RandomInDuct(centre=LOW, heights=(0.0, 10.0), radii=(1.0, 3.0))
+    rule = r"duct\.radii must be equal at both ends in a box that is periodic along z; received \(1\."
+    with pytest.raises(InputError, match=rule):
+        stepped.centres(np.full(3, 0.4), AROUND, 0)
+    assert stepped.centres(np.full(3, 0.4), Open(), 0).shape == (3, 3)
     with pytest.raises(InputError, match="places in the duct must be so near the origin"):
         RandomInDuct(centre=(0.0, 0.0, 1e17), **DUCT).centres(np.full(1, 0.3), Open(), 0)

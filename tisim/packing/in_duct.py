@@ -28,9 +28,9 @@ class RandomInDuct(Placement):
 
     They fill at most half of it. The duct has ``radii`` at ``heights`` above its lower end, and is conical
     between them; its axis is along z. Where the domain is periodic along z, its length is that of the domain,
-    and it goes on across the faces; else spheres lie within its ends. Places are drawn evenly, and then
-    overlaps with each other and with the wall are pushed apart until there are none. It is no random
-    sequential addition, which ends below 0.38, and earlier beside walls.
+    and it goes on across the faces, with one radius at both ends; else spheres lie within its ends.
+    Places are drawn evenly, and then overlaps with each other and with the wall are pushed apart until there
+    are none. It is no random sequential addition, which ends below 0.38, and earlier beside walls.
     """
 
     centre: Vector = parameter("m", "middle of the lower end", (0.0, 0.0, 0.0))
@@ -71,6 +71,8 @@ class RandomInDuct(Placement):
         if endless:
             side, rule = float(domain.edges(0.0)[2, 2]), "that of the box along z, which is periodic"
             must(abs(side - length) <= 1e-9 * side, "length of the duct", f"{side:g} m, {rule}", length)
+            rule = "equal at both ends in a box that is periodic along z"
+            must(self.radii[0] == self.radii[-1], "duct.radii", rule, self.radii)
         generator = np.random.default_rng([seed, 0x64756374])
         places, wider = self._anywhere(len(radii), generator), radii * (1 + CLEARANCE)
         for _ in range(MOST_PUSHES):
@@ -121,7 +123,7 @@ class RandomInDuct(Placement):
         corners = np.stack([self.radii, self.heights], axis=1)
         if endless:
             up = np.array([0.0, self.heights[-1]])
-            corners = np.vstack([corners[-2:-1] - up, corners, corners[1:2] + up])
+            corners = np.vstack([corners - up, corners, corners + up])
         else:
             corners = np.vstack([[0.0, 0.0], corners, [0.0, self.heights[-1]]])
         best = np.full(len(places), np.inf)
