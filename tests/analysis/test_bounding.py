@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull, Voronoi
 from scipy.spatial.transform import Rotation
 from scipy.stats import special_ortho_group
 
@@ -121,7 +122,8 @@ def test_voronoi_cells_fill_a_periodic_box(rng, time):
 
 
 def test_voronoi_cells_fill_boxes_that_are_long_or_crowded(rng):
-    """Cells reach across several images of the narrow sides; in a plane there are none."""
+    """A cell reaches half a side along each axis at most, and no layer of images beyond the first has a part
+    in it, however far away all others are; in a plane there are no cells."""
     apart = np.column_stack([rng.uniform(size=(30, 2)), rng.uniform(4, 6, 30)])
     volumes = voronoi_volumes(apart, (1, 1, 10))
     assert volumes.sum() == pytest.approx(10.0, rel=1e-12)
@@ -130,8 +132,32 @@ def test_voronoi_cells_fill_boxes_that_are_long_or_crowded(rng):
     assert voronoi_volumes(layers, (1, 1, 10)).sum() == pytest.approx(10.0, rel=1e-9)
     leaning = periodic_sides(ShearedBox(low=(0, 0, 0), high=(1, 10, 1), rate=0.1), 4.3)
     assert voronoi_volumes(apart[:, [0, 2, 1]], leaning).sum() == pytest.approx(10.0, rel=1e-12)
-    with pytest.raises(InputError, match=r"^particles must be points not all in a plane; received points$"):
+    rule = r"^particles must be points not all in a plane; received points in a plane$"
+    with pytest.raises(InputError, match=rule):
         voronoi_volumes(apart * (1, 1, 0))
+    with pytest.raises(InputError, match=r"^positions must be finite; received .*nan"):
+        voronoi_volumes(apart * (1, 1, np.nan), (1, 1, 10))
+
+
+def tiled(points, sides, layers):
+    """Volumes of cells by SciPy's hulls, among so many layers of images along each axis."""
+    turns = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in layers), indexing="ij"), -1).reshape(-1, 3)
+    turns = turns[np.argsort(np.abs(turns).sum(axis=1), kind="stable")]
+    diagram = Voronoi(np.vstack([points + turn * np.array(sides) for turn in turns]))
+    regions = [diagram.regions[region] for region in diagram.point_region[: len(points)]]
+    return [ConvexHull(diagram.vertices[region]).volume for region in regions]
+
+
+def test_one_layer_of_images_is_enough_in_a_box_that_is_far_longer_than_wide(rng):
+    """Of points in one end of it; and of a layer that is flat, whose cells are those in the plane."""
+    points = rng.uniform(size=(30, 3))
+    volumes = voronoi_volumes(points, (1, 1, 30))
+    np.testing.assert_allclose(volumes, tiled(points, (1, 1, 30), (3, 3, 1)), rtol=1e-9)
+    long = np.column_stack([rng.uniform(size=(10, 2)), rng.uniform(0, 0.01, 10)])
+    assert voronoi_volumes(long, (1, 1, 1000)).sum() == pytest.approx(1000.0, rel=1e-9)
+    flat = np.column_stack([rng.uniform(size=(60, 2)), np.full(60, 0.3)])
+    volumes = voronoi_volumes(flat, (1, 1, 7))
+    np.testing.assert_allclose(volumes, tiled(flat, (1, 1, 7), (2, 2, 1)), rtol=1e-9)
 
 
 def test_voronoi_cells_of_a_lattice_and_those_that_are_open():

@@ -33,7 +33,8 @@ def hull_volume(position: np.ndarray, radius: np.ndarray | float = 0.0) -> float
     try:
         return float(ConvexHull(points).volume)
     except QhullError:
-        raise InputError("particles must be spheres, or points not all in a plane; received points") from None
+        rule = "spheres, or points not all in a plane"
+        raise InputError(f"particles must be {rule}; received points in a plane") from None
 
 
 def hull_density(position: np.ndarray, mass: np.ndarray, radius: np.ndarray | float = 0.0) -> float:

@@ -12,7 +12,8 @@ from tisim.analysis.separations import Sides, vectors_of, with_images
 from tisim.errors import InputError, must
 
 SHELL = 4.0
-"""Images are taken from this many mean distances of particles beyond the faces of a periodic box."""
+"""Images are taken from this many mean distances of particles beyond the faces of a periodic box, and from
+farther away where cells reach there."""
 
 
 class ShellVolumes(NamedTuple):
@@ -63,10 +64,11 @@ def voronoi_by_shell(position: np.ndarray, ellipsoid: Ellipsoid, shells: int) ->
 def _cells(r: np.ndarray, sides: Sides) -> tuple[np.ndarray, Voronoi]:
     """Return the volumes of cells and their diagram, in which particles come first."""
     must(len(r) > 4, "particles", "more than 4", len(r))
+    must(bool(np.isfinite(r).all()), "positions", "finite", r[~np.isfinite(r)][:1])
     try:
         diagram = _diagram(r, vectors_of(sides))
     except QhullError:
-        raise InputError("particles must be points not all in a plane; received points") from None
+        raise InputError("particles must be points not all in a plane; received points in a plane") from None
     volumes, box = _volumes(diagram)[: len(r)], float(np.prod(np.diag(vectors_of(sides))))
     filled = not box or np.isclose(volumes.sum(), box, rtol=1e-6)
     must(filled, "the sum of the cells", f"the volume of the box, {box:g} m^3", volumes.sum())
@@ -85,7 +87,7 @@ def _diagram(r: np.ndarray, vectors: np.ndarray) -> Voronoi:
     while True:
         try:
             diagram = Voronoi(_with_layers(r, reach, vectors))
-            if _is_whole(diagram, r, vectors):
+            if reach >= _farthest(vectors).max() or _is_whole(diagram, r, vectors):
                 return diagram
         except QhullError:
             # All in a plane, of which there may be images farther away.
@@ -94,19 +96,27 @@ def _diagram(r: np.ndarray, vectors: np.ndarray) -> Voronoi:
         reach *= 2
 
 
+def _farthest(vectors: np.ndarray) -> np.ndarray:
+    """Return how far (m) beyond the faces along each axis there may be images with a part in the cells of
+    particles: a side, as no cell reaches farther than half of one; along an axis whose vector leans that is
+    not so, and has no limit here."""
+    return np.where(np.count_nonzero(vectors, axis=1) > 1, np.inf, np.diag(vectors))
+
+
 def _with_layers(position: np.ndarray, reach: float, vectors: np.ndarray) -> np.ndarray:
-    """Return positions (m) inside the periodic box, then those of all images at most ``reach`` (m) outside:
-    of as many layers along each axis as it takes."""
+    """Return positions (m) inside the periodic box, then those of all images at most ``reach`` (m) outside,
+    and not farther than any have a part in cells: of as many layers along each axis as it takes."""
     sides = np.diag(vectors)
     places = with_images(position, 0.0, vectors)[0][: len(position)]
-    layers = np.ceil(np.divide(reach, sides, out=np.zeros(3), where=sides > 0))
+    beyond = np.minimum(reach, _farthest(vectors))
+    layers = np.ceil(np.divide(beyond, sides, out=np.zeros(3), where=sides > 0))
     # A box that leans carries its layers along another axis.
     lean = np.abs(vectors - np.diag(sides)).T @ layers
     layers += np.ceil(np.divide(lean, sides, out=np.zeros(3), where=sides > 0))
     turns = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in layers), indexing="ij"), -1).reshape(-1, 3)
     images = [places + turn @ vectors for turn in turns if turn.any()]
     outside = np.concatenate([places[:0], *images])
-    near = ((outside >= -reach) & (outside <= sides + reach)) | (sides == 0)
+    near = ((outside >= -beyond) & (outside <= sides + beyond)) | (sides == 0)
     return np.vstack([places, outside[near.all(axis=1)]])
 
 
