@@ -33,7 +33,8 @@ class FailureAttribution:
 
     @ti.func
     def force_by_other(self, effect: ti.template(), w, i, j, t):  # type: ignore[valid-type]
-        """Return what j does to i by one law, given what they have stored of each other."""
+        """Return what j does to i by one law, given what they have stored of each other; nothing where both
+        are of one rigid body, within which it does not act."""
         s = self.s
         d = self.forces.domain.separation(w, s.position[w, i], s.position[w, j], t)
         first, second, sign = i, j, ti.cast(1.0, s.real)
@@ -45,7 +46,10 @@ class FailureAttribution:
         force, torque_i, torque_j, _ = effect.interaction(
             s, w, first, second, sign * d, d.norm(), past, dt, t
         )
-        return self.forces.wrench(sign * force, ti.select(first == i, torque_i, torque_j))
+        load = self.forces.wrench(sign * force, ti.select(first == i, torque_i, torque_j))
+        if ti.static(effect.short_ranged and not effect.within_bodies):
+            load = ti.select(self.forces.half_list.joined(w, i, j), 0.0, load)
+        return load
 
     @ti.func
     def find_failing_effect(self, w, i, t):
