@@ -8,9 +8,9 @@ from tests.throwaway import SoftShell
 from tisim import Box, GrainClass, InputError
 from tisim.backend.taichi import ti
 from tisim.effects import Heating, Impact
-from tisim.engine.loading import check_sides
+from tisim.engine.loading import check_sides, volume
 from tisim.operators import InsertionByFlux
-from tisim.packing import UniformSizes
+from tisim.packing import EqualSizes, UniformSizes
 from tisim.steppers import FixedStep, Verlet
 
 
@@ -95,6 +95,15 @@ class FarShell(SoftShell):
     @ti.func
     def reach(self, s, w, i):
         return self.width(w) * s.radius[w, i]
+
+
+def test_the_volume_of_what_is_empty_is_that_around_the_largest_that_come():
+    """Whatever the order of their classes."""
+    classes = [GrainClass(sizes=EqualSizes(radius=radius), density=1.0) for radius in (0.1, 0.4)]
+    for grains in (classes, classes[::-1]):
+        coming = InsertionByFlux(flux=1.0, number=5, grains=grains, low=(0.0,) * 3, high=(9.0,) * 3)
+        made = scene(np.zeros((0, 3)), np.zeros((0, 3)), (coming,))
+        assert volume(made, made.start()) == pytest.approx(0.8**3)
 
 
 @pytest.mark.slow

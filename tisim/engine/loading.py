@@ -227,7 +227,8 @@ def volume(scene: Scene, start: Arrays) -> float:
     particles; where there are none, around one of the largest that may be put in."""
     place, radius = start["position"], start["radius"]
     if not len(place):
-        place, radius = np.zeros((1, 3)), np.append(radii(scene, start), 1.0)[:1]
+        place, later = np.zeros((1, 3)), radii(scene, start)
+        radius = later if len(later) else np.ones(1)
     reach = radius.max()
     extent = (place.max(axis=0) + reach) - (place.min(axis=0) - reach)
     low, high = scene.domain.bounds()
