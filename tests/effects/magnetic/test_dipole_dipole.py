@@ -237,6 +237,8 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
     nearer = TruncatedDipoleDipole(cutoff=2.0, gap=8e-6).approximations(1.0)
     assert [(one.cutoff, one.gap) for one in nearer] == [(2.0, 4e-6), (2.0, 5.6e-6)]
     assert [one.cutoff for one in TruncatedDipoleDipole().approximations(1.0)] == [16.0, 21.6]
+    # Rounded to contact, without a gap, it would be no law.
+    assert TruncatedDipoleDipole(cutoff=2.004).approximations(1.0) == ()
     (_, several) = law.model_copy(update={"sweeps": 0}).approximations(1.0)
     assert several.sweeps == 100
 

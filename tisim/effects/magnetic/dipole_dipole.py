@@ -110,11 +110,12 @@ class TruncatedDipoleDipole(DipolePairs, DipoleDipole):
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         beyond = self.cutoff - 2
+        nearer = ((three_digits(2 + part * beyond), three_digits(part * self.gap)) for part in NEARER)
+        # Rounded to contact, it is no law.
         return tuple(
-            self.model_copy(
-                update={"cutoff": three_digits(2 + part * beyond), "gap": three_digits(part * self.gap)}
-            )
-            for part in NEARER
+            self.model_copy(update={"cutoff": cutoff, "gap": gap})
+            for cutoff, gap in nearer
+            if cutoff > 2 or gap > 0
         )
 
     @ti.func
