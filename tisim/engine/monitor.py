@@ -164,14 +164,14 @@ class Monitor:
                 if broken[w].any():
                     return f"{name} of particle {then['id'][w][broken[w]].min()} is not finite"
         failing_effect, who = int(then["failing_effect"][w]), int(then["failing_particle"][w])
-        effects = self.simulation.scenes[w].effects
+        scene = self.simulation.scenes[w]
         reason = REASONS[code or WorldStatus.NOT_FINITE]
         if code == WorldStatus.NOT_CONVERGED:
             reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
         where = ""
-        if failing_effect < len(effects):
-            effect = effects[failing_effect]
+        if failing_effect < len(scene.effects):
+            effect = scene.effects[failing_effect]
             reason += f", by effects.{effect.label}"
-            if code == WorldStatus.NOT_FINITE and (stops := effect.may_stop()):
-                where = f" (it is so where {stops})"
+            stops = effect.may_stop(scene.effects, scene.domain) if code == WorldStatus.NOT_FINITE else ""
+            where = f" (it is so where {stops})" if stops else ""
         return f"{reason}{where}" if who == NO_ONE else f"{reason}, at particle {who}{where}"

@@ -5,7 +5,7 @@ import pytest
 
 from tests.effects.contact.grains import CAPACITY, FLOOR, HERTZ_MINDLIN, USUAL, WORLDS, grains
 from tests.scenes import scene, simulate
-from tisim import GrainClass, InputError, Material, MaterialPair
+from tisim import GrainClass, InputError, Material, MaterialPair, Open
 from tisim.effects import (
     DMT,
     JKR,
@@ -155,6 +155,18 @@ def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
         with pytest.raises(InputError) as fault:
             cohesive(Hooke(), density, *given)
         assert words in str(fault.value)
+
+
+def test_walls_say_what_the_laws_of_the_scene_say():
+    """Of cohesion where a law has one that grows with the overlap; a bridge holds on to what parts."""
+    long, held = "a step is too long for its springs and dashpots", "or no elastic force holds its cohesion"
+    bridge = CapillaryBridge(surface_tension=1.0, volume=1e-3)
+    for laws, words in (
+        ((Granular(normal=Hooke()),), long),
+        ((Granular(normal=Hooke(), cohesion=SJKR()), bridge), f"{long}, {held}"),
+        ((bridge,), ""),
+    ):
+        assert FLAT.may_stop((FLAT, *laws), Open()) == words
 
 
 def test_a_scene_is_asked_before_it_runs():

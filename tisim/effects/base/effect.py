@@ -105,7 +105,8 @@ class Effect(LawHints, Component):
 
     def largest_newcomers(self) -> Mapping[str, np.ndarray]:
         """Return ``radius`` (m) and ``material``, its index, of the largest two particles of each class that
-        it may put in, or of the one; by default it puts in none."""
+        it may put in, or of one of each where it puts in one alone: pairs of them are then asked for too, as
+        if each came. By default it puts in none."""
         return {"radius": np.zeros(0), "material": np.zeros(0, int)}
 
     def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
@@ -141,9 +142,9 @@ class Effect(LawHints, Component):
         """Set its quantities of a world at the end of a step, and once before the first; serially, before
         events and operators. It is asked of an effect that keeps quantities of a world."""
 
-    def may_stop(self) -> str:
-        """Return where it stops a world on purpose, by a force that is not a number, as a message says it
-        after "it is so where"; by default nowhere."""
+    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+        """Return where it stops a world on purpose, by what is not a number, as a message says it after "it
+        is so where", among the effects and in the domain of a scene; by default nowhere."""
         return ""
 
     @classmethod

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import PairForce, parameter
+from tisim.components.domain import Domain
+from tisim.effects.base import Effect, PairForce, parameter
 from tisim.effects.contact.granular.spring import turned
 from tisim.effects.contact.granular.step_limit import can_follow, can_follow_both, least_mass
 from tisim.numerics.vectors import piece
@@ -68,7 +70,7 @@ class ParallelBond(PairForce):
     shear_strength: float = parameter("Pa", "strength tau_c", examples=[1e7], gt=0)
     damping_ratio: float = parameter("", "damping of each spring over the critical one", 0.0, ge=0)
 
-    def may_stop(self) -> str:
+    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
         return "a step is too long for its springs and dashpots"
 
     @ti.func

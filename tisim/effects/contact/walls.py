@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Component, Text
+from tisim.components.domain import Domain
 from tisim.components.material_law import UsesMaterials
 from tisim.components.materials import Materials
 from tisim.effects.base import Effect, Field, Force, option
@@ -82,10 +83,9 @@ class Walls(WallContacts, UsesMaterials, Force):
             if isinstance(law, GranularContact):
                 law.suits_wall(start, effects, self.material_index(self._materials), self.label)
 
-    def may_stop(self) -> str:
-        return (
-            "a step is too long for a contact's springs and dashpots, or no elastic force holds its cohesion"
-        )
+    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+        laws = (law.may_stop(effects, domain) for law in effects if isinstance(law, GranularContact))
+        return ", or ".join(filter(None, laws))
 
     def material_index(self, materials: Materials) -> int:
         """Return the index of the material of the walls among those of a scene."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar, Self
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.constants import mu_0
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.domain import Domain
-from tisim.effects.base import LongRange, Vector, option, parameter
+from tisim.effects.base import Effect, LongRange, Vector, option, parameter
 from tisim.effects.magnetic.dipole_pairs import Dipoles
 from tisim.effects.magnetic.ewald_accuracy import WIDEST_DECAY, most_waves, screening_for, waves_for
 from tisim.errors import must
@@ -107,6 +108,10 @@ class EwaldPairs(LongRange, Dipoles):
         needed = most_waves(domain, self.slab_factor, limit)
         enough = all(there >= need for there, need in zip(self.waves, needed, strict=True))
         must(enough, f"{where}.waves", f"at least {needed} in this box", self.waves)
+
+    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+        beyond = "the centre of a particle is beyond the box along its open axis"
+        return "" if all(domain.imaged()) else beyond
 
     @ti.func
     def reach(self, s, w, i):

@@ -8,6 +8,7 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component
+from tisim.components.domain import Domain
 from tisim.components.material_law import MaterialLaw
 from tisim.effects.base import Effect, option
 from tisim.effects.contact.granular.cohesion_limit import check_grains, check_wall, with_newcomers
@@ -109,7 +110,7 @@ class Granular(ContactGuards, GranularContact):
         if self.by_overlap:
             check_wall(self, self._materials, with_newcomers(start, effects), material, label)
 
-    def may_stop(self) -> str:
+    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
         cohesion = ", or no elastic force holds its cohesion" if self.by_overlap else ""
         return f"a step is too long for its springs and dashpots{cohesion}"
 
