@@ -9,8 +9,10 @@ from scipy.optimize import brentq
 from tests.effects.contact.grains import AWAY, twin
 from tests.effects.contact.granular_twin import law_of
 from tests.hard.granular_scenes import ELASTIC, grains, loaded, push
-from tisim import InputError
-from tisim.effects import Granular
+from tests.scenes import by_id, scene, simulate
+from tests.throwaway import Trap
+from tisim import InputError, Material
+from tisim.effects import Granular, Hooke
 
 pytestmark = pytest.mark.slow
 
@@ -153,23 +155,53 @@ def test_what_no_step_can_follow_stops_the_world(name):
                 np.testing.assert_array_equal(result.state[field], start[field], err_msg=way)
 
 
-@pytest.mark.parametrize(("grains_in_row", "part"), [(2, 1.0), (3, 0.8165), (10, 0.7159), (300, 0.7071)])
-def test_energy_of_a_row_grows_in_shorter_steps_than_that_of_a_pair(grains_in_row, part):
-    """Of undamped springs k between grains of a mass m, by half kicks: from 1 / (sqrt(2) cos(pi / (2 n))) of
-    the limit of a pair on, which is S dt^2 = 4 m*."""
-    of_a_pair = np.sqrt(2.0)  # s, of k = 1 N/m and m = 1 kg.
-    n = grains_in_row
+def half_kicks(n, dt, held):
+    """What half kicks of undamped springs, of 1 N/m, do in a step to places and speeds of a row of grains of
+    1 kg; ``held`` by others to one place, N/m."""
     neighbours = np.eye(n, k=1) + np.eye(n, k=-1)
-    pull, still = np.diag(neighbours.sum(axis=1)) - neighbours, np.zeros((n, n))
+    pull, still = np.diag(neighbours.sum(axis=1) + held) - neighbours, np.zeros((n, n))
+    kick = np.block([[np.eye(n), still], [-0.5 * dt * pull, np.eye(n)]])
+    drift = np.block([[np.eye(n), dt * np.eye(n)], [still, np.eye(n)]])
+    return kick @ drift @ kick
+
+
+OF_A_PAIR = np.sqrt(2.0)
+"""s, the limit of a pair of 1 kg each, of 1 N/m: S dt^2 = 4 m*."""
+
+
+@pytest.mark.parametrize(("grains_in_row", "part"), [(2, 1.0), (3, 0.8165), (10, 0.7159), (100, 0.7071)])
+def test_rows_have_shorter_limits_the_longer_they_are(grains_in_row, part):
+    """In NumPy, from 1 / (sqrt(2) cos(pi / (2 n))) of the limit of a pair on."""
 
     def growth(dt):
-        kick = np.block([[np.eye(n), still], [-0.5 * dt * pull, np.eye(n)]])
-        drift = np.block([[np.eye(n), dt * np.eye(n)], [still, np.eye(n)]])
-        return np.abs(np.linalg.eigvals(kick @ drift @ kick)).max()
+        return np.abs(np.linalg.eigvals(half_kicks(grains_in_row, dt, 0.0))).max()
 
-    assert part == pytest.approx(1 / (np.sqrt(2) * np.cos(np.pi / (2 * n))), abs=1e-4)
-    assert growth(0.999 * part * of_a_pair) == pytest.approx(1.0, abs=1e-6)
-    assert growth(1.001 * part * of_a_pair) > 1.01
+    assert part == pytest.approx(1 / (np.sqrt(2) * np.cos(np.pi / (2 * grains_in_row))), abs=1e-4)
+    assert growth(0.999 * part * OF_A_PAIR) == pytest.approx(1.0, abs=1e-6)
+    assert growth(1.001 * part * OF_A_PAIR) > 1.01
+
+
+def test_energy_of_three_grains_in_a_row_grows_in_shorter_steps_than_that_of_a_pair():
+    """They are pressed together by a weak spring to the middle, so that contacts last, and move a little: as
+    half kicks in NumPy do, and beyond the limit of three, where no pair stops the world, without end."""
+    held, k = 1e-3, 1e4
+    overlap, tiny, steps = 2 * held / (1 + held), 1e-7 * np.array([1.0, -2.0, 1.0]), 20
+    place = np.array([[overlap - 2, 0, 5], [0, 0, 5], [2 - overlap, 0, 5]])
+    acting = (Granular(normal=Hooke()), Trap(stiffness=held * k, centre=(0.0, 0.0, 5.0)))
+    parts, made = (0.98, 1.02), []
+    for part in parts:
+        made.append(
+            scene(place, tiny[:, None] * [1, 0, 0], acting, radius=1.0, mass=1.0, steps=steps,
+                  dt=part * 0.8165 * OF_A_PAIR / np.sqrt(k), materials={"iron": Material(stiffness=k)})
+        )  # fmt: skip
+    for part, result in zip(parts, simulate(made, worlds=2, capacity=4), strict=True):
+        assert result.status.ok, result.status.reason
+        step = half_kicks(3, part * 0.8165 * OF_A_PAIR, held)
+        speed = (np.linalg.matrix_power(step, steps) @ np.append(0 * tiny, tiny))[3:]
+        found = by_id(result)["velocity"][:, 0]
+        np.testing.assert_allclose(found, speed, rtol=0, atol=1e-5 * np.abs(speed).max())
+        grown = (speed**2).sum() / (tiny**2).sum()
+        assert grown < 2 if part < 1 else grown > 1e5
 
 
 def test_springs_without_friction_stop_nothing():
