@@ -14,6 +14,8 @@ from tests.device.launches import assert_launches
 from tests.device.scenes import SCENES, STEPS
 from tests.engine.test_fast import numbers
 from tests.scenes import compiled
+from tisim.geometry import Plane
+from tisim.operators import AtRest, Outflow
 
 pytestmark = [
     pytest.mark.gpu,
@@ -48,9 +50,10 @@ def on_cpu(tmp_path_factory):
     return {name: dict(np.load(folder / f"{name}.npz")) for name in SCENES}
 
 
-def simulation(name):
-    """The compiled simulation of a scene, loaded with it."""
+def simulation(name, *more):
+    """The compiled simulation of a scene, and of more effects, loaded with it."""
     scene = SCENES[name]()
+    scene = scene.model_copy(update={"effects": (*scene.effects, *more)})
     loaded = compiled(scene, capacity=scene.capacity())
     loaded.load(scene)
     return loaded
@@ -75,3 +78,9 @@ def test_a_sum_carries_its_rounding_error_along():
 
 def test_a_step_is_two_launches_and_few_ask_how_far_worlds_have_come():
     assert_launches(simulation("grains"), STEPS, each=2)
+
+
+@pytest.mark.parametrize("look", [AtRest(time=9.0), Outflow(planes=[Plane(point=(0.0, 0.0, -9.0))])])
+def test_a_step_that_something_looks_at_the_grains_after_is_five_launches(look):
+    """It acts between two fillings of slots, after which forces may be summed again."""
+    assert_launches(simulation("grains", look), STEPS, each=5)
