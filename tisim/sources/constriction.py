@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.components.ranges import check_direction
+from tisim.components.directed import Directed
 from tisim.errors import must
 from tisim.sources.base import Source, parameter
 
 
-class ConstrictionFlow(Source):
+class ConstrictionFlow(Directed, Source):
     """A fluid is driven along a round duct and through its constriction, where it is faster; drag laws feel
     it.
 
@@ -38,6 +40,8 @@ class ConstrictionFlow(Source):
     """
 
     quantity = "flow_velocity"
+    along: ClassVar[str] = "axis"
+    unit: ClassVar[str] = "downstream"
 
     centre: Vector = parameter("m", "middle of the constriction, on the axis", (0.0, 0.0, 0.0))
     axis: Vector = parameter("", "direction n of the flow", (0.0, 0.0, 1.0))
@@ -49,7 +53,6 @@ class ConstrictionFlow(Source):
 
     @model_validator(mode="after")
     def _narrow(self) -> ConstrictionFlow:
-        check_direction(f"{self.label}.axis", self.axis)
         rule = f"below {self.label}.duct_radius"
         must(self.throat_radius < self.duct_radius, f"{self.label}.throat_radius", rule, self.throat_radius)
         return self
@@ -57,20 +60,20 @@ class ConstrictionFlow(Source):
     @ti.func
     def value(self, w, r, t):
         n, z, rho, _away = self.place(w, r)
-        return self.speed(w) * self.across(w, rho)[0] * self.along(w, z, rho)[0] * n
+        return self.speed(w) * self.across(w, rho)[0] * self.speeding_up(w, z, rho)[0] * n
 
     @ti.func
     def gradient(self, w, r, t):
         n, z, rho, away = self.place(w, r)
         p, dp = self.across(w, rho)
-        f, df = self.along(w, z, rho)
+        f, df = self.speeding_up(w, z, rho)
         return self.speed(w) * n.outer_product(dp * f * away + p * df * n)
 
     @ti.func
     def place(self, w, r):
         """Return the unit vector along the axis, the place along it (m), the distance from it (m), and the
         unit vector away from it, 0 on it."""
-        n, out = self.axis(w) / self.axis(w).norm(), r - self.centre(w)
+        n, out = self.downstream(w), r - self.centre(w)
         z = out.dot(n)
         across = out - z * n
         rho = across.norm()
@@ -84,7 +87,7 @@ class ConstrictionFlow(Source):
         return ti.min(ti.max(p, 0.0), 1.0), ti.select(p > 0.0 and p < 1.0, -slope, 0.0)
 
     @ti.func
-    def along(self, w, z, rho):
+    def speeding_up(self, w, z, rho):
         """Return f and its derivative by z (1/m)."""
         ratio, width = self.duct_radius(w) / self.throat_radius(w), self.transition(w)
         more = ti.select(rho <= self.throat_radius(w), ratio * ratio - 1.0, 0.0)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.components.ranges import check_direction
+from tisim.components.directed import Directed
 from tisim.errors import must
 from tisim.sources.base import Source, parameter
 
 
-class CouetteFlow(Source):
+class CouetteFlow(Directed, Source):
     """A fluid is sheared between two parallel walls that slide past each other, which drag laws feel.
 
         v = v_1 + (x - x_1) / (x_2 - x_1) (v_2 - v_1),    x = r.n
@@ -25,6 +27,8 @@ class CouetteFlow(Source):
     """
 
     quantity = "flow_velocity"
+    along: ClassVar[str] = "normal"
+    unit: ClassVar[str] = "across"
 
     normal: Vector = parameter("", "normal n of both walls", (0.0, 0.0, 1.0))
     first: float = parameter("m", "place x_1 of the first wall along the normal", examples=[0.0])
@@ -36,7 +40,6 @@ class CouetteFlow(Source):
 
     @model_validator(mode="after")
     def _apart(self) -> CouetteFlow:
-        check_direction(f"{self.label}.normal", self.normal)
         must(self.first < self.second, f"{self.label}.second", f"above {self.label}.first", self.second)
         return self
 
@@ -49,7 +52,7 @@ class CouetteFlow(Source):
     def gradient(self, w, r, t):
         part, change = self.part(w, r), self.second_velocity(w) - self.first_velocity(w)
         rate = ti.select(part >= 0.0 and part <= 1.0, 1.0 / (self.second(w) - self.first(w)), 0.0)
-        return self.moving(w, t) * rate * change.outer_product(self.normal(w) / self.normal(w).norm())
+        return self.moving(w, t) * rate * change.outer_product(self.across(w))
 
     @ti.func
     def moving(self, w, t):
@@ -59,5 +62,4 @@ class CouetteFlow(Source):
     @ti.func
     def part(self, w, r):
         """Return how far r (m) is on the way from the first wall, at 0, to the second, at 1."""
-        x = r.dot(self.normal(w)) / self.normal(w).norm()
-        return (x - self.first(w)) / (self.second(w) - self.first(w))
+        return (r.dot(self.across(w)) - self.first(w)) / (self.second(w) - self.first(w))
