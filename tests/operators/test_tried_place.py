@@ -35,6 +35,6 @@ def test_grains_are_put_where_none_of_any_block_is(rng, monkeypatch):
     (result,) = simulation.results()
     simulation.close()
     where = result.state["position"]
-    assert len(where) > BED
+    assert len(where) == BED + ADDED
     apart = np.linalg.norm(where[:, None] - where, axis=2) + 9.0 * np.eye(len(where))
     assert apart.min() >= 2 * RADIUS * (1 - 1e-6)
