@@ -20,15 +20,18 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
 4. ``counters`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
    ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
    back. Of several effects of one kind they are summed, as all write the same. What is summed over particles
-   in a step, in any order, is a whole number, of ``totals``. Where the options decide, ``keeps`` returns the
-   names. ``end_step`` sets quantities of a world by what the forces of a step come to; ``measures`` makes
+   in a step, in any order, is a whole number, of ``totals``. What it keeps for itself alone are ``flags``,
+   i32, and ``clocks``, f64. Where the options decide, ``keeps`` returns the names; none may be one of the
+   stepper's. ``end_step`` sets quantities of a world by what the forces of a step come to; ``measures`` makes
    more of the particles of a Result, and ``measured`` names all of both, with units.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
    are summed in scene order. The velocity of j relative to i is ``s.relative_velocity(w, i, j, separation)``:
    that of an image that moves past the box is not the difference of the two. What near pairs remember of
    each other (``memory``) is handed to ``interaction``, which returns it brought up to date, together with
    the force; what a particle remembers of a force, such as that of walls, is brought up to date in ``load``,
-   where that is told to, and there it may add to ``totals``.
+   where that is told to, and there it may add to ``totals``. Between the particles of one rigid body a
+   short-ranged law acts only where it says so, ``within_bodies``. A law that stops a world on purpose, by a
+   force that is not a number, says where in ``may_stop``.
 6. Who feels an external field finds it with ``sources`` (see tisim/sources/base.py), and names in
    ``requires_source`` the quantities of which a scene must have at least one source.
 7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the field
@@ -43,7 +46,8 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
 10. A ``Constraint`` moves the particles that it holds, in place of the stepper, whatever the forces on them.
 11. ``connect`` returns what an effect wants to know of the other bound effects, ``peers.of(Heating)``;
     ``requires`` names the effects without which it means nothing, ``excludes`` those that it does not go
-    with, ``precedes`` those that must come after it. Nobody asks what an effect is called.
+    with, ``precedes`` those that must come after it; ``suits_others`` refuses others by their settings, and
+   ``beside`` takes these over from one that it is tried with. Nobody asks what an effect is called.
 12. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may ever
     live at once, given the start.
 13. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``

@@ -80,9 +80,9 @@ class Effect(LawHints, Component):
 
     def keeps(self, what: str) -> tuple[str, ...]:
         """Return the names of the ``counters``, ``world_quantities``, ``totals``, ``flags`` (i32) or
-        ``clocks`` (f64) that it keeps of a world, given its options; by default those of its class, and no
-        Result has the last two. Names that begin with its own are of it alone, where
-        there are several of a kind; it finds them with ``remembers``."""
+        ``clocks`` (f64) that it keeps of a world, given its options; by default those of its class. No Result
+        has flags or clocks. Names that begin with its own are of it alone, where there are several of a kind;
+        it finds them with ``remembers``."""
         return getattr(self, what, ())
 
     def connect(self, peers: Peers) -> dict[str, Any]:

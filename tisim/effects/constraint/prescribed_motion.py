@@ -30,7 +30,7 @@ class PrescribedMotion(Constraint):
     field ``group`` of the start has, or join it on the way (``join_group``); 0 is that of particles that move
     freely. Their velocities and spins at the start are those of the motion, whatever the start says. They act
     on others as ever, and in granular contacts they count as so heavy as a wall; short-ranged laws do not act
-    between them, but for those of dipoles, as all that is summed over all pairs does. The result tells the
+    between them. Dipoles, and all that is summed over all pairs, do act between them. The result tells the
     sum of all forces (N) on the group, gravity among them, as ``measures["NAME_force_x"]`` and so on, and
     that of their torques (N m), about the origin or the centre of its rotation, as ``NAME_torque_x``.
 
