@@ -12,6 +12,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
 from tisim.interactions.pair_sum import MANY
 from tisim.numerics import elementary
+from tisim.worlds.block_sum import BlockSums, PerBlock
 from tisim.worlds.bound import Bound
 from tisim.worlds.occasion import OnOccasion
 from tisim.worlds.phases import Item, PerParticle, Phase
@@ -29,7 +30,8 @@ class WaveSum(LongRangeSum):
     column 0, of n_x = n_y = 0, has n_z > 0, and the others are those after it in the order of n_x and n_y.
 
     turns : exp(i 2 pi n x_a / L_a) of each particle along each axis, for n from 0 on. amplitude : 2 mu_0 / V
-    g S(k). top : the largest n_z of a column; -1 for none. mean : -mu_0 N M / V, T. field : T. force : N.
+    g S(k). top : the largest n_z of a column; -1 for none. moments : M. mean : -mu_0 N M / V, T. field : T.
+    force : N.
     """
 
     def __init__(self, s: State, effect: Bound[Any], domain: Bound[Any], forces: bool) -> None:
@@ -53,19 +55,20 @@ class WaveSum(LongRangeSum):
             builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
         if forces:
             (self.force,) = force
-        self.tree = Tree(builder)
+        self.tree, self.moments = Tree(builder), BlockSums(s, 3)
 
     def phases(self) -> tuple[Item, ...]:
         return (
             MeasureColumns(self),
             TurnParticles(self),
-            SumMoments(self),
+            SumMoments(self.moments),
+            FieldOfPoles(self),
             StructureFactors(self),
             Waves(self),
         )
 
     def bytes(self) -> int:
-        return self.tree.bytes
+        return self.tree.bytes + self.moments.bytes()
 
     @ti.func
     def period(self, w):
@@ -152,7 +155,15 @@ class TurnParticles(OnOccasion, PerParticle):
                 turn = times(turn, one)
 
 
-class SumMoments(OnOccasion, Phase):
+class SumMoments(OnOccasion, PerBlock):
+    """This phase sums the moments of all particles, by blocks."""
+
+    @ti.func
+    def each(self, w, i):
+        return ti.cast(self.s.moment[w, i], ti.f64)
+
+
+class FieldOfPoles(OnOccasion, Phase):
     """This phase sets the field that the poles of the sample make."""
 
     def __init__(self, total: WaveSum) -> None:
@@ -160,9 +171,7 @@ class SumMoments(OnOccasion, Phase):
 
     @ti.func
     def run(self, w, _k):
-        a, total = self.sum, ti.Vector.zero(self.s.real, 3)
-        for i in range(self.s.count[w]):
-            total += self.s.moment[w, i]
+        a, total = self.sum, ti.cast(self.sum.moments.total(w), self.s.real)
         factors = a.effect.demagnetising_factors(w)
         for axis in ti.static(range(3)):
             if ti.static(not a.joined[axis]):
