@@ -74,12 +74,73 @@ class PutStrengths(OfTree):
         self.moments.strength[w, k] = G * self.s.mass[w, self.t.order[w, k]]
 
 
-class LeafMoments(OnOccasion, Phase):
-    """This phase makes box and moments of each leaf."""
+class Gather(Phase):
+    """This phase makes box and moments of cells of what they hold: members that have a box, a centre, G m,
+    second moments about it, and an extent around it."""
+
+    def __init__(self, moments: CellMoments, extent: int) -> None:
+        self.m, self.t, self.s, self.extent = moments, moments.t, moments.s, extent
+
+    @ti.func
+    def box(self, w, c):
+        """Return the low and the high corner of member c, m."""
+        return self.t.low[w, c], self.t.high[w, c]
+
+    @ti.func
+    def middle(self, w, c):
+        """Return the centre (m) and the total (m^3/s^2) of member c."""
+        return self.m.centre[w, c], self.m.total[w, c]
+
+    @ti.func
+    def spread(self, w, c):
+        """Return the second moments (m^5/s^2) and the extent (m) of member c about its centre."""
+        return self.m.diagonal[w, c], self.m.mixed[w, c], self.m.extent[w, c]
+
+    @ti.func
+    def gather(self, w, cell, begin, end):
+        """Set box and moments of a cell by its members, ``begin`` to ``end``."""
+        low, high = self.box(w, begin)
+        # About the first one: so it is exact where all are in one place.
+        first, _part = self.middle(w, begin)
+        shift, total = ti.Vector.zero(self.s.real, 3), ti.cast(0.0, self.s.real)
+        for c in range(begin, end):
+            lowest, highest = self.box(w, c)
+            centre, part = self.middle(w, c)
+            low, high = ti.min(low, lowest), ti.max(high, highest)
+            total += part
+            shift += part * (centre - first)
+        about, extent = first + shift / total, ti.cast(0.0, self.s.real)
+        diagonal, mixed = ti.Vector.zero(self.s.real, 3), ti.Vector.zero(self.s.real, 3)
+        for c in range(begin, end):
+            centre, part = self.middle(w, c)
+            along, across, far = self.spread(w, c)
+            x = centre - about
+            own, off = second_moments(x)
+            diagonal += along + part * own
+            mixed += across + part * off
+            extent = ti.max(extent, x.norm() + far)
+        self.t.low[w, cell], self.t.high[w, cell] = low, high
+        self.m.set(w, cell, total, about, diagonal, mixed, extent)
+
+
+class LeafMoments(OnOccasion, Gather):
+    """This phase makes box and moments of each leaf, of its particles."""
 
     def __init__(self, moments: CellMoments) -> None:
-        self.m, self.t, self.s = moments, moments.t, moments.s
-        self.extent = self.t.leaves
+        super().__init__(moments, moments.t.leaves)
+
+    @ti.func
+    def box(self, w, c):
+        return self.t.place[w, c], self.t.place[w, c]
+
+    @ti.func
+    def middle(self, w, c):
+        return self.t.place[w, c], self.m.strength[w, c]
+
+    @ti.func
+    def spread(self, w, c):
+        none = ti.Vector.zero(self.s.real, 3)
+        return none, none, ti.cast(0.0, self.s.real)
 
     @ti.func
     def size(self, w):
@@ -87,27 +148,9 @@ class LeafMoments(OnOccasion, Phase):
 
     @ti.func
     def run(self, w, c):
-        m, t = self.m, self.t
         if c == 0:
-            m.level[w] = 1
-        begin, end = c * LEAF, t.leaf_end(w, c)
-        low, high, total = t.place[w, begin], t.place[w, begin], ti.cast(0.0, self.s.real)
-        # About the first one: so it is exact where all are in one place.
-        first, shift = t.place[w, begin], ti.Vector.zero(self.s.real, 3)
-        for k in range(begin, end):
-            low, high = ti.min(low, t.place[w, k]), ti.max(high, t.place[w, k])
-            total += m.strength[w, k]
-            shift += m.strength[w, k] * (t.place[w, k] - first)
-        centre, square = first + shift / total, ti.cast(0.0, self.s.real)
-        diagonal, mixed = ti.Vector.zero(self.s.real, 3), ti.Vector.zero(self.s.real, 3)
-        for k in range(begin, end):
-            x = t.place[w, k] - centre
-            own, off = second_moments(x)
-            diagonal += m.strength[w, k] * own
-            mixed += m.strength[w, k] * off
-            square = ti.max(square, x.norm_sqr())
-        t.low[w, c], t.high[w, c] = low, high
-        m.set(w, c, total, centre, diagonal, mixed, ti.sqrt(square))
+            self.m.level[w] = 1
+        self.gather(w, c, c * LEAF, self.t.leaf_end(w, c))
 
 
 class EachLevel(Repeat):
@@ -122,12 +165,11 @@ class EachLevel(Repeat):
         return self.m.t.levels[w] - self.m.level[w]
 
 
-class LevelMoments(Phase):
+class LevelMoments(Gather):
     """This phase makes box and moments of each cell of a level, of the cells that it has of the one below."""
 
     def __init__(self, moments: CellMoments) -> None:
-        self.m, self.t, self.s = moments, moments.t, moments.s
-        self.extent = -(-self.t.leaves // FAN)
+        super().__init__(moments, -(-moments.t.leaves // FAN))
 
     @ti.func
     def size(self, w):
@@ -135,26 +177,9 @@ class LevelMoments(Phase):
 
     @ti.func
     def run(self, w, k):
-        m, t, level = self.m, self.t, self.m.level[w]
+        t, level = self.t, self.m.level[w]
         below = t.first(level - 1)
-        begin, end = below + k * FAN, below + t.child_end(w, level, k)
-        low, high, total = t.low[w, begin], t.high[w, begin], ti.cast(0.0, self.s.real)
-        first, shift = m.centre[w, begin], ti.Vector.zero(self.s.real, 3)
-        for c in range(begin, end):
-            low, high = ti.min(low, t.low[w, c]), ti.max(high, t.high[w, c])
-            total += m.total[w, c]
-            shift += m.total[w, c] * (m.centre[w, c] - first)
-        centre, extent = first + shift / total, ti.cast(0.0, self.s.real)
-        diagonal, mixed = ti.Vector.zero(self.s.real, 3), ti.Vector.zero(self.s.real, 3)
-        for c in range(begin, end):
-            x = m.centre[w, c] - centre
-            own, off = second_moments(x)
-            diagonal += m.diagonal[w, c] + m.total[w, c] * own
-            mixed += m.mixed[w, c] + m.total[w, c] * off
-            extent = ti.max(extent, x.norm() + m.extent[w, c])
-        at = t.first(level) + k
-        t.low[w, at], t.high[w, at] = low, high
-        m.set(w, at, total, centre, diagonal, mixed, extent)
+        self.gather(w, t.first(level) + k, below + k * FAN, below + t.child_end(w, level, k))
 
 
 class EndLevel(Phase):
