@@ -26,7 +26,7 @@ from tisim.effects import (
     option,
 )
 from tisim.engine.explain import known_effects
-from tisim.interactions.force_sum import FORCE
+from tisim.interactions.loads import FORCE
 from tisim.operators import Capture, JoinGroup, Operator, Outflow
 from tisim.sources import MagneticCylinders, MagneticField, MagneticSpheres
 from tisim.steppers import (

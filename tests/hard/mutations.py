@@ -245,7 +245,7 @@ SUMS = {
         f"{DIPOLES}ewald.py::test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name",
     ),
     "virial": (
-        "tisim/interactions/force_sum.py", "= -0.5 * separation[a]", "= 0.5 * separation[a]",
+        "tisim/interactions/loads.py", "= -0.5 * separation[a]", "= 0.5 * separation[a]",
         "tests/effects/pair/test_virial.py::test_contacts_in_shear_have_the_virial_of_their_twin",
     ),
     "gravity_by_a_tree": (

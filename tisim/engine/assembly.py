@@ -21,8 +21,9 @@ from tisim.interactions.collision_rounds import Rounds
 from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts
 from tisim.interactions.contact_memory import ContactMemory, memory_fields
 from tisim.interactions.failure_attribution import FailureAttribution
-from tisim.interactions.force_sum import FORCE, TORQUE, SumForces, SumTrialForces, turning
+from tisim.interactions.force_sum import SumForces, SumTrialForces, turning
 from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, ExportedTerms, fuse, sum_phases
+from tisim.interactions.loads import FORCE, TORQUE
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rearrangement import StoreBefore, acting, active, rearrange
 from tisim.interactions.rebuild_pairs import update_pairs

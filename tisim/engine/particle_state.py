@@ -11,7 +11,7 @@ from tisim.effects.base import DerivedQuantity
 from tisim.engine.loading import check_field, check_start
 from tisim.engine.monitor import Monitor
 from tisim.errors import must
-from tisim.interactions.force_sum import FORCE, TORQUE
+from tisim.interactions.loads import FORCE, TORQUE
 from tisim.scene.initial_state import check_sizes
 from tisim.worlds.status import NEVER, WorldStatus
 

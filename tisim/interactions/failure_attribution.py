@@ -46,7 +46,7 @@ class FailureAttribution:
         force, torque_i, torque_j, _ = effect.interaction(
             s, w, first, second, sign * d, d.norm(), past, dt, t
         )
-        load = self.forces.wrench(sign * force, ti.select(first == i, torque_i, torque_j))
+        load = self.forces.loads.wrench(sign * force, ti.select(first == i, torque_i, torque_j))
         if ti.static(effect.short_ranged and not effect.within_bodies):
             load = ti.select(self.forces.half_list.joined(w, i, j), 0.0, load)
         return load
@@ -62,7 +62,7 @@ class FailureAttribution:
             if finite(most) and not (size <= most):
                 most, index = size, effect.index
         for effect in ti.static(self.forces.pair_forces):
-            total = ti.Vector.zero(s.real, self.forces.load_size)
+            total = ti.Vector.zero(s.real, self.forces.loads.size)
             for j in range(s.count[w]):
                 if i != j:
                     total += self.force_by_other(effect, w, i, j, t)

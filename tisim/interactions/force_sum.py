@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
+from tisim.interactions.loads import Loads
 from tisim.interactions.pair_sum import PairSum
 from tisim.numerics.ieee import finite
 from tisim.numerics.roots import estimates_roots
 from tisim.numerics.vectors import piece
-from tisim.worlds.fields import Field
 from tisim.worlds.occasion import Occasion
 from tisim.worlds.status import WorldStatus
 
@@ -19,30 +19,10 @@ if TYPE_CHECKING:
     from tisim.worlds.bound import Bound, Peers
     from tisim.worlds.state import State
 
-FORCE = Field("force", "N", 3, "sum")
-TORQUE = Field("torque", "N m", 3, "sum")
-VIRIAL = Field("virial", "J", 1, "keep", slots=9)
-"""This is the half of a particle in the virial of its pairs: xx, xy, xz, yx, ... zz."""
-
 
 def turning(effects: Sequence[Effect]) -> bool:
     """Return whether any of these exerts torques."""
     return any(effect.turns(effects) for effect in effects if isinstance(effect, Force | PairForce))
-
-
-@ti.func
-def _force_and_torque(force, torque):
-    return ti.Vector([force[0], force[1], force[2], torque[0], torque[1], torque[2]])
-
-
-@ti.func
-def _force_alone(force, torque):
-    return force
-
-
-@ti.func
-def _load_alone(load, separation):
-    return load
 
 
 class SumForces(PairSum):
@@ -75,14 +55,12 @@ class SumForces(PairSum):
         self.half_list: Any = pairs.half_list if pairs else None
         self.turning = turning([effect.data for effect in effects])
         self.has_fixed = any(field.name == "fixed" for field in s.fields)
-        self.has_virial = VIRIAL in s.fields
-        self.wrench, self.load_size = (_force_and_torque, 6) if self.turning else (_force_alone, 3)
-        self.summand = self.load_and_virial if self.has_virial else _load_alone
-        self.components = self.load_size + (VIRIAL.slots if self.has_virial else 0)
+        self.loads = Loads(s, self.turning)
+        self.components = self.loads.components
         # A listed pair comes to a force, torques on both, how far apart they are where that is of use, and
         # what each law has it remember.
         self.separation_begin = 9 if self.turning else 3
-        self.pair_values, laws = self.separation_begin + (3 if self.has_virial else 0), []
+        self.pair_values, laws = self.separation_begin + (3 if self.loads.virial else 0), []
         for law in self.short_ranged:
             laws.append((law, self.pair_values))
             self.pair_values += law.data.memory if self.commits else 0
@@ -94,30 +72,19 @@ class SumForces(PairSum):
             for effect in (*self.forces, *self.pair_forces)
         )
         able = all(effect.data.offers_inverse() for effect in self.long_ranged)
-        self.by_inverse = able and not self.turning and not self.has_virial and estimates_roots()
-
-    @ti.func
-    def load_and_virial(self, load, separation):
-        """Return a load by another particle, which is at ``separation`` (m), with the half of its virial that
-        is of the one it acts on."""
-        total = ti.Vector.zero(self.s.real, self.components)
-        for k in ti.static(range(self.load_size)):
-            total[k] = load[k]
-        for a, b in ti.static(ti.ndrange(3, 3)):
-            total[self.load_size + 3 * a + b] = -0.5 * separation[a] * load[b]
-        return total
+        self.by_inverse = able and not self.turning and not self.loads.virial and estimates_roots()
 
     @ti.func
     def start(self, w, i, t):
-        return self.summand(self.external_load(w, i, t), 0.0 * self.s.position[w, i])
+        return self.loads.summand(self.external_load(w, i, t), 0.0 * self.s.position[w, i])
 
     @ti.func
     def finish(self, w, i, total, t):
         taken = total
         if ti.static(self.has_fixed):
-            for k in ti.static(range(self.load_size)):
+            for k in ti.static(range(self.loads.size)):
                 taken[k] = ti.select(self.is_free(w, i), total[k], 0.0)
-        self.write(w, i, taken)
+        self.loads.write(w, i, taken)
         self.check(w, i, taken)
 
     @ti.func
@@ -125,13 +92,13 @@ class SumForces(PairSum):
         """Set the force on i, at a time of its own, where particles do not feel each other."""
         for solver in ti.static(self.derived_solvers):
             solver.set(self.s, w, i, t)
-        self.write(w, i, self.external_load(w, i, t))
+        self.loads.write(w, i, self.external_load(w, i, t))
 
     @ti.func
     def external_load(self, w, i, t):
         """Return the sum of the forces on i that no other particle exerts, with their torques."""
         s = self.s
-        total = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
+        total = self.loads.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
         if self.is_free(w, i):
             for effect in ti.static(self.forces):
                 total += self.load_by(effect, w, i, t)
@@ -139,20 +106,11 @@ class SumForces(PairSum):
 
     @ti.func
     def write_sum(self, w, i, total):
-        # Not +=, which would be atomic.
-        self.write(w, i, total)
+        self.loads.write(w, i, total)
 
     @ti.func
     def read_sum(self, w, i):
-        s = self.s
-        load = self.wrench(s.force[w, i], s.force[w, i])
-        if ti.static(self.turning):
-            load = self.wrench(s.force[w, i], s.torque[w, i])
-        total = self.summand(load, 0.0 * s.force[w, i])
-        if ti.static(self.has_virial):
-            for k in ti.static(range(VIRIAL.slots)):
-                total[self.load_size + k] = s.virial[w, i, k]
-        return total
+        return self.loads.read(w, i)
 
     @ti.func
     def compute_pair(self, w, m, i, j, separation, distance, t):
@@ -167,7 +125,7 @@ class SumForces(PairSum):
             if ti.static(self.commits):
                 for k in ti.static(range(law.memory)):
                     values[begin + k] = memory[k]
-        if ti.static(self.has_virial):
+        if ti.static(self.loads.virial):
             for k in ti.static(range(3)):
                 values[self.separation_begin + k] = separation[k]
         return values
@@ -197,15 +155,15 @@ class SumForces(PairSum):
 
     @ti.func
     def pair_contributions(self, values):
-        force = piece(values, 0, 3)
-        here, there = self.wrench(force, force), self.wrench(-force, force)
+        force, loads = piece(values, 0, 3), self.loads
+        here, there = loads.wrench(force, force), loads.wrench(-force, force)
         if ti.static(self.turning):
-            here = self.wrench(force, piece(values, 3, 3))
-            there = self.wrench(-force, piece(values, 6, 3))
+            here = loads.wrench(force, piece(values, 3, 3))
+            there = loads.wrench(-force, piece(values, 6, 3))
         separation = 0.0 * force
-        if ti.static(self.has_virial):
+        if ti.static(loads.virial):
             separation = piece(values, self.separation_begin, 3)
-        return self.summand(here, separation), self.summand(there, -separation)
+        return loads.summand(here, separation), loads.summand(there, -separation)
 
     @ti.func
     def write_memory(self, w, m, values):
@@ -246,17 +204,6 @@ class SumForces(PairSum):
         return free
 
     @ti.func
-    def write(self, w, i, total):
-        s = self.s
-        for k in ti.static(range(3)):
-            s.force[w, i][k] = total[k]
-            if ti.static(self.turning):
-                s.torque[w, i][k] = total[3 + k]
-        if ti.static(self.has_virial):
-            for k in ti.static(range(VIRIAL.slots)):
-                s.virial[w, i, k] = total[self.load_size + k]
-
-    @ti.func
     def check(self, w, i, total):
         if not finite(total.norm_sqr()):
             if self.s.occasion[w] == Occasion.AHEAD:
@@ -268,16 +215,16 @@ class SumForces(PairSum):
     def load_by(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
         """Return the force on i by one law that no other particle exerts, with its torque."""
         force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.updates_memory(w))
-        return self.wrench(force, torque)
+        return self.loads.wrench(force, torque)
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
         s = self.s
-        load = self.wrench(
+        load = self.loads.wrench(
             effect.pair_force(s, w, i, j, separation, distance, t),
             effect.pair_torque(s, w, i, j, separation, distance, t),
         )
-        return self.summand(load, separation)
+        return self.loads.summand(load, separation)
 
     @ti.func
     def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]

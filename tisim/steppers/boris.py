@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force
-from tisim.interactions.force_sum import FORCE
+from tisim.interactions.loads import FORCE
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import (
     AdvanceClock,

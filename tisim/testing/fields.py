@@ -7,7 +7,8 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.interactions.contact_memory import memory_fields
-from tisim.interactions.force_sum import FORCE, TORQUE, turning
+from tisim.interactions.force_sum import turning
+from tisim.interactions.loads import FORCE, TORQUE
 from tisim.scene.scene import Scene
 from tisim.testing.uncompiled import allocated, offered
 from tisim.worlds.bound import Bound, Peers

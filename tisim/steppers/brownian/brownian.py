@@ -9,7 +9,7 @@ from tisim.components.component import option, parameter
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.errors import must
-from tisim.interactions.force_sum import FORCE
+from tisim.interactions.loads import FORCE
 from tisim.operators.base import Operator
 from tisim.steppers.base import Stepper, single
 from tisim.steppers.brownian.coupled import BrownianDrift, Proceed, Scatter, Separate

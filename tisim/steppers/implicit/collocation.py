@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairForce
-from tisim.interactions.force_sum import FORCE
+from tisim.interactions.loads import FORCE
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
 from tisim.steppers.context import Buffer, Step, StepContext
