@@ -1,4 +1,5 @@
-"""Draw-down tests of grains that differ in one property, and of silos with other outlets, as one batch.
+"""Draw-down tests of grains that differ in one property, and of silos with other outlets, as one batch, each
+from several random starts.
 
 The rate of discharge is held against Beverloo's law, W = C rho_b sqrt(g) (D - k d)^(5/2), by a straight line
 through W^(2/5): its slope has C and where it meets 0 has k.
@@ -21,6 +22,7 @@ from scipy.constants import g as STANDARD_GRAVITY
 from cases.granular_bench.measures import discharge, heap, repose
 from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 from cases.runs import sound
+from cases.statistics import Mean
 from tisim import Result, run
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, panel, walls_at
@@ -30,10 +32,11 @@ VALUES = {
     "friction": (0.1, 0.3, 0.5, 0.8),
     "rolling_friction": (0.0, 0.1, 0.2, 0.4),
     "restitution": (0.3, 0.5, 0.8),
-    "seed": (0, 1, 2),
     "outlet": (5.0, 6.0, 7.0, 8.0, 9.0),
 }
-"""What is varied alone: of NATURAL, the random start, and the outlet of the silo in diameters of a grain."""
+"""What is varied alone: of NATURAL, and the outlet of the silo in diameters of a grain."""
+STARTS = 4
+"""Each is run from so many random starts."""
 SHOWN = (("rolling_friction", 0.0), ("rolling_friction", 0.2), ("rolling_friction", 0.4))
 """These are drawn as they lie."""
 PACKED = 0.6
@@ -43,35 +46,58 @@ COLOURS = ("#4477aa", "#cc6677", "#228833")
 
 @dataclass(frozen=True)
 class Bed:
-    """A bed has what was varied and to what, and its result."""
+    """A bed has what was varied and to what, and its results, one for each start."""
 
     what: str
     value: float
-    result: Result
+    results: Sequence[Result]
 
     @property
-    def angle(self) -> float:
-        """Return the angle of repose, degrees."""
-        return repose(self.result)
+    def angle(self) -> Mean:
+        """Return the angle of repose, degrees; not a number where a start leaves no heap."""
+        return Mean.of([repose(result) for result in self.results])
 
     @property
-    def rate(self) -> float:
+    def rates(self) -> np.ndarray:
+        """Return the discharge rate of each start, kg/s."""
+        return np.array([discharge(result) for result in self.results])
+
+    @property
+    def rate(self) -> Mean:
         """Return the discharge rate, kg/s."""
-        return discharge(self.result)
+        return Mean.of(self.rates)
+
+    @property
+    def kept(self) -> Mean:
+        """Return how many grains stay on the disc."""
+        return Mean.of([heap(result).sum() for result in self.results])
 
 
 def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
     """Run the beds of VALUES as one batch, those that are alike once."""
     wanted = [(what, value) for what, values in VALUES.items() for value in values]
     scenes = [
-        scene({**NATURAL, what: value}, **size) if what in NATURAL else scene(**{**size, what: value})
+        scene({**NATURAL, what: value}, seed, **size)
+        if what in NATURAL
+        else scene(seed=seed, **{**size, what: value})
         for what, value in wanted
+        for seed in range(STARTS)
     ]
     digests = [one.digest() for one in scenes]
     different = dict(zip(digests, scenes, strict=True))
     found = sound(run(list(different.values()), progress))
     results = dict(zip(different, found, strict=True))
-    return [Bed(*one, results[digest]) for one, digest in zip(wanted, digests, strict=True)]
+    grouped = np.reshape(digests, (len(wanted), STARTS))
+    return [Bed(*one, [results[key] for key in row]) for one, row in zip(wanted, grouped, strict=True)]
+
+
+def beverloo_constants(found: Sequence[Bed]) -> tuple[Mean, Mean]:
+    """Return C and k of Beverloo's law, means of fits to the first, second, ... start of each outlet. An arch
+    has closed those that nothing flows through: they are left out."""
+    outlets = np.array([one.value for one in found])
+    by_start = np.array([one.rates for one in found]).T
+    constants = np.array([beverloo_fit(outlets[rates > 0], rates[rates > 0]) for rates in by_start])
+    return Mean.of(constants[:, 0]), Mean.of(constants[:, 1])
 
 
 def beverloo_fit(outlets: np.ndarray, rates: np.ndarray) -> tuple[float, float]:
@@ -86,19 +112,20 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
     figure = empty(11.6, 7.2)
     (first, second, angles), (third, rates, law) = figure.subplots(2, 3)
     chosen = [next(one for one in found if (one.what, one.value) == key) for key in SHOWN]
-    states = [one.result.state for one in chosen]
-    walls = [walls_at(one.result.scene, states, one.result.time) for one in chosen]
+    firsts = [one.results[0] for one in chosen]
+    states = [one.state for one in firsts]
+    walls = [walls_at(one.scene, states, one.time) for one in firsts]
     # No box: the silo stands in open space.
     square = common(states, np.vstack([corners(None, None), *itertools.chain(*walls)]))
-    for axis, one, lines in zip((first, second, third), chosen, walls, strict=True):
-        panel(axis, one.result.state, square, corners(None, None), walls=lines)
-        angle = "no heap" if np.isnan(one.angle) else f"{one.angle:.0f} degrees"
+    for axis, one, state, lines in zip((first, second, third), chosen, states, walls, strict=True):
+        panel(axis, state, square, corners(None, None), walls=lines)
+        angle = "no heap" if np.isnan(one.angle.value) else f"{one.angle.value:.0f} degrees"
         axis.set_title(f"{one.what.replace('_', ' ')} {one.value:g}: {angle}")
     for k, what in enumerate(NATURAL):
         group = [one for one in found if one.what == what]
         values = [one.value for one in group]
         for axis, numbers in ((angles, [one.angle for one in group]), (rates, [one.rate for one in group])):
-            axis.plot(values, numbers, "os^"[k] + "-", ms=5, color=COLOURS[k], label=what.replace("_", " "))
+            bars(axis, values, numbers, fmt="os^"[k] + "-", color=COLOURS[k], label=what.replace("_", " "))
             axis.set_xlabel("coefficient, the others as usual")
             axis.legend(frameon=False, fontsize=8)
     angles.set(ylabel="angle of repose (degrees)", title="angle of repose")
@@ -110,31 +137,37 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
     return figure
 
 
+def bars(axis: Axes, values: Sequence[float], means: Sequence[Mean], **style: Any) -> None:
+    """Draw means by what was varied, with their 95 % intervals."""
+    numbers, halves = [one.value for one in means], [one.half for one in means]
+    axis.errorbar(values, numbers, halves, ms=5, capsize=2, elinewidth=0.8, **style)
+
+
 def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
     """Draw the rate to the power 2/5 by the outlet, and the line of Beverloo's law."""
-    outlets, rates = np.array([one.value for one in found]), np.array([one.rate for one in found])
-    # An arch has closed those that nothing flows through.
-    flows = rates > 0
-    constant, empty_part = beverloo_fit(outlets[flows], rates[flows])
-    line = np.linspace(empty_part, outlets.max(), 50)
+    constant, empty_part = beverloo_constants(found)
+    outlets = [one.value for one in found]
+    line = np.linspace(empty_part.value, max(outlets), 50)
     bulk = PACKED * DENSITY
-    free = np.maximum((line - empty_part) * DIAMETER, 0.0)
-    rate = constant * bulk * np.sqrt(STANDARD_GRAVITY) * free**2.5
-    label = f"Beverloo, C = {constant:.2f}, k = {empty_part:.2f}"
+    free = np.maximum((line - empty_part.value) * DIAMETER, 0.0)
+    rate = constant.value * bulk * np.sqrt(STANDARD_GRAVITY) * free**2.5
+    label = f"Beverloo, C = {constant}, k = {empty_part}"
     axis.plot(line, rate**0.4, color="0.2", lw=1.0, label=label)
-    axis.plot(outlets, rates**0.4, "o", ms=6, mfc="none", color=COLOURS[0], label="as run")
+    powers = [Mean.of(one.rates**0.4) for one in found]
+    bars(axis, outlets, powers, fmt="o", mfc="none", color=COLOURS[0], label="as run")
     axis.set(xlabel="outlet (diameters of a grain)", ylabel=r"rate$^{2/5}$ ((kg/s)$^{2/5}$)",
              title="Beverloo's law")  # fmt: skip
     axis.legend(frameon=False, fontsize=8)
 
 
 def table(found: Sequence[Bed]) -> str:
-    """Return what was varied, the angle of repose and the discharge rate as CSV."""
+    """Return what was varied, the angle of repose, the discharge rate and the grains of the heap, each with
+    half of its 95 % interval, as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
-    writer.writerow(
-        ["varied", "value", "angle_of_repose_degrees", "discharge_rate_kg_s", "grains_of_the_heap"]
-    )
+    measured = ("angle_of_repose_degrees", "discharge_rate_kg_s", "grains_of_the_heap")
+    writer.writerow(["varied", "value", *(name for one in measured for name in (one, f"{one}_95"))])
     for one in found:
-        writer.writerow([one.what, one.value, one.angle, one.rate, int(heap(one.result).sum())])
+        means = (one.angle, one.rate, one.kept)
+        writer.writerow([one.what, one.value, *(x for mean in means for x in (mean.value, mean.half))])
     return text.getvalue()

@@ -55,9 +55,10 @@ SEARCH_SETTINGS = {
     "ensemble": {"tolerance": 0.9, "min_starts": 1, "block": 1, "max_starts": 1},
 }  # fmt: skip
 SMALL_SEARCH_SETTINGS = {
-    **SEARCH_SETTINGS, "generations": 11,
-    # One heap of so few grains tells its angle to 2 degrees only.
-    "ensemble": {"tolerance": 0.9, "min_starts": 2, "block": 2, "max_starts": 2},
+    **SEARCH_SETTINGS, "generations": 14,
+    # One heap of so few grains tells its angle to 2 degrees only, and what is best by few heaps is best by
+    # luck: fresh ones decide.
+    "ensemble": {"tolerance": 0.9, "min_starts": 4, "block": 4, "max_starts": 4, "confirm": 12},
 }  # fmt: skip
 
 BED = "bed"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.granular_bench.beds import PACKED, VALUES, Bed, bed_figure, beverloo_fit, table
+from cases.granular_bench.beds import PACKED, VALUES, Bed, bed_figure, beverloo_constants, beverloo_fit, table
 from cases.granular_bench.measures import discharge, floor, heap, repose
 from cases.granular_bench.problem import problem
 from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, SEARCH_SETTINGS, scene
@@ -61,23 +61,41 @@ def test_beverloos_law_is_found_again():
     assert beverloo_fit(outlets, rates) == pytest.approx((0.61, 1.3), rel=1e-9)
 
 
+def test_beverloos_law_is_known_as_well_as_starts_agree():
+    """What is closed in a start is left out of its fit."""
+    outlets = (5.0, 6.0, 8.0)
+
+    def bed(d, closed):
+        law = [beverloo_rate(d * DIAMETER, DIAMETER, PACKED * DENSITY, discharge=c) for c in (0.5, 0.7)]
+        return Bed("outlet", d, [cone(25.0, law[0] * (not closed)), cone(25.0, law[1])])
+
+    constant, k = beverloo_constants([bed(d, d == 5.0) for d in outlets])
+    assert (constant.value, constant.half) == pytest.approx((0.6, 1.2706), rel=1e-4)
+    assert (k.value, k.half) == pytest.approx((1.4, 0.0), abs=1e-9)
+
+
 @pytest.mark.long
 def test_table_and_figure_have_each_bed():
     found = [
-        Bed(what, value, cone(20.0 + 5 * k, 0.01 * (k + 1)))
+        Bed(what, value, [cone(20.0 + 5 * k, 0.01 * (k + 1) * part) for part in (0.9, 1.1)])
         for what, values in VALUES.items() for k, value in enumerate(values)
     ]  # fmt: skip
     rows = table(found).splitlines()
     assert len(rows) == 1 + len(found)
-    assert rows[0].startswith("varied,value,angle_of_repose_degrees,discharge_rate_kg_s")
+    assert rows[0].startswith("varied,value,angle_of_repose_degrees,angle_of_repose_degrees_95,discharge")
+    # Of 0.009 and 0.011: Student's 12.7 for two, times 0.001.
+    name, *first = rows[1].split(",")
+    assert name == "friction"
+    assert [float(x) for x in first[2:5]] == pytest.approx([0.0, 0.01, 0.012706], abs=1e-6)
     figure = bed_figure(found)
     # The silo, its bottom and the disc are drawn around the grains, beside a scale bar.
     rims = [line.get_xydata() for line in figure.axes[0].lines if len(line.get_xydata()) > 2]
     widths = sorted(np.ptp(rim[:, 0]) / DIAMETER for rim in rims)
     assert widths == pytest.approx([7.0, 12.0, 12.0, 12.0, 16.0], rel=1e-2)
     angles, law = figure.axes[2], figure.axes[5]
-    np.testing.assert_allclose(angles.lines[0].get_ydata(), [one.angle for one in found[:4]])
-    np.testing.assert_allclose(law.lines[1].get_ydata(), [one.rate**0.4 for one in found[-5:]])
+    drawn = [np.asarray(axis.containers[0].lines[0].get_ydata(), float) for axis in (angles, law)]
+    np.testing.assert_allclose(drawn[0], [one.angle.value for one in found[:4]])
+    np.testing.assert_allclose(drawn[1], [(one.rates**0.4).mean() for one in found[-5:]])
 
 
 def test_settings_of_the_search_are_sound():
