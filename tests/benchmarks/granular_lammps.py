@@ -181,13 +181,14 @@ def lammps_model(law: TwinLaw) -> str:
     }[law.normal]
     if law.cohesion == "dmt":
         normal = f"dmt {elastic} {of['surface_energy']:.17g}"
-    nu, mu = of["poisson"], of["friction"]
+    nu, mu = of["poisson"], of.get("friction", 0.0)
     aside, shear = np.sqrt(2 * (1 - nu) / (2 - nu)), 2 / 7 * of.get("stiffness", 0)
     tangential = {
         "mindlin_force": f"mindlin_rescale/force NULL {aside:.17g} {mu:.17g}",
         "mindlin_displacement": f"mindlin NULL {aside:.17g} {mu:.17g}",
         "linear_spring": f"linear_history {shear:.17g} {np.sqrt(2 / 7):.17g} {mu:.17g}",
         "viscous_friction": f"linear_nohistory 1.0 {mu:.17g}",
+        "None": "linear_nohistory 0.0 0.0",
     }[str(law.tangential)]
     text = f"{normal} tangential {tangential} damping {damping}"
     for what in ("rolling", "twisting"):

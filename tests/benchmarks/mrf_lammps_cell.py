@@ -1,0 +1,110 @@
+"""The sheared cell of mrf_lammps.py in LAMMPS: what it is given in in.npz of a folder, it runs to out.npz."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.constants import mu_0
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from tests.benchmarks import lammps_peer
+
+State = dict[str, np.ndarray]
+
+
+def worker(folder: Path) -> None:
+    """Find the forces on grains in each state, and what comes of it after some steps."""
+    with np.load(folder / "in.npz") as given:
+        at = dict(given)
+    found: dict[str, list[Any]] = {"force": [], "position": [], "raft_force": []}
+    lasted = 0.0
+    for place, velocity in zip(at["position"], at["velocity"], strict=True):
+        machine = cell(folder, at, place, velocity)
+        found["force"].append(vectors(machine, "f"))
+        if at["steps"].any():
+            began = time.perf_counter()
+            found["raft_force"].append(shear(machine, at))
+            lasted += time.perf_counter() - began
+        found["position"].append(vectors(machine, "x"))
+        machine.close()
+    np.savez(folder / "out.npz", lasted=lasted, **found)
+
+
+def vectors(machine: Any, name: str) -> np.ndarray:
+    """A quantity of each particle, in the order of ids."""
+    return np.array(machine.gather_atoms(name, 1, 3)).reshape(-1, 3)
+
+
+def cell(folder: Path, at: State, place: np.ndarray, velocity: np.ndarray) -> Any:
+    """A LAMMPS that knows the forces on grains at their places, in the oil, between the plates."""
+    machine = lammps_peer.begin()
+    machine.commands_list(["units si", "atom_style hybrid sphere dipole", "boundary p p f"])
+    # Of its Coulomb's law, J m / C^2: electric dipoles attract as these magnetic ones do.
+    coulomb = machine.extract_global("qqr2e")
+    moment = at["moment"] * np.sqrt(mu_0 / (4 * np.pi * coulomb))
+    d, (x, y, z) = at["diameter"], at["sides"]
+    density = at["mass"] / (np.pi / 6 * d**3)
+    text = [f"grains\n\n{len(place)} atoms\n1 atom types\n", f"0 {x} xlo xhi\n0 {y} ylo yhi"]
+    text += [f"-{d} {z + d} zlo zhi\n\nAtoms\n"]
+    for k, row in enumerate(place, 1):
+        put = " ".join(f"{value:.17g}" for value in row)
+        text.append(f"{k} 1 {put} {d:.17g} {density:.17g} 0 0 0 {moment:.17g}")
+    text.append("\nVelocities\n")
+    text += [f"{k} {' '.join(f'{u:.17g}' for u in row)} 0 0 0" for k, row in enumerate(velocity, 1)]
+    (folder / "data").write_text("\n".join(text) + "\n")
+    model = str(at["law"])
+    machine.commands_list(
+        [
+            "atom_modify map array", "newton off", "comm_modify vel yes", f"neighbor {0.1 * d} bin",
+            "neigh_modify every 1 delay 0", f"read_data {folder / 'data'}",
+            f"pair_style hybrid/overlay granular lj/cut/dipole/cut {d} {at['reach']:.17g}",
+            f"pair_coeff * * granular {model}", f"pair_coeff * * lj/cut/dipole/cut 0.0 {d}",
+            f"timestep {at['dt']:.17g}", f"fix plates all wall/gran granular {model} zplane 0 {z}",
+            oil("all", at),
+            # It turns no grains, on which dipoles have torques.
+            "fix move all nve", "run 0",
+        ]
+    )  # fmt: skip
+    return machine
+
+
+def oil(group: str, at: State) -> str:
+    """The command by which oil at rest drags a group of grains."""
+    return f"fix oil {group} viscous {3 * np.pi * at['viscosity'] * at['diameter']:.17g}"
+
+
+def shear(machine: Any, at: State) -> tuple[float, float]:
+    """Run all of an experiment; the mean force along x on the lower and on the upper raft, N."""
+    joins, begins, ends = (int(one) for one in at["steps"])
+    bottom, top = at["raft"], at["sides"][2] - at["raft"]
+    speed = at["rate"] * (top - bottom) / 2
+    machine.commands_list(
+        [
+            f"run {joins}", "unfix move", "unfix oil",
+            f"region below block INF INF INF INF INF {bottom}",
+            f"region above block INF INF INF INF {top} INF",
+            "group lower region below", "group upper region above", "group rafts union lower upper",
+            "group free subtract all rafts", oil("free", at), "fix move free nve",
+            f"velocity lower set {-speed} 0 0", f"velocity upper set {speed} 0 0",
+            f"fix lower lower move linear {-speed} 0 0", f"fix upper upper move linear {speed} 0 0",
+            # What is frozen has no end of mass in impacts, as what is held here; its forces are kept before.
+            "fix borne rafts store/force", "fix heavy rafts freeze",
+            f"run {begins - joins}",
+            "compute lower lower reduce sum f_borne[1]", "compute upper upper reduce sum f_borne[1]",
+            "fix mean all ave/time 1 1 1 c_lower c_upper ave running",
+            # The mean is that of forces at the beginnings of steps.
+            f"run {ends - begins - 1}",
+        ]
+    )  # fmt: skip
+    lower, upper = (machine.extract_fix("mean", 0, 1, nrow=k) for k in range(2))
+    machine.command("run 1")
+    return lower, upper
+
+
+if __name__ == "__main__":
+    worker(Path(sys.argv[2]))
