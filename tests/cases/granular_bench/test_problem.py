@@ -24,7 +24,7 @@ from cases.granular_bench.problem import (
 from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
 from tisim import InputError
 
-INTERVALS = {"friction": 0.05, "rolling_friction": 0.08, "restitution": 0.03}
+INTERVALS = {"friction": 0.05, "rolling_friction": 0.05, "restitution": 0.02}
 """How far what is found may be from the known design."""
 GOOD = (
     "quantity, value, uncertainty\n\nangle_of_repose,24.5,1.0\n discharge_rate , 0.15,5e-3\n"
