@@ -84,7 +84,7 @@ class SumForces(PairSum):
         if ti.static(self.has_fixed):
             for k in ti.static(range(self.loads.size)):
                 taken[k] = ti.select(self.is_free(w, i), total[k], 0.0)
-        self.loads.write(w, i, taken)
+        self.loads.write(self.s, w, i, taken)
         self.check(w, i, taken)
 
     @ti.func
@@ -92,7 +92,7 @@ class SumForces(PairSum):
         """Set the force on i, at a time of its own, where particles do not feel each other."""
         for solver in ti.static(self.derived_solvers):
             solver.set(self.s, w, i, t)
-        self.loads.write(w, i, self.external_load(w, i, t))
+        self.loads.write(self.s, w, i, self.external_load(w, i, t))
 
     @ti.func
     def external_load(self, w, i, t):
@@ -106,11 +106,11 @@ class SumForces(PairSum):
 
     @ti.func
     def write_sum(self, w, i, total):
-        self.loads.write(w, i, total)
+        self.loads.write(self.s, w, i, total)
 
     @ti.func
     def read_sum(self, w, i):
-        return self.loads.read(w, i)
+        return self.loads.read(self.s, w, i)
 
     @ti.func
     def compute_pair(self, w, m, i, j, separation, distance, t):

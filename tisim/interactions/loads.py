@@ -19,14 +19,15 @@ VIRIAL = Field("virial", "J", 1, "keep", slots=9)
 
 @ti.data_oriented
 class Loads:
-    """Loads are what is summed over the forces on each particle, and where it is written to.
+    """Loads are what is summed over the forces on each particle, and where in a state it is written to: that
+    of the worlds, or the one that a loop over particles which do not feel each other has of its own.
 
     turning : whether there are torques. virial : whether there is a virial. size : how many values a force
     with its torque is. components : how many all of them are.
     """
 
     def __init__(self, s: State, turning: bool) -> None:
-        self.s, self.turning, self.virial = s, turning, VIRIAL in s.fields
+        self.real, self.turning, self.virial = s.real, turning, VIRIAL in s.fields
         self.wrench, self.size = (_force_and_torque, 6) if turning else (_force_alone, 3)
         self.summand = self.load_and_virial if self.virial else _load_alone
         self.components = self.size + (VIRIAL.slots if self.virial else 0)
@@ -35,7 +36,7 @@ class Loads:
     def load_and_virial(self, load, separation):
         """Return a load by another particle, which is at ``separation`` (m), with the half of its virial that
         is of the one it acts on."""
-        total = ti.Vector.zero(self.s.real, self.components)
+        total = ti.Vector.zero(self.real, self.components)
         for k in ti.static(range(self.size)):
             total[k] = load[k]
         for a, b in ti.static(ti.ndrange(3, 3)):
@@ -43,9 +44,8 @@ class Loads:
         return total
 
     @ti.func
-    def write(self, w, i, total):
+    def write(self, s, w, i, total):
         """Set what the forces on i come to: not by +=, which would be atomic."""
-        s = self.s
         for k in ti.static(range(3)):
             s.force[w, i][k] = total[k]
             if ti.static(self.turning):
@@ -55,9 +55,8 @@ class Loads:
                 s.virial[w, i, k] = total[self.size + k]
 
     @ti.func
-    def read(self, w, i):
+    def read(self, s, w, i):
         """Return what the forces on i have come to."""
-        s = self.s
         load = self.wrench(s.force[w, i], s.force[w, i])
         if ti.static(self.turning):
             load = self.wrench(s.force[w, i], s.torque[w, i])
