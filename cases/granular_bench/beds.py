@@ -162,12 +162,14 @@ def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
 
 def table(found: Sequence[Bed]) -> str:
     """Return what was varied, the angle of repose, the discharge rate and the grains of the heap, each with
-    half of its 95 % interval, as CSV."""
+    half of its 95 % interval, and how many starts flow, as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     measured = ("angle_of_repose_degrees", "discharge_rate_kg_s", "grains_of_the_heap")
-    writer.writerow(["varied", "value", *(name for one in measured for name in (one, f"{one}_95"))])
+    headings = [name for one in measured for name in (one, f"{one}_95")]
+    writer.writerow(["varied", "value", *headings, "starts_that_flow"])
     for one in found:
         means = (one.angle, one.rate, one.kept)
-        writer.writerow([one.what, one.value, *(x for mean in means for x in (mean.value, mean.half))])
+        numbers = [x for mean in means for x in (mean.value, mean.half)]
+        writer.writerow([one.what, one.value, *numbers, int((one.rates > 0).sum())])
     return text.getvalue()

@@ -87,6 +87,7 @@ def test_table_and_figure_have_each_bed():
     name, *first = rows[1].split(",")
     assert name == "friction"
     assert [float(x) for x in first[2:5]] == pytest.approx([0.0, 0.01, 0.012706], abs=1e-6)
+    assert first[-1] == "2"
     figure = bed_figure(found)
     # The silo, its bottom and the disc are drawn around the grains, beside a scale bar.
     rims = [line.get_xydata() for line in figure.axes[0].lines if len(line.get_xydata()) > 2]

@@ -47,7 +47,7 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
 11. ``connect`` returns what an effect wants to know of the other bound effects, ``peers.of(Heating)``;
     ``requires`` names the effects without which it means nothing, ``excludes`` those that it does not go
     with, ``precedes`` those that must come after it; ``suits_others`` refuses others by their settings, and
-   ``beside`` takes these over from one that it is tried with. Nobody asks what an effect is called.
+    ``beside`` takes these over from one that it is tried with. Nobody asks what an effect is called.
 12. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may ever
     live at once, given the start.
 13. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
