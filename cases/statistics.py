@@ -29,7 +29,11 @@ class Mean:
         return Mean(ratio, abs(ratio) * float(np.hypot(self.half / self.value, other.half / other.value)))
 
     def __str__(self) -> str:
-        return f"{self.value:.4g} ± {self.half:.2g}"
+        """Return it with two digits of the interval, and none of the mean that are beyond those."""
+        if not (self.value and np.isfinite(self.half) and self.half > 0):
+            return f"{self.value:.4g} ± {self.half:.2g}"
+        beyond = np.floor(np.log10(abs(self.value))) - np.floor(np.log10(self.half))
+        return f"{self.value:.{max(int(beyond) + 2, 1)}g} ± {self.half:.2g}"
 
 
 @dataclass(frozen=True)

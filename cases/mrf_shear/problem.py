@@ -53,7 +53,7 @@ def design_viscosity(small: float, fraction: float) -> float:
 def viscosity(result: Result) -> float:
     """Return the viscosity without field of the fluid of a run, Pa s: by the sizes that it was asked for."""
     start = start_of(result)
-    diameters = [2 * float(one.sizes.nodes()[0].mean()) for one in start.grains]
+    diameters = [2 * one.sizes.mean_radius() for one in start.grains]
     return off_state_viscosity(asked_fraction(result), diameters, [one.share for one in start.grains])
 
 

@@ -18,6 +18,19 @@ def test_mean_and_its_interval():
     assert Mean(4.0, 0.1).over(Mean(2.0, 0.03)).half == pytest.approx((a / b).std(), rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("value", "half", "shown"),
+    [
+        (0.48314, 0.0823, "0.483 ± 0.082"), (2.4462, 0.0823, "2.446 ± 0.082"), (-1711.3, 24.6, "-1711 ± 25"),
+        (0.016, 0.018, "0.016 ± 0.018"), (0.01234, 3.21, "0.01 ± 3.2"), (0.0, 0.5, "0 ± 0.5"),
+        (1.23456, 0.0, "1.235 ± 0"), (1.23456, np.nan, "1.235 ± nan"), (np.nan, np.nan, "nan ± nan"),
+        (1.0, np.inf, "1 ± inf"),
+    ],
+)  # fmt: skip
+def test_a_mean_has_no_more_digits_than_its_interval(value, half, shown):
+    assert str(Mean(value, half)) == shown
+
+
 def test_claim_holds_when_all_of_the_interval_does():
     assert Claim("", Mean(0.5, 0.1), least=0.39).ok
     assert not Claim("", Mean(0.5, 0.1), least=0.41).ok
