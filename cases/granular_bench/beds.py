@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.constants import g as STANDARD_GRAVITY
 
-from cases.granular_bench.measures import discharge, heap, repose
+from cases.granular_bench.measures import discharge, flowed, heap, repose
 from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 from cases.runs import sound
 from cases.statistics import Mean
@@ -59,13 +59,19 @@ class Bed:
 
     @property
     def rates(self) -> np.ndarray:
-        """Return the discharge rate of each start, kg/s."""
-        return np.array([discharge(result) for result in self.results])
+        """Return the discharge rate of each start, kg/s; not a number where an arch has closed the silo."""
+        return np.array([discharge(result) if flowed(result) else np.nan for result in self.results])
 
     @property
-    def rate(self) -> Mean:
-        """Return the discharge rate, kg/s."""
-        return Mean.of(self.rates)
+    def flowing(self) -> int:
+        """Return how many starts flow to the end."""
+        return int(np.isfinite(self.rates).sum())
+
+    def mean_rate(self, power: float = 1.0) -> Mean:
+        """Return the mean of a power of the discharge rates (kg/s) of starts that flow; without an interval
+        where one alone does."""
+        rates = self.rates[np.isfinite(self.rates)]
+        return Mean.of(rates**power) if len(rates) else Mean(np.nan, np.nan)
 
     @property
     def kept(self) -> Mean:
@@ -92,12 +98,14 @@ def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
 
 
 def beverloo_constants(found: Sequence[Bed]) -> tuple[Mean, Mean]:
-    """Return C and k of Beverloo's law, means of fits to the first, second, ... start of each outlet. An arch
-    has closed those that nothing flows through: they are left out."""
+    """Return C and k of Beverloo's law, means of fits to the first, second, ... start of each outlet. Those
+    that an arch has closed are left out, and starts of which two outlets do not flow."""
     outlets = np.array([one.value for one in found])
-    by_start = np.array([one.rates for one in found]).T
-    constants = np.array([beverloo_fit(outlets[rates > 0], rates[rates > 0]) for rates in by_start])
-    return Mean.of(constants[:, 0]), Mean.of(constants[:, 1])
+    flows = ((rates, np.isfinite(rates)) for rates in np.array([one.rates for one in found]).T)
+    fits = [beverloo_fit(outlets[open_], rates[open_]) for rates, open_ in flows if open_.sum() > 1]
+    if not fits:
+        return Mean(np.nan, np.nan), Mean(np.nan, np.nan)
+    return Mean.of([constant for constant, _ in fits]), Mean.of([empty_part for _, empty_part in fits])
 
 
 def beverloo_fit(outlets: np.ndarray, rates: np.ndarray) -> tuple[float, float]:
@@ -124,7 +132,10 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
     for k, what in enumerate(NATURAL):
         group = [one for one in found if one.what == what]
         values = [one.value for one in group]
-        for axis, numbers in ((angles, [one.angle for one in group]), (rates, [one.rate for one in group])):
+        for axis, numbers in (
+            (angles, [one.angle for one in group]),
+            (rates, [one.mean_rate() for one in group]),
+        ):
             bars(axis, values, numbers, fmt="os^"[k] + "-", color=COLOURS[k], label=what.replace("_", " "))
             axis.set_xlabel("coefficient, the others as usual")
             axis.legend(frameon=False, fontsize=8)
@@ -153,23 +164,23 @@ def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
     rate = constant.value * bulk * np.sqrt(STANDARD_GRAVITY) * free**2.5
     label = f"Beverloo, C = {constant}, k = {empty_part}"
     axis.plot(line, rate**0.4, color="0.2", lw=1.0, label=label)
-    powers = [Mean.of(one.rates**0.4) for one in found]
-    bars(axis, outlets, powers, fmt="o", mfc="none", color=COLOURS[0], label="as run")
+    powers = [one.mean_rate(0.4) for one in found]
+    bars(axis, outlets, powers, fmt="o", mfc="none", color=COLOURS[0], label="as run, of starts that flow")
     axis.set(xlabel="outlet (diameters of a grain)", ylabel=r"rate$^{2/5}$ ((kg/s)$^{2/5}$)",
              title="Beverloo's law")  # fmt: skip
     axis.legend(frameon=False, fontsize=8)
 
 
 def table(found: Sequence[Bed]) -> str:
-    """Return what was varied, the angle of repose, the discharge rate and the grains of the heap, each with
-    half of its 95 % interval, and how many starts flow, as CSV."""
+    """Return what was varied, the angle of repose, the discharge rate of the starts that flow, and the grains
+    of the heap, each with half of its 95 % interval, and how many starts flow, as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     measured = ("angle_of_repose_degrees", "discharge_rate_kg_s", "grains_of_the_heap")
     headings = [name for one in measured for name in (one, f"{one}_95")]
     writer.writerow(["varied", "value", *headings, "starts_that_flow"])
     for one in found:
-        means = (one.angle, one.rate, one.kept)
+        means = (one.angle, one.mean_rate(), one.kept)
         numbers = [x for mean in means for x in (mean.value, mean.half)]
-        writer.writerow([one.what, one.value, *numbers, int((one.rates > 0).sum())])
+        writer.writerow([one.what, one.value, *numbers, one.flowing])
     return text.getvalue()

@@ -8,11 +8,14 @@ from scipy.spatial import cKDTree
 from tisim import Result
 from tisim.effects import Walls
 from tisim.geometry import Disc
+from tisim.operators import Passage
 
 FALLING = 0.1
 """What is faster falls, m/s: from half a millimetre on."""
 FLANK_PART = (0.15, 0.9)
 """Between these parts of the disc's radius the flank of the heap is taken."""
+CLOSED = 0.1
+"""A silo is closed if nothing passes for this part of its run: some fifty grains do so through the narrowest."""
 FEWEST = 20
 """A heap has a flank, and so an angle, if so many grains lie on it at least."""
 
@@ -68,5 +71,17 @@ def repose(result: Result) -> float:
 
 
 def discharge(result: Result) -> float:
-    """Return the discharge rate in steady flow, kg/s."""
+    """Return the discharge rate in steady flow, kg/s; of a silo that an arch has closed, up to then."""
     return result.measures["passage_rate"]
+
+
+def flowed(result: Result) -> bool:
+    """Return whether a silo flows on until the mass has passed that its discharge rate is of, or to the end:
+    an arch has closed one through which nothing has passed for the last CLOSED of its run."""
+    passage = next(one for one in result.scene.effects if isinstance(one, Passage))
+    names = ("passed_mass", "passage_rate", "passage_begin_mass", "passage_begin_time")
+    passed, rate, first_mass, first_time = (result.measures[name] for name in names)
+    if passed >= passage.end or rate == 0:
+        return bool(rate > 0)
+    last = first_time + (passed - first_mass) / rate
+    return bool(last > (1 - CLOSED) * result.scene.duration)

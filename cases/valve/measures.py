@@ -82,14 +82,19 @@ def held_pressure(result: Result) -> float:
     return result.measures["valve_force_z"] / duct_of(result.scene).area
 
 
+SIDE = 27.0
+"""An arch ends on the wall within this angle of the direction of the field, degrees."""
+
+
 @dataclass(frozen=True)
 class Clusters:
     """The clusters of grains that touch.
 
     largest : the part of all grains that are in the largest. bridged : whether grains within the cones and
-    the constriction that are bound to each other there touch opposite quarters of the wall, those around the
-    direction of the field: an arch or a chain across. They are quarters, as chains stand along the field, and
-    as two neighbours where halves of the wall meet would be an arch, one on either side.
+    the constriction that are bound to each other there touch the wall on opposite sides, within SIDE of the
+    direction of the field: an arch or a chain across. So near to it, as chains stand along the field, and as
+    four in a row along the wall of a narrow constriction, which reach from one quarter to the next but one,
+    would else be an arch.
     """
 
     largest: float
@@ -105,9 +110,10 @@ def clusters(state: Arrays, scene: Scene) -> Clusters:
     inside = np.abs(z) <= duct.straight / 2 + duct.taper
     # Bound to each other within the constriction alone.
     there = labels(len(radius), pairs[inside[pairs].all(axis=1)])
-    touches = inside & (duct.depth(np.hypot(x, y), z) <= radius) & (np.abs(x) > np.abs(y))
-    quarters = [set(there[touches & (sign * x > 0)].tolist()) for sign in (-1, 1)]
-    return Clusters(float(size / len(radius)), bool(quarters[0] & quarters[1]))
+    aside = np.abs(y) < np.tan(np.radians(SIDE)) * np.abs(x)
+    touches = inside & aside & (duct.depth(np.hypot(x, y), z) <= radius)
+    sides = [set(there[touches & (sign * x > 0)].tolist()) for sign in (-1, 1)]
+    return Clusters(float(size / len(radius)), bool(sides[0] & sides[1]))
 
 
 def attraction(radius: float, flux: float) -> float:

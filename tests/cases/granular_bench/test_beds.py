@@ -9,15 +9,16 @@ import tisim
 from cases.granular_bench.beds import PACKED, VALUES, Bed, bed_figure, beverloo_constants, beverloo_fit, table
 from cases.granular_bench.measures import discharge, floor, heap, repose
 from cases.granular_bench.problem import problem
-from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, SEARCH_SETTINGS, scene
+from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, SEARCH_SETTINGS, STEADY_PART, scene
 from optimize.settings import Settings, proposed
 from tisim.analysis import beverloo_rate
 
 STARTS = 4
 
 
-def cone(degrees, rate=0.1):
-    """A result with a heap of known slope on the disc of a scene, grains in the silo and one that falls."""
+def cone(degrees, rate=0.1, closed=None):
+    """A result with a heap of known slope on the disc of a scene, grains in the silo and one that falls. The
+    silo flows at a rate (kg/s), and is closed for the last part of its time."""
     made = scene(number=10)
     low, slope = -8 * DIAMETER, np.tan(np.radians(degrees))
     side = np.arange(-8 * DIAMETER, 8 * DIAMETER, 0.4 * DIAMETER)
@@ -38,7 +39,14 @@ def cone(degrees, rate=0.1):
         "velocity": velocity,
         "radius": np.full(len(position), DIAMETER / 2),
     }
-    return SimpleNamespace(scene=made, state=state, time=1.0, measures={"passage_rate": rate})
+    begin, end = (part * 10 * DENSITY * np.pi / 6 * DIAMETER**3 for part in STEADY_PART)
+    passed, first = (end, 0.1) if closed is None else ((begin + end) / 2, 0.0)
+    if closed is not None and rate > 0:
+        first = (1 - closed) * made.duration - (passed - begin) / rate
+    measures = {
+        "passage_rate": rate, "passed_mass": passed, "passage_begin_mass": begin, "passage_begin_time": first,
+    }  # fmt: skip
+    return SimpleNamespace(scene=made, state=state, time=1.0, measures=measures)
 
 
 def test_the_heap_is_what_lies_on_the_disc_and_has_its_slope():
@@ -62,16 +70,22 @@ def test_beverloos_law_is_found_again():
 
 
 def test_beverloos_law_is_known_as_well_as_starts_agree():
-    """What is closed in a start is left out of its fit."""
-    outlets = (5.0, 6.0, 8.0)
+    """What is closed in a start is left out of its fit: also where it flowed at first."""
 
     def bed(d, closed):
         law = [beverloo_rate(d * DIAMETER, DIAMETER, PACKED * DENSITY, discharge=c) for c in (0.5, 0.7)]
-        return Bed("outlet", d, [cone(25.0, law[0] * (not closed)), cone(25.0, law[1])])
+        return Bed("outlet", d, [cone(25.0, law[0], closed), cone(25.0, law[1])])
 
-    constant, k = beverloo_constants([bed(d, d == 5.0) for d in outlets])
+    found = [bed(d, closed) for d, closed in ((4.0, 1.0), (5.0, 0.2), (6.0, 0.05), (8.0, None))]
+    assert [one.flowing for one in found] == [1, 1, 2, 2]
+    constant, k = beverloo_constants(found)
     assert (constant.value, constant.half) == pytest.approx((0.6, 1.2706), rel=1e-4)
     assert (k.value, k.half) == pytest.approx((1.4, 0.0), abs=1e-9)
+    assert found[0].mean_rate().value == found[0].rates[1]
+    # Lines are through two outlets and more.
+    assert beverloo_constants(found[1:3])[0].value == pytest.approx(0.7)
+    closed = Bed("outlet", 3.0, [cone(25.0, 0.0), cone(25.0, 0.0, 0.5)])
+    assert np.isnan([closed.mean_rate().value, beverloo_constants([closed])[0].value]).all()
 
 
 @pytest.mark.long

@@ -83,7 +83,15 @@ def test_two_neighbours_at_the_wall_are_no_arch():
     assert not found(pair).bridged
 
 
-@pytest.mark.parametrize(("degrees", "along"), [(0, True), (40, True), (50, False), (90, False)])
+def test_a_row_along_the_wall_is_no_arch():
+    """Four of them reach around a third of it."""
+    angle = np.radians(39.0) * np.array([-1.5, -0.5, 0.5, 1.5])
+    row = np.column_stack([66 * np.sin(angle), 66 * np.cos(angle), 0 * angle])
+    assert found(row).largest == 1
+    assert not found(row).bridged
+
+
+@pytest.mark.parametrize(("degrees", "along"), [(0, True), (25, True), (30, False), (90, False)])
 def test_an_arch_stands_along_the_field(degrees, along):
     a = np.radians(degrees)
     assert found([[x * np.cos(a), x * np.sin(a), 0] for x, _, _ in ARCH]).bridged == along

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cases.valve import checks, figures, studies
-from cases.valve.measures import oil_of, unhindered_rate
+from cases.valve.measures import Clusters, oil_of, unhindered_rate
 from cases.valve.runs import FLOW_LOOKS, Flow
 from cases.valve.scene import FIELD
 from cases.valve.sizes import FINE_DIAMETER, THROATS, D
@@ -51,7 +51,7 @@ def test_each_valve_has_its_starts():
     assert valves[-1].name == "4 grains of 44 µm, no field"
 
 
-def test_claims_are_of_the_valves_they_name():
+def test_claims_are_of_the_valves_they_name(monkeypatch):
     found = {one.name: one for one in checks.check(4)}
     arrested = [one for name, one in found.items() if "20x, 30x jam" in name]
     assert [one.mean.value for one in arrested] == [pytest.approx(0.01 + 1.5e-4)]
@@ -60,6 +60,10 @@ def test_claims_are_of_the_valves_they_name():
     # The starts are random, in which no grains touch.
     shown = [one for name, one in found.items() if "from wall to wall" in name]
     assert [(one.value, one.beside, one.ok) for one in shown] == [(0, "of 4", None)] * 2 + [(0, "of 2", None)]
+    # All but the first start of a valve end with an arch.
+    monkeypatch.setattr(checks, "clusters", lambda state, made: Clusters(1.0, made.seed > 0))
+    arches = [checks.arches(one).value for one in studies.by_throat(4)]
+    assert arches == [3, 3, 1, 3]
     without = next(one for name, one in found.items() if "in the end over that before" in name)
     assert not without.ok, "a third is less than half"
 
