@@ -64,6 +64,14 @@ def size_named(name: str, sizes: Mapping[str, Size]) -> Size:
     return sizes[name]
 
 
+def searched_size(name: str, sizes: Mapping[str, Size]) -> Size:
+    """Return a size by name of which a case has a search; InputError when there is none of that name, or no
+    search of it."""
+    searched = [key for key, one in sizes.items() if one.search is not None]
+    must(name in searched, "size", f"one of {', '.join(searched)} for the inverse problem", name)
+    return sizes[name]
+
+
 @dataclass(frozen=True)
 class Late:
     """A function of a case's module that is imported when it is called first."""
@@ -121,12 +129,10 @@ class Case:
         measured : a file of measurements that it is to meet, in place of the case's own.
         InputError when the case has none, or not of that size, or takes no measurements.
         """
-        search = self.size(size).search
         if self.problem is None:
             raise InputError(f"case must be one with an inverse problem; received {self.name!r}")
-        if search is None:
-            sizes = ", ".join(key for key, one in self.sizes.items() if one.search is not None)
-            raise InputError(f"size must be one of {sizes} for the inverse problem; received {size!r}")
+        search = searched_size(size, self.sizes).search
+        assert search is not None
         chosen = next(iter(self.variants), "") if variant is None else variant
         rule = f"one of {', '.join(self.variants)}"
         must(chosen in self.variants or not self.variants, "variant", rule, chosen)

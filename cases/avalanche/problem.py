@@ -22,7 +22,7 @@ from cases.avalanche.scene import IRON_DESIGN, TITLE, scene
 from cases.avalanche.sizes import SIZES
 from cases.case import size_named
 from cases.granular_bench.measured import Measurement
-from cases.granular_bench.problem import OTHER_STARTS
+from cases.runs import OTHER_STARTS
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
 from tisim import Result, Scene
@@ -39,8 +39,8 @@ GENES = (
 KNOWN: Mapping[str, float] = IRON_DESIGN
 """The design whose angle is to be met where no file is given."""
 EXAMPLE = Measurement(27.9, 3.0)
-"""The angle of repose of KNOWN without a field, degrees: the mean of 16 starts, and the deviation of one,
-which ``tests/benchmarks/known_slope.py`` prints."""
+"""The angle of repose of KNOWN without a field, degrees: the mean of 16 starts, and the deviation of one, 2.8
+and rounded up, which ``tests/benchmarks/known_slope.py`` prints."""
 MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
 
 

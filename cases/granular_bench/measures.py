@@ -15,7 +15,7 @@ FALLING = 0.1
 FLANK_PART = (0.15, 0.9)
 """Between these parts of the disc's radius the flank of the heap is taken."""
 CLOSED = 0.1
-"""A silo is closed if nothing passes for this part of its run: some fifty grains do so through the narrowest."""
+"""A silo is closed if nothing passes for this part of its run: some fifty grains pass the narrowest in it."""
 FEWEST = 20
 """A heap has a flank, and so an angle, if so many grains lie on it at least."""
 

@@ -20,6 +20,7 @@ from cases.granular_bench.measured import QUANTITY_UNITS, Measured, Measurement,
 from cases.granular_bench.measures import discharge, repose
 from cases.granular_bench.plate import rebound, scene_with_plate, sliding
 from cases.granular_bench.scene import BED, SIZES, TITLE
+from cases.runs import OTHER_STARTS
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
 from tisim import Result, Scene
@@ -69,8 +70,6 @@ EXAMPLES: Mapping[str, Measured] = {
     for size, values in MEASURED.items()
 }
 """What is to be met where no file is given."""
-OTHER_STARTS = 1_000_000
-"""The seeds of the runs that KNOWN is measured in are from this one on."""
 MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
 
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cases.case import searched_size
 from cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS, mixture
 from cases.mrf_shear.measures import extent, flux, shear_stress, volume_fraction
 from cases.mrf_shear.off_state import off_state_viscosity
@@ -84,9 +85,7 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
     """Return the search for fluids; by variant the front of stress and viscosity, the highest stress at a
     bounded viscosity, or the front of stress, viscosity and field."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
-    searched = [name for name, one in SIZES.items() if one.search is not None]
-    must(size in searched, "size", f"one of {', '.join(searched)} for the inverse problem", size)
-    settings = {**SIZES[size].scene, **SEARCHED}
+    settings = {**searched_size(size, SIZES).scene, **SEARCHED}
 
     def designed(design: Mapping[str, float], seed: int) -> Scene:
         small, fraction = design["small"], design["fraction"]

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cases.case import searched_size
 from cases.mrf_shear.grains import equal
 from cases.valve import published
 from cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
@@ -37,7 +38,8 @@ GENES = {
     "never": (THROAT_GENE, DIAMETER_GENE),
 }
 BOUND = 23.5e-9
-"""An open flow is to be at least so large where it is bounded, m^3/s."""
+"""An open flow is to be at least so large where it is bounded, m^3/s: that of a constriction of 4.6 of L21's
+largest grains."""
 WANTED = {
     "front": "the front of the field that arrests the flow and of what flows without it",
     "field": f"the least field that arrests the flow, of valves of {1e9 * BOUND:g} mm^3/s without",
@@ -109,9 +111,7 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
     """Return the search for valves; by variant the front of field and open flow, the least field at a bounded
     open flow, or the narrowest that never jam."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
-    searched = [name for name, one in SIZES.items() if one.search is not None]
-    must(size in searched, "size", f"one of {', '.join(searched)} for the inverse problem", size)
-    settings = {**SIZES[size].scene, **SEARCHED}
+    settings = {**searched_size(size, SIZES).scene, **SEARCHED}
 
     def designed(design: Mapping[str, float], seed: int) -> Scene:
         one = scene(

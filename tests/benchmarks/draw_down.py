@@ -3,12 +3,12 @@
     python tests/benchmarks/draw_down.py [--size small] [--starts 8] [--design 0.4 0.27 0.6]
     python tests/benchmarks/draw_down.py --valley [--size small] [--starts 2]
 
-First each quantity of cases/granular_bench/measured.py with its mean, its standard deviation over random
-starts, which are others than those of a search, and the uncertainty that a calibration takes it with; and the
-mean misfit of a start, with half of its 95 % interval. A design is friction, rolling friction and
-restitution. With --valley: of each friction the rolling friction of some with which angle of repose and
-discharge rate, means over the starts, are nearest to those of the known design at its restitution; with these
-and their misfit.
+First each quantity of cases/granular_bench/measured.py with its mean and half of the 95 % interval of that,
+its standard deviation over random starts, which are others than those of a search, and the uncertainty that
+a calibration takes it with; and the mean misfit of a start, with half of its 95 % interval. A design is
+friction, rolling friction and restitution. With --valley: of each friction the rolling friction of some with
+which angle of repose and discharge rate, means over the starts, are nearest to those of the known design at
+its restitution; with these and their misfit.
 """
 
 import argparse
@@ -32,10 +32,10 @@ def measured(design: dict[str, float], size: str, starts: int) -> None:
     """Print what a design has."""
     results = tisim.run(other_runs(design, size, starts))
     print("of", ", ".join(f"{name} {value:g}" for name, value in design.items()))
-    print(f"{'quantity':16} {'mean':>9} {'deviation':>9} {'uncertainty':>11}")
+    print(f"{'quantity':16} {'mean':>16} {'deviation':>9} {'uncertainty':>11}")
     for name, measure in SIMULATED.items():
         values = np.array([measure(result) for result in results])
-        print(f"{name:16} {values.mean():9.4g} {values.std(ddof=1):9.2g} {UNCERTAINTIES[name]:11g}")
+        print(f"{name:16} {Mean.of(values)!s:>16} {values.std(ddof=1):9.2g} {UNCERTAINTIES[name]:11g}")
     print("misfit", Mean.of([misfit(result, EXAMPLES[size]) for result in results]))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cases.runs import overlap, sound
-from tisim import Box, RunError
+from tisim import Box, RunError, ShearedBox
 from tisim.components.domain import Open
 from tisim.engine.result import Status
 
@@ -27,7 +27,15 @@ def test_the_largest_overlap_is_over_the_mean_radius_and_across_faces(periodic, 
     """Two of radius 1 and 3 that overlap by 0.5, and by 1 across the face of a periodic box."""
     box = Box(low=(0.0,) * 3, high=(6.5, 9.0, 9.0), periodic=(periodic, False, False))
     state = {"position": np.array([[0.5, 4.0, 4.0], [4.0, 4.0, 4.0]]), "radius": np.array([1.0, 3.0])}
-    result = SimpleNamespace(scene=SimpleNamespace(domain=box), state=state)
+    result = SimpleNamespace(scene=SimpleNamespace(domain=box), state=state, time=0.0)
     assert overlap(result) == pytest.approx(deepest)
     result.scene.domain = Open()
     assert overlap(result) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(("time", "deepest"), [(0.0, 0.5), (1.0, 0.0)])
+def test_images_of_a_sheared_box_lean_as_it_does_at_the_end(time, deepest):
+    box = ShearedBox(low=(0.0,) * 3, high=(8.0, 6.0, 8.0), rate=0.5)
+    state = {"position": np.array([[4.0, 0.5, 4.0], [4.0, 5.0, 4.0]]), "radius": np.ones(2)}
+    result = SimpleNamespace(scene=SimpleNamespace(domain=box), state=state, time=time)
+    assert overlap(result) == pytest.approx(deepest)

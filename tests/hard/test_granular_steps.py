@@ -157,7 +157,7 @@ def test_what_no_step_can_follow_stops_the_world(name):
 
 def half_kicks(n, dt, held):
     """What half kicks of undamped springs, of 1 N/m, do in a step to places and speeds of a row of grains of
-    1 kg; ``held`` by others to one place, N/m."""
+    1 kg. held : stiffness of a spring from each grain to its place, N/m."""
     neighbours = np.eye(n, k=1) + np.eye(n, k=-1)
     pull, still = np.diag(neighbours.sum(axis=1) + held) - neighbours, np.zeros((n, n))
     kick = np.block([[np.eye(n), still], [-0.5 * dt * pull, np.eye(n)]])

@@ -91,7 +91,8 @@ def test_a_known_design_is_met():
     """What is found has the angle of the known design, from other starts than those of the search, too. One
     angle does not tell three parameters: designs that have it are far from each other."""
     case = every()["avalanche"]
-    outcome = optimize.run(case.inverse("default", "calibrate"), **case.sizes["default"].search)
+    problem, search = case.inverse("default", "calibrate")
+    outcome = optimize.run(problem, **search)
     frictions = met_columns(outcome.problem, outcome.estimates)["friction"]
     assert len(frictions) > 5
     assert max(frictions) - min(frictions) > 0.3

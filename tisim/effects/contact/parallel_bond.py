@@ -71,7 +71,7 @@ class ParallelBond(PairForce):
     damping_ratio: float = parameter("", "damping of each spring over the critical one", 0.0, ge=0)
 
     def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
-        return "a step is too long for its springs and dashpots"
+        return "a step is too long for the springs and dashpots of a bond"
 
     @ti.func
     def reach(self, s, w, i):

@@ -111,8 +111,8 @@ class Granular(ContactGuards, GranularContact):
             check_wall(self, self._materials, with_newcomers(start, effects), material, label)
 
     def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
-        cohesion = ", or no elastic force holds its cohesion" if self.by_overlap else ""
-        return f"a step is too long for its springs and dashpots{cohesion}"
+        cohesion = ", or no elastic force holds the cohesion there" if self.by_overlap else ""
+        return f"a step is too long for the springs and dashpots of a contact{cohesion}"
 
     def members(self) -> dict[str, Component]:
         names = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
