@@ -17,8 +17,6 @@ STARTS = 6
 """Each valve is run from so many starts, that of fine grains from half as many."""
 BALANCE = 0.05
 """Walls bear the drag on an arrested flow to this part."""
-STILL_FLOWS = 0.5
-"""Without a field at least this part of the flow at first is left as long after."""
 
 
 def check(starts: int = STARTS) -> Iterator[Check | Claim | Shown]:
@@ -26,7 +24,7 @@ def check(starts: int = STARTS) -> Iterator[Check | Claim | Shown]:
     narrow, wide, fine, without = by_throat(starts)
     yield from flowing([narrow, wide, fine])
     name = f"{without.name}: flow in the end over that before"
-    yield Claim(name, left(without.flows), STILL_FLOWS)
+    yield Claim(name, left(without.flows), ARRESTED)
     yield from arrested(narrow)
     yield from going_on(wide, "L21: 40x does not jam")
     yield from going_on(fine, "L21: fine grains yield")
