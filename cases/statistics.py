@@ -32,8 +32,12 @@ class Mean:
         """Return it with two digits of the interval, and none of the mean that are beyond those."""
         if not (self.value and np.isfinite(self.half) and self.half > 0):
             return f"{self.value:.4g} ± {self.half:.2g}"
-        beyond = np.floor(np.log10(abs(self.value))) - np.floor(np.log10(self.half))
-        return f"{self.value:.{max(int(beyond) + 2, 1)}g} ± {self.half:.2g}"
+        digits = 1 - int(np.floor(np.log10(self.half)))
+        if -4 < digits < 6:
+            value, half = (f"{round(one, digits):.{max(digits, 0)}f}" for one in (self.value, self.half))
+            return f"{value} ± {half}"
+        beyond = int(np.floor(np.log10(abs(self.value)))) + digits
+        return f"{self.value:.{max(beyond + 1, 1)}g} ± {self.half:.2g}"
 
 
 @dataclass(frozen=True)

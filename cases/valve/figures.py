@@ -60,7 +60,7 @@ def flow_figure(throats: Sequence[ValveRuns], fields: Sequence[ValveRuns]) -> Fi
         line.sort(key=lambda one: one.flux)
         means = [left(one.flows) for one in line]
         sweep.errorbar([one.flux for one in line], [one.value for one in means], [one.half for one in means],
-                       fmt="o-", ms=4, capsize=3, color=colour, label=line[0].name)  # fmt: skip
+                       fmt="o-", ms=4, capsize=3, color=colour, label=line[-1].name)  # fmt: skip
     sweep.axhline(ARRESTED, color="0.5", lw=0.8, ls=":")
     sweep.set(xlabel="flux density (T)", ylabel="part of the flow rate that is left", title="by field")
     for axis in (rates, sweep):

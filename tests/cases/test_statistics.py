@@ -22,7 +22,9 @@ def test_mean_and_its_interval():
     ("value", "half", "shown"),
     [
         (0.48314, 0.0823, "0.483 ± 0.082"), (2.4462, 0.0823, "2.446 ± 0.082"), (-1711.3, 24.6, "-1711 ± 25"),
-        (0.016, 0.018, "0.016 ± 0.018"), (0.01234, 3.21, "0.01 ± 3.2"), (0.0, 0.5, "0 ± 0.5"),
+        (0.016, 0.018, "0.016 ± 0.018"), (0.01234, 3.21, "0.0 ± 3.2"), (0.0, 0.5, "0 ± 0.5"),
+        (966.7, 143.4, "970 ± 140"), (0.5, 0.1, "0.50 ± 0.10"), (2.4462e-9, 8.23e-11, "2.446e-09 ± 8.2e-11"),
+        (3.2e-9, 8.2e7, "3e-09 ± 8.2e+07"),
         (1.23456, 0.0, "1.235 ± 0"), (1.23456, np.nan, "1.235 ± nan"), (np.nan, np.nan, "nan ± nan"),
         (1.0, np.inf, "1 ± inf"),
     ],
@@ -36,11 +38,11 @@ def test_claim_holds_when_all_of_the_interval_does():
     assert not Claim("", Mean(0.5, 0.1), least=0.41).ok
     assert Claim("", Mean(0.5, 0.1), most=0.61).ok
     assert not Claim("", Mean(0.5, 0.1), most=0.59).ok
-    assert Claim("", Mean(0.5, 0.1), most=0.6).cells[:2] == ("0.5 ± 0.1", "below 0.6")
+    assert Claim("", Mean(0.5, 0.1), most=0.6).cells[:2] == ("0.50 ± 0.10", "below 0.6")
 
 
 def test_what_is_shown_is_not_judged():
-    assert Shown("", Mean(1.0, 0.5), "2").cells == ("1 ± 0.5", "2", "", "")
+    assert Shown("", Mean(1.0, 0.5), "2").cells == ("1.00 ± 0.50", "2", "", "")
     assert Shown("", 1.23456).cells[0] == "1.235"
     assert Shown("", 1.0).ok is None
 

@@ -78,5 +78,8 @@ def test_figures_are_of_all_valves():
     throats, fields = studies.by_throat(2), studies.by_field(2)
     rows = figures.table([*throats, *fields]).splitlines()
     assert len(rows) == 1 + 2 * 3 + 1 + 2 * 4
-    assert len(figures.flow_figure(throats, fields).axes) == 2
+    _, sweep = figures.flow_figure(throats, fields).axes
+    assert [text.get_text() for text in sweep.get_legend().get_texts()] == [
+        "4 grains of 44 µm", "6.5 grains of 44 µm"
+    ]  # fmt: skip
     assert len(figures.cut_figure(throats[:3]).axes) == 4
