@@ -129,6 +129,7 @@ class Case:
         measured : a file of measurements that it is to meet, in place of the case's own.
         InputError when the case has none, or not of that size, or takes no measurements.
         """
+        self.size(size)
         if self.problem is None:
             raise InputError(f"case must be one with an inverse problem; received {self.name!r}")
         search = searched_size(size, self.sizes).search

@@ -82,7 +82,7 @@ def held_pressure(result: Result) -> float:
     return result.measures["valve_force_z"] / duct_of(result.scene).area
 
 
-SIDE = 27.0
+ARCH_ANGLE = 27.0
 """An arch ends on the wall within this angle of the direction of the field, degrees."""
 
 
@@ -91,10 +91,10 @@ class Clusters:
     """The clusters of grains that touch.
 
     largest : the part of all grains that are in the largest. bridged : whether grains within the cones and
-    the constriction that are bound to each other there touch the wall on opposite sides, within SIDE of the
-    direction of the field: an arch or a chain across. So near to it, as chains stand along the field, and as
-    four in a row along the wall of a narrow constriction, which reach from one quarter to the next but one,
-    would else be an arch.
+    the constriction that are bound to each other there touch the wall on opposite sides, within ARCH_ANGLE of
+    the direction of the field: an arch or a chain across. So near to it, as chains stand along the field, and
+    as four in a row along the wall of a narrow constriction, which reach from one quarter to the next but
+    one, would else be an arch.
     """
 
     largest: float
@@ -110,7 +110,7 @@ def clusters(state: Arrays, scene: Scene) -> Clusters:
     inside = np.abs(z) <= duct.straight / 2 + duct.taper
     # Bound to each other within the constriction alone.
     there = labels(len(radius), pairs[inside[pairs].all(axis=1)])
-    aside = np.abs(y) < np.tan(np.radians(SIDE)) * np.abs(x)
+    aside = np.abs(y) < np.tan(np.radians(ARCH_ANGLE)) * np.abs(x)
     touches = inside & aside & (duct.depth(np.hypot(x, y), z) <= radius)
     sides = [set(there[touches & (sign * x > 0)].tolist()) for sign in (-1, 1)]
     return Clusters(float(size / len(radius)), bool(sides[0] & sides[1]))

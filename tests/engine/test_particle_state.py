@@ -194,6 +194,7 @@ def test_a_write_that_cannot_be_gone_on_from_is_a_failure_in_words():
     assert (good.status.reason, good.work["steps"]) == ("running", 2)
 
 
+@pytest.mark.slow
 def test_a_world_begins_anew_with_its_forces_also_after_a_run_of_no_steps():
     made = crystal()
     simulation = compiled(made, 1, 64)

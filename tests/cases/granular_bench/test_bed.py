@@ -21,7 +21,7 @@ def test_quantities_of_a_bed():
         "position": position, "radius": np.full(4, 1.3e-3), "mass": np.array([1.0, 1.0, 1.0, 2.0]),
         "side_loads": loads,
     }  # fmt: skip
-    result = SimpleNamespace(scene=bed(), state=state)
+    result = SimpleNamespace(scene=bed(), state=state, time=0.0)
     assert centre_height(result) == pytest.approx(2.6e-3)
     assert side_load(result) == pytest.approx(5.0 / (5.0 * 9.80665))
     apart = np.hypot(2.5e-3, 0.2e-3)

@@ -37,7 +37,7 @@ def result_of(position, mean_force=None, group=None, radius=R, cell=CELL):
         "group": np.zeros(n) if group is None else np.asarray(group),
         "mean_force": np.zeros((n, 3)) if mean_force is None else np.asarray(mean_force, float),
     }
-    return SimpleNamespace(state=state, scene=cell)
+    return SimpleNamespace(state=state, scene=cell, time=0.0)
 
 
 def test_stress_is_the_mean_of_both_rafts_over_their_area():

@@ -19,4 +19,4 @@ def result_of(made, position, velocity=None, radius=22e-6, mass=1.0, measures=No
         "radius": np.broadcast_to(radius, n).astype(float),
         "mass": np.broadcast_to(mass, n).astype(float),
     }
-    return SimpleNamespace(scene=made, state=state, measures=measures or {})
+    return SimpleNamespace(scene=made, state=state, time=0.0, measures=measures or {})

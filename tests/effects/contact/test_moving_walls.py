@@ -129,6 +129,7 @@ def pressed():
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_a_servo_presses_with_the_wanted_force(pressed, tmp_path):
     made, gap, speed = pressed
     simulation = compiled(made, WORLDS, CAPACITY)

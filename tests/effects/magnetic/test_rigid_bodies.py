@@ -75,6 +75,7 @@ def force_of(r, m, i, others):
     return force
 
 
+@pytest.mark.slow
 def test_a_cut_off_beyond_all_is_a_sum_over_all_pairs():
     """Moments are those of a linear solve, forces those of all dipoles and of the contacts between bodies;
     pairs within a body remember nothing."""
