@@ -99,7 +99,7 @@ def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
 
 def beverloo_constants(found: Sequence[Bed]) -> tuple[Mean, Mean]:
     """Return C and k of Beverloo's law, means of fits to the first, second, ... start of each outlet. Those
-    that an arch has closed are left out, and starts of which two outlets do not flow."""
+    that an arch has closed are left out, and starts with which fewer than two outlets flow."""
     outlets = np.array([one.value for one in found])
     flows = ((rates, np.isfinite(rates)) for rates in np.array([one.rates for one in found]).T)
     fits = [beverloo_fit(outlets[open_], rates[open_]) for rates, open_ in flows if open_.sum() > 1]
