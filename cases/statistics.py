@@ -30,13 +30,14 @@ class Mean:
 
     def __str__(self) -> str:
         """Return it with two digits of the interval, and none of the mean that are beyond those."""
-        if not (self.value and np.isfinite(self.half) and self.half > 0):
+        if not (np.isfinite([self.value, self.half]).all() and self.half > 0):
             return f"{self.value:.4g} ± {self.half:.2g}"
-        digits = 1 - int(np.floor(np.log10(self.half)))
+        # Of the interval as it is rounded, which may have a digit more before the point.
+        digits = 1 - int(np.floor(np.log10(float(f"{self.half:.1e}"))))
         if -4 < digits < 6:
             value, half = (f"{round(one, digits):.{max(digits, 0)}f}" for one in (self.value, self.half))
             return f"{value} ± {half}"
-        beyond = int(np.floor(np.log10(abs(self.value)))) + digits
+        beyond = int(np.floor(np.log10(abs(self.value)))) + digits if self.value else 0
         return f"{self.value:.{max(beyond + 1, 1)}g} ± {self.half:.2g}"
 
 

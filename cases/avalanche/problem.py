@@ -20,7 +20,7 @@ from cases.avalanche.measured import MeasuredProfile, Target, read
 from cases.avalanche.measures import profile, repose
 from cases.avalanche.scene import IRON_DESIGN, TITLE, scene
 from cases.avalanche.sizes import SIZES
-from cases.case import size_named
+from cases.case import searched_size, size_named
 from cases.granular_bench.measured import Measurement
 from cases.runs import OTHER_STARTS
 from optimize.problem.genome import Gene, Genome
@@ -69,7 +69,7 @@ def calibration(size: str, variant: str, path: Path) -> Problem:
 
 def _problem(size: str, variant: str, target: Target) -> Problem:
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
-    settings = size_named(size, SIZES).scene
+    settings = searched_size(size, SIZES).scene
     plain = [np.asarray(value).tolist() for value in vars(target).values()]
     wanted = "a measured profile"
     if isinstance(target, Measurement):

@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.constants import g as STANDARD_GRAVITY
 
-from cases.granular_bench.measures import discharge, flowed, heap, repose
+from cases.granular_bench.measures import discharge, heap, repose
 from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 from cases.runs import sound
 from cases.statistics import Mean
@@ -60,11 +60,11 @@ class Bed:
     @property
     def rates(self) -> np.ndarray:
         """Return the discharge rate of each start, kg/s; not a number where an arch has closed the silo."""
-        return np.array([discharge(result) if flowed(result) else np.nan for result in self.results])
+        return np.array([discharge(result) for result in self.results])
 
     @property
     def flowing(self) -> int:
-        """Return how many starts flow to the end."""
+        """Return in how many starts no arch closes the silo before its rate is known."""
         return int(np.isfinite(self.rates).sum())
 
     def mean_rate(self, power: float = 1.0) -> Mean:

@@ -15,7 +15,8 @@ FALLING = 0.1
 FLANK_PART = (0.15, 0.9)
 """Between these parts of the disc's radius the flank of the heap is taken."""
 CLOSED = 0.1
-"""A silo is closed if nothing passes for this part of its run: some fifty grains pass the narrowest in it."""
+"""A silo is closed if nothing passes for this part of its run, in which some eighty grains pass the narrowest
+that flows."""
 FEWEST = 20
 """A heap has a flank, and so an angle, if so many grains lie on it at least."""
 
@@ -71,8 +72,8 @@ def repose(result: Result) -> float:
 
 
 def discharge(result: Result) -> float:
-    """Return the discharge rate in steady flow, kg/s; of a silo that an arch has closed, up to then."""
-    return result.measures["passage_rate"]
+    """Return the discharge rate in steady flow, kg/s; not a number where an arch has closed the silo."""
+    return result.measures["passage_rate"] if flowed(result) else float("nan")
 
 
 def flowed(result: Result) -> bool:

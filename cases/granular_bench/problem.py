@@ -15,11 +15,11 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from cases.case import size_named
+from cases.case import searched_size, size_named
 from cases.granular_bench.measured import QUANTITY_UNITS, Measured, Measurement, read
 from cases.granular_bench.measures import discharge, repose
 from cases.granular_bench.plate import rebound, scene_with_plate, sliding
-from cases.granular_bench.scene import BED, SIZES, TITLE
+from cases.granular_bench.scene import SIZES, TITLE
 from cases.runs import OTHER_STARTS
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
@@ -87,7 +87,7 @@ def other_runs(design: Mapping[str, float], size: str, starts: int) -> list[Scen
 
 def problem(size: str = "default", variant: str = "calibrate") -> Problem:
     """Return the calibration to what KNOWN has."""
-    must(size in EXAMPLES, "size", f"one of {', '.join(EXAMPLES)}", size)
+    searched_size(size, SIZES)
     return calibration_to(EXAMPLES[size], size, variant)
 
 
@@ -99,8 +99,7 @@ def calibration(size: str, variant: str, path: Path) -> Problem:
 def calibration_to(measured: Measured, size: str = "default", variant: str = "calibrate") -> Problem:
     """Return the calibration to what was measured."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
-    must(size != BED, "size", "that of a draw-down test", size)
-    settings = size_named(size, SIZES).scene
+    settings = searched_size(size, SIZES).scene
     plain = {name: [one.value, one.uncertainty] for name, one in sorted(measured.items())}
     wanted = ", ".join(
         f"{name} {one.value:g} ± {one.uncertainty:g} {QUANTITY_UNITS[name]}".strip()

@@ -14,6 +14,7 @@ CASE = Case(
     scene=scene_for,
     check=Late("cases.mrf_shear.checks", "check"),
     quantities=quantities,
+    cost_size="small",
     problem=Late("cases.mrf_shear.problem", "problem"),
     variants=("front", "bounded", "field"),
     figures=Late("cases.mrf_shear.figures", "figures"),

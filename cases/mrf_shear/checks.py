@@ -33,7 +33,7 @@ SAID = {
         *(one["33:67"] / one["00:100"] for one in (published.MEASURED_YIELD, published.SIMULATED_YIELD))
     ),
 }
-"""What L21 says of each variant, which so few starts do not tell from no change."""
+"""What L21 says of each variant."""
 SATURATES = "iron that saturates"
 """The variant that L21 does not try."""
 
@@ -62,8 +62,9 @@ def balances(results: Sequence[Result]) -> Iterator[Check]:
     """Yield that what drags one raft back drags the other as much: drag and inertia of what is between them
     are little beside it."""
     forces = np.array([[raft_force(one, group)[0] for group in (LOWER, UPPER)] for one in results])
-    off = float(forces.sum() / np.abs(forces).sum())
-    yield Check("forces on both rafts along the flow: sum over that of sizes", off, 0.0, BALANCE)
+    off = forces.sum(axis=1) / np.abs(forces).sum(axis=1)
+    name = "forces on both rafts along the flow: sum over that of sizes, of the start where it is largest"
+    yield Check(name, float(np.abs(off).max()), 0.0, BALANCE)
 
 
 def chains(results: Sequence[Result]) -> Iterator[Claim]:

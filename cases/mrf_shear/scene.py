@@ -90,6 +90,7 @@ SIZES = {
         "183 grains of 6.7 um in a cell of 40 x 40 x 60 um, at 2000 1/s; a search has 32 x 32 x 48 um", {},
         SEARCH_SETTINGS,
     ),
+    "small": Size("94 grains in a cell of 32 x 32 x 48 um, at 10 000 1/s, for shorter strains", SEARCHED),
     "polydisperse": Size(
         "some 260 grains of L21's mixture 00:100 in a cell of 66 x 66 x 80 um, at 10 000 1/s",
         {

@@ -83,7 +83,9 @@ def held_pressure(result: Result) -> float:
 
 
 ARCH_ANGLE = 27.0
-"""An arch ends on the wall within this angle of the direction of the field, degrees."""
+"""An arch ends on the wall within this angle of the direction of the field, degrees: four grains in a row
+along the wall of a constriction four grains wide do not reach from side to side of it, nor seven where it is
+6.5 grains wide; five and eight do."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,8 @@ class Clusters:
 
     largest : the part of all grains that are in the largest. bridged : whether grains within the cones and
     the constriction that are bound to each other there touch the wall on opposite sides, within ARCH_ANGLE of
-    the direction of the field: an arch or a chain across. So near to it, as chains stand along the field, and
-    as four in a row along the wall of a narrow constriction, which reach from one quarter to the next but
-    one, would else be an arch.
+    the direction of the field: an arch, a chain across, or many in a row along the wall. Valves that flow
+    have them, too.
     """
 
     largest: float

@@ -101,5 +101,11 @@ def flows(scenes: Sequence[Scene], progress: Progress = lambda part: None) -> li
 
 
 def left(group: Sequence[Flow]) -> Mean:
-    """Return the part of the flow rate that is left in the field, a mean over starts."""
+    """Return the part of the flow rate before the field that is left at the end, a mean over starts."""
     return Mean.of([one.left for one in group])
+
+
+def left_of(group: Sequence[Flow], without: Sequence[Flow]) -> Mean:
+    """Return the flow rate at the end over that of the same starts without a field, as late: a mean over
+    starts. A flow that slows down by itself does not count for the field."""
+    return Mean.of([one.closed_rate / other.closed_rate for one, other in zip(group, without, strict=True)])

@@ -70,12 +70,17 @@ def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) ->
 
 
 def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return coarse grains in each constriction; fine ones in the narrow one, which are eight times as many,
-    from half as many starts; and coarse ones there for as long without a field."""
-    narrow = THROATS[0]
-    coarse = [Wanted(throat, D, FIELD, starts) for throat in THROATS]
-    fine, without = Wanted(narrow, FINE_DIAMETER, FIELD, starts // 2), Wanted(narrow, D, 0.0, starts)
-    return run_all([*coarse, fine, without], progress)
+    """Return coarse grains in each constriction, in the narrow one from twice as many starts; fine ones in
+    the narrow one, which are eight times as many, from half as many starts; and coarse ones there from the
+    same starts without a field."""
+    narrow, wide = THROATS
+    wanted = [
+        Wanted(narrow, D, FIELD, 2 * starts),
+        Wanted(wide, D, FIELD, starts),
+        Wanted(narrow, FINE_DIAMETER, FIELD, starts // 2),
+        Wanted(narrow, D, 0.0, 2 * starts),
+    ]
+    return run_all(wanted, progress)
 
 
 def by_field(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:

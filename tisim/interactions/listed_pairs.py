@@ -90,8 +90,13 @@ class PartOfSum(PerChunk):
         p = self.p
         begin, end = p.begin[w, c], p.end[w, c]
         near = self.partition_pairs(w, begin, end)
-        for block in range((near - begin + self.lanes - 1) // self.lanes):
-            self.compute_block(w, c, begin + block * self.lanes, near)
+        if ti.static(self.lanes > 1):
+            for block in range((near - begin + self.lanes - 1) // self.lanes):
+                self.compute_block(w, c, begin + block * self.lanes, near)
+        else:
+            # Vectors of one lane in two loops of a kernel do not compile for Vulkan.
+            for k in range(begin, near):
+                self.process_pair(w, c, p.partitioned[w, k], self.values_of(w, p.partitioned[w, k]))
         for k in range(near, end):
             self.process_distant_pair(w, c, p.partitioned[w, k])
 
@@ -111,16 +116,20 @@ class PartOfSum(PerChunk):
         return near
 
     @ti.func
+    def values_of(self, w, m):
+        """Return the values that listed pair m comes to."""
+        s, i, j, t = self.s, self.p.first[w, m], self.p.second[w, m], self.s.time[w]
+        d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
+        return self.total.compute_pair(w, m, i, j, d, d.norm(), t)
+
+    @ti.func
     def compute_block(self, w, c, begin, end):
         """Compute as many pairs as there are lanes, or as there are before ``end``, and process each."""
-        p, s, t = self.p, self.s, self.s.time[w]
+        p, s = self.p, self.s
         lanes = [ti.Vector([0.0] * self.lanes, s.real) for _ in ti.static(range(self.total.pair_values))]
         for lane in range(self.lanes):
             # Lanes without a pair of their own compute the last one again, and nobody reads it.
-            m = p.partitioned[w, ti.min(begin + lane, end - 1)]
-            i, j = p.first[w, m], p.second[w, m]
-            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
-            values = self.total.compute_pair(w, m, i, j, d, d.norm(), t)
+            values = self.values_of(w, p.partitioned[w, ti.min(begin + lane, end - 1)])
             for k in ti.static(range(self.total.pair_values)):
                 lanes[k][lane] = values[k]
         for lane in range(ti.min(self.lanes, end - begin)):

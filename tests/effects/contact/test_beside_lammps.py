@@ -6,6 +6,7 @@ import pytest
 
 from tests.benchmarks import granular_lammps as bench
 from tests.benchmarks import lammps_peer, settled_lammps, sheared_lammps
+from tisim.numerics.statistics import half_width
 
 pytestmark = [
     pytest.mark.slow,
@@ -103,7 +104,7 @@ def test_a_bed_that_settles_has_the_bulk_statistics_of_lammps(name):
     confidence = 1 - 1e-3 / len(ours)
     for what, values in ours.items():
         apart = values - theirs[what]
-        half = settled_lammps.half_interval(apart, confidence)
+        half = half_width(apart, confidence)
         assert abs(apart.mean()) < half, what
         if what in NARROW:
             assert half < NARROW[what] * theirs[what].mean(), what

@@ -239,7 +239,9 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
     assert [one.cutoff for one in TruncatedDipoleDipole().approximations(1.0)] == [16.0, 21.6]
     # Rounded to contact, without a gap, it would be no law.
     assert TruncatedDipoleDipole(cutoff=2.004).approximations(1.0) == ()
-    assert TruncatedDipoleDipole(cutoff=2.01) not in TruncatedDipoleDipole(cutoff=2.01).approximations(1.0)
+    # Rounded up it would be no nearer, and two that are rounded to one are one.
+    assert TruncatedDipoleDipole(cutoff=2.008).approximations(1.0) == ()
+    assert [one.cutoff for one in TruncatedDipoleDipole(cutoff=2.014).approximations(1.0)] == [2.01]
     (_, several) = law.model_copy(update={"sweeps": 0}).approximations(1.0)
     assert several.sweeps == 100
 

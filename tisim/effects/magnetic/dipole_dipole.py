@@ -111,11 +111,11 @@ class TruncatedDipoleDipole(DipolePairs, DipoleDipole):
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         beyond = self.cutoff - 2
         nearer = ((three_digits(2 + part * beyond), three_digits(part * self.gap)) for part in NEARER)
-        # Rounded to contact it is no law, and rounded to where the law itself ends it is no other.
+        # Rounded to contact it is no law, and rounded to where the law itself ends or beyond it is no nearer.
         return tuple(
             self.model_copy(update={"cutoff": cutoff, "gap": gap})
-            for cutoff, gap in nearer
-            if (cutoff > 2 or gap > 0) and (cutoff, gap) != (self.cutoff, self.gap)
+            for cutoff, gap in dict.fromkeys(nearer)
+            if (cutoff > 2 or gap > 0) and (cutoff < self.cutoff or gap < self.gap)
         )
 
     @ti.func
