@@ -17,7 +17,6 @@ import numpy as np
 
 from cases.statistics import Mean
 
-
 State = dict[str, np.ndarray]
 """Of all particles, by name."""
 

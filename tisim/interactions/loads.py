@@ -19,8 +19,11 @@ VIRIAL = Field("virial", "J", 1, "keep", slots=9)
 
 @ti.data_oriented
 class Loads:
-    """Loads are what is summed over the forces on each particle, and where in a state it is written to: that
-    of the worlds, or the one that a loop over particles which do not feel each other has of its own.
+    """Loads are what the forces on each particle are summed up to; they are read from a state and written to
+    one.
+
+    A loop over particles that do not feel each other has a state of its own: ``read`` and ``write`` are given
+    the state at hand.
 
     turning : whether there are torques. virial : whether there is a virial. size : how many values a force
     with its torque is. components : how many all of them are.

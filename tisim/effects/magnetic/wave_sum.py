@@ -30,8 +30,8 @@ class WaveSum(LongRangeSum):
     column 0, of n_x = n_y = 0, has n_z > 0, and the others are those after it in the order of n_x and n_y.
 
     turns : exp(i 2 pi n x_a / L_a) of each particle along each axis, for n from 0 on. amplitude : 2 mu_0 / V
-    g S(k). top : the largest n_z of a column; -1 for none. moments : sums over blocks of
-    all moments, in all M, A m^2. mean : -mu_0 N M / V, T. field : T. force : N.
+    g S(k). top : the largest n_z of a column; -1 for none. moments : sums over blocks of all moments, in all
+    M, A m^2. mean : -mu_0 N M / V, T. field : T. force : N.
     """
 
     def __init__(self, s: State, effect: Bound[Any], domain: Bound[Any], forces: bool) -> None:
