@@ -14,12 +14,12 @@ SOFTER = (1000.0, 100.0, 10.0)
 
 def softening(scene: Scene) -> dict[str, float]:
     """Return the properties of materials by which the contacts of a scene may be softened, each with the
-    power of it that the time of an impact goes by; none where something else would have to be lowered too."""
-    every = [part for _, part in parts(scene)]
-    powers = {name: power for part in every for name, power in part.softening.items()}
+    power of it that the time of an impact goes by; none where one of them is given for a pair of materials,
+    which would stay as stiff as it is."""
+    powers = {name: power for _, part in parts(scene) for name, power in part.softening.items()}
     pairs = scene.material_pairs.values()
     given = any(getattr(pair, name, None) is not None for pair in pairs for name in powers)
-    return powers if all(part.softens for part in every) and not given else {}
+    return {} if given else powers
 
 
 def softened(scene: Scene, properties: Mapping[str, float], factor: float) -> Scene:

@@ -20,15 +20,13 @@ class AccuracyHints(BaseModel):
     softening : properties of materials that may be lowered for longer steps, each with the power of it that
         the time of an impact at a given speed goes by; as {"young": 0.4}, where that is as E^-0.4. Under a
         given load it may go by less: the overlap of Hertz's law goes as E^-2/3, so the stiffness of a
-        contact at rest as E^(2/3), and the time in which it swings as E^-1/3.
-    softens : whether it is what it was where materials are softer; not so where a constant of its own, or one
-        of the materials that nothing lowers, is a stiffness, a damping or a time of contacts. Softer
-        materials are tried where all parts of a scene say so.
+        contact at rest as E^(2/3), and the time in which it swings as E^-1/3. All other constants stay as
+        they are, such as a cohesion, of which softer grains have more, or a spring of a bond, for which
+        longer steps may be too long: what that does is part of what is measured.
     """
 
     accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = ()
     softening: ClassVar[Mapping[str, float]] = {}
-    softens: ClassVar[bool] = True
 
 
 class LawHints(AccuracyHints):

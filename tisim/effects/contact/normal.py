@@ -66,8 +66,6 @@ class NormalContact(PairForce):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
-    # How stiff it is, it says itself.
-    softens: ClassVar[bool] = False
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
     fields = ("radius",)

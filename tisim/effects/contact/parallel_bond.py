@@ -54,8 +54,6 @@ class ParallelBond(PairForce):
     depends_on_velocity: ClassVar[bool] = True
     # It breaks.
     smooth: ClassVar[bool] = False
-    # Young's modulus of the cement is its own.
-    softens: ClassVar[bool] = False
     # Its steps know nothing of how stiff bonds are.
     incompatible_controls = ("approach_time",)
     memory: ClassVar[int] = 8

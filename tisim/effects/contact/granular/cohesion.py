@@ -31,8 +31,6 @@ class SJKR(Cohesion):
 
     uses: ClassVar = ("cohesion_energy_density",)
     by_overlap: ClassVar[bool] = True
-    # What is softer is pressed deeper, and would be pulled more.
-    softens: ClassVar[bool] = False
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"density": pair.mixed("cohesion_energy_density")}

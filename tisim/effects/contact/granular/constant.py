@@ -18,7 +18,6 @@ class ConstantDamping(Damping):
     """
 
     uses: ClassVar = ("damping",)
-    softens: ClassVar[bool] = False
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"constant": pair.mixed("damping")}

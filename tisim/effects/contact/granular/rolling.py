@@ -98,7 +98,6 @@ class RollingSDS(RollingResistance):
 
     memory: ClassVar[int] = 3
     uses: ClassVar = ("rolling_friction", "rolling_stiffness", "rolling_damping")
-    softens: ClassVar[bool] = False
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {

@@ -65,7 +65,6 @@ class TwistingSDS(TwistingResistance):
 
     memory: ClassVar[int] = 1
     uses: ClassVar = ("twisting_friction", "twisting_stiffness", "twisting_damping")
-    softens: ClassVar[bool] = False
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {

@@ -22,7 +22,6 @@ class ViscoelasticDamping(Damping):
     """
 
     uses: ClassVar = ("viscous_time",)
-    softens: ClassVar[bool] = False
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"lag": pair.mixed("viscous_time")}
