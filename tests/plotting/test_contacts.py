@@ -1,0 +1,49 @@
+"""The figure of contacts: bars are fractions of grains, the rose is that of the directions."""
+
+import numpy as np
+import pytest
+
+from tisim.plotting.contacts import ROSE_SECTORS, fabric, planar_density
+
+
+def pairs_along(angles):
+    """Two grains for each angle (rad) in the plane of x and z, a unit apart."""
+    first = np.stack([3.0 * np.arange(len(angles)), np.zeros(len(angles)), np.zeros(len(angles))], axis=1)
+    second = first + np.stack([np.cos(angles), np.zeros(len(angles)), np.sin(angles)], axis=1)
+    number = np.arange(len(angles))
+    return np.concatenate([first, second]), np.stack([number, number + len(angles)], axis=1)
+
+
+def test_bars_are_fractions_of_grains():
+    """Three in a row, and one that touches none."""
+    position = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [5, 5, 5]])
+    bars, _ = fabric(position, np.array([[0, 1], [1, 2]])).axes
+    assert [bar.get_height() for bar in bars.patches] == pytest.approx([1 / 4, 2 / 4, 1 / 4])
+
+
+def test_the_rose_is_that_of_the_directions(rng):
+    """Drawn from 1 + cos(2 theta - 0.6), by throwing away; contacts point both ways. A bar has an error of
+    0.04."""
+    angles = rng.uniform(-np.pi, np.pi, 60_000)
+    angles = angles[rng.uniform(0, 2, len(angles)) < 1 + np.cos(2 * angles - 0.6)]
+    _, rose = fabric(*pairs_along(angles), plane=(0, 2)).axes
+    bars = np.array([bar.get_height() for bar in rose.patches])
+    theta = -np.pi + 2 * np.pi / ROSE_SECTORS * (np.arange(ROSE_SECTORS) + 0.5)
+    np.testing.assert_allclose(bars, 1 + np.cos(2 * theta - 0.6), atol=0.15)
+    (line,) = rose.get_lines()
+    np.testing.assert_allclose(line.get_ydata(), 1 + np.cos(2 * line.get_xdata() - 0.6), atol=0.05)
+    assert bars.mean() == pytest.approx(1)
+    assert [text.get_text() for text in rose.get_xticklabels()] == ["x", "z", "-x", "-z"]
+
+
+def test_contacts_count_by_their_part_in_the_plane():
+    """Of two in the plane across each other, and a third upright, the third is not seen."""
+    position = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    _, rose = fabric(position, np.array([[0, 1], [0, 2], [0, 3]])).axes
+    np.testing.assert_allclose(rose.get_lines()[0].get_ydata(), 1.0)
+
+
+def test_density_of_one_direction():
+    """As far as two terms go: 3 along it, -1 across."""
+    along = np.outer([0.0, 1, 0], [0.0, 1, 0])
+    np.testing.assert_allclose(planar_density(along, (0, 1), np.array([0, np.pi / 2])), [-1, 3])
