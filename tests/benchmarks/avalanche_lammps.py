@@ -118,13 +118,9 @@ def worker(folder: Path) -> None:
     length, width = CELL.length * D, CELL.width * D
     found, lasted = [], 0.0
     for places in starts:
-        text = f"grains\n\n{n} atoms\n1 atom types\n"
-        text += (
-            f"-{D} {length + D} xlo xhi\n0 {width} ylo yhi\n-{D} {2 * CELL.height * D} zlo zhi\n\nAtoms\n\n"
-        )
-        rows = [f"{k} 1 {D:.17g} {density:.17g} {x:.17g} {y:.17g} {z:.17g}"
-                for k, (x, y, z) in enumerate(places, 1)]  # fmt: skip
-        (folder / "data").write_text(text + "\n".join(rows) + "\n")
+        box = [(-D, length + D), (0, width), (-D, 2 * CELL.height * D)]
+        rows = np.column_stack([np.full(n, D), np.full(n, density), places])
+        lammps_peer.write_data(folder / "data", box, rows)
         machine = lammps_peer.begin()
         wall = f"all wall/gran granular {model}"
         opens, ends = (round(time * unit / dt) for time in (OPENS, DURATION))

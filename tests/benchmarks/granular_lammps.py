@@ -214,12 +214,7 @@ def worker(folder: Path) -> None:
     n, m = len(at["radius"]), at["mass"]
     rows = np.column_stack([2 * at["radius"], m / (4 / 3 * np.pi * at["radius"] ** 3), at["position"]])
     moving = np.column_stack([at["velocity"], at["spin"]])
-    text = [f"grains\n\n{n} atoms\n1 atom types\n"]
-    text += [f"-2 {SIDE + 2} {axis}lo {axis}hi" for axis in "xyz"]
-    for title, kind, table in (("Atoms", "1 ", rows), ("Velocities", "", moving)):
-        text.append(f"\n{title}\n")
-        text += [f"{k} {kind}{' '.join(f'{x:.17g}' for x in row)}" for k, row in enumerate(table, 1)]
-    (folder / "data").write_text("\n".join(text) + "\n")
+    lammps_peer.write_data(folder / "data", 3 * [(-2, SIDE + 2)], rows, moving)
     walls = [
         f"fix {axis} all wall/gran granular {model} {axis}plane 0 {SIDE}" for axis in "xyz" if at["walls"]
     ]

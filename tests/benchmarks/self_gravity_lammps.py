@@ -80,13 +80,8 @@ def worker(folder: Path) -> None:
         place, mass, repeats = given["place"], given["mass"], int(given["repeats"])
     n, side = len(mass), 2 * RADIUS
     density = mass / (np.pi / 6 * SIZE**3)
-    rows = [
-        f"{k} 1 {x:.17g} {y:.17g} {z:.17g} {G**0.5 * m:.17g} {SIZE} {rho:.17g}"
-        for k, (m, rho, (x, y, z)) in enumerate(zip(mass, density, place, strict=True), 1)
-    ]
-    box = "".join(f"{-side} {side} {axis}lo {axis}hi\n" for axis in "xyz")
-    text = f"a cloud\n\n{n} atoms\n1 atom types\n{box}\nAtoms\n\n"
-    (folder / "data").write_text(text + "\n".join(rows) + "\n")
+    rows = np.column_stack([place, G**0.5 * mass, np.full(n, SIZE), density])
+    lammps_peer.write_data(folder / "data", 3 * [(-side, side)], rows)
     machine = lammps_peer.begin()
     machine.commands_list(
         [

@@ -125,12 +125,8 @@ def worker(folder: Path) -> None:
         radius, mass = at["radius"][w], at["mass"][w]
         rows = np.column_stack([2 * radius, mass / (4 / 3 * np.pi * radius**3), at["position"][w]])
         moving = np.column_stack([at["velocity"][w], at["spin"][w]])
-        text = [f"grains\n\n{n} atoms\n1 atom types\n"]
-        text += [f"-1 {SIDE + 1} xlo xhi\n-1 {SIDE + 1} ylo yhi\n-1 {3 * SIDE} zlo zhi"]
-        for title, kind, table in (("Atoms", "1 ", rows), ("Velocities", "", moving)):
-            text.append(f"\n{title}\n")
-            text += [f"{k} {kind}{' '.join(f'{x:.17g}' for x in row)}" for k, row in enumerate(table, 1)]
-        (folder / "data").write_text("\n".join(text) + "\n")
+        box = [(-1, SIDE + 1), (-1, SIDE + 1), (-1, 3 * SIDE)]
+        lammps_peer.write_data(folder / "data", box, rows, moving)
         ends = {"x": SIDE, "y": SIDE, "z": "NULL"}
         walls = [
             f"fix {axis} all wall/gran granular {model} {axis}plane 0 {end}" for axis, end in ends.items()

@@ -91,12 +91,7 @@ def worker(folder: Path) -> None:
     n, volumes, steps = len(at["radius"]), 4 / 3 * np.pi * at["radius"] ** 3, int(at["steps"])
     rows = np.column_stack([2 * at["radius"], at["mass"] / volumes, at["position"]])
     moving = np.column_stack([at["velocity"], at["spin"]])
-    text = [f"grains\n\n{n} atoms\n1 atom types\n"]
-    text += [*(f"0 {SIDE} {axis}lo {axis}hi" for axis in "xyz"), "0 0 0 xy xz yz"]
-    for title, kind, table in (("Atoms", "1 ", rows), ("Velocities", "", moving)):
-        text.append(f"\n{title}\n")
-        text += [f"{k} {kind}{' '.join(f'{x:.17g}' for x in row)}" for k, row in enumerate(table, 1)]
-    (folder / "data").write_text("\n".join(text) + "\n")
+    lammps_peer.write_data(folder / "data", 3 * [(0, SIDE)], rows, moving, tilted=True)
     aside = np.sqrt(2 * (1 - LAW["poisson"]) / (2 - LAW["poisson"]))
     model = (
         f"hertz/material {LAW['young']:.17g} {LAW['restitution']:.17g} {LAW['poisson']:.17g} tangential "

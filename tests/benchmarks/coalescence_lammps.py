@@ -1,0 +1,182 @@
+"""Clouds that fall together by their gravity beside LAMMPS, from the same random starts in both.
+
+    python -m pip install ".[bench]"
+    python tests/benchmarks/coalescence_lammps.py [--starts 10]
+
+It is the case coalescence without magnetisation: a seed and 180 grains with velocities, spins and a rotation
+become a rubble pile, under Hertz, Mindlin, restitution and rolling SDS; without cohesion, with which LAMMPS
+takes no restitution. The gravity of particles is the Coulomb's law of LAMMPS, with charges of G^1/2 m and a
+dielectric constant of -1. Paths of
+grains are chaotic, so the programs, whose levers differ (granular_lammps.py), are compared by means over
+starts. Printed are both means, the mean of the differences, with half of their 95 % intervals, and the
+largest difference; and the time for a particle and step of both programs, on one thread each, from the first
+step to the last, without compiling.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.constants import G
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from cases.coalescence import scene as cloud  # noqa: E402
+from cases.coalescence.measures import Asteroid, Conserved, Gathering  # noqa: E402
+from cases.runs import sound  # noqa: E402
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
+from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tisim import Scene, Simulation  # noqa: E402
+from tisim.effects import SelfGravity  # noqa: E402
+
+LOOKS = (5000.0, 10_000.0)
+"""When both are looked at, s: on the way and at the end."""
+SIDE = 400.0
+"""Of the box of LAMMPS, m, in which all grains stay; none of its pairs is left out."""
+LAW = TwinLaw(
+    (cloud.rubble(cloud.scale_of(cloud.DEFAULT["number"])).model_dump(exclude_none=True),),
+    rolling="rolling_sds",
+)
+FIELDS = {"position": "x", "velocity": "v", "spin": "omega"}
+
+
+def scenes(seeds: Sequence[int]) -> list[Scene]:
+    """The clouds of the package."""
+    laws = {"effects": (composed(LAW), SelfGravity())}
+    made = (cloud.scene(**cloud.DEFAULT, magnetisation=0.0, seed=seed) for seed in seeds)
+    return [one.model_copy(update=laws) for one in made]
+
+
+def particle_steps(made: Sequence[Scene]) -> float:
+    """Steps of some clouds, times their particles."""
+    return sum(len(one.start()["mass"]) * LOOKS[-1] / one.stepper.control.dt for one in made)
+
+
+def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
+    """The states of each start at LOOKS, and the time for a particle and step, s."""
+    simulation = Simulation(made[0], len(made))
+    simulation.load(list(made))
+    found: list[list[State]] = [[] for _ in made]
+    for look in LOOKS:
+        simulation.run(until=look)
+        for states, result in zip(found, sound(simulation.results()), strict=True):
+            states.append(result.state)
+    lasted = simulation.wall_s
+    simulation.close()
+    return found, lasted / particle_steps(made)
+
+
+def by_lammps(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
+    """The same in LAMMPS, in a process of its own."""
+    starts = [one.start() for one in made]
+    stacked = {name: np.stack([at[name] for at in starts]) for name in (*FIELDS, "radius", "mass")}
+    steps = [round(look / made[0].stepper.control.dt) for look in LOOKS]
+    found = lammps_peer.apart(
+        __file__, law=lammps_model(LAW), steps=steps, dt=made[0].stepper.control.dt, **stacked
+    )
+    states = [
+        [
+            {**{name: found[name][w, k] for name in FIELDS}, "radius": at["radius"], "mass": at["mass"]}
+            for k in range(len(LOOKS))
+        ]
+        for w, at in enumerate(starts)
+    ]
+    return states, float(found["lasted"]) / particle_steps(made)
+
+
+def worker(folder: Path) -> None:
+    """Run LAMMPS on each start of in.npz of a folder, and write out.npz."""
+    with np.load(folder / "in.npz") as given:
+        at = dict(given)
+    found: dict[str, list[list[np.ndarray]]] = {name: [] for name in FIELDS}
+    lasted = 0.0
+    for w in range(len(at["radius"])):
+        machine = machine_of(
+            {name: at[name][w] for name in (*FIELDS, "radius", "mass")}, folder, str(at["law"])
+        )
+        machine.commands_list([f"timestep {float(at['dt'])}", "run 0"])
+        for values in found.values():
+            values.append([])
+        done = 0
+        for steps in at["steps"]:
+            began = time.perf_counter()
+            machine.command(f"run {steps - done} pre no post no")
+            lasted += time.perf_counter() - began
+            done = steps
+            for name, theirs in FIELDS.items():
+                found[name][-1].append(np.array(machine.gather_atoms(theirs, 1, 3)).reshape(-1, 3))
+        machine.close()
+    np.savez(folder / "out.npz", lasted=lasted, **{name: np.array(values) for name, values in found.items()})
+
+
+def machine_of(at: State, folder: Path, model: str) -> lammps_peer.Any:
+    """LAMMPS with a cloud."""
+    radius, mass, n = at["radius"], at["mass"], len(at["mass"])
+    density = mass / (4 / 3 * np.pi * radius**3)
+    rows = np.column_stack([at["position"], G**0.5 * mass, 2 * radius, density])
+    moving = np.column_stack([at["velocity"], at["spin"]])
+    lammps_peer.write_data(folder / "data", 3 * [(-SIDE / 2, SIDE / 2)], rows, moving)
+    machine = lammps_peer.begin()
+    machine.commands_list(
+        [
+            "units lj", "atom_style hybrid charge sphere", "boundary f f f",
+            "atom_modify map array", "newton off", "comm_modify vel yes", f"read_data {folder / 'data'}",
+            "dielectric -1.0",
+            f"pair_style hybrid/overlay granular coul/cut {2 * SIDE}", f"pair_coeff * * granular {model}",
+            "pair_coeff * * coul/cut", "neighbor 1.0 bin",
+            f"neigh_modify every 1 delay 0 one {n} page {20 * n}", "fix move all nve/sphere",
+        ]
+    )  # fmt: skip
+    return machine
+
+
+def statistics(states: list[State]) -> dict[str, float]:
+    """What is compared of one cloud."""
+    way, end = states
+    mass, place = end["mass"], end["position"]
+    away = ((place - np.average(place, axis=0, weights=mass)) ** 2).sum(axis=1)
+    pile = Asteroid.of(end)
+    before, after = Conserved.of(way), Conserved.of(end)
+    return {
+        "part bound on the way": Gathering.of(way).bound,
+        "part of the asteroid on the way": Gathering.of(way).coalesced,
+        "part of the asteroid": Gathering.of(end).coalesced,
+        "radius of gyration, m": float(np.sqrt(np.average(away, weights=mass))),
+        "energy of gravity, J": after.gravity,
+        "kinetic energy on the way, J": before.kinetic,
+        "density of the hull, kg/m^3": float(pile.grains["mass"].sum() / pile.volume),
+        "longest axis over shortest": pile.elongation,
+        "spin about z, urad/s": 1e6 * float(pile.spin[2]),
+    }
+
+
+def table(clouds: Sequence[list[State]]) -> dict[str, np.ndarray]:
+    """Each statistic of every start."""
+    return lammps_peer.columns([statistics(states) for states in clouds])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--starts", type=int, default=10)
+    options = parser.parse_args()
+    import tisim
+
+    tisim.init(threads=1)
+    made = scenes(range(options.starts))
+    (here, our_time), (there, their_time) = by_package(made), by_lammps(made)
+    lammps_peer.print_beside(table(here), table(there))
+    lammps_peer.print_times(our_time, their_time)
+
+
+if __name__ == "__main__":
+    lammps_peer.start(main, worker)

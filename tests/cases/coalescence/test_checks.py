@@ -1,0 +1,11 @@
+"""What the case coalescence must show."""
+
+import pytest
+
+from cases.coalescence.checks import check
+
+
+@pytest.mark.slow
+def test_all_checks_pass():
+    wrong = [(item.name, *item.cells) for item in check() if item.ok is False]
+    assert not wrong

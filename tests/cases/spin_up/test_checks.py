@@ -1,0 +1,11 @@
+"""What the case spin_up must show."""
+
+import pytest
+
+from cases.spin_up.checks import check
+
+
+@pytest.mark.slow
+def test_all_checks_pass():
+    wrong = [(item.name, *item.cells) for item in check() if item.ok is False]
+    assert not wrong
