@@ -8,6 +8,9 @@ import sys
 from rich import progress as bars
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
+
+from tisim.compiling import is_compiling
 
 FILE_WIDTH = 110
 """Width of tables that do not go to a terminal, characters; rich would assume 80."""
@@ -25,10 +28,17 @@ def err() -> Console:
     return Console(stderr=True, markup=False, width=None if sys.stderr.isatty() else FILE_WIDTH)
 
 
+class Compiling(bars.ProgressColumn):
+    """This column says so while kernels are compiled, in which nothing else advances."""
+
+    def render(self, task: bars.Task) -> Text:
+        return Text("compiling" if is_compiling() else "")
+
+
 def progress_bar(before: str, after: str = "", console: Console | None = None) -> bars.Progress:
     """Return a bar with the time taken and left, between two texts with fields of its task."""
     return bars.Progress(
-        bars.TextColumn(before, markup=False), bars.BarColumn(), bars.TaskProgressColumn(),
+        bars.TextColumn(before, markup=False), Compiling(), bars.BarColumn(), bars.TaskProgressColumn(),
         bars.TimeElapsedColumn(), bars.TextColumn("left"), bars.TimeRemainingColumn(),
         bars.TextColumn(after, markup=False), console=console or err(),
     )  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 from tisim.backend import memory, runtime
 from tisim.backend.memory import NoRoom, Tree, collected
 from tisim.backend.thread import in_taichi_thread
+from tisim.compiling import compiling
 from tisim.engine import law_errors
 from tisim.engine.allocation import Allocation
 from tisim.engine.assembly import Assembly
@@ -93,7 +94,7 @@ class CompiledWorlds:
         else:
             self.first, self.program = world_programs(self.s, (first, step), self.teams, rest_every)
         self.sort = LaunchedProgram(self.s, sort.items(), once=True) if sort else None
-        with law_errors.in_a_line():
+        with law_errors.in_a_line(), compiling():
             for program in (self.program, self.first, self.sort):
                 if program and program.items:
                     program.compile()

@@ -1,0 +1,22 @@
+"""Whether kernels of a step are being compiled now, for what shows progress."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_now = 0
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Have ``is_compiling`` say so within the block, in every thread."""
+    global _now
+    _now += 1
+    try:
+        yield
+    finally:
+        _now -= 1
+
+
+def is_compiling() -> bool:
+    """Return whether kernels of a step are being compiled in this process."""
+    return _now > 0
