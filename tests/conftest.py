@@ -22,9 +22,10 @@ ON_DEVICES = (
     *("effects/contact/test_walls.py", "effects/contact/test_contact.py", "effects/pair/test_near_field.py"),
     *("effects/pair/test_mie.py", "effects/external/test_drag.py", "effects/magnetic/test_dipole_dipole.py"),
     *("steppers/test_verlet.py", "steppers/test_conservation.py", "interactions/test_beyond_contact.py"),
-    *("effects/test_contract.py", "operators/test_contract.py", "operators/test_passage.py"),
-    *("operators/test_peak_displacement.py", "interactions/test_vacated_slots.py", "test_testing.py"),
-    *("interactions/test_cell_tree.py", "effects/gravitation/test_tree_gravity.py"),
+    *("effects/test_contract.py", "operators/test_contract.py", "steppers/test_contract.py"),
+    *("operators/test_passage.py", "operators/test_peak_displacement.py", "test_testing.py"),
+    *("interactions/test_vacated_slots.py", "interactions/test_cell_tree.py"),
+    "effects/gravitation/test_tree_gravity.py",
 )
 """These files hold on every device: the contracts, and the physics of each kind of law. Insertions and
 clumps, whose steps take longest to compile, are left out."""

@@ -41,8 +41,8 @@ FIELD = 0.3
 """T."""
 ACCURACIES = (1e-6, 1e-3, 1e-2)
 """The first one is the reference."""
-CUTOFFS = (4.0, 6.0, 8.0)
-"""Radii."""
+CUTOFFS = (4.0, 2 + 8e-6 / RADIUS, 6.0, 8.0)
+"""Radii; the second is L21's, a gap of 8 um (section 2.4.3)."""
 TRIES = 100_000
 
 
