@@ -3,8 +3,8 @@
     python tests/benchmarks/mrf_stiffness.py [--starts 8] [--young 0.5e9 1e9 2e9 4e9]
 
 The cell of a search of mrf_shear at 10 000 1/s, in steps of the stiffest of them. Printed are the stress and
-what it is over that of L21's 1 GPa from the same starts, and the largest overlap over a radius; means with half
-of their 95 % intervals. Some minutes.
+what it is over that of L21's 1 GPa from the same starts, and the largest overlap over a radius; means with
+half of their 95 % intervals. Some minutes.
 """
 
 import argparse
