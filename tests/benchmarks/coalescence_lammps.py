@@ -6,11 +6,11 @@
 It is the case coalescence without magnetisation: a seed and 180 grains with velocities, spins and a rotation
 become a rubble pile, under Hertz, Mindlin, restitution and rolling SDS; without cohesion, with which LAMMPS
 takes no restitution. The gravity of particles is the Coulomb's law of LAMMPS, with charges of G^1/2 m and a
-dielectric constant of -1. Paths of
-grains are chaotic, so the programs, whose levers differ (granular_lammps.py), are compared by means over
-starts. Printed are both means, the mean of the differences, with half of their 95 % intervals, and the
-largest difference; and the time for a particle and step of both programs, on one thread each, from the first
-step to the last, without compiling.
+dielectric constant of -1. Paths of grains are chaotic, so the programs, whose levers differ
+(granular_lammps.py), are compared by means over starts. Printed are both means, the mean of the differences,
+with half of their 95 % intervals, and the largest difference; and the time for a particle and step of both
+programs, on one thread each, from the first step to the last, without compiling: of a batch of all starts,
+and of LAMMPS for one after another.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.constants import G
@@ -117,7 +118,7 @@ def worker(folder: Path) -> None:
     np.savez(folder / "out.npz", lasted=lasted, **{name: np.array(values) for name, values in found.items()})
 
 
-def machine_of(at: State, folder: Path, model: str) -> lammps_peer.Any:
+def machine_of(at: State, folder: Path, model: str) -> Any:
     """LAMMPS with a cloud."""
     radius, mass, n = at["radius"], at["mass"], len(at["mass"])
     density = mass / (4 / 3 * np.pi * radius**3)

@@ -45,7 +45,8 @@ def write_data(
     tilted: bool = False,
 ) -> None:
     """Write what LAMMPS's read_data takes: particles of one type in a box, of low and high x, y and z; the
-    columns of their atom style after the type; and velocities with spins. tilted : whether it is to be."""
+    columns of their atom style after the type; and velocities with spins. tilted : whether the
+    box is to be tilted later."""
     text = [f"particles\n\n{len(atoms)} atoms\n1 atom types\n"]
     text += [f"{a:.17g} {b:.17g} {axis}lo {axis}hi" for axis, (a, b) in zip("xyz", box, strict=True)]
     text += ["0 0 0 xy xz yz"] * tilted
@@ -78,9 +79,9 @@ def print_beside(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray
     intervals, and of the largest difference."""
     print("| | tisim | LAMMPS | difference | largest |\n|---|---|---|---|---|")
     for what, values in ours.items():
-        apart = values - theirs[what]
-        means = (str(Mean.of(one)) for one in (values, theirs[what], apart))
-        cells = (*means, f"{np.abs(apart).max():.2g}")
+        off = values - theirs[what]
+        means = (str(Mean.of(one)) for one in (values, theirs[what], off))
+        cells = (*means, f"{np.abs(off).max():.2g}")
         print(f"| {what} | {' | '.join(cells)} |")
 
 

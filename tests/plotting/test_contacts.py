@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tisim.errors import InputError
 from tisim.plotting.contacts import ROSE_SECTORS, fabric, planar_density
 
 
@@ -47,3 +48,19 @@ def test_density_of_one_direction():
     """As far as two terms go: 3 along it, -1 across."""
     along = np.outer([0.0, 1, 0], [0.0, 1, 0])
     np.testing.assert_allclose(planar_density(along, (0, 1), np.array([0, np.pi / 2])), [-1, 3])
+
+
+def test_directions_are_those_to_the_nearest_image():
+    """Across a face of a box of 10 two touch along x, and not by the way through the box."""
+    position = np.array([[0.2, 0.0, 0.0], [9.9, 0.2, 0.0]])
+    _, rose = fabric(position, np.array([[0, 1]]), (10.0, 10.0, 10.0)).axes
+    bars = np.array([bar.get_height() for bar in rose.patches])
+    theta = -np.pi + 2 * np.pi / ROSE_SECTORS * (np.arange(ROSE_SECTORS) + 0.5)
+    pointing = np.arctan2(0.2, -0.3)
+    assert abs(theta[bars > 0] % np.pi - pointing % np.pi).max() < np.pi / ROSE_SECTORS
+
+
+@pytest.mark.parametrize(("pairs", "plane"), [([], (0, 1)), ([[0, 1]], (0, 0)), ([[0, 1]], (0, 3))])
+def test_nothing_to_draw_is_refused(pairs, plane):
+    with pytest.raises(InputError, match="must be"):
+        fabric(np.eye(3), np.reshape(pairs, (-1, 2)).astype(int), plane=plane)

@@ -9,6 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tisim.analysis import coordination_numbers, fabric_tensor
 from tisim.analysis.separations import Sides, nearest_image
+from tisim.errors import must
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 ROSE_SECTORS = 24
@@ -27,8 +28,11 @@ def fabric(
     the part of their direction that lies in the plane, so F is that of all contacts, there.
 
     position : m, shape (n, 3). pairs : those in contact, shape (m, 2). sides : those of a periodic box.
+    InputError where there are no pairs, or no such plane.
     Source: L. Rothenburg and R. J. Bathurst, Geotechnique 39 (1989) 601.
     """
+    must(sorted({*plane} | {0, 1, 2}) == [0, 1, 2] and plane[0] != plane[1], "plane", "two of 0, 1, 2", plane)
+    must(len(pairs) > 0, "pairs", "at least one", len(pairs))
     figure = empty(8.0, 3.6)
     bars, rose = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="polar")
     assert isinstance(rose, PolarAxes)

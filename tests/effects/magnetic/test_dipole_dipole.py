@@ -241,6 +241,8 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
     assert TruncatedDipoleDipole(cutoff=2.004).approximations(1.0) == ()
     # Rounded up it would be no nearer, and two that are rounded to one are one.
     assert TruncatedDipoleDipole(cutoff=2.008).approximations(1.0) == ()
+    small = TruncatedDipoleDipole(cutoff=2.008, gap=1e-9).approximations(1.0)
+    assert [(one.cutoff, one.gap) for one in small] == [(2.0, 5e-10), (2.008, 7e-10)]
     assert [one.cutoff for one in TruncatedDipoleDipole(cutoff=2.014).approximations(1.0)] == [2.01]
     (_, several) = law.model_copy(update={"sweeps": 0}).approximations(1.0)
     assert several.sweeps == 100

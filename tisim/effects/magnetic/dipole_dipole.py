@@ -110,12 +110,15 @@ class TruncatedDipoleDipole(DipolePairs, DipoleDipole):
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         beyond = self.cutoff - 2
-        nearer = ((three_digits(2 + part * beyond), three_digits(part * self.gap)) for part in NEARER)
-        # Rounded to contact it is no law, and rounded to where the law itself ends or beyond it is no nearer.
+        # Rounding may end at contact, where it is no law, and at where the law itself ends, or beyond that.
+        nearer = dict.fromkeys(
+            (min(three_digits(2 + part * beyond), self.cutoff), three_digits(part * self.gap))
+            for part in NEARER
+        )
         return tuple(
             self.model_copy(update={"cutoff": cutoff, "gap": gap})
-            for cutoff, gap in dict.fromkeys(nearer)
-            if (cutoff > 2 or gap > 0) and (cutoff < self.cutoff or gap < self.gap)
+            for cutoff, gap in nearer
+            if (cutoff > 2 or gap > 0) and (cutoff, gap) != (self.cutoff, self.gap)
         )
 
     @ti.func
