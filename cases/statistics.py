@@ -23,6 +23,10 @@ class Mean:
         """Return the mean of two runs or more, its interval by Student's t."""
         return cls(float(np.mean(np.asarray(runs, float))), float(half_width(runs)))
 
+    def minus(self, other: Mean) -> Mean:
+        """Return the difference of two independent means."""
+        return Mean(self.value - other.value, float(np.hypot(self.half, other.half)))
+
     def over(self, other: Mean) -> Mean:
         """Return the ratio of two independent means, to first order in their errors."""
         ratio = self.value / other.value

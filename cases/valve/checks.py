@@ -27,6 +27,8 @@ def check(starts: int = STARTS) -> Iterator[Check | Claim | Shown]:
     yield Shown(f"{without.name}: flow in the end over that before", left(without.flows))
     yield from arrested(narrow, without)
     yield going_on(wide, "L21: 40x does not jam")
+    more = left(wide.flows).minus(left(narrow.flows))
+    yield Claim(f"{wide.name}: the same, less that of {narrow.name}", more, 0.0)
     yield going_on(fine, "L21: fine grains yield")
 
 
@@ -48,11 +50,12 @@ def unhindered(flow: Flow) -> float:
 
 
 def arrested(valve: ValveRuns, without: ValveRuns) -> Iterator[Check | Claim | Shown]:
-    """Yield that the field arrests a flow, and that the walls bear the drag on it."""
+    """Yield that a flow is arrested, what is left of it beside that without a field, and that the walls bear
+    the drag on it."""
     results = [flow.result for flow in valve.flows]
-    yield Shown(f"{valve.name}: flow in the end over that before the field", left(valve.flows))
-    name = "the same: over that of the same starts without a field, as late (L21: 20x, 30x jam)"
-    yield Claim(name, left_of(valve.flows, without.flows), most=ARRESTED)
+    yield Claim(f"{valve.name}: flow left in the field (L21: 20x, 30x jam)", left(valve.flows), most=ARRESTED)
+    name = "the same: over that of the same starts without a field, as late"
+    yield Shown(name, left_of(valve.flows, without.flows))
     borne = np.array([held_pressure(one) / drag_pressure(one) for one in results])
     farthest = float(borne[np.abs(borne - 1).argmax()])
     yield Check(

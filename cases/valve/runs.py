@@ -23,8 +23,8 @@ LATE = 0.2
 """Flow rates without a field and in it are means over this last part of the time of either."""
 ARRESTED = 0.05
 """A flow is arrested where less than this part is left: of its own mean rate before the field, as a mean
-(``Flow.left``); a check asks it of the rate of the same starts without a field, as late (``left_of``); and a
-search, which has no time without a field, of that of grains that go with the oil (``problem.part_left``)."""
+(``Flow.left``); and in a search, which has no time without a field, of the rate of grains that go with the
+oil, at the end (``problem.part_left``)."""
 
 
 class FlowSeries(Observer):

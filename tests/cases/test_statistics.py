@@ -16,6 +16,8 @@ def test_mean_and_its_interval():
     rng = np.random.default_rng(0)
     a, b = rng.normal(4.0, 0.1, 200_000), rng.normal(2.0, 0.03, 200_000)
     assert Mean(4.0, 0.1).over(Mean(2.0, 0.03)).half == pytest.approx((a / b).std(), rel=0.02)
+    apart = Mean(4.0, 0.1).minus(Mean(2.0, 0.03))
+    assert (apart.value, apart.half) == (2.0, pytest.approx((a - b).std(), rel=0.02))
 
 
 @pytest.mark.parametrize(
