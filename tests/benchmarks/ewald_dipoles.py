@@ -110,7 +110,7 @@ def methods(place: np.ndarray, side: float) -> dict[str, tisim.Scene]:
     for shifted in (False, True):
         for cutoff in CUTOFFS:
             cut = {"cutoff": cutoff, "shifted": shifted}
-            name = f"cut-off of {cutoff:g} radii, {'shifted' if shifted else 'plain'}"
+            name = f"cut-off of {cutoff:.3g} radii, {'shifted' if shifted else 'plain'}"
             scenes[name] = scene(
                 place, side, MutualFroehlichMoment(**iron, **cut), TruncatedDipoleDipole(**cut)
             )
