@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from cases.statistics import Mean
+from tisim.numerics.statistics import half_width
 
 State = dict[str, np.ndarray]
 """Of all particles, by name."""
@@ -83,6 +84,19 @@ def print_beside(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray
         means = (str(Mean.of(one)) for one in (values, theirs[what], off))
         cells = (*means, f"{np.abs(off).max():.2g}")
         print(f"| {what} | {' | '.join(cells)} |")
+
+
+def assert_alike(
+    ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray], narrow: Mapping[str, float]
+) -> None:
+    """Assert that zero is within the interval of each mean difference over starts, which is so wide that one of
+    a thousand such comparisons fails by chance; and that some are so narrow, over the mean itself."""
+    for what, values in ours.items():
+        off = values - theirs[what]
+        half = half_width(off, 1 - 1e-3 / len(ours))
+        assert abs(off.mean()) < half, what
+        if what in narrow:
+            assert half < narrow[what] * abs(theirs[what].mean()), what
 
 
 def print_times(ours: float, theirs: float) -> None:

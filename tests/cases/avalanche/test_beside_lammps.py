@@ -1,11 +1,9 @@
 """Avalanches without a field beside LAMMPS."""
 
-import numpy as np
 import pytest
 
 from tests.benchmarks import avalanche_lammps
-from tests.benchmarks.lammps_peer import installed
-from tisim.numerics.statistics import half_width
+from tests.benchmarks.lammps_peer import assert_alike, installed
 
 NARROW = {
     "volume of the heap over that of its grains": 0.03,
@@ -23,8 +21,4 @@ def test_slopes_are_those_of_lammps():
     seeds = range(100, 110)
     programs = avalanche_lammps.by_package, avalanche_lammps.by_lammps
     ours, theirs = (avalanche_lammps.table(by(seeds)[0]) for by in programs)
-    for what, values in ours.items():
-        apart = values - theirs[what]
-        half = half_width(apart, 1 - 1e-3 / len(ours))
-        assert abs(apart.mean()) < half, what
-        assert half < NARROW.get(what, np.inf) * theirs[what].mean(), what
+    assert_alike(ours, theirs, NARROW)

@@ -1,11 +1,9 @@
 """Clouds without magnetisation beside LAMMPS."""
 
-import numpy as np
 import pytest
 
 from tests.benchmarks import coalescence_lammps
-from tests.benchmarks.lammps_peer import installed
-from tisim.numerics.statistics import half_width
+from tests.benchmarks.lammps_peer import assert_alike, installed
 
 NARROW = {
     "part of the asteroid": 0.05,
@@ -24,8 +22,4 @@ def test_piles_are_those_of_lammps():
     made = coalescence_lammps.scenes(range(100, 110))
     programs = coalescence_lammps.by_package, coalescence_lammps.by_lammps
     ours, theirs = (coalescence_lammps.table(by(made)[0]) for by in programs)
-    for what, values in ours.items():
-        apart = values - theirs[what]
-        half = half_width(apart, 1 - 1e-3 / len(ours))
-        assert abs(apart.mean()) < half, what
-        assert half < NARROW.get(what, np.inf) * abs(theirs[what].mean()), what
+    assert_alike(ours, theirs, NARROW)

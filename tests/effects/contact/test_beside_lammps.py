@@ -6,7 +6,6 @@ import pytest
 
 from tests.benchmarks import granular_lammps as bench
 from tests.benchmarks import lammps_peer, settled_lammps, sheared_lammps
-from tisim.numerics.statistics import half_width
 
 pytestmark = [
     pytest.mark.slow,
@@ -101,10 +100,4 @@ def test_a_bed_that_settles_has_the_bulk_statistics_of_lammps(name):
         settled_lammps.table(starts, by(law, starts))
         for by in (settled_lammps.by_package, settled_lammps.by_lammps)
     )
-    confidence = 1 - 1e-3 / len(ours)
-    for what, values in ours.items():
-        apart = values - theirs[what]
-        half = half_width(apart, confidence)
-        assert abs(apart.mean()) < half, what
-        if what in NARROW:
-            assert half < NARROW[what] * theirs[what].mean(), what
+    lammps_peer.assert_alike(ours, theirs, NARROW)
