@@ -89,8 +89,8 @@ def print_beside(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray
 def assert_alike(
     ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray], narrow: Mapping[str, float]
 ) -> None:
-    """Assert that zero is within the interval of each mean difference over starts, which is so wide that one of
-    a thousand such comparisons fails by chance; and that some are so narrow, over the mean itself."""
+    """Assert that zero is within the interval of each mean difference over starts, which is so wide that one
+    of a thousand such comparisons fails by chance; and that some are so narrow, over the mean itself."""
     for what, values in ours.items():
         off = values - theirs[what]
         half = half_width(off, 1 - 1e-3 / len(ours))

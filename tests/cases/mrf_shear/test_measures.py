@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.constants import mu_0
 
-from cases.mrf_shear import published
+from cases.mrf_shear import checks, published
 from cases.mrf_shear.flow_curve import Curve, table
 from cases.mrf_shear.grains import LARGE_RADIUS
 from cases.mrf_shear.measures import (
@@ -136,3 +136,12 @@ def test_a_curve_is_fitted_with_the_spread_over_starts():
     assert square.power().value == pytest.approx(2.0)
     bent = Curve(rates, [group(rate, [rate, rate**3]) for rate in rates]).power()
     assert (bent.value, bent.half) == pytest.approx((2.0, Mean.of([1.0, 3.0]).half))
+
+
+def test_rafts_balance_in_each_start(monkeypatch):
+    """What is off in one start, and as much the other way in the next, is off."""
+    forces = {("a", LOWER): 1.0, ("a", UPPER): -0.7, ("b", LOWER): 0.7, ("b", UPPER): -1.0}
+    monkeypatch.setattr(checks, "raft_force", lambda result, group: np.array([forces[result, group], 0, 0]))
+    (found,) = checks.balances(["a", "b"])
+    assert found.measured == pytest.approx(0.3 / 1.7)
+    assert not found.ok
