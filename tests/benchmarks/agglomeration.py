@@ -29,6 +29,7 @@ import numpy as np
 from cases.agglomeration.problem import cost
 from cases.agglomeration.published_strings import designs
 from cases.agglomeration.scene import DURATION, scene
+from tests.benchmarks.spread import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 from tisim.scene.initial_state import Arrays
@@ -59,11 +60,6 @@ def timed(call: Callable, *arguments: object) -> tuple[np.ndarray, Any]:
     began = np.array([time.perf_counter(), time.process_time()])
     value = call(*arguments)
     return np.array([time.perf_counter(), time.process_time()]) - began, value
-
-
-def spread(values: list[float]) -> str:
-    """Median, and least and greatest."""
-    return f"{np.median(values):.3g} ({min(values):.3g} .. {max(values):.3g})"
 
 
 def summary(values: list[float]) -> str:

@@ -20,6 +20,7 @@ import numba
 import numpy as np
 
 from cases.blast.scene import AIR, FLUX, VISCOSITY, scene
+from tests.benchmarks.spread import spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime
 
@@ -36,11 +37,6 @@ def peer_control(setup: Scene) -> tuple[tuple[float, ...], int, int]:
         control.iterations,
         WINDOW,
     )
-
-
-def spread(values: list[float]) -> str:
-    """Median, and least and greatest."""
-    return f"{np.median(values):.3g} ({min(values):.3g} .. {max(values):.3g})"
 
 
 def compare(number: int, duration: float, repeats: int) -> None:

@@ -26,6 +26,7 @@ import numba
 import numpy as np
 
 from tests.benchmarks import brownian_numba as peer
+from tests.benchmarks.spread import spread
 from tests.steppers.brownian.colloids import DIFFUSIVITY, MOBILITY, RADIUS, colloids
 from tisim import Simulation
 from tisim.backend import runtime
@@ -86,15 +87,13 @@ def compare(title: str, programs: dict, particle_steps: int, repeats: int, varia
     for _ in range(repeats):
         for name, (run, _) in programs.items():
             times[name].append(run())
-    first = None
     print(f"\n{title}")
+    ours = np.array(next(iter(times.values())))
     for name, (_, end) in programs.items():
         ratio = float(np.mean(end() ** 2)) / variance
-        rate = particle_steps / float(np.median(times[name]))
-        first = first or rate
-        spread = (max(times[name]) - min(times[name])) / float(np.median(times[name]))
-        speed = f"{rate:10.3g} particle-steps/s (spread {spread:4.0%})"
-        print(f"  {name:30s} {speed}, tisim/this {first / rate:6.2f}, variance {ratio:.3f}")
+        each = np.array(times[name])
+        speed = f"{spread(1e9 * each / particle_steps)} ns a particle and step"
+        print(f"  {name:30s} {speed}, tisim's rate over this {spread(each / ours)}, variance {ratio:.3f}")
 
 
 def main() -> None:

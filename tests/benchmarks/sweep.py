@@ -24,6 +24,7 @@ from cases.agglomeration import scene as agglomeration
 from cases.agglomeration.published_strings import designs
 from cases.capture import scene as capture
 from cases.vibration import scene as vibration
+from tests.benchmarks.spread import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 
@@ -71,11 +72,6 @@ def through(pipes: list[Connection]) -> float:
     for pipe in pipes:
         pipe.recv()
     return time.perf_counter() - began
-
-
-def spread(values: list[float]) -> str:
-    """Median, and least and greatest."""
-    return f"{np.median(values):.3g} ({min(values):.3g} .. {max(values):.3g})"
 
 
 def main() -> None:
