@@ -29,7 +29,7 @@ import numpy as np
 from cases.agglomeration.problem import cost
 from cases.agglomeration.published_strings import designs
 from cases.agglomeration.scene import DURATION, scene
-from tests.benchmarks.spread import spread
+from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 from tisim.scene.initial_state import Arrays

@@ -20,7 +20,7 @@ import numba
 import numpy as np
 
 from cases.blast.scene import AIR, FLUX, VISCOSITY, scene
-from tests.benchmarks.spread import spread
+from tests.benchmarks.turns import rest, spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime
 
@@ -52,9 +52,11 @@ def compare(number: int, duration: float, repeats: int) -> None:
     ours, theirs = [], []
     for _ in range(repeats):
         simulation.load([setup])
+        rest()
         began = time.perf_counter()
         simulation.run()
         ours.append(time.perf_counter() - began)
+        rest()
         began = time.perf_counter()
         position, _, counts = peer.simulate(start, *fixed, duration)
         theirs.append(time.perf_counter() - began)

@@ -26,7 +26,7 @@ import numba
 import numpy as np
 
 from tests.benchmarks import brownian_numba as peer
-from tests.benchmarks.spread import spread
+from tests.benchmarks.turns import rest, spread
 from tests.steppers.brownian.colloids import DIFFUSIVITY, MOBILITY, RADIUS, colloids
 from tisim import Simulation
 from tisim.backend import runtime
@@ -86,6 +86,7 @@ def compare(title: str, programs: dict, particle_steps: int, repeats: int, varia
         run()
     for _ in range(repeats):
         for name, (run, _) in programs.items():
+            rest()
             times[name].append(run())
     print(f"\n{title}")
     ours = np.array(next(iter(times.values())))

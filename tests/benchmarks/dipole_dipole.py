@@ -20,7 +20,7 @@ os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
 import numba
 import numpy as np
 
-from tests.benchmarks.spread import spread
+from tests.benchmarks.turns import rest, spread
 from tisim import Particles, Scene, Simulation
 from tisim.backend import runtime
 from tisim.effects import DipoleDipole
@@ -100,6 +100,7 @@ def main() -> None:
     off = np.abs(simulation.s.read("force")[0] - np.stack(out, axis=1)).max() / np.abs(out).max()
     for _ in range(options.repeats):
         for name, way in ways.items():
+            rest()
             began = time.perf_counter()
             way(options.steps)
             times[name].append((time.perf_counter() - began) / options.steps)

@@ -33,6 +33,7 @@ import numpy as np
 
 import tisim
 from tests.benchmarks import granular_lammps, lammps_peer
+from tests.benchmarks.turns import rest
 from tisim.backend import runtime
 from tisim.effects import Granular, Gravity, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
@@ -212,6 +213,8 @@ def compare(runs: dict[str, Steps], n: int, steps: int, repeats: int, clock: Cal
     times: dict[str, list[float]] = {name: [] for name in runs}
     for _ in range(repeats):
         for name, take in runs.items():
+            rest()
+            take(steps // 10)
             began = clock()
             take(steps)
             times[name].append((clock() - began) / steps / n)

@@ -25,6 +25,7 @@ import numba
 import numpy as np
 
 from tests.benchmarks import lammps_peer
+from tests.benchmarks.turns import rest
 from tisim import Particles, Scene, Simulation
 from tisim.backend import runtime
 from tisim.effects import NearField
@@ -127,6 +128,7 @@ def compare(n: int, real: type, args: argparse.Namespace) -> None:
     for _ in range(args.repeats):
         rates.append([peer.rate(k, e, real, args.threads) for k, e in ((peer.roots, 1), (peer.products, 32))])
         for name, (advance, _) in there.items():
+            rest()
             began = time.perf_counter()
             advance(steps[name])
             seconds[name].append((time.perf_counter() - began) / steps[name])
@@ -156,7 +158,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--arithmetic", choices=runtime.ARITHMETICS, default="strict")
     parser.add_argument("--repeats", type=int, default=9)
-    parser.add_argument("--schedule", choices=("world", "particle"))
+    parser.add_argument("--schedule", choices=("world", "team", "particle"))
     args = parser.parse_args()
     runtime.init(precision=args.precision, threads=args.threads, arithmetic=args.arithmetic)
     numba.set_num_threads(args.threads)

@@ -24,7 +24,7 @@ from cases.agglomeration import scene as agglomeration
 from cases.agglomeration.published_strings import designs
 from cases.capture import scene as capture
 from cases.vibration import scene as vibration
-from tests.benchmarks.spread import spread
+from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 

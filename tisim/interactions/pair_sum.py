@@ -30,11 +30,6 @@ VECTOR_BYTES = 32
 """The widest vectors used (256 bits); the lanes of a tile that are computed are a whole number of them."""
 
 
-MANY = 1000
-"""With so many others, the pairs of a world are work enough for more threads than one (measured on 2 cores:
-launches cost a step 0.2 ms, as much as the pairs of 400)."""
-
-
 class PairSum(OnOccasion, PerParticle):
     """A pair sum is, for each particle, a sum over the others: all of them, then those near enough to be
     listed.
@@ -65,9 +60,8 @@ class PairSum(OnOccasion, PerParticle):
         self.domain, self.pairs = domain, pairs
         self.long_ranged = tuple(e for e in effects if not e.short_ranged)
         self.short_ranged = tuple(e for e in effects if e.short_ranged)
+        self.others = s.capacity if self.long_ranged else 0
         # A tile may reach past the particles alive, but not past the slots that there are.
-        idle = s.worlds < runtime.current().threads
-        self.long = bool(self.long_ranged) and idle and s.capacity >= MANY
         self.tiled = bool(self.long_ranged) and runtime.current().device == "cpu" and s.capacity >= TILE
 
     @ti.func

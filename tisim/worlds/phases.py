@@ -11,13 +11,15 @@ class Phase:
     """A phase is one loop: ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds
     size.
 
-    ``long`` says that one item is work enough for a launch, ``light`` that a task has many items, on a CPU.
+    ``long`` says that one item is work enough for a launch, ``light`` that a task has many items, on a CPU;
+    ``others`` how many of something else, such as particles or waves, an item goes through one by one.
     """
 
     conditional: ClassVar[bool] = False
     long: bool = False
     extent: int = 1
     light: bool = True
+    others: int = 0
 
     @property
     def name(self) -> str:

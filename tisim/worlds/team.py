@@ -18,7 +18,9 @@ from tisim.backend.taichi import BACKEND, ti
 LOOKS_WHEN_LATE = 40_000 if BACKEND == "taichi" else 300_000
 """Who has looked so often for the others waits for one that has no core: it takes about 1.5 ms."""
 DOUBLED_AT = 40_000
-"""In a world of so many particles it is twice as often, as there may be as much to wait for."""
+"""In a world with the work of so many particles it is twice as often, as there may be as much to wait for."""
+MOST_LOOKS = 2**30
+"""Looks are counted in 32 bits."""
 TIMES_LATE = 8
 """A team that has waited so often for one without a core parts after the step."""
 LINE = 16
@@ -36,13 +38,14 @@ come too late."""
 class Teams:
     """Teams of the CPU threads of a launch take one world after the other.
 
-    threads : so many there are. number : of teams, where threads are not alone. turns : of each world, that
-    it may still take.
+    work : of a world in a step, in particles that feel those near them alone. threads : so many there are.
+    number : of teams, where threads are not alone. turns : of each world, that it may still take.
     """
 
-    def __init__(self, worlds: int, capacity: int, threads: int, number: int) -> None:
+    def __init__(self, worlds: int, work: int, threads: int, number: int) -> None:
         self.worlds, self.threads, self.number = worlds, threads, number
-        self.shared, self.late = number < threads, LOOKS_WHEN_LATE + LOOKS_WHEN_LATE * capacity // DOUBLED_AT
+        self.shared = number < threads
+        self.late = min(LOOKS_WHEN_LATE + LOOKS_WHEN_LATE * work // DOUBLED_AT, MOST_LOOKS)
         self.roll, self.arrived, self.said, self.waits, self.drawn = (ti.field(ti.i64) for _ in range(5))
         self.turns = ti.field(ti.i32)
         builder = Builder()

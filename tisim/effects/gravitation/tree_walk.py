@@ -13,11 +13,13 @@ from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
 from tisim.effects.gravitation.cell_moments import CellMoments
 from tisim.interactions.cell_tree import FAN, LEAF, CellTree
-from tisim.interactions.pair_sum import MANY
 from tisim.worlds.bound import Bound
 from tisim.worlds.occasion import OnOccasion
 from tisim.worlds.phases import Item, Phase
 from tisim.worlds.state import State
+
+MET = 300
+"""A particle meets about so many cells and particles on its way through a tree."""
 
 
 @ti.data_oriented
@@ -57,7 +59,7 @@ class WalkTree(OnOccasion, Phase):
         self.effect = total.effect
         self.lanes = LEAF if runtime.current().device == "cpu" else 1
         self.extent = -(-self.s.capacity // self.lanes)
-        self.long = self.s.worlds < runtime.current().threads and self.s.capacity >= MANY
+        self.others = self.lanes * min(self.s.capacity, MET)
 
     @ti.func
     def size(self, w):

@@ -5,12 +5,10 @@ from typing import Any
 
 from scipy.constants import mu_0
 
-from tisim.backend import runtime
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
-from tisim.interactions.pair_sum import MANY
 from tisim.numerics import elementary
 from tisim.worlds.block_sum import BlockSums, PerBlock
 from tisim.worlds.bound import Bound
@@ -186,8 +184,7 @@ class StructureFactors(OnOccasion, Phase):
 
     def __init__(self, total: WaveSum) -> None:
         self.sum, self.s = total, total.s
-        self.extent = total.columns * total.height
-        self.long = self.s.worlds < runtime.current().threads and self.s.capacity >= MANY
+        self.extent, self.others = total.columns * total.height, total.s.capacity
 
     @ti.func
     def size(self, w):
@@ -217,7 +214,7 @@ class Waves(OnOccasion, PerParticle):
     def __init__(self, total: WaveSum) -> None:
         super().__init__(total.s)
         self.sum = total
-        self.long = self.s.worlds < runtime.current().threads and self.s.capacity >= MANY
+        self.others = total.columns * total.height
 
     @ti.func
     def run(self, w, i):
