@@ -15,6 +15,7 @@ CASE = Case(
     scene=scene_for,
     check=Late("cases.avalanche.checks", "check"),
     quantities=quantities,
+    cost_size="small",
     problem=Late("cases.avalanche.problem", "problem"),
     variants=("calibrate",),
     calibration=Late("cases.avalanche.problem", "calibration"),

@@ -24,6 +24,8 @@ class Cell:
 
 DEFAULT = Cell(number=400, column=10.0, width=5.25, length=40.0, height=14.0)
 """Its width is just twice the cut-off of the dipoles."""
+SMALL = Cell(number=200, column=7.0, width=5.25, length=28.0, height=11.0)
+"""Half as many grains in a column as wide for its height."""
 LARGE_CELL = Cell(number=2500, column=25.0, width=5.25, length=90.0, height=30.0)
 """A column 18 diameters high, whose slope is longer than the chains that stand on it."""
 L21_CELLS = {
@@ -43,6 +45,7 @@ SIZES = {
     "default": Size(
         f"{DEFAULT.number} grains in a narrow cell, softened", {"cell": DEFAULT}, SEARCH_SETTINGS
     ),
+    "small": Size(f"{SMALL.number} grains, softened", {"cell": SMALL}),
     "large": Size(f"{LARGE_CELL.number} grains, 18 diameters high, softened", {"cell": LARGE_CELL}),
     **{
         name: Size(

@@ -14,5 +14,6 @@ CASE = Case(
     scene=scene_for,
     check=Late("cases.coalescence.checks", "check"),
     quantities=quantities,
+    cost_size="small",
     figures=Late("cases.coalescence.figures", "figures"),
 )

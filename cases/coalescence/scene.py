@@ -52,6 +52,8 @@ ROTATION = 5e-5
 """The angular velocity of the cloud, rad/s; with it the pile turns at a third of the critical spin."""
 DEFAULT: Mapping[str, Any] = {"number": 180, "seed_diameter": 2.0}
 """A laptop's cloud; the seed has the mass of eight grains of 180, L21's that of 125 of 32 662."""
+SMALL: Mapping[str, Any] = {"number": 60, "seed_diameter": 1.4}
+"""A third of it, seed and all."""
 
 LAW = Granular(
     normal=HertzMaterial(),
@@ -64,6 +66,7 @@ LAW = Granular(
 SIZES = {
     "default": Size("180 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's cloud", DEFAULT),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
+    "small": Size("60 grains, and a seed of as much of their mass", SMALL),
     "l21": Size(
         "L21's 32,662 grains of 100 cm and its seed of 5 m, rotation as printed, gravity by a tree",
         {"rotation": published.ROTATIONS[1], "tree": True, "duration": published.DURATION},

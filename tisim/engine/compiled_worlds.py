@@ -15,24 +15,17 @@ from tisim.compiling import compiling
 from tisim.engine import law_errors
 from tisim.engine.allocation import Allocation
 from tisim.engine.assembly import Assembly
+from tisim.engine.schedule_choice import choose, work_of
 from tisim.errors import InputError, RunError, must
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.worlds.finite import FiniteCheck
 from tisim.worlds.launched_program import LaunchedProgram
 from tisim.worlds.occasion import Occasion
-from tisim.worlds.phases import nested
 from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
 from tisim.worlds.team import Teams
 from tisim.worlds.world_program import world_programs
-
-TEAM_FROM = 2000
-"""Worlds of so many particles are shared by threads, where there are more of these than worlds. With 8000
-grains two threads are faster than one (docs/performance.md), with 500 slower."""
-OTHERS_OF_ONE = 40
-"""Going through so many others takes as long as the rest of a step of a particle: a grain takes some 80 ns,
-the force between two charges or dipoles 1 to 2 ns."""
 
 
 class CompiledWorlds:
@@ -64,7 +57,7 @@ class CompiledWorlds:
                 rule = f"{no.rule}, with {others / 1e9:.3g} GB that others use" if others else no.rule
                 raise InputError(f"{what} must be {rule}; received {no.received}") from None
         self.s, self.table = self.allocation.s, self.allocation.table
-        self.schedule = schedule or self._choose()
+        self.schedule = schedule or choose(self.assembly.step, self.s, self.runtime)
         self.s.shared = self.schedule != "world"
         self.s.write("status", WorldStatus.ENDED)
         if self.schedule != "particle":
@@ -82,7 +75,7 @@ class CompiledWorlds:
         threads = min(self.runtime.threads, runtime.cores())
         number = min(self.worlds, threads) if self.schedule == "team" else threads
         with collected() as trees:
-            self.teams = Teams(self.worlds, self._work, threads, number)
+            self.teams = Teams(self.worlds, work_of(self.assembly.step, self.s), threads, number)
         self.trees += trees
 
     def _compile(self) -> None:
@@ -142,20 +135,6 @@ class CompiledWorlds:
         # Those of the lists before have been destroyed.
         self.trees = [tree for tree in self.trees if tree.alive] + trees
         self._compile()
-
-    def _choose(self) -> str:
-        long = any(phase.long for phase, _ in nested(self.assembly.step))
-        if long or self.runtime.device != "cpu":
-            return "particle"
-        # A thread for each world is best; fewer are shared, where that is worth waiting for each other.
-        many = self.worlds >= self.runtime.threads
-        return "world" if many or self._work < TEAM_FROM else "team"
-
-    @property
-    def _work(self) -> int:
-        """Return of how many particles a world has the work, at most, if they feel those near them alone."""
-        others = sum(phase.extent * phase.others for phase, _ in nested(self.assembly.step))
-        return self.s.capacity + others // OTHERS_OF_ONE
 
     def put(self, image: Mapping[str, np.ndarray]) -> None:
         """Put all worlds where they were when ``s.image()`` was made of them."""

@@ -114,7 +114,7 @@ def test_published_slopes():
     grown = [magnetised.angle - without.angle for without, magnetised in SLOPES.values()]
     assert grown == pytest.approx([13.26, 2.01, 0.12], abs=0.01)
     assert [larger(d) for d in DIAMETERS] == pytest.approx([1.09, 1.08, 1.01], abs=5e-3)
-    assert SIZES.keys() == {"default", "large", "l21", "l21_1cm", "l21_5cm"}
+    assert SIZES.keys() == {"default", "small", "large", "l21", "l21_1cm", "l21_5cm"}
 
 
 def test_a_run_of_few_frames_has_no_picture():

@@ -97,7 +97,7 @@ def test_the_default_is_all_pairs_and_the_seed_the_heaviest():
     np.testing.assert_array_equal(scene_for("unmagnetised", 5).start()["position"], start["position"])
     assert not np.array_equal(scene_for("default", 6).start()["velocity"], start["velocity"])
     assert "moment" not in scene_for("unmagnetised", 0).start()
-    assert SIZES.keys() == {"default", "unmagnetised", "l21", "l21_50cm"}
+    assert SIZES.keys() == {"default", "unmagnetised", "small", "l21", "l21_50cm"}
 
 
 def test_sites_are_the_nearest_to_the_middle():

@@ -1,0 +1,27 @@
+"""Which schedule worlds run on unless one is given, by the work of a step."""
+
+from tisim.backend.runtime import Runtime
+from tisim.worlds.phases import Item, nested
+from tisim.worlds.state import State
+
+TEAM_FROM = 2000
+"""Worlds with the work of so many particles are shared by threads, where there are more of these than worlds.
+With 8000 grains two threads are faster than one (docs/performance.md), with 500 slower."""
+OTHERS_OF_ONE = 40
+"""Going through so many others takes as long as the rest of a step of a particle: a grain takes some 80 ns,
+the force between two charges or dipoles 1 to 2 ns."""
+
+
+def work_of(step: tuple[Item, ...], s: State) -> int:
+    """Return the work of a world in a step: so many particles have it that feel those near them alone."""
+    others = sum(phase.extent * phase.others for phase, _ in nested(step))
+    return s.capacity + others // OTHERS_OF_ONE
+
+
+def choose(step: tuple[Item, ...], s: State, runtime: Runtime) -> str:
+    """Return the schedule on which worlds take a step in the least time."""
+    if runtime.device != "cpu" or any(phase.long for phase, _ in nested(step)):
+        return "particle"
+    # A thread for each world is best; fewer are shared, where that is worth waiting for each other.
+    many = s.worlds >= runtime.threads
+    return "world" if many or work_of(step, s) < TEAM_FROM else "team"
