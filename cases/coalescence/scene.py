@@ -66,7 +66,7 @@ LAW = Granular(
 SIZES = {
     "default": Size("180 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's cloud", DEFAULT),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
-    "small": Size("60 grains, and a seed of as much of their mass", SMALL),
+    "small": Size("60 grains, and a seed with the same share of the mass", SMALL),
     "l21": Size(
         "L21's 32,662 grains of 100 cm and its seed of 5 m, rotation as printed, gravity by a tree",
         {"rotation": published.ROTATIONS[1], "tree": True, "duration": published.DURATION},

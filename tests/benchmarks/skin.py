@@ -34,8 +34,9 @@ def compare(scene: Scene, skins: list[float], repeats: int) -> None:
         diameter = 2 * float(scene.start()["radius"].max())
         made = {None: scene} | {skin: scene.replace({"skin": skin * diameter}) for skin in skins}
         times: dict[float | None, list[float]] = {skin: [] for skin in made}
-        simulation.load(scene)
-        simulation.run()
+        for one in made.values():
+            simulation.load(one)
+            simulation.run()
         for _ in range(repeats):
             for skin, one in made.items():
                 simulation.load(one)

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 REST = 0.05
-"""Threads of OpenMP look for work for some ms after they have had some, s."""
+"""Threads of GNU's OpenMP, which numba and LAMMPS have, look for more work for some ms, s."""
 
 
 def rest() -> None:

@@ -6,21 +6,23 @@ import numpy as np
 import pytest
 
 from tests.effects.contact.grains import heap
-from tests.scenes import fixed, scene
+from tests.scenes import fixed, laws, scene
 from tests.steppers.brownian.colloids import colloids
 from tisim.backend import memory
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects import DipoleDipole, NearField, TreeGravity
+from tisim.effects import DipoleDipole, NearField
 from tisim.engine.allocation import Allocation
-from tisim.engine.schedule_choice import choose
+from tisim.engine.schedule_choice import choose, members
+from tisim.worlds.phases import Phase
+from tisim.worlds.team import MOST_LOOKS, Teams
 
 TWO_THREADS = SimpleNamespace(device="cpu", threads=2)
 
 
-def two(effect, **quantities):
+def two(*effects, **quantities):
     """Two particles that feel each other however far apart."""
     place = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
-    return scene(place, np.zeros((2, 3)), (effect,), stepper=fixed(1e-3), quantities=quantities)
+    return scene(place, np.zeros((2, 3)), effects, stepper=fixed(1e-3), quantities=quantities)
 
 
 def charges():
@@ -29,6 +31,11 @@ def charges():
 
 def dipoles():
     return two(DipoleDipole(), moment=np.ones((2, 3)))
+
+
+def merging():
+    """Sums of forces stand twice in a step: after events they are made anew."""
+    return scene([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], np.zeros((2, 3)), (NearField(alpha2=1.0), *laws()))
 
 
 def grains():
@@ -40,7 +47,7 @@ CASES = {
     "charges": (charges, 1, 500, "team"),
     "charges, a world for each thread": (charges, 2, 500, "world"),
     "dipoles": (dipoles, 1, 500, "team"),
-    "masses by a tree": (lambda: two(TreeGravity()), 1, 1000, "team"),
+    "few that also merge": (merging, 1, 200, "world"),
     "grains feel those near them": (grains, 1, 1000, "world"),
     "many grains": (grains, 1, 3000, "team"),
     "each by itself": (lambda: colloids([[0.0, 0.0, 0.0]]), 1, 10, "particle"),
@@ -63,6 +70,15 @@ def chosen(made, worlds, capacity):
 def test_what_is_worth_sharing_is_shared(what):
     made, worlds, capacity, expected = CASES[what]
     assert chosen(made(), worlds, capacity) == expected
+
+
+def test_more_threads_share_more_work():
+    step, worlds = (Phase(),), SimpleNamespace(capacity=5000)
+    assert [members(step, worlds, threads) for threads in (1, 2, 64)] == [1, 2, 5]
+
+
+def test_a_team_waits_for_as_long_as_looks_can_be_counted():
+    assert Teams(1, 10**12, 2, 1).late == MOST_LOOKS
 
 
 def test_devices_take_phases_of_all_worlds():

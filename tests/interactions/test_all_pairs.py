@@ -7,7 +7,9 @@ from scipy.constants import g
 from tests.scenes import fixed, scene, simulate
 from tisim import Box
 from tisim.effects import Gravity, NearField
+from tisim.engine import compiled_worlds
 from tisim.interactions.pair_sum import TILE
+from tisim.worlds.team import Teams
 
 NUMBERS = (1, TILE - 1, TILE, TILE + 1, 2 * TILE + 6)
 ROOM = max(NUMBERS)
@@ -50,11 +52,18 @@ def test_forces_in_every_tile_are_their_numpy_twin(usual):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("schedule", "room", "numbers"),
-    [("particle", ROOM, NUMBERS), ("world", 4 * TILE, NUMBERS), ("world", TILE - 1, NUMBERS[:2])],
-    ids=["a launch per phase", "more room", "too little room for a tile"],
+    [
+        ("particle", ROOM, NUMBERS),
+        ("team", ROOM, NUMBERS),
+        ("world", 4 * TILE, NUMBERS),
+        ("world", TILE - 1, NUMBERS[:2]),
+    ],
+    ids=["a launch per phase", "a team", "more room", "too little room for a tile"],
 )
-def test_the_same_bits(usual, schedule, room, numbers):
-    """Whatever else there is room for, tiles or not, on both schedules."""
+def test_the_same_bits(usual, monkeypatch, schedule, room, numbers):
+    """Whatever else there is room for, tiles or not, on all schedules; one team takes all worlds."""
+    if schedule == "team":
+        monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
     again = simulate([cloud(n, n) for n in numbers], worlds=len(NUMBERS), capacity=room, schedule=schedule)
     for a, b in zip(usual, again, strict=False):
         for name, values in a.state.items():

@@ -15,7 +15,7 @@ from tisim.compiling import compiling
 from tisim.engine import law_errors
 from tisim.engine.allocation import Allocation
 from tisim.engine.assembly import Assembly
-from tisim.engine.schedule_choice import choose, work_of
+from tisim.engine.schedule_choice import choose, members, work_of
 from tisim.errors import InputError, RunError, must
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
@@ -73,7 +73,10 @@ class CompiledWorlds:
         """Make a team for each world, or for each thread."""
         # Who waits for others awake has a core.
         threads = min(self.runtime.threads, runtime.cores())
-        number = min(self.worlds, threads) if self.schedule == "team" else threads
+        number = threads
+        if self.schedule == "team":
+            number = min(self.worlds, threads)
+            threads = min(threads, number * members(self.assembly.step, self.s, threads))
         with collected() as trees:
             self.teams = Teams(self.worlds, work_of(self.assembly.step, self.s), threads, number)
         self.trees += trees

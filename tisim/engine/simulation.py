@@ -32,7 +32,7 @@ class Simulation(CompiledWorlds):
     """A simulation is compiled for the structure of a scene, a number of worlds and a capacity of particles.
 
     scene : any scene of the structure; its values do not matter here.
-    schedule : "world", "team" or "particle" (see program.py), or None to choose by device and size.
+    schedule : "world", "team" or "particle" (see program.py), or None to choose by device and work.
     Loading and running other scenes of the same structure compiles nothing. It is for one thread at a time.
     """
 

@@ -6,13 +6,18 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.worlds.state import State
 
+MANY = 1000
+"""With so many particles, items of unlike length are work enough for a launch (measured on 2 cores: launches
+cost a step 0.2 ms, as much as the pairs of 400)."""
+
 
 class Phase:
     """A phase is one loop: ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds
     size.
 
     ``long`` says that one item is work enough for a launch, ``light`` that a task has many items, on a CPU;
-    ``others`` how many of something else, such as particles or waves, an item goes through one by one.
+    ``others`` how many other particles an item goes through one by one: by it the schedule is chosen
+    (engine/schedule_choice.py), and how long a team waits for a thread.
     """
 
     conditional: ClassVar[bool] = False

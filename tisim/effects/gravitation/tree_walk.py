@@ -15,11 +15,8 @@ from tisim.effects.gravitation.cell_moments import CellMoments
 from tisim.interactions.cell_tree import FAN, LEAF, CellTree
 from tisim.worlds.bound import Bound
 from tisim.worlds.occasion import OnOccasion
-from tisim.worlds.phases import Item, Phase
+from tisim.worlds.phases import MANY, Item, Phase
 from tisim.worlds.state import State
-
-MET = 300
-"""A particle meets about so many cells and particles on its way through a tree."""
 
 
 @ti.data_oriented
@@ -59,7 +56,7 @@ class WalkTree(OnOccasion, Phase):
         self.effect = total.effect
         self.lanes = LEAF if runtime.current().device == "cpu" else 1
         self.extent = -(-self.s.capacity // self.lanes)
-        self.others = self.lanes * min(self.s.capacity, MET)
+        self.long = self.s.worlds < runtime.current().threads and self.s.capacity >= MANY
 
     @ti.func
     def size(self, w):

@@ -5,6 +5,7 @@ from typing import Any
 
 from scipy.constants import mu_0
 
+from tisim.backend import runtime
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
@@ -13,7 +14,7 @@ from tisim.numerics import elementary
 from tisim.worlds.block_sum import BlockSums, PerBlock
 from tisim.worlds.bound import Bound
 from tisim.worlds.occasion import OnOccasion
-from tisim.worlds.phases import Item, PerParticle, Phase
+from tisim.worlds.phases import MANY, Item, PerParticle, Phase
 from tisim.worlds.state import State
 
 
@@ -184,7 +185,8 @@ class StructureFactors(OnOccasion, Phase):
 
     def __init__(self, total: WaveSum) -> None:
         self.sum, self.s = total, total.s
-        self.extent, self.others = total.columns * total.height, total.s.capacity
+        self.extent = total.columns * total.height
+        self.long = self.s.worlds < runtime.current().threads and self.s.capacity >= MANY
 
     @ti.func
     def size(self, w):
@@ -214,7 +216,7 @@ class Waves(OnOccasion, PerParticle):
     def __init__(self, total: WaveSum) -> None:
         super().__init__(total.s)
         self.sum = total
-        self.others = total.columns * total.height
+        self.long = self.s.worlds < runtime.current().threads and self.s.capacity >= MANY
 
     @ti.func
     def run(self, w, i):

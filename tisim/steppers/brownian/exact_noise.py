@@ -125,6 +125,8 @@ class Factor(Phase):
 
     def __init__(self, exact) -> None:
         self.s, self.m = exact.s, exact
+        # 9 N^3 operations of one thread, for which others wait.
+        self.others = self.s.capacity**3
 
     @ti.func
     def run(self, w, _k):
