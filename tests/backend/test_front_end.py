@@ -1,13 +1,14 @@
 """What the front end of the compiler remembers is what it would find."""
 
 import ast
+import importlib
 import inspect
 import textwrap
 from types import SimpleNamespace
 
 import pytest
 
-from tisim.backend.front_end import _by_code, _by_place, _in_class_body
+from tisim.backend.front_end import ShortTextWrapper, _by_code, _by_place, _in_class_body
 from tisim.backend.taichi import BACKEND, ti
 
 
@@ -91,6 +92,27 @@ def test_equal_codes_of_two_files_are_two():
         functions.append(names["f"])
     look = _by_code(lambda function: function.__code__.co_filename)
     assert [look(function) for function in functions] == ["one.py", "two.py"]
+
+
+def test_text_of_one_line_is_wrapped_as_by_python():
+    line = "    total = self.term(effect, w, i, j, separation, distance, t)"
+    texts = [
+        line,
+        line + "\n",
+        " " * 12 + "^" * 9 + "  ",
+        "",
+        "   ",
+        "\n",
+        "a\tb",
+        "a\r",
+        line.ljust(80),
+        2 * line,
+        "x" * 80,
+    ]
+    for text in texts:
+        assert ShortTextWrapper(width=80).wrap(text) == textwrap.wrap(text, 80)
+    called = importlib.import_module(f"{BACKEND}.lang.ast.ast_transformer_utils").TextWrapper
+    assert called is ShortTextWrapper
 
 
 @pytest.mark.skipif(BACKEND != "taichi", reason="Quadrants remembers the texts of places itself")

@@ -4,7 +4,8 @@ Where a class defines a function for kernels, both look up the line of the class
 is one, though the frame of the caller says so. Taichi 1.7.4, which reads a function anew wherever it is
 called, also looks up its source each time, and sets for every expression a text that shows its place, for an
 error that may come. Together that is a third of the time to start a simulation whose kernels lie in the
-cache. Here what is found is remembered, and errors say the same. Quadrants remembers sources by itself.
+cache. Here what is found is remembered, and errors say the same. Quadrants remembers sources by itself. Both
+take each of those texts into words to wrap it; here that is done where it does not fit into a line.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import functools
 import importlib
 import sys
 from collections.abc import Callable
+from textwrap import TextWrapper
 from types import CodeType
 from typing import Any
 
@@ -21,11 +23,26 @@ def relieve(package: str) -> None:
     """Let the front end of ``taichi`` or ``quadrants`` remember what it has found."""
     kernels: Any = importlib.import_module(f"{package}.lang.kernel_impl")
     kernels._inside_class = _in_class_body
+    texts: Any = importlib.import_module(f"{package}.lang.ast.ast_transformer_utils")
+    texts.TextWrapper = ShortTextWrapper
     if package == "taichi":
         kernels.getsourcelines = _by_code(kernels.getsourcelines)
         kernels.getsourcefile = _by_code(kernels.getsourcefile)
-        texts: Any = importlib.import_module("taichi.lang.ast.ast_transformer_utils").ASTTransformerContext
-        texts.get_pos_info = _by_place(texts.get_pos_info)
+        context = texts.ASTTransformerContext
+        context.get_pos_info = _by_place(context.get_pos_info)
+
+
+class ShortTextWrapper(TextWrapper):
+    """This wrapper does not take text into words that fits into one line: most lines of sources do, and twice
+    for each expression that took a twelfth of a process whose kernels lie in the cache."""
+
+    def wrap(self, text: str) -> list[str]:
+        if len(text) > self.width or not self._odd.isdisjoint(text):
+            return super().wrap(text)
+        line = text.replace("\n", " ").rstrip(" ")
+        return [line] if line else []
+
+    _odd = frozenset("\t\x0b\x0c\r")
 
 
 def _in_class_body(level_of_class_stackframe: int) -> bool:
