@@ -16,7 +16,7 @@ from cases.case import searched_size
 from cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS, mixture
 from cases.mrf_shear.measures import extent, flux, shear_stress, volume_fraction
 from cases.mrf_shear.off_state import off_state_viscosity
-from cases.mrf_shear.scene import SEARCHED, SIZES, TITLE, scene
+from cases.mrf_shear.scene import SEARCHED, SIZES, SWEPT, TITLE, scene
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
@@ -92,7 +92,9 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
         thick = design_viscosity(small, fraction)
         allowed = BOUND if variant == "bounded" else np.inf
         must(thick <= allowed, "viscosity of the design", f"at most {BOUND:g} Pa s", thick)
-        return scene(flux=design["flux"], grains=mixture(small), fraction=fraction, seed=seed, **settings)
+        grains = mixture(small)
+        made = scene(flux=design["flux"], grains=grains, fraction=fraction, seed=seed, **settings)
+        return made.replace(SWEPT)
 
     return Problem(
         name=f"mrf_shear-{variant}" + ("" if size == "default" else f"-{size}"),

@@ -13,6 +13,7 @@ import numpy as np
 
 from cases.case import searched_size
 from cases.mrf_shear.grains import equal
+from cases.mrf_shear.scene import SWEPT
 from cases.valve import published
 from cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
 from cases.valve.open_flow import open_flow
@@ -123,7 +124,7 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
         )
         let = volume_rate(one)
         must(variant != "field" or let >= BOUND, "open flow of the design", f"at least {BOUND:g} m^3/s", let)
-        return one
+        return one.replace(SWEPT)
 
     return Problem(
         name=f"valve-{variant}" + ("" if size == "default" else f"-{size}"),
