@@ -79,7 +79,7 @@ SWEPT = {"effects.mutual_induced_moment.largest_change": 0.1}
 """In a search a step sweeps on only where moments change by a tenth of the largest. That takes half of the
 time, and changes nothing that `tisim cost` shows of eight starts."""
 SEARCH_SETTINGS = {
-    "generations": 6, "options": {"population": 12},
+    "method": "nsga2", "generations": 6, "options": {"population": 12},
     "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1, "confirm": 0},
 }  # fmt: skip
 LEPS: dict[str, Any] = {

@@ -30,7 +30,7 @@ GRADIENT = published.PRESSURE / L21_LENGTH
 SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 4e-4}
 """What a search runs of each design: the field is on from the first."""
 SEARCH_SETTINGS = {
-    "generations": 4, "options": {"population": 12},
+    "method": "nsga2", "generations": 4, "options": {"population": 12},
     "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1, "confirm": 0},
 }  # fmt: skip
 

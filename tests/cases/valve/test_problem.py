@@ -8,6 +8,7 @@ from cases.valve.measures import duct_of, pressure_at_rest, unhindered_rate
 from cases.valve.open_flow import open_flow
 from cases.valve.problem import BOUND, STRONGEST, arrested, flux, part_left, problem, volume_rate, width
 from cases.valve.runs import ARRESTED
+from optimize.settings import Settings, proposed
 from tests.cases.valve.states import result_of
 from tisim import InputError
 from tisim.sources import MagneticField
@@ -69,5 +70,12 @@ def test_variants():
     )  # fmt: skip
     assert [one.maximise for one in problem(variant="front").objectives] == [False, True]
     assert not problem(variant="field").several
-    _, settings = every()["valve"].inverse("default", None)
-    assert settings["generations"] > 0
+
+
+@pytest.mark.parametrize("name", ["valve", "mrf_shear"])
+def test_every_variant_is_searched_with_as_few_designs_as_the_case_says(name):
+    case = every()[name]
+    for variant in case.variants:
+        made, search = case.inverse("default", variant)
+        settings = Settings(**proposed(made, search, None))
+        assert (settings.options.population, settings.generations) == (12, search["generations"])
