@@ -28,7 +28,7 @@ PARTS = {
 @pytest.mark.long
 @pytest.mark.parametrize(
     "template",
-    [pytest.param(part, marks=() if part in ("pair", "operator") else pytest.mark.slow) for part in PARTS],
+    [pytest.param(part, marks=() if part == "pair" else pytest.mark.slow) for part in PARTS],
 )
 def test_a_part_of_scenes(tisim, own_file, tmp_path, template):
     words, law, slip = PARTS[template]

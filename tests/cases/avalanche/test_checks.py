@@ -79,7 +79,9 @@ def test_figures_of_a_size_are_of_its_settings_and_have_each_slope(staircases, m
     assert bar.get_ylabel() == "part of the volume that grains fill"
     assert len(drawn["forces.png"].axes[0].lines) == 8
     # Each of L21's sizes is of one diameter.
-    with pytest.raises(InputError, match=r"size must be one whose cell holds .* \(default, large, stiff\)"):
+    with pytest.raises(
+        InputError, match=r"size must be one whose cell holds .* \(default, small, large, stiff\)"
+    ):
         figures("l21_1cm", None)
 
 
