@@ -5,15 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import optimize
 import tisim
 from cases.case import every
 from cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS
 from cases.mrf_shear.measures import flux, shear_stress
 from cases.mrf_shear.off_state import off_state_viscosity
-from cases.mrf_shear.problem import BOUND, GENES, design_viscosity, problem, viscosity
+from cases.mrf_shear.problem import BOUND, design_viscosity, problem, viscosity
 from cases.runs import OTHER_STARTS, sound
-from cases.statistics import Mean
 from tisim import InputError
 
 DESIGN = {"small": 0.25, "fraction": 0.2, "flux": 0.5}
@@ -54,14 +52,13 @@ def test_objectives_of_each_variant():
 
 
 @pytest.mark.slow
-def test_what_a_search_finds_bears_more_from_other_starts_too():
-    """At a bounded viscosity: all but the strongest field is best, as stress goes as B^2. More stress than of
-    the middle of what is searched, in the same field, is the grains' doing."""
-    made, settings = every()["mrf_shear"].inverse("default", "bounded")
-    best = optimize.run(made, **{**settings, "generations": 3}).designs[0].genes
-    assert best["flux"] > 0.9 * {gene.name: gene.high for gene in GENES}["flux"]
-    middle = {gene.name: (gene.low + gene.high) / 2 for gene in GENES} | {"flux": best["flux"]}
-    scenes = [made.scene(design, OTHER_STARTS + k) for design in (best, middle) for k in range(8)]
-    stress = np.reshape([shear_stress(result) for result in sound(tisim.run(scenes))], (2, 8))
-    more = Mean.of(stress[0] - stress[1])
-    assert more.value - more.half > 0
+def test_a_fluid_that_a_search_found_bears_as_much_from_other_starts():
+    """That of the largest stress in docs/mrf_shear.md; in half of its field a quarter, as it goes as B^2."""
+    found = {"small": 0.0875, "fraction": 0.2736, "flux": 0.7874}
+    fields = (found["flux"], found["flux"] / 2)
+    scenes = [problem().scene({**found, "flux": b}, OTHER_STARTS + k) for b in fields for k in range(3)]
+    strong, weak = np.reshape([shear_stress(result) for result in sound(tisim.run(scenes))], (2, 3)).mean(
+        axis=1
+    )
+    assert 70e3 < strong < 115e3
+    assert 2.5 < strong / weak < 6.5

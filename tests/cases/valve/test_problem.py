@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import tisim
 from cases.case import every
+from cases.runs import OTHER_STARTS, sound
 from cases.valve.measures import duct_of, pressure_at_rest, unhindered_rate
 from cases.valve.open_flow import open_flow
 from cases.valve.problem import BOUND, STRONGEST, arrested, flux, part_left, problem, volume_rate, width
@@ -79,3 +81,15 @@ def test_every_variant_is_searched_with_as_few_designs_as_the_case_says(name):
         made, search = case.inverse("default", variant)
         settings = Settings(**proposed(made, search, None))
         assert (settings.options.population, settings.generations) == (12, search["generations"])
+
+
+@pytest.mark.slow
+def test_a_valve_that_a_search_found_jams_from_other_starts_and_flows_in_a_weak_field():
+    """That of the largest flow in docs/valve.md."""
+    found = {"throat": 233.2e-6, "diameter": 41.33e-6, "flux": 0.3247}
+    scenes = [
+        problem().scene({**found, "flux": b}, OTHER_STARTS + k) for b in (0.3247, 0.02) for k in range(6)
+    ]
+    left = np.reshape([part_left(result) for result in sound(tisim.run(scenes))], (2, 6))
+    assert left[0].mean() < ARRESTED
+    assert left[1].min() > 0.5
