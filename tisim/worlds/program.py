@@ -8,8 +8,8 @@ a ``Repeat``. The same phases run on three schedules, with the same bits:
              phases, and a world stays in cache: the way for batches and small systems on a CPU.
 "team"     - so does a team of threads: each takes a share of the items of a phase, and they wait for each
              other, awake, before the next (team.py): the way for large systems on many cores of a CPU, or
-             smaller ones in which all feel each other. Where
-             other programs want the cores, each thread takes a world alone meanwhile (team_trials.py).
+             smaller ones in which all feel each other. Where other programs want the cores, each thread
+             takes a world alone meanwhile (team_trials.py).
 "particle" - each phase is one loop of a launch over all particles of all worlds: the way for GPUs, and for
              phases of few long items on a CPU, where threads take tasks as they are done with others. What
              may be repeated begins a launch of its own. On a GPU many steps are launched in a row before
