@@ -131,7 +131,7 @@ def pair(shift, stepper=None):
     )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "stepper", [None, pytest.param(Boris(control=FixedStep(dt=DT)), marks=pytest.mark.slow)]
 )
@@ -149,6 +149,7 @@ def test_a_pair_across_the_face_is_one_in_the_middle(stepper):
             np.testing.assert_allclose(by_id(here)[name], touched[name], rtol=0, atol=atol)
 
 
+@pytest.mark.long
 def test_what_a_study_compares_does_not_jump_at_a_face():
     """The velocity of a pair relative to the flow is the same wherever it is, also after it has crossed."""
     (there,), (here,) = run(pair(np.zeros(3))), run(pair(np.array([0.0, -0.75, 0.0])))

@@ -53,6 +53,7 @@ def test_it_is_what_a_result_would_have(simulation):
         _ = simulation.state
 
 
+@pytest.mark.slow
 def test_a_world_written_to_goes_on_as_one_that_starts_so():
     """Same forces, lists and steps, to the bit, wherever the particles have been put; time has gone on."""
     simulation = compiled(crystal(), 2)

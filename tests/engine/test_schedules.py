@@ -69,6 +69,7 @@ def test_two_runs_the_second_in_portions(usual):
         same(a, b)
 
 
+@pytest.mark.long
 def test_a_launch_for_each_phase(usual):
     """A launch per phase over all particles, against a thread that takes a world through all phases."""
     launched = simulate(WORLDS, worlds=len(WORLDS), capacity=200, schedule="particle")

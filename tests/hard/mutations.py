@@ -219,6 +219,10 @@ SUMS = {
         "tisim/interactions/force_sum.py", "apart = not self.half_list.joined(w, i, j)", "apart = True",
         f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
     ),
+    "exports_of_two_sorts_of_laws": (
+        "tisim/interactions/listed_pairs.py", "self.exported.read(w, m) + term", "term",
+        "tests/interactions/test_short_ranged.py::test_contacts_within_a_far_cut_off_are_those_of_contact_alone",
+    ),
     "shifted_cut_off": (
         f"{MAGNETIC}/dipole_pairs.py", "slope = 12.0 * x", "slope = 11.9 * x",
         f"{DIPOLES}cutoff.py::test_forces_and_torques_are_minus_the_gradient_of_the_energy[True]",

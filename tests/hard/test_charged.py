@@ -148,6 +148,7 @@ def test_sweeps_that_cannot_follow_the_rotation_say_so():
     np.testing.assert_array_equal(result.state["velocity"], result.start["velocity"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_reversed_time_returns_to_the_start(name):
     """Two like charges that B holds together: a thousand steps there; back with velocities and B reversed."""

@@ -62,6 +62,7 @@ def column(n=10, g=10.0):
     return place, anchor
 
 
+@pytest.mark.long
 def test_a_tall_column_rests():
     """Ten grains, 300 times the period of the softest contact: what starts in balance stays, without creep or
     heat, undamped too; what starts off balance keeps its energy, and with dissipation comes to rest."""

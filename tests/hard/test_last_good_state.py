@@ -220,7 +220,7 @@ class Doubles(Operator):
         return len(masses) + 8
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_fails_after_events_is_taken_up_as_any_step():
     """Forces are summed in the middle of a step then: what was kept goes on with whole steps all the same."""
     place, speed = [[0, 0, 0], [0, 0, 1.9e-3], [0, 0.1, 0]], [[0.1, 0, 0], [0, 0, 0], [0, 0, 0]]

@@ -159,6 +159,7 @@ def worlds_of_lists(rng):
     yield "two, across a face", np.array([[0.0, 0.5, 0.5], [0.95, 0.5, 0.5]]), 0.1
 
 
+@pytest.mark.long
 def test_forces_over_lists_are_those_over_all_pairs(rng):
     """As by NumPy over all pairs, none twice and none left out; and they add up to nothing."""
     scenes = [grains(place, np.broadcast_to(radius, len(place))) for _, place, radius in worlds_of_lists(rng)]

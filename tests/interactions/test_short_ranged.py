@@ -8,6 +8,7 @@ from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import PairForce, parameter
+from tisim.interactions import pair_chunks
 from tisim.io import checkpoint
 
 
@@ -48,6 +49,7 @@ def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, sche
         np.testing.assert_allclose(after, before, rtol=0, atol=1e-12 * result.state["mass"].sum())
 
 
+@pytest.mark.long
 def test_grains_meet_as_soon_as_one_comes_through_a_face():
     """Without images: far apart as forces see them, next to each other in the step after. Equal ones change
     velocities, whenever the list was made; a force that begins too late would add energy."""
@@ -94,13 +96,19 @@ class Grip(PairForce):
 SIDE, STEP = 1.0, 2e-3
 
 
-def grains(seed=5, n=160, steps=150, grip=300.0):
+class CutOff(SoftShell):
+    """A shell that is far wider than grains are."""
+
+    truncated = True
+
+
+def grains(seed=5, n=160, steps=150, grip=300.0, others=()):
     """Rubbing grains of three sizes, overlapping at the start, in a periodic box."""
     rng = np.random.default_rng(seed)
     return scene(
         rng.uniform(0.0, SIDE, (n, 3)),
         rng.normal(size=(n, 3)),
-        (Grip(stiffness=500.0, grip=grip),),
+        (Grip(stiffness=500.0, grip=grip), *others),
         radius=rng.choice([0.05, 0.07, 0.1], n),
         mass=1.0,
         dt=STEP,
@@ -192,6 +200,30 @@ def test_what_is_remembered_is_bounded_and_forgotten():
     assert {tuple(sorted(pair)) for pair in partners} == {tuple(pair) for pair in np.argwhere(np.triu(touch))}
     assert len(partners) == touch.sum() / 2
     assert all(radius[i] <= radius[j] for i, j in partners)
+
+
+@pytest.mark.long
+def test_contacts_within_a_far_cut_off_are_those_of_contact_alone(monkeypatch):
+    """Grains part within the reach of another law: what they remember is forgotten as it is where that law is
+    summed over all pairs. Pairs reach particles of another chunk, too."""
+    kept, shell = {}, {"stiffness": 5.0, "width": 0.25}
+    for kind in (SoftShellOfAll, CutOff):
+        setup = grains(others=(kind(**shell),))
+        simulation = Simulation(setup, capacity=160, schedule="world")
+        simulation.load([setup])
+        simulation.run()
+        kept[kind] = by_id(simulation.results()[0])
+        simulation.close()
+        monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", 64)
+    over_all, cut = kept.values()
+    for name in ("velocity", "spin"):
+        np.testing.assert_allclose(cut[name], over_all[name], rtol=0, atol=1e-8, err_msg=name)
+    partners = (np.sort(state["grip_partners"], axis=1) for state in (cut, over_all))
+    np.testing.assert_array_equal(*partners)
+    # Both act: grains roll, and not as they do by themselves.
+    alone = by_id(simulate([grains()], capacity=160, schedule="world")[0])
+    assert np.abs(cut["spin"]).max() > 1
+    assert np.abs(cut["velocity"] - alone["velocity"]).max() > 0.1
 
 
 @pytest.mark.slow

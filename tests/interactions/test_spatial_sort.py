@@ -133,6 +133,7 @@ def test_they_are_those_of_an_unsorted_run_but_for_rounding(unsorted, usual):
     alike(usual[0], ends(unsorted, [bed(1)])[0])
 
 
+@pytest.mark.slow
 def test_grains_are_taken_out_of_a_sorted_world(simulation, unsorted, tmp_path):
     """As of one that is not; also beside another, and in a run that is restarted."""
     leaving = bed(3, exit_height=0.4)

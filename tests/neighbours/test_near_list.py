@@ -112,7 +112,7 @@ def near_pairs(position, radius, domain, horizon):
     return {tuple(pair) for pair in pairs.tolist()}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("domain", SOME)
 def test_every_near_pair_is_offered_once_its_larger_member_first(rng, domain):
     """At the start, and after each of several steps in which some move far and most do not."""

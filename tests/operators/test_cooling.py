@@ -42,6 +42,7 @@ def rate(t, radius=RADIUS):
     return -area * flux / (mass * HEAT_CAPACITY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("temperature", [1800.0, 20.0])
 def test_cools_as_the_differential_equation_at_first_order(temperature):
     """Against scipy's integrator; halving the step halves the error."""

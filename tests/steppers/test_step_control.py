@@ -68,7 +68,7 @@ def test_a_grain_alone_takes_the_longest_step():
     assert result.work["steps"] == 10
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_scene_that_the_default_steps_cannot_resolve_is_refused():
     """Two grains of 1 um, 10 um apart, that meet at 5 m/s each: in 1 us, the shortest step of the default,
     they would be past each other and no impact be seen. With shorter steps they collide."""

@@ -22,8 +22,9 @@ from tisim.interactions.contact_list import ClearContacts, ContactList, FindCont
 from tisim.interactions.contact_memory import ContactMemory, memory_fields
 from tisim.interactions.failure_attribution import FailureAttribution
 from tisim.interactions.force_sum import SumForces, SumTrialForces, turning
-from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, ExportedTerms, fuse, sum_phases
+from tisim.interactions.listed_pairs import ExportedTerms, fuse, sum_phases
 from tisim.interactions.loads import FORCE, TORQUE
+from tisim.interactions.memory_advance import AdvanceParticles, advance_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rearrangement import StoreBefore, acting, active, rearrange
 from tisim.interactions.rebuild_pairs import update_pairs
@@ -224,7 +225,7 @@ class Assembly:
         """
         items: list[Item] = []
         if self.pairs and self.pairs.memories and self.exported:
-            items += [*pairs, AdvancePairs(force_sum, self.exported)]
+            items += [*pairs, *advance_phases(force_sum, self.exported)]
         if any(force.data.offers("load") for force in self.effects.of(Force)):
             items.append(AdvanceParticles(force_sum))
         return tuple(items)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
+from tisim.interactions.listed_laws import ListedLaws
 from tisim.interactions.loads import Loads
 from tisim.interactions.pair_sum import PairSum
 from tisim.numerics.ieee import finite
@@ -60,13 +61,6 @@ class SumForces(PairSum):
         # A listed pair comes to a force, torques on both, how far apart they are where that is of use, and
         # what each law has it remember.
         self.separation_begin = 9 if self.turning else 3
-        self.pair_values, laws = self.separation_begin + (3 if self.loads.virial else 0), []
-        for law in self.short_ranged:
-            laws.append((law, self.pair_values))
-            self.pair_values += law.data.memory if self.commits else 0
-        self.laws = tuple(laws)
-        # Values have no room for memory where the sum may not advance it.
-        self.remembering = tuple((law, begin) for law, begin in laws if self.commits and law.data.memory)
         self.remembers = any(
             effect.data.offers("load" if isinstance(effect.data, Force) else "interaction")
             for effect in (*self.forces, *self.pair_forces)
@@ -112,10 +106,13 @@ class SumForces(PairSum):
     def read_sum(self, w, i):
         return self.loads.read(self.s, w, i)
 
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        return ListedLaws(laws, self.separation_begin + (3 if self.loads.virial else 0), self.commits)
+
     @ti.func
-    def compute_pair(self, w, m, i, j, separation, distance, t):
-        values = ti.Vector.zero(self.s.real, self.pair_values)
-        for law, begin in ti.static(self.laws):
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        values = ti.Vector.zero(self.s.real, laws.values)
+        for law, begin in ti.static(laws.placed):
             force, torque_i, torque_j, memory = self.interaction(law, w, m, i, j, separation, distance, t)
             for k in ti.static(range(3)):
                 values[k] += force[k]
@@ -166,9 +163,9 @@ class SumForces(PairSum):
         return loads.summand(here, separation), loads.summand(there, -separation)
 
     @ti.func
-    def write_memory(self, w, m, values):
+    def write_memory(self, laws: ti.template(), w, m, values):  # type: ignore[valid-type]
         if self.updates_memory(w):
-            for law, begin in ti.static(self.remembering):
+            for law, begin in ti.static(laws.remembering):
                 law.past.write(w, m, piece(values, begin, law.memory))
 
     @ti.func
@@ -189,11 +186,10 @@ class SumForces(PairSum):
         return updates
 
     @ti.func
-    def out_of_reach(self, w, m):
+    def out_of_reach(self, laws: ti.template(), w, m):  # type: ignore[valid-type]
         if self.updates_memory(w):
-            for effect in ti.static(self.short_ranged):
-                if ti.static(effect.memory > 0):
-                    effect.past.forget(w, m)
+            for law, _begin in ti.static(laws.remembering):
+                law.past.forget(w, m)
 
     @ti.func
     def is_free(self, w, i):

@@ -2,7 +2,8 @@
 
 On a CPU several pairs are computed at once, one lane each, in a loop whose results have no other readers, so
 compilers vectorise it. First the pairs within reach are partitioned off, without a branch: no CPU can foresee
-which of those they are that a list with a skin holds, and none of the lanes should be idle.
+which of those they are that a list with a skin holds, and none of the lanes should be idle. Where some laws
+end at contact and others go on to a cut-off, each sort is computed for the pairs within its own reach.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from tisim.worlds.occasion import Occasion
 from tisim.worlds.phases import Item, PerParticle, Phase
 
 if TYPE_CHECKING:
-    from tisim.interactions.force_sum import SumForces
+    from tisim.interactions.listed_laws import ListedLaws
     from tisim.interactions.pair_sum import PairSum
 
 
@@ -63,17 +64,23 @@ class PartOfSum(PerChunk):
         super().__init__(exported.pairs)
         self.total, self.exported = total, exported
         self.listed_only = not total.long_ranged
-        self.lanes = LANES if runtime.current().device == "cpu" else 1
-        self.commits = total.commits and bool(exported.pairs.memories)
 
     @ti.func
     def when(self, w):
         return self.total.when(w)
 
+
+class ComputePairs(PartOfSum):
+    """This phase computes the pairs of a chunk by some of the laws."""
+
+    def __init__(self, total: "PairSum", exported: ExportedTerms, laws: "ListedLaws") -> None:
+        super().__init__(total, exported)
+        self.laws, self.lanes = laws, LANES if runtime.current().device == "cpu" else 1
+
     @ti.func
     def note_memory(self, w):
         """Note that pairs remember what the particles have not stored, where the sum brings it up to date."""
-        if ti.static(self.commits) and self.total.updates_memory(w):
+        if ti.static(len(self.laws.remembering) > 0) and self.total.updates_memory(w):
             self.p.unsaved[w] = 1
 
     @ti.func
@@ -82,7 +89,7 @@ class PartOfSum(PerChunk):
 
     @ti.func
     def process_distant_pair(self, w, c, m):
-        """Take note that pair m of chunk c is farther apart than any law reaches."""
+        """Take note that pair m of chunk c is farther apart than any of the laws reaches."""
 
     @ti.func
     def compute_pairs(self, w, c):
@@ -109,7 +116,7 @@ class PartOfSum(PerChunk):
         for m in range(begin, end):
             i, j = p.first[w, m], p.second[w, m]
             d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
-            limit = p.half_list.widest(w, i, j)
+            limit = p.half_list.widest(self.laws.reaching, w, i, j)
             within = ti.cast(d.norm_sqr() <= limit * limit, ti.i32)
             p.partitioned[w, ti.select(within > 0, near, far)] = m
             near, far = near + within, far + within - 1
@@ -120,34 +127,41 @@ class PartOfSum(PerChunk):
         """Return the values that listed pair m comes to."""
         s, i, j, t = self.s, self.p.first[w, m], self.p.second[w, m], self.s.time[w]
         d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
-        return self.total.compute_pair(w, m, i, j, d, d.norm(), t)
+        return self.total.compute_pair(self.laws, w, m, i, j, d, d.norm(), t)
 
     @ti.func
     def compute_block(self, w, c, begin, end):
         """Compute as many pairs as there are lanes, or as there are before ``end``, and process each."""
         p, s = self.p, self.s
-        lanes = [ti.Vector([0.0] * self.lanes, s.real) for _ in ti.static(range(self.total.pair_values))]
+        lanes = [ti.Vector([0.0] * self.lanes, s.real) for _ in ti.static(range(self.laws.values))]
         for lane in range(self.lanes):
             # Lanes without a pair of their own compute the last one again, and nobody reads it.
             values = self.values_of(w, p.partitioned[w, ti.min(begin + lane, end - 1)])
-            for k in ti.static(range(self.total.pair_values)):
+            for k in ti.static(range(self.laws.values)):
                 lanes[k][lane] = values[k]
         for lane in range(ti.min(self.lanes, end - begin)):
-            values = ti.Vector.zero(s.real, self.total.pair_values)
-            for k in ti.static(range(self.total.pair_values)):
+            values = ti.Vector.zero(s.real, self.laws.values)
+            for k in ti.static(range(self.laws.values)):
                 values[k] = lanes[k][lane]
             self.process_pair(w, c, p.partitioned[w, begin + lane], values)
 
 
-class AddPairs(PartOfSum):
+class AddPairs(ComputePairs):
     """This phase computes the pairs of a chunk, and adds each to both particles, or to the one that is in
-    it."""
+    it.
+
+    first : whether nothing has been added of pairs so far.
+    """
+
+    def __init__(self, total: "PairSum", exported: ExportedTerms, laws: "ListedLaws", first: bool) -> None:
+        super().__init__(total, exported, laws)
+        self.first = first
 
     @ti.func
     def run(self, w, c):
         p, s = self.p, self.s
         self.note_memory(w)
-        if ti.static(self.listed_only):
+        if ti.static(self.first and self.listed_only):
             for i in range(c * p.chunk, ti.min((c + 1) * p.chunk, s.count[w])):
                 self.total.write_sum(w, i, ti.Vector.zero(s.real, self.total.components))
         self.compute_pairs(w, c)
@@ -156,21 +170,29 @@ class AddPairs(PartOfSum):
     def process_pair(self, w, c, m, values):
         p, i, j = self.p, self.p.first[w, m], self.p.second[w, m]
         here, there = self.total.pair_contributions(values)
-        self.total.write_memory(w, m, values)
+        self.total.write_memory(self.laws, w, m, values)
         if m < p.outer[w, c]:
             self.total.write_sum(w, i, self.total.read_sum(w, i) + here)
             self.total.write_sum(w, j, self.total.read_sum(w, j) + there)
         elif p.chunk_of(i) == c:
             self.total.write_sum(w, i, self.total.read_sum(w, i) + here)
-            self.exported.write(w, m, there)
+            self.export(w, m, there)
         else:
             self.total.write_sum(w, j, self.total.read_sum(w, j) + there)
-            self.exported.write(w, m, here)
+            self.export(w, m, here)
+
+    @ti.func
+    def export(self, w, m, term):
+        """Leave what pair m adds to the particle of another chunk."""
+        if ti.static(self.first):
+            self.exported.write(w, m, term)
+        else:
+            self.exported.write(w, m, self.exported.read(w, m) + term)
 
     @ti.func
     def process_distant_pair(self, w, c, m):
-        self.total.out_of_reach(w, m)
-        if m >= self.p.outer[w, c]:
+        self.total.out_of_reach(self.laws, w, m)
+        if ti.static(self.first) and m >= self.p.outer[w, c]:
             self.exported.write(w, m, ti.Vector.zero(self.s.real, self.total.components))
 
 
@@ -227,34 +249,6 @@ def sum_phases(total: "PairSum", exported: ExportedTerms | None) -> tuple[Phase,
     if exported is None or not total.short_ranged:
         return (total,)
     before = (total,) if total.long_ranged else ()
-    return *before, AddPairs(total, exported), CloseSum(total, exported)
-
-
-class AdvanceParticles(PerParticle):
-    """This phase brings what particles remember by themselves up to date with the end of a step found by
-    trial."""
-
-    def __init__(self, total: "SumForces") -> None:
-        super().__init__(total.s)
-        self.total = total
-
-    @ti.func
-    def run(self, w, i):
-        self.total.external_load(w, i, self.s.time[w])
-
-
-class AdvancePairs(PartOfSum):
-    """This phase brings what pairs remember up to date with the end of a step that was found by trial."""
-
-    @ti.func
-    def run(self, w, c):
-        self.note_memory(w)
-        self.compute_pairs(w, c)
-
-    @ti.func
-    def process_pair(self, w, c, m, values):
-        self.total.write_memory(w, m, values)
-
-    @ti.func
-    def process_distant_pair(self, w, c, m):
-        self.total.out_of_reach(w, m)
+    parts = enumerate(total.listed_laws())
+    added = tuple(AddPairs(total, exported, laws, first=k == 0) for k, laws in parts)
+    return *before, *added, CloseSum(total, exported)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
+from tisim.interactions.listed_laws import ListedLaws
 from tisim.numerics.roots import inverse_root
 from tisim.worlds.occasion import OnOccasion
 from tisim.worlds.phases import PerParticle
@@ -36,16 +37,14 @@ class PairSum(OnOccasion, PerParticle):
 
     A subclass says what the sum begins with, in ``start``, what one other contributes, in ``term``, and what
     becomes of it, in ``finish``; ``components`` is its length. Where pairs are listed it also says where the
-    sum is kept meanwhile, in ``write_sum`` and ``read_sum``, what is computed for a pair, a vector of
-    ``pair_values``, in ``compute_pair``, and what of it is added to the sums of the two, in
-    ``pair_contributions``.
+    sum is kept meanwhile, in ``write_sum`` and ``read_sum``, what is computed for a pair by some of the laws,
+    a vector, in ``compute_pair``, and what of it is added to the sums of the two, in ``pair_contributions``.
 
     commits : whether what pairs remember may be brought up to date with the sum, by ``write_memory``.
     by_inverse : whether terms of all pairs are made by ``term_by_inverse``.
     """
 
     components: int = 3
-    pair_values: int = 0
     by_inverse: bool = False
     commits: ClassVar[bool] = False
 
@@ -92,11 +91,23 @@ class PairSum(OnOccasion, PerParticle):
         """Return the sum of i so far."""
         return ti.Vector.zero(self.s.real, self.components)
 
+    def listed_laws(self) -> tuple[ListedLaws, ...]:
+        """Return the short-ranged laws, those that are computed together as one: what is truncated far from
+        contact, and the others."""
+        cut = tuple(law for law in self.short_ranged if law.data.truncated)
+        close = tuple(law for law in self.short_ranged if not law.data.truncated)
+        return tuple(self.together(laws) for laws in (close, cut) if laws)
+
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        """Return laws as they are computed together."""
+        raise NotImplementedError
+
     @ti.func
-    def compute_pair(self, w, m, i, j, separation, distance, t):
-        """Return what is summed or remembered of listed pair m of i and j, a vector of ``pair_values``; i has
-        the lower id. It writes nothing: pairs are computed side by side, and some more than once."""
-        return ti.Vector.zero(self.s.real, self.pair_values)
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        """Return what is summed or remembered, by some laws, of listed pair m of i and j, a vector of
+        ``laws.values``; i has the lower id. It writes nothing: pairs are computed side by side, and some more
+        than once."""
+        return ti.Vector.zero(self.s.real, laws.values)
 
     @ti.func
     def pair_contributions(self, values):
@@ -110,12 +121,12 @@ class PairSum(OnOccasion, PerParticle):
         return False
 
     @ti.func
-    def write_memory(self, w, m, values):
+    def write_memory(self, laws: ti.template(), w, m, values):  # type: ignore[valid-type]
         """Store what listed pair m remembers from now on, by the values computed for it."""
 
     @ti.func
-    def out_of_reach(self, w, m):
-        """Take note that listed pair m is farther apart than any law reaches."""
+    def out_of_reach(self, laws: ti.template(), w, m):  # type: ignore[valid-type]
+        """Take note that listed pair m is farther apart than any of these laws reaches."""
 
     @ti.func
     def run(self, w, i):

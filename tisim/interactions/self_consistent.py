@@ -12,6 +12,7 @@ from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, LongRange, SelfConsistentQuantity
 from tisim.effects.base.derived_quantity import SWEEPS
 from tisim.interactions.derived import DerivedSolver
+from tisim.interactions.listed_laws import ListedLaws
 from tisim.interactions.listed_pairs import ExportedTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.pair_sum import PairSum
@@ -119,7 +120,10 @@ class JacobiSweep(PairSum):
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__(solver.s, solver.domain, (solver.effect,), solver.pairs)
         self.solver, self.effect, self.trial = solver, solver.effect, trial
-        self.components, self.pair_values = solver.components, 2 * solver.components
+        self.components = solver.components
+
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        return ListedLaws(laws, 2 * self.components, remember=False)
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
@@ -134,10 +138,10 @@ class JacobiSweep(PairSum):
         return self.solver.packed(self.solver.next[w, i])
 
     @ti.func
-    def compute_pair(self, w, m, i, j, separation, distance, t):
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
         here = self.term(self.effect, w, i, j, separation, distance, t)
         there = self.term(self.effect, w, j, i, -separation, distance, t)
-        values = ti.Vector.zero(self.s.real, self.pair_values)
+        values = ti.Vector.zero(self.s.real, laws.values)
         for k in ti.static(range(self.components)):
             values[k], values[self.components + k] = here[k], there[k]
         return values

@@ -122,19 +122,24 @@ class HalfList(NeighbourRows):
 
     @ti.func
     def reach(self, w, i):
+        return self.reach_of(self.laws, w, i)
+
+    @ti.func
+    def reach_of(self, laws: ti.template(), w, i):  # type: ignore[valid-type]
+        """Return the widest gap (m) at which one of these laws acts between i and a particle no larger."""
         gap = ti.cast(0.0, self.s.real)
-        for law in ti.static(self.laws):
+        for law in ti.static(laws):
             gap = ti.max(gap, law.reach(self.s, w, i))
         return gap
 
     @ti.func
-    def widest(self, w, i, j):
-        """Return the widest distance (m) at which a law acts between two; beyond all in a world that looks
-        at all."""
+    def widest(self, laws: ti.template(), w, i, j):  # type: ignore[valid-type]
+        """Return the widest distance (m) at which one of these laws, which act beyond contact, or contact
+        itself, acts between two; beyond all in a world that looks at all."""
         s, distance = self.s, self.s.radius[w, i] + self.s.radius[w, j]
-        if ti.static(len(self.laws) > 0):
+        if ti.static(len(laws) > 0):
             a, b = s.radius[w, i], s.radius[w, j]
-            first, second = self.reach(w, i), self.reach(w, j)
+            first, second = self.reach_of(laws, w, i), self.reach_of(laws, w, j)
             distance += ti.select(a > b, first, ti.select(b > a, second, ti.max(first, second)))
         return ti.select(s.listed_above[w] >= ALL_PAIRS, ti.static(far_away()), distance)
 

@@ -36,6 +36,7 @@ def test_centre_of_gravity_follows_the_closed_form(near_field):
         assert (spread < 2 * SPACING * 1.1).all()
 
 
+@pytest.mark.long
 def test_error_falls_and_work_rises_with_the_accuracy_asked_for():
     """The printed near field, before chaos: the paths of a reference two orders tighter."""
     tolerances = (1e-4, 1e-5, 1e-6, 1e-8)

@@ -148,6 +148,7 @@ def test_a_clump_on_springs_is_its_numpy_twin():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_weight_acts_at_the_centre_of_mass():
     (result,) = simulate([clumps(PEAR, [(0, 0, 0)], (Gravity(acceleration=(0, 0, -9.81)),), 1e-3, 100)])
     body = clump_bodies(result.state)
@@ -283,7 +284,7 @@ def momenta(state):
     return p.sum(axis=0) + (mass * v).sum(axis=0), whole
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_clumps_that_collide_keep_momentum_and_shape():
     (result,) = run([tumbling()])
     start, end = clump_bodies(result.start), clump_bodies(result.state)

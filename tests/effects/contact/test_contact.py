@@ -217,6 +217,7 @@ def test_grains_that_just_touch_at_rest_rub_with_no_force():
         np.testing.assert_array_equal(state["torque"], 0)
 
 
+@pytest.mark.long
 def test_stick_vanishes_with_the_time_step():
     """What the docstring says of the paper's regularisation."""
     friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))

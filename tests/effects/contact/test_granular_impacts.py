@@ -75,6 +75,7 @@ def critically_damped(tau, speed):
     return time, stretched(tau) ** 0.8, speed * (1 - rate * tau) * np.exp(-rate * tau)
 
 
+@pytest.mark.slow
 def test_without_restitution_a_grain_stays_where_it_hits():
     """At e = 0 damping is critical: the overlap goes to 0 as Antypov and Elliott have it, at a wall and at
     another grain; at no time does a grain part."""

@@ -232,6 +232,7 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
         assert np.abs(result.state["velocity"]).max() <= 9
 
 
+@pytest.mark.long
 def test_what_is_pressed_far_into_each_other_gives_back_what_it_holds():
     """A grain far beyond a wall, one within a larger one, and centres 1e-6 radii apart: Hertz's 8/15 E*
     sqrt(R*) delta^2.5, by steps that resolve it."""

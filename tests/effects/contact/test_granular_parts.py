@@ -168,6 +168,7 @@ def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(nam
     np.testing.assert_allclose(couple, expected[:, None] * X, rtol=1e-9, atol=1e-9 * limit)
 
 
+@pytest.mark.slow
 def test_a_contact_that_is_pressed_twisted_eased_and_twisted_back_yields_no_work():
     """Twisted: half of what the spring has lost times the square of the angle is lost."""
     n, angle = 500, 1e-4

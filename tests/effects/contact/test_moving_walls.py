@@ -158,7 +158,7 @@ def test_a_servo_presses_with_the_wanted_force(pressed, tmp_path):
         np.testing.assert_allclose(recorded.measures["floor_force_z"][3:], -100.0 - G, rtol=1e-3)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_servo_goes_on_from_a_checkpoint_to_the_same_bits(pressed, tmp_path):
     """And beside other worlds."""
     made, *_ = pressed

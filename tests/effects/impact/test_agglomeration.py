@@ -44,6 +44,7 @@ def test_two_bonded_grains_become_one_sphere(rng):
         assert one["temperature"][0] > (start["mass"] @ start["temperature"]) / start["mass"].sum()
 
 
+@pytest.mark.long
 def test_bonded_grains_stay_two_where_nothing_merges_them():
     """Without the effect a bond is counted, the two move on together, and both remain."""
     (result,) = simulate([head_on(5.0, (Impact(hardness=SOFT),), mass=[1.0, 3.0])], worlds=300, capacity=2)

@@ -69,6 +69,7 @@ def test_largest_grain_that_sticks_closed_form():
     assert [len(r.state["mass"]) for r in results] == [1, 16]
 
 
+@pytest.mark.long
 def test_pieces_keep_mass_momentum_energy_and_centre(rng):
     """n equal pieces in place of one: same mass, momentum, kinetic energy, volume, centre; no overlap."""
     scenes = []
@@ -162,7 +163,7 @@ def test_agglomerate_of_grains_breaks_into_all_of_them():
     assert len(result.state["mass"]) == 14
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_grains_of_several_blocks_of_memory_break_at_once(rng, monkeypatch):
     """Six pairs of 2 to 7 grains each, in any order among ten that nothing hits: each grain has its pieces,
     about its own pair's centre."""

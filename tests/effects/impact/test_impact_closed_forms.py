@@ -13,6 +13,7 @@ def restitution(result, speed):
     return (v[1] - v[0]) / (2 * speed)
 
 
+@pytest.mark.long
 def test_restitution_of_equal_grains_closed_form():
     """Z04 (4.13)-(4.14) with a_0 = 0, a_f = 1: e = 1 - v/v*, v* = sqrt(3 H beta / (2 rho)), 0 above."""
     cases = []

@@ -55,6 +55,7 @@ def total(state, pull=1e-6):
     return energy(state) + pull * np.log(apart / (2 * RADIUS))
 
 
+@pytest.mark.long
 def test_a_pressed_pair_collides_once_whatever_the_step():
     results = run_rows(
         [row(steps=steps, pull=pull) for steps in (10, 100, 1000) for pull in (1e-9, 1e-6, 1e-4)]

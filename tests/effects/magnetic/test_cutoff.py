@@ -58,6 +58,7 @@ def steps(n, h):
         yield i, a, change
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_forces_and_torques_are_minus_the_gradient_of_the_energy(rng, shifted):
     """By central differences of positions and of turns; of a plain cut-off within it and beyond it. All of

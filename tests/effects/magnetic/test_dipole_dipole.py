@@ -200,6 +200,7 @@ def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_
         close(state["force"], expected, 1e-7)
 
 
+@pytest.mark.long
 def test_langevin_moments_in_each_others_field(rng):
     """Each has the moment that the field at its place gives it, that of the others included; where the field
     is weak it is not that of the sources alone."""

@@ -86,6 +86,7 @@ def mutual(rng, b, law):
     return scene(place, 0 * place, effects, radius=1.0, mass=1.0)
 
 
+@pytest.mark.long
 def test_saturation_gives_moments_an_end_where_linear_ones_have_none():
     """Two that overlap until 2 a = 2 exceeds 1, in a weak field: each saturates the other."""
     law = MutualFroehlichMoment(**NUMBERS, tolerance=1e-14, sweeps=1000)

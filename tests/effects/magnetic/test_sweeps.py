@@ -140,6 +140,7 @@ STEPPERS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("stepper", "most"), STEPPERS)
 def test_every_stepper_takes_moments_by_sweeps(stepper, most):
     """What a stepper keeps of its own sweeps is not what those of moments come to, relative to these."""

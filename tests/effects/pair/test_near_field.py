@@ -106,6 +106,7 @@ def test_near_pairs_only(rng):
     close(state["force"], expected)
 
 
+@pytest.mark.long
 def test_alpha1_attracts_and_alpha2_repels():
     """Two particles side by side; between unlike signs each does the opposite."""
 

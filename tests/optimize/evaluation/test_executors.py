@@ -105,7 +105,7 @@ def test_results_are_those_of_one_process_to_the_bit_and_so_are_failures(away, h
     assert evaluator.settings == {**runtime.current().settings, "backend": runtime.backend()}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_effects_of_the_users_own_act_in_workers(away, own_file):
     """Each worker is given the file; one that has another version of it takes the new one."""
     evaluator, _ = away

@@ -119,6 +119,7 @@ def errors_of_inclined(ratios, n, rng):
     return np.array(errors)
 
 
+@pytest.mark.long
 def test_long_cylinders_in_any_direction(rng):
     """Beside one that is magnetised along its axis the field is 1e-7 of what it would be across."""
     assert errors_of_inclined((1.0, 30.0, 300.0, 2000.0), 3, rng).max() < 1

@@ -102,6 +102,7 @@ def test_the_error_asked_for_is_met_and_costs_work(runs):
     assert all(r.work["solver_iterations"] < 2.2 * (r.work["steps"] + r.work["rejections"]) for r in results)
 
 
+@pytest.mark.long
 def test_goes_on_from_a_checkpoint_to_the_same_bits(runs, tmp_path):
     """What the next step is predicted from is kept too; and steps asked for are steps taken."""
     assert runs

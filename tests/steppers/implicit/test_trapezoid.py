@@ -189,6 +189,7 @@ def test_time_does_not_drift():
     assert result.state["position"][0, 0] == pytest.approx(np.cos(2.0), abs=1e-9)
 
 
+@pytest.mark.long
 def test_linear_terms_in_velocity_are_solved_exactly():
     """The rotation by B converges at w dt = 20, where plain iteration has no chance, and keeps the speed."""
     setup = charged(equal_steps(20.0 / 3.0, tolerance=1e-12), 20.0, velocity=(0.6, -0.8, 0.0))

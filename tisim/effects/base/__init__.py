@@ -30,7 +30,8 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    each other (``memory``) is handed to ``interaction``, which returns it brought up to date, together with
    the force; what a particle remembers of a force, such as that of walls, is brought up to date in ``load``,
    where that is told to, and there it may add to ``totals``. Between the particles of one rigid body a
-   short-ranged law acts only where it says so, ``within_bodies``. A law that stops a world on purpose, by a
+   short-ranged law acts only where it says so, ``within_bodies``; one that ends at a cut-off far beyond
+   contact, ``truncated``, is summed apart from laws of contact. A law that stops a world on purpose, by a
    force that is not a number, says where in ``may_stop``.
 6. Who feels an external field finds it with ``sources`` (see tisim/sources/base.py), and names in
    ``requires_source`` the quantities of which a scene must have at least one source.

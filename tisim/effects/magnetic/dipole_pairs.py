@@ -36,6 +36,7 @@ class Dipoles(Pairwise):
 
     contract: ClassVar[bool] = True
     within_bodies: ClassVar[bool] = True
+    truncated: ClassVar[bool] = True
     alike: ClassVar[tuple[str, ...]] = ("cutoff", "gap", "shifted")
 
     def summed(self) -> dict[str, Any]:

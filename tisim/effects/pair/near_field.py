@@ -12,7 +12,7 @@ With strengths of charge, beta_2 = 2 and abar_2 = 1/(4 pi epsilon) alone this is
 lacks the minus sign that its n_ij, from i to j, asks for: like charges repel.)
 """
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import three_digits
@@ -106,6 +106,7 @@ class TruncatedNearField(NearField):
     """
 
     short_ranged = True
+    truncated: ClassVar[bool] = True
 
     cutoff: float = parameter("m", "cut-off distance of the centres", examples=[0.1], gt=0)
 
