@@ -81,7 +81,8 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
         square = (left - room, bottom - room, WIDER * side)
         for axis, rate in zip(row, SHOWN, strict=True):
             step = run.at(rate)
-            close_up(axis, step.state, step.asteroid.grains, square)
+            # About the centre of all grains: that of the largest part of what is disrupted leaves out the others.
+            close_up(axis, step.state, step.state, square)
             axis.set_title(f"{m:g} A/m, {1e6 * step.rate:.0f} µrad/s")
     directions(axes[0, 0], square, NO_GRAVITY)
     letters(axes.flat)
