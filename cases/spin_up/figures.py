@@ -81,7 +81,7 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
         square = (left - room, bottom - room, WIDER * side)
         for axis, rate in zip(row, SHOWN, strict=True):
             step = run.at(rate)
-            # About the centre of all grains: that of the largest part of what is disrupted leaves out the others.
+            # About the centre of all: around the largest part of what is disrupted, others are cut off.
             close_up(axis, step.state, step.state, square)
             axis.set_title(f"{m:g} A/m, {1e6 * step.rate:.0f} µrad/s")
     directions(axes[0, 0], square, NO_GRAVITY)

@@ -33,8 +33,8 @@ SEARCH_SETTINGS = {
     "method": "nsga2", "generations": 4, "options": {"population": 12},
     "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1, "confirm": 6},
 }  # fmt: skip
-"""From one start some valves jam by luck, and a search keeps those: what is found is run again from six that no
-design has had. Where each design is to jam from four starts, few do, and a search has little to go by."""
+"""From one start some valves jam by luck, and a search keeps those: what is found is run again from six that
+no design has had. Where each design is to jam from four starts, few do, and a search has little to go by."""
 
 
 def l21(ratio: int, **more: Any) -> dict[str, Any]:
