@@ -22,7 +22,7 @@ from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 SHOWN = (0.0, 6e-4, 8e-4)
 """Piles are drawn after these steps, rad/s."""
-WIDER = 2.2
+WIDER = 2.6
 """A picture is so many times as wide as the pile at rest."""
 
 
