@@ -3,8 +3,8 @@
 A design is the diameter of the constriction, that of the grains, and the field. A wide constriction lets more
 through while the field is off, and takes more field to jam. Whether it jams is simulated, from some starts,
 in a field that is on from the first. What flows without one is that of ``open_flow``, which is no simulation.
-From some starts a valve jams and from others not: a start that misses what is wanted counts as the worst that
-there is, so that means tell how often that is.
+From some starts a valve jams and from others not: a start that misses what is wanted counts as MISSED times
+the worst that there may be, so that of four starts none may, and a search sees how many do.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ STRONGEST = 0.4
 """The field may be so strong, T; L21 has 0.23, and 0.56 between inserts of iron (section 3.4.3)."""
 THROAT_GENE, DIAMETER_GENE = Gene("throat", "m", 3.5 * D, 6 * D), Gene("diameter", "m", 0.7 * D, D)
 FLUX_GENE = Gene("flux", "T", 0.02, STRONGEST)
+MISSED = 4.0
+"""A start that misses what is wanted counts as so many times the worst that there may be."""
 WIDEST = THROAT_GENE.high / DIAMETER_GENE.low
 """So many grains at most are side by side in a constriction."""
 GENES = {
@@ -50,10 +52,11 @@ WANTED = {
 }
 """What each variant of the problem looks for."""
 MEANINGS = {
-    "field": f"flux density that arrests the flow; {STRONGEST:g} T for a start in which it does not",
+    "field": f"flux density that arrests the flow; {MISSED * STRONGEST:g} T for a start in which it does not",
     "open flow": "volume that flows without field, after Hagen, Poiseuille, Krieger and Dougherty; none "
     "for a start that is not arrested",
-    "width": f"diameter of the constriction over that of the grains; {WIDEST:.2g} for one that is arrested",
+    "width": "diameter of the constriction over that of the grains; "
+    f"{MISSED * WIDEST:.2g} for a start that is arrested",
     "throat": "diameter of the constriction",
     "diameter": "diameter of the grains",
 }
@@ -88,8 +91,8 @@ def volume_rate(scene: Scene) -> float:
 
 
 def arresting_field(result: Result) -> float:
-    """Return the field where it arrests the flow, T; the strongest there may be where it does not."""
-    return flux(result) if arrested(result) else STRONGEST
+    """Return the field where it arrests the flow, T; MISSED of the strongest where it does not."""
+    return flux(result) if arrested(result) else MISSED * STRONGEST
 
 
 def arresting_flow(result: Result) -> float:
@@ -98,9 +101,9 @@ def arresting_flow(result: Result) -> float:
 
 
 def flowing_width(result: Result) -> float:
-    """Return how many grains are side by side in the constriction where the flow goes on; the most there may
-    be where it is arrested."""
-    return WIDEST if arrested(result) else width(result)
+    """Return how many grains are side by side in the constriction where the flow goes on; MISSED times the
+    most where it is arrested."""
+    return MISSED * WIDEST if arrested(result) else width(result)
 
 
 LEAST_FIELD = Objective("field", arresting_field, "T")

@@ -8,7 +8,18 @@ from cases.case import every
 from cases.runs import OTHER_STARTS, sound
 from cases.valve.measures import duct_of, pressure_at_rest, unhindered_rate
 from cases.valve.open_flow import open_flow
-from cases.valve.problem import BOUND, STRONGEST, arrested, flux, part_left, problem, volume_rate, width
+from cases.valve.problem import (
+    BOUND,
+    MISSED,
+    STRONGEST,
+    WIDEST,
+    arrested,
+    flux,
+    part_left,
+    problem,
+    volume_rate,
+    width,
+)  # fmt: skip
 from cases.valve.runs import ARRESTED
 from optimize.settings import Settings, proposed
 from tests.cases.valve.states import result_of
@@ -43,15 +54,23 @@ def test_a_design_is_the_valve_it_says():
 
 @pytest.mark.parametrize("part", [0.9 * ARRESTED, 1.1 * ARRESTED])
 def test_fields_count_where_they_arrest_and_widths_where_they_do_not(part):
-    """Elsewhere a start counts as the worst there is."""
+    """Elsewhere a start counts as so much worse than the worst that one of four is worse than none."""
     jams = part < ARRESTED
     result = moving(problem().scene(DESIGN, 0), part)
     assert arrested(result) == jams
     field, let = (one.of(result) for one in problem(variant="front").objectives)
-    assert (field, let) == ((0.15, volume_rate(result.scene)) if jams else (STRONGEST, 0.0))
+    assert (field, let) == ((0.15, volume_rate(result.scene)) if jams else (4 * STRONGEST, 0.0))
     assert problem(variant="field").objectives[0].of(result) == field
     never = problem(variant="never").objectives[0].of(result)
-    assert never == pytest.approx(6 / 0.7 if jams else 5.0)
+    assert never == pytest.approx(4 * 6 / 0.7 if jams else 5.0)
+
+
+def test_one_of_four_starts_that_misses_is_worse_than_none():
+    """The least field and constriction of which one start misses, and the largest of which none does."""
+    genes = {gene.name: gene for gene in problem(variant="front").genome.genes}
+    weakest, narrowest = genes["flux"].low, genes["throat"].low / genes["diameter"].high
+    assert (3 * weakest + MISSED * STRONGEST) / 4 > STRONGEST
+    assert (3 * narrowest + MISSED * WIDEST) / 4 > WIDEST
 
 
 def test_a_valve_that_lets_little_through_is_refused_where_that_is_bounded():
