@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from tests.scenes import by_id, compiled, scene, simulate
+from tests.scenes import by_id, compiled, fixed, scene, simulate
 from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import PairForce, parameter
 from tisim.interactions import pair_chunks
 from tisim.io import checkpoint
+from tisim.steppers import Trapezoid
+from tisim.steppers.implicit.step_control import ErrorControl
 
 
 def shells(kind, rng, images):
@@ -94,6 +96,8 @@ class Grip(PairForce):
 
 
 SIDE, STEP = 1.0, 2e-3
+TRIALS = Trapezoid(control=ErrorControl(error=1e-3, tolerance=1e-10, first=1e-4, longest=STEP, shortest=1e-9))
+"""Steps that are found by trial, after which what pairs remember is brought up to date by itself."""
 
 
 class CutOff(SoftShell):
@@ -102,7 +106,7 @@ class CutOff(SoftShell):
     truncated = True
 
 
-def grains(seed=5, n=160, steps=150, grip=300.0, others=()):
+def grains(seed=5, n=160, steps=150, grip=300.0, others=(), stepper=None):
     """Rubbing grains of three sizes, overlapping at the start, in a periodic box."""
     rng = np.random.default_rng(seed)
     return scene(
@@ -111,8 +115,8 @@ def grains(seed=5, n=160, steps=150, grip=300.0, others=()):
         (Grip(stiffness=500.0, grip=grip), *others),
         radius=rng.choice([0.05, 0.07, 0.1], n),
         mass=1.0,
-        dt=STEP,
-        steps=steps,
+        duration=steps * STEP,
+        stepper=stepper or fixed(STEP),
         domain=Box(low=(0.0, 0.0, 0.0), high=(SIDE, SIDE, SIDE)),
     )
 
@@ -203,12 +207,13 @@ def test_what_is_remembered_is_bounded_and_forgotten():
 
 
 @pytest.mark.long
-def test_contacts_within_a_far_cut_off_are_those_of_contact_alone(monkeypatch):
+@pytest.mark.parametrize("stepper", [None, pytest.param(TRIALS, marks=pytest.mark.slow)])
+def test_contacts_within_a_far_cut_off_are_those_of_contact_alone(monkeypatch, stepper):
     """Grains part within the reach of another law: what they remember is forgotten as it is where that law is
     summed over all pairs. Pairs reach particles of another chunk, too."""
     kept, shell = {}, {"stiffness": 5.0, "width": 0.25}
     for kind in (SoftShellOfAll, CutOff):
-        setup = grains(others=(kind(**shell),))
+        setup = grains(others=(kind(**shell),), stepper=stepper)
         simulation = Simulation(setup, capacity=160, schedule="world")
         simulation.load([setup])
         simulation.run()

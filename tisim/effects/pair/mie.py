@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic import model_validator
@@ -28,7 +28,6 @@ class Mie(PairForce):
 
     fields = ("radius",)
     short_ranged = True
-    truncated: ClassVar[bool] = True
 
     epsilon: float = parameter("J", "depth eps of the potential well", examples=[4e-19], gt=0)
     n: Exponent = option("exponent n of the repulsion, above m; whole ones are fastest", 30, gt=0)
