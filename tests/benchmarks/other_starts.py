@@ -1,6 +1,6 @@
 """What becomes of designs that a search has found from other random starts than those it had.
 
-    python tests/benchmarks/other_starts.py valve out/valve/best.csv [--variant front] [--starts 6]
+    python tests/benchmarks/other_starts.py valve out/valve-front/best.csv [--starts 6]
 
 The designs are those of the first --most lines of the table. Printed is each objective, and whatever else the
 case tells of a design, as a mean with half of its 95 % interval over the starts in which it is finite, and in
