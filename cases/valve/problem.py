@@ -48,7 +48,7 @@ largest grains."""
 WANTED = {
     "front": "the front of the field that arrests the flow and of what flows without it",
     "field": f"the least field that arrests the flow, of valves of {1e9 * BOUND:g} mm^3/s without",
-    "never": f"the fewest grains across a constriction that a field of {STRONGEST:g} T never arrests",
+    "never": f"the fewest grains across a constriction that a field of {published.FLUX:g} T never arrests",
 }
 """What each variant of the problem looks for."""
 MEANINGS = {
@@ -124,7 +124,7 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
         one = scene(
             throat=design["throat"],
             grains=equal(design["diameter"] / 2, 1.0),
-            flux=design.get("flux", STRONGEST),
+            flux=design.get("flux", published.FLUX),
             seed=seed,
             **settings,
         )

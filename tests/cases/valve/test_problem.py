@@ -6,6 +6,7 @@ import pytest
 import tisim
 from cases.case import every
 from cases.runs import OTHER_STARTS, sound
+from cases.valve import published
 from cases.valve.measures import duct_of, pressure_at_rest, unhindered_rate
 from cases.valve.open_flow import open_flow
 from cases.valve.problem import (
@@ -88,7 +89,7 @@ def test_only_the_small_valve_is_searched():
 
 def test_variants():
     assert problem(variant="never").scene({"throat": 200e-6, "diameter": 44e-6}, 0).effects[0].constant == (
-        STRONGEST, 0.0, 0.0,
+        published.FLUX, 0.0, 0.0,
     )  # fmt: skip
     assert [one.maximise for one in problem(variant="front").objectives] == [False, True]
     assert not problem(variant="field").several
