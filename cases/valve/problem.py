@@ -35,7 +35,7 @@ THROAT_GENE, DIAMETER_GENE = Gene("throat", "m", 3.5 * D, 6 * D), Gene("diameter
 FLUX_GENE = Gene("flux", "T", 0.02, STRONGEST)
 MISSED = 4.0
 """A start that misses what is wanted counts as so many times the worst that there may be."""
-WIDEST = THROAT_GENE.high / DIAMETER_GENE.low
+MOST_ACROSS = THROAT_GENE.high / DIAMETER_GENE.low
 """So many grains at most are side by side in a constriction."""
 GENES = {
     "front": (THROAT_GENE, DIAMETER_GENE, FLUX_GENE),
@@ -56,7 +56,7 @@ MEANINGS = {
     "open flow": "volume that flows without field, after Hagen, Poiseuille, Krieger and Dougherty; none "
     "for a start that is not arrested",
     "width": "diameter of the constriction over that of the grains; "
-    f"{MISSED * WIDEST:.2g} for a start that is arrested",
+    f"{MISSED * MOST_ACROSS:.2g} for a start that is arrested",
     "throat": "diameter of the constriction",
     "diameter": "diameter of the grains",
 }
@@ -103,7 +103,7 @@ def arresting_flow(result: Result) -> float:
 def flowing_width(result: Result) -> float:
     """Return how many grains are side by side in the constriction where the flow goes on; MISSED times the
     most where it is arrested."""
-    return MISSED * WIDEST if arrested(result) else width(result)
+    return MISSED * MOST_ACROSS if arrested(result) else width(result)
 
 
 LEAST_FIELD = Objective("field", arresting_field, "T")

@@ -12,8 +12,8 @@ from cases.valve.open_flow import open_flow
 from cases.valve.problem import (
     BOUND,
     MISSED,
+    MOST_ACROSS,
     STRONGEST,
-    WIDEST,
     arrested,
     flux,
     part_left,
@@ -71,7 +71,7 @@ def test_one_of_four_starts_that_misses_is_worse_than_none():
     genes = {gene.name: gene for gene in problem(variant="front").genome.genes}
     weakest, narrowest = genes["flux"].low, genes["throat"].low / genes["diameter"].high
     assert (3 * weakest + MISSED * STRONGEST) / 4 > STRONGEST
-    assert (3 * narrowest + MISSED * WIDEST) / 4 > WIDEST
+    assert (3 * narrowest + MISSED * MOST_ACROSS) / 4 > MOST_ACROSS
 
 
 def test_a_valve_that_lets_little_through_is_refused_where_that_is_bounded():
