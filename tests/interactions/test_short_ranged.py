@@ -121,8 +121,9 @@ def grains(seed=5, n=160, steps=150, grip=300.0, others=(), stepper=None):
     )
 
 
-def twin(start, steps, stiffness, grip):
-    """The same in NumPy: all pairs, what they remember in a matrix, velocity Verlet."""
+def twin(start, steps, stiffness, grip, shell=(0.0, 0.0)):
+    """The same in NumPy: all pairs, what they remember in a matrix, velocity Verlet; with shells of a
+    stiffness and width."""
     r, v, m, radius = (start[name].copy() for name in ("position", "velocity", "mass", "radius"))
     spin, n = np.zeros_like(v), len(m)
     inertia = 0.4 * m * radius**2
@@ -142,7 +143,8 @@ def twin(start, steps, stiffness, grip):
         normal, distance, touch = pairs()
         force = (-stiffness * (reach - distance)[..., None] * normal + grip * past) * touch[..., None]
         torque = (radius[:, None, None] * np.cross(normal, force)).sum(axis=1)
-        return force.sum(axis=1), torque
+        depth = np.maximum(shell[1] - (distance - reach), 0.0) * ~np.eye(n, dtype=bool)
+        return (force - shell[0] * depth[..., None] * normal).sum(axis=1), torque
 
     force, torque = loads()
     for _ in range(steps):
@@ -206,29 +208,46 @@ def test_what_is_remembered_is_bounded_and_forgotten():
     assert all(radius[i] <= radius[j] for i, j in partners)
 
 
+def of_chunks(setup, slots, monkeypatch):
+    """What becomes of grains in chunks of so many slots."""
+    monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", slots)
+    simulation = Simulation(setup, capacity=160, schedule="world")
+    simulation.load([setup])
+    simulation.run()
+    (result,) = simulation.results()
+    simulation.close()
+    return result
+
+
+SHELL = {"stiffness": 5.0, "width": 0.25}
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("stepper", [None, pytest.param(TRIALS, marks=pytest.mark.slow)])
-def test_contacts_within_a_far_cut_off_are_those_of_contact_alone(monkeypatch, stepper):
-    """Grains part within the reach of another law: what they remember is forgotten as it is where that law is
-    summed over all pairs. Pairs reach particles of another chunk, too."""
-    kept, shell = {}, {"stiffness": 5.0, "width": 0.25}
-    for kind in (SoftShellOfAll, CutOff):
-        setup = grains(others=(kind(**shell),), stepper=stepper)
-        simulation = Simulation(setup, capacity=160, schedule="world")
-        simulation.load([setup])
-        simulation.run()
-        kept[kind] = by_id(simulation.results()[0])
-        simulation.close()
-        monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", 64)
-    over_all, cut = kept.values()
+def test_contacts_within_a_far_cut_off_are_those_of_the_twin(monkeypatch):
+    """Grains part within the reach of another law, and what they remember is forgotten. Pairs reach particles
+    of another chunk, too."""
+    result = of_chunks(grains(others=(CutOff(**SHELL),), steps=75), 64, monkeypatch)
+    state, shell = by_id(result), tuple(SHELL.values())
+    v, spin = twin(result.start, 75, 500.0, 300.0, shell)
+    np.testing.assert_allclose(state["velocity"], v, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(state["spin"], spin, rtol=0, atol=1e-8)
+    # Both act.
+    assert np.abs(twin(result.start, 75, 500.0, 300.0)[0] - v).max() > 0.1
+    assert np.abs(twin(result.start, 75, 500.0, 0.0, shell)[0] - v).max() > 0.1
+
+
+@pytest.mark.slow
+def test_so_are_those_of_steps_found_by_trial(monkeypatch):
+    """After a step what pairs remember is brought up to date by itself, as it is where the other law is
+    summed over all pairs."""
+    over_all, cut = (
+        by_id(of_chunks(grains(others=(kind(**SHELL),), stepper=TRIALS), slots, monkeypatch))
+        for kind, slots in ((SoftShellOfAll, 512), (CutOff, 64))
+    )
     for name in ("velocity", "spin"):
         np.testing.assert_allclose(cut[name], over_all[name], rtol=0, atol=1e-8, err_msg=name)
     partners = (np.sort(state["grip_partners"], axis=1) for state in (cut, over_all))
     np.testing.assert_array_equal(*partners)
-    # Both act: grains roll, and not as they do by themselves.
-    alone = by_id(simulate([grains()], capacity=160, schedule="world")[0])
-    assert np.abs(cut["spin"]).max() > 1
-    assert np.abs(cut["velocity"] - alone["velocity"]).max() > 0.1
 
 
 @pytest.mark.slow

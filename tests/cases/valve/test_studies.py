@@ -51,7 +51,7 @@ def test_each_valve_has_its_starts():
     assert valves[-1].name == "4 grains of 44 µm, no field"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_claims_are_of_the_valves_they_name(monkeypatch):
     found = {one.name: one for one in checks.check(4)}
     arrested = [one for name, one in found.items() if "20x, 30x jam" in name]
