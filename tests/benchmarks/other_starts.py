@@ -19,6 +19,7 @@ import numpy as np
 
 import tisim
 from cases.case import every
+from cases.runs import OTHER_STARTS
 from cases.statistics import Mean
 from optimize import Problem
 from tisim import Result
@@ -50,7 +51,7 @@ def main() -> None:
     parser.add_argument("table", type=Path, help="best.csv of the search")
     parser.add_argument("--variant")
     parser.add_argument("--starts", type=int, default=6)
-    parser.add_argument("--first", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=OTHER_STARTS)
     parser.add_argument("--most", type=int, default=5)
     options = parser.parse_args()
     tisim.init()
