@@ -45,6 +45,7 @@ def test_a_family_has_all_of_its_parts(family):
         "FilledPart",
         "FilledRegion",
         "GrainShapes",
+        "RandomSequential",
     }
     assert missing <= shared | {"LinearSpheres", "Pairwise", "Uniform"}
 

@@ -27,12 +27,13 @@ COMPARED = {"rate": RATES[-1]}
 """Variants and fields are compared at the fastest of the rates, which is the quickest to run."""
 FLUXES = (0.1, 0.2, 0.3, 0.45, 0.6)
 """Flux densities of the sweep, T."""
+WHOLE, MIXED = "as L21 has it", "a third of small grains"
 VARIATIONS: dict[str, Settings] = {
-    "as L21 has it": {},
+    WHOLE: {},
     "no resistance to rolling": {"rolling": 0.0},
     "no cohesion": {"cohesion": 0.0},
     "oil at rest": {"still": True},
-    "a third of small grains": {"grains": mixture(1 / 3)},
+    MIXED: {"grains": mixture(1 / 3)},
     "iron that saturates": {"saturation": CARBONYL_IRON.saturation},
 }
 """The variants that L21 compares (section 2.4.2), a mixture, and grains that saturate, which L21 has not."""
@@ -72,9 +73,13 @@ class Curve:
         they are errors of their own, would not know how far off it is.
         """
         fits = [fit_bingham(self.x, start) for start in self.of_starts.T]
-        yields = Mean.of([one.yield_stress.value for one in fits])
+        yields = Mean.of(self.yield_stresses())
         viscosity = Mean.of([one.plastic_viscosity.value for one in fits])
         return BinghamFit(*(Estimate(one.value, one.half) for one in (yields, viscosity)))
+
+    def yield_stresses(self) -> np.ndarray:
+        """Return the yield stress of the fluid of Bingham that fits the curve of each start, Pa."""
+        return np.array([fit_bingham(self.x, start).yield_stress.value for start in self.of_starts.T])
 
     def power(self) -> Mean:
         """Return the mean over starts of the exponent of the power law that fits the curve of each."""
@@ -82,9 +87,11 @@ class Curve:
         return Mean.of([np.polyfit(x, np.log(start), 1)[0] for start in self.of_starts.T])
 
 
-def flow_curve(starts: int, rates: Sequence[float] = RATES, progress: Progress | None = None) -> Curve:
-    """Return stress by shear rate; one world for each rate and start, all as one batch."""
-    groups = cells([{"rate": rate} for rate in rates], starts, progress)
+def flow_curve(
+    starts: int, part: Settings, rates: Sequence[float] = RATES, progress: Progress | None = None
+) -> Curve:
+    """Return stress by shear rate of a variant; one world for each rate and start, all as one batch."""
+    groups = cells([{**part, "rate": rate} for rate in rates], starts, progress)
     return Curve(np.array([shear_rate(group[0]) for group in groups]), groups)
 
 

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from tisim import InputError
-from tisim.packing.random_sequential import SATURATION_FRACTION, place
-from tisim.packing.region import box
+from tisim import Box, Cloud, InputError, Scene
+from tisim.engine.batches import Batches
+from tisim.packing import random_sequential
+from tisim.packing.random_sequential import SATURATION_FRACTION, place, placed_side_by_side
+from tisim.packing.region import box, inside_round
 from tisim.packing.saturation import fill
+from tisim.packing.tried_places import Packing
 
 LOW, HIGH = np.array([-1.0, 0.0, 2.0]), np.array([1.0, 1.0, 3.5])
 RADIUS = 0.05
@@ -58,6 +61,65 @@ def test_what_is_just_beyond_reach_says_what_was_reached():
     reached = float(str(error_info.value).split("at most ")[1][:6])
     # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
     assert reached == pytest.approx(SATURATION_FRACTION, abs=0.006)
+
+
+PACKINGS = [
+    Packing(np.full(300, RADIUS), box(LOW, HIGH), 3),
+    Packing(np.full(300, RADIUS), box(LOW, HIGH, (True,) * 3), 3),
+    Packing(
+        np.repeat([0.004, 0.2, 0.03], [50, 1, 20]), inside_round("ball", (1.0, 0.0, 0.0), (1.0,) * 3, 0.2), 4
+    ),
+    Packing(np.full(300, RADIUS), box(LOW, HIGH), 3),
+    Packing(np.full(1, 0.5), box(LOW, HIGH), 2**63 - 1),
+    Packing(np.array([0.3, 0.3, 0.3]), box(LOW, LOW + 0.4), 0),
+]
+"""Unlike ones, two that are the same, and one with room for a single sphere."""
+
+
+def test_side_by_side_packings_are_those_made_alone(monkeypatch):
+    def made(packing):
+        try:
+            return place(packing.radii, packing.region, packing.seed)
+        except InputError as error:
+            return str(error)
+
+    alone, rounds = [made(packing) for packing in PACKINGS], []
+    everywhere = random_sequential.everywhere
+    monkeypatch.setattr(
+        random_sequential, "everywhere", lambda some: rounds.append(len(some)) or everywhere(some)
+    )
+    with placed_side_by_side(PACKINGS):
+        together = [made(packing) for packing in PACKINGS]
+    assert rounds == [5]
+    assert "3 were placed" in alone[-1]
+    for one, other in zip(alone, together, strict=True):
+        np.testing.assert_array_equal(one, other)
+    # Nothing is kept beyond.
+    made(PACKINGS[0])
+    assert rounds == [5, 1]
+
+
+def test_spheres_of_a_batch_are_placed_side_by_side(monkeypatch):
+    """Also where one scene has no room for a sphere, which then fails alone."""
+    rounds, everywhere = [], random_sequential.everywhere
+    monkeypatch.setattr(
+        random_sequential, "everywhere", lambda some: rounds.append(len(some)) or everywhere(some)
+    )
+    box_of_two_walls = Box(low=(0.0,) * 3, high=(1.0,) * 3, periodic=(False, True, True))
+    scenes = [
+        Scene(
+            particles=Cloud(number=20, radius=radius, density=1.0),
+            domain=box_of_two_walls,
+            duration=1.0,
+            seed=seed,
+        )
+        for seed, radius in enumerate((0.02, 0.05, 0.6, 0.08))
+    ]
+    results = dict(Batches().run(scenes, strict=False))
+    assert rounds == [3]
+    assert [k for k, result in results.items() if not result.status.ok] == [2]
+    for k in (0, 1, 3):
+        np.testing.assert_array_equal(results[k].start["position"], scenes[k].start()["position"])
 
 
 def saturated(region, radius, seed=0):

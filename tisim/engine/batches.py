@@ -13,6 +13,7 @@ from tisim.engine.result import Result, Status
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, must
 from tisim.scene.initial_state import Arrays
+from tisim.scene.placed_together import placed_together
 from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -68,17 +69,20 @@ class Batches:
         """
         starts: dict[int, Arrays] = {}
         groups: dict[Any, list[int]] = {}
-        for index, scene in enumerate(scenes):
-            try:
-                starts[index] = scene.start()
-            except InputError as error:
-                if strict:
-                    raise
-                failed = Status(False, str(error))
-                yield index, Result(scene, {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
-                continue
-            groups.setdefault(scene.structure(), []).append(index)
-        finished_scenes = len(scenes) - len(starts)
+        failures: dict[int, str] = {}
+        with placed_together(scenes):
+            for index, scene in enumerate(scenes):
+                try:
+                    starts[index] = scene.start()
+                    groups.setdefault(scene.structure(), []).append(index)
+                except InputError as error:
+                    if strict:
+                        raise
+                    failures[index] = str(error)
+        for index, reason in failures.items():
+            failed = Status(False, reason)
+            yield index, Result(scenes[index], {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
+        finished_scenes = len(failures)
         for members in groups.values():
             with self._simulation([scenes[k] for k in members]) as simulation:
                 for begin in range(0, len(members), simulation.worlds):

@@ -18,6 +18,7 @@ from tisim.engine.result import Result
 from tisim.errors import InputError, is_number, is_whole, must
 from tisim.neighbours import near_list
 from tisim.scene.initial_state import Arrays
+from tisim.scene.placed_together import placed_together
 from tisim.scene.scene import Scene
 from tisim.worlds.status import NEVER, WorldStatus
 
@@ -66,7 +67,10 @@ class Simulation(CompiledWorlds):
                 f"at most {self.s.capacity}",
                 room,
             )
-        starts = list(starts or (scene.start() for scene in scenes))
+        if starts is None:
+            with placed_together(scenes):
+                starts = [scene.start() for scene in scenes]
+        starts = list(starts)
         for scene, start in zip(scenes, starts, strict=True):
             check_start(self.s.fields, scene, start)
         self.table.write([parts(scene) for scene in scenes])

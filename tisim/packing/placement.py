@@ -15,6 +15,8 @@ from tisim.errors import must
 from tisim.geometry.directions import along_axis
 from tisim.packing import region
 from tisim.packing.random_sequential import place
+from tisim.packing.region import Region
+from tisim.packing.tried_places import Packing
 
 
 class Placement(Component):
@@ -33,8 +35,31 @@ class Placement(Component):
         """
         raise NotImplementedError(f"{type(self).__name__} must define centres")
 
+    def packing(self, radii: np.ndarray, domain: Domain, seed: int) -> Packing | None:
+        """Return the random sequential addition that ``centres`` asks for; None where there is none.
 
-class RandomInDomain(Placement):
+        Those of a batch of worlds are placed side by side.
+        """
+        return None
+
+
+class RandomSequential(Placement):
+    """This is the contract of a placement by random sequential addition, within a region."""
+
+    contract: ClassVar[bool] = True
+
+    def region(self, radii: np.ndarray, domain: Domain) -> Region:
+        """Return the region of the centres of the largest of these spheres (m)."""
+        raise NotImplementedError(f"{type(self).__name__} must define region")
+
+    def packing(self, radii: np.ndarray, domain: Domain, seed: int) -> Packing:
+        return Packing(radii, self.region(radii, domain), seed)
+
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        return place(radii, self.region(radii, domain), seed)
+
+
+class RandomInDomain(RandomSequential):
     """Spheres lie at random with their centres anywhere in the domain, by random sequential addition.
 
     They may reach over faces of the domain that are joined, and across these they keep apart where particles
@@ -43,22 +68,21 @@ class RandomInDomain(Placement):
     Source: Z04 section 8.
     """
 
-    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
-        return place(radii, region.in_domain(domain, float(radii.max())), seed)
+    def region(self, radii: np.ndarray, domain: Domain) -> Region:
+        return region.in_domain(domain, float(radii.max()))
 
 
-class RandomInBox(Placement):
+class RandomInBox(RandomSequential):
     """Spheres lie at random and wholly inside a box, by random sequential addition."""
 
     low: Vector = parameter("m", "lower corner of the box", examples=[(0.0, 0.0, 0.0)])
     high: Vector = parameter("m", "upper corner of the box", examples=[(0.01, 0.01, 0.01)])
 
-    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
-        low, high = np.asarray(self.low), np.asarray(self.high)
-        return place(radii, region.inside_box(low, high, float(radii.max())), seed)
+    def region(self, radii: np.ndarray, domain: Domain) -> Region:
+        return region.inside_box(np.asarray(self.low), np.asarray(self.high), float(radii.max()))
 
 
-class RandomInBall(Placement):
+class RandomInBall(RandomSequential):
     """Spheres lie at random and wholly inside a ball, by random sequential addition.
 
     Source: Z16 sections 6.1, 9.
@@ -67,12 +91,12 @@ class RandomInBall(Placement):
     radius: float = parameter("m", "radius of the ball", examples=[0.01], gt=0)
     centre: Vector = parameter("m", "centre of the ball", (0.0, 0.0, 0.0))
 
-    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
-        half, largest = (self.radius, self.radius, self.radius), float(radii.max())
-        return place(radii, region.inside_round("ball", self.centre, half, largest), seed)
+    def region(self, radii: np.ndarray, domain: Domain) -> Region:
+        half = (self.radius, self.radius, self.radius)
+        return region.inside_round("ball", self.centre, half, float(radii.max()))
 
 
-class RandomInCylinder(Placement):
+class RandomInCylinder(RandomSequential):
     """Spheres lie at random and wholly inside a cylinder, by random sequential addition."""
 
     centre: Vector = parameter("m", "centre of the cylinder", (0.0, 0.0, 0.0))
@@ -85,11 +109,14 @@ class RandomInCylinder(Placement):
         check_direction(f"{self.label}.axis", self.axis)
         return self
 
+    def region(self, radii: np.ndarray, domain: Domain) -> Region:
+        half = (self.radius, self.radius, self.length / 2)
+        return region.inside_round("cylinder", (0.0, 0.0, 0.0), half, float(radii.max()))
+
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
-        half, largest = (self.radius, self.radius, self.length / 2), float(radii.max())
-        cylinder = region.inside_round("cylinder", (0.0, 0.0, 0.0), half, largest)
-        check_resolved("places in the cylinder", np.abs(self.centre) + cylinder.high, float(radii.min()))
-        return np.asarray(self.centre) + along_axis(place(radii, cylinder, seed), self.axis)
+        farthest = np.abs(self.centre) + self.region(radii, domain).high
+        check_resolved("places in the cylinder", farthest, float(radii.min()))
+        return np.asarray(self.centre) + along_axis(super().centres(radii, domain, seed), self.axis)
 
 
 class Lattice(Placement):

@@ -22,6 +22,7 @@ from tisim.packing.grains import (
     quantity,
 )
 from tisim.packing.placement import Placement, RandomInDomain
+from tisim.packing.tried_places import Packing
 from tisim.scene.initial_state import Arrays, Start, worst
 from tisim.scene.initial_velocity import Pulse
 
@@ -136,6 +137,9 @@ class Cloud(Start):
         names = self.grains[0].quantities
         further = {name: quantity(self.grains, name, which) for name in names}
         return {"radius": radius, "mass": masses(self.grains, which, radius), **further}
+
+    def packing(self, domain: Domain, seed: int) -> Packing | None:
+        return self.placement.packing(self._spheres(self.count(), seed)["radius"], domain, seed)
 
     def structure(self) -> tuple[Any, ...]:
         return (type(self),)

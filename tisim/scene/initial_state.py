@@ -15,6 +15,7 @@ from tisim.components.materials import Materials
 from tisim.components.ranges import MOST, limits
 from tisim.errors import InputError, abbreviated, must
 from tisim.packing.clump import Clump, clump_columns, sphere_columns
+from tisim.packing.tried_places import Packing
 
 Arrays = dict[str, np.ndarray]
 """These are particle quantities by field name: shape (n,) or (n, 3), SI."""
@@ -32,6 +33,10 @@ class Start(Component):
     def arrays(self, domain: Domain, seed: int) -> Arrays:
         """Return position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
+
+    def packing(self, domain: Domain, seed: int) -> Packing | None:
+        """Return the random sequential addition that ``arrays`` asks for; None where there is none."""
+        return None
 
     def material_indices(self, materials: Materials, seed: int) -> np.ndarray | None:
         """Return the index of the material of each particle, shape (n,), given those of the scene; None where

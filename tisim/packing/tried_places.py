@@ -1,0 +1,171 @@
+"""Random sequential addition by trying places everywhere; packings are made side by side, one a thread."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.geometry import round_box
+from tisim.numerics import philox
+from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
+from tisim.packing.region import Region
+
+MAX_CONSECUTIVE_FAILURES = 5_000
+"""After so many failures in a row places are no longer tried everywhere, only where there is room."""
+MAX_CELLS = 128
+"""The list of neighbours has so many cells along an axis at most: 8 MB of them, for a million spheres."""
+CELLS_OF_A_SPHERE = 8
+"""A level has about so many cells for each sphere at most."""
+MAX_LEVELS = 12
+"""Spheres of half the size have smaller cells; from the size ratio 2^11 on no smaller ones."""
+
+
+@in_taichi_thread
+@ti.kernel
+def _add(
+    spheres: ti.types.ndarray(),  # type: ignore[valid-type]
+    chains: ti.types.ndarray(),  # type: ignore[valid-type]
+    levels: ti.types.ndarray(),  # type: ignore[valid-type]
+    heads: ti.types.ndarray(),  # type: ignore[valid-type]
+    packings: ti.types.ndarray(),  # type: ignore[valid-type]
+    regions: ti.types.ndarray(),  # type: ignore[valid-type]
+    seeds: ti.types.ndarray(),  # type: ignore[valid-type]
+    max_failures: ti.i32,
+):
+    """Place the spheres of each packing, whose radii never rise.
+
+    spheres : the radius of each, then its centre. chains : its level, and the one before it in its cell.
+    levels : the first cell of each, and how many it has along each axis. heads : the last member of each
+    cell; -1 where there is none. packings : the first sphere of each, the one after the last, its first
+    level, and then how many found room. regions : the corner and sides of the region of the largest sphere,
+    and of the smallest, and whether each axis is periodic, round and walled.
+    """
+    for p in range(packings.shape[0]):
+        low, side = _row(regions, p, 0), _row(regions, p, 1)
+        widest_low, widest_side = _row(regions, p, 2), _row(regions, p, 3)
+        periodic, rounded, walled = _row(regions, p, 4), _row(regions, p, 5), _row(regions, p, 6)
+        first, lowest = packings[p, 0], packings[p, 2]
+        attempt = ti.cast(0, ti.u64)
+        placed = 0
+        stuck = False
+        for i in range(first, packings[p, 1]):
+            radius, level = spheres[i, 0], chains[i, 0]
+            wider = walled * (spheres[first, 0] - radius)
+            free = False
+            tries = 0
+            while not free and tries < max_failures and not stuck:
+                a = philox.uniform(philox.bits(seeds[p], SEQUENTIAL_ADDITION, 0, attempt, 0))
+                b = philox.uniform(philox.bits(seeds[p], SEQUENTIAL_ADDITION, 0, attempt, 1))
+                u = ti.Vector([a[0], a[1], b[0]])
+                attempt += ti.cast(1, ti.u64)
+                if round_box.contains(rounded, ti.Vector([0.5, 0.5, 0.5]), u - 0.5):
+                    tries += 1
+                    x = low - wider + u * (side + 2.0 * wider)
+                    place = (x - widest_low) / widest_side
+                    free = True
+                    # From the cell itself on: most places that are taken are found to be so there.
+                    for k in range(27 * (level + 1)):
+                        m, turn = lowest + level - k // 27, (k + 13) % 27
+                        dims = ti.Vector([levels[m, 1], levels[m, 2], levels[m, 3]])
+                        cell = ti.max(0, ti.min(ti.floor(place * dims, ti.i32), dims - 1))
+                        c = cell + ti.Vector([turn // 9 - 1, turn // 3 % 3 - 1, turn % 3 - 1])
+                        c = ti.select(periodic > 0.0, (c + dims) % dims, c)
+                        if free and c.min() >= 0 and (c < dims).all():
+                            j = heads[levels[m, 0] + (c[0] * dims[1] + c[1]) * dims[2] + c[2]]
+                            while j >= 0:
+                                gap = x - ti.Vector([spheres[j, 1], spheres[j, 2], spheres[j, 3]])
+                                gap -= periodic * side * ti.round(gap / side)
+                                apart = radius + spheres[j, 0]
+                                if gap.norm_sqr() < apart * apart:
+                                    free = False
+                                j = chains[j, 1]
+                    if free:
+                        m = lowest + level
+                        dims = ti.Vector([levels[m, 1], levels[m, 2], levels[m, 3]])
+                        cell = ti.max(0, ti.min(ti.floor(place * dims, ti.i32), dims - 1))
+                        at = levels[m, 0] + (cell[0] * dims[1] + cell[1]) * dims[2] + cell[2]
+                        chains[i, 1] = heads[at]
+                        heads[at] = i
+                        for k in ti.static(range(3)):
+                            spheres[i, 1 + k] = x[k]
+            if free:
+                placed += 1
+            else:
+                stuck = True
+        packings[p, 3] = placed
+
+
+@ti.func
+def _row(array: ti.template(), p, k):  # type: ignore[valid-type]
+    return ti.Vector([array[p, k, 0], array[p, k, 1], array[p, k, 2]])
+
+
+@dataclass(frozen=True)
+class Packing:
+    """A packing is of spheres of these radii (m), shape (n,), at least one, by the random numbers of a seed.
+
+    region : of the centres of the largest.
+    """
+
+    radii: np.ndarray
+    region: Region
+    seed: int
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """The order in which the spheres are placed: the largest first."""
+        return np.argsort(-self.radii, kind="stable")
+
+    def key(self) -> tuple[bytes, bytes, int]:
+        """Return what decides where the spheres lie."""
+        return self.radii.tobytes(), self.rows.tobytes(), self.seed
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """What ``regions`` of the kernel has of it, shape (7, 3)."""
+        region = self.region
+        widest = region.for_radius(float(self.radii.max()), float(self.radii.min()))
+        axes = (region.periodic, round_box.ROUND[region.shape], region.walled)
+        return np.array([region.low, region.side, widest.low, widest.side, *axes], float)
+
+
+def everywhere(packings: Sequence[Packing]) -> list[np.ndarray]:
+    """Return of each packing the first centres, in its order, found by trying places in all of its region."""
+    grids = [_cells(packing) for packing in packings]
+    radii = [packing.radii[packing.order] for packing in packings]
+    ends, lowest = np.cumsum([len(one) for one in radii]), np.cumsum([0, *map(len, grids)])[:-1]
+    dims = np.concatenate(grids)
+    cells = np.cumsum(dims.prod(axis=1))
+    spheres, chains = np.zeros((ends[-1], 4)), np.full((ends[-1], 2), -1, np.int32)
+    spheres[:, 0] = np.concatenate(radii)
+    chains[:, 0] = np.concatenate([_levels(one) for one in radii])
+    levels = np.column_stack([np.concatenate([[0], cells[:-1]]), dims]).astype(np.int32)
+    heads = np.full(cells[-1], -1, np.int32)
+    starts = np.concatenate([[0], ends[:-1]])
+    ranges = np.column_stack([starts, ends, lowest, 0 * ends]).astype(np.int32)
+    regions = np.stack([packing.rows for packing in packings])
+    seeds = np.array([packing.seed for packing in packings], np.uint64)
+    _add(spheres, chains, levels, heads, ranges, regions, seeds, MAX_CONSECUTIVE_FAILURES)
+    return [spheres[first : first + placed, 1:] for first, _, _, placed in ranges]
+
+
+def _levels(radii: np.ndarray) -> np.ndarray:
+    """Return the level of each sphere, whose radii never rise: those of half the size have smaller cells."""
+    return np.minimum(np.log2(radii[0] / radii), MAX_LEVELS - 1).astype(np.int32)
+
+
+def _cells(packing: Packing) -> np.ndarray:
+    """Return how many cells each level has along each axis, shape (levels, 3).
+
+    They are at least a diameter wide, so that overlaps are found in the 27 cells around, and not many more
+    than spheres.
+    """
+    largest, side = float(packing.radii.max()), packing.rows[3]
+    levels = int(_levels(np.array([largest, packing.radii.min()]))[1]) + 1
+    widths = 2.0 * largest * 0.5 ** np.arange(levels)
+    dims = np.clip(np.floor(side / widths[:, None]), 1, MAX_CELLS)
+    too_many = np.cbrt(np.maximum(dims.prod(axis=1) / (CELLS_OF_A_SPHERE * len(packing.radii)), 1.0))
+    return np.maximum(np.floor(dims / too_many[:, None]), 1).astype(np.int32)
