@@ -6,6 +6,7 @@ A ``Component`` is a frozen pydantic model. Its name in a file is its class name
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -128,22 +129,28 @@ class Component(AccuracyHints, Checked):
                     yield from part.parts()
 
     @classmethod
-    def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
-        """Yield name, declaration and number of components of each parameter that may differ per world."""
+    @functools.cache
+    def parameters(cls) -> tuple[tuple[str, FieldInfo, int], ...]:
+        """Return name, declaration and number of components of each parameter that may differ per world."""
+        found = []
         for name, info in cls.model_fields.items():
             if info.annotation in (float, float | None):
-                yield name, info, 1
+                found.append((name, info, 1))
             elif info.annotation == Vector:
-                yield name, info, 3
+                found.append((name, info, 3))
+        return tuple(found)
 
     @classmethod
-    def lists(cls) -> Iterator[tuple[str, type[Component]]]:
-        """Yield name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a
+    @functools.cache
+    def lists(cls) -> tuple[tuple[str, type[Component]], ...]:
+        """Return name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a
         world may have any number of them."""
+        found = []
         for name, info in cls.model_fields.items():
             row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)
             if rest == [...] and isinstance(row, type) and issubclass(row, Component):
-                yield name, row
+                found.append((name, row))
+        return tuple(found)
 
     @classmethod
     def from_files(cls, values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:

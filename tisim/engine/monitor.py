@@ -144,14 +144,15 @@ class Monitor:
             finite &= ~broken.any(axis=1)
         return finite
 
-    def status(self, w: int, code: int) -> Status:
-        """Return how a world whose status field holds ``code`` has ended, or that it runs."""
+    def status(self, w: int, now: Image) -> Status:
+        """Return how a world has ended, or that it runs; ``now`` has ``status`` and ``ending_effect``."""
         if w in self.faults:
             when, why = self.faults[w]
             return Status(
                 False, f"found at t = {when:.6g} s: {why}; kept t = {self.last_good['time'][w]:.6g} s"
             )
-        effects, by = self.simulation.scenes[w].effects, int(self.s.read("ending_effect")[w])
+        effects = self.simulation.scenes[w].effects
+        code, by = int(now["status"][w]), int(now["ending_effect"][w])
         if code == WorldStatus.ENDED and by < len(effects):
             return Status(True, f"{effects[by].ends}, by effects.{effects[by].label}")
         return Status(code == WorldStatus.ENDED, REASONS[code])

@@ -96,7 +96,7 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
     s = simulation.s
     now, before = s.image(), simulation.monitor.replay.whole()
     status, goal, pauses = now["status"].copy(), now["goal"].copy(), s.read("pause_time")
-    reason = simulation.monitor.status(w, int(status[w])).reason
+    reason = simulation.monitor.status(w, now).reason
     must(status[w] == WorldStatus.RUNNING, "world to write to", "one that runs", reason)
     must(now["underway"][w] == 0, "world to write to", "between two steps", "one whose step is under way")
     now[name][w, simulation.in_order(w, now)] = values

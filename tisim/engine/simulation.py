@@ -215,7 +215,6 @@ class Simulation(CompiledWorlds):
         self._check_loaded()
         now, good = self.s.snapshot(self.s.columns), self.monitor.last_good
         counts = {name: now[name] for name in self.s.counters}
-        status = now["status"]
         results = []
         asked = range(len(self.scenes)) if worlds is None else worlds
         for w, measures in zip(asked, self.measures(asked), strict=True):
@@ -228,7 +227,7 @@ class Simulation(CompiledWorlds):
                     start=self.starts[w],
                     time=float(good["time"][w]),
                     work={name: int(count[w]) for name, count in counts.items()},
-                    status=self.monitor.status(w, int(status[w])),
+                    status=self.monitor.status(w, now),
                     wall_s=self.wall_s / len(self.scenes),
                     settings={**self.runtime.described, **self._edited(w)},
                     measures=measures,

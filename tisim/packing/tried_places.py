@@ -6,12 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
+from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.geometry import round_box
 from tisim.numerics import philox
 from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
 from tisim.packing.region import Region
+from tisim.worlds.launches import TASK
 
 MAX_CONSECUTIVE_FAILURES = 5_000
 """After so many failures in a row places are no longer tried everywhere, only where there is room."""
@@ -33,7 +35,7 @@ def _add(
     packings: ti.types.ndarray(),  # type: ignore[valid-type]
     regions: ti.types.ndarray(),  # type: ignore[valid-type]
     seeds: ti.types.ndarray(),  # type: ignore[valid-type]
-    max_failures: ti.i32,
+    task: ti.i32,
 ):
     """Place the spheres of each packing, whose radii never rise.
 
@@ -41,61 +43,79 @@ def _add(
     levels : the first cell of each, and how many it has along each axis. heads : the last member of each
     cell; -1 where there is none. packings : the first sphere of each, the one after the last, its first
     level, and then how many found room. regions : the corner and sides of the region of the largest sphere,
-    and of the smallest, and whether each axis is periodic, round and walled.
+    and of the smallest, and whether each axis is periodic, round and walled. task : a thread takes so many
+    iterations of a loop at least.
     """
-    for p in range(packings.shape[0]):
-        low, side = _row(regions, p, 0), _row(regions, p, 1)
-        widest_low, widest_side = _row(regions, p, 2), _row(regions, p, 3)
-        periodic, rounded, walled = _row(regions, p, 4), _row(regions, p, 5), _row(regions, p, 6)
-        first, lowest = packings[p, 0], packings[p, 2]
-        attempt = ti.cast(0, ti.u64)
-        placed = 0
-        stuck = False
-        for i in range(first, packings[p, 1]):
-            radius, level = spheres[i, 0], chains[i, 0]
-            wider = walled * (spheres[first, 0] - radius)
-            free = False
-            tries = 0
-            while not free and tries < max_failures and not stuck:
-                a = philox.uniform(philox.bits(seeds[p], SEQUENTIAL_ADDITION, 0, attempt, 0))
-                b = philox.uniform(philox.bits(seeds[p], SEQUENTIAL_ADDITION, 0, attempt, 1))
-                u = ti.Vector([a[0], a[1], b[0]])
-                attempt += ti.cast(1, ti.u64)
-                if round_box.contains(rounded, ti.Vector([0.5, 0.5, 0.5]), u - 0.5):
-                    tries += 1
-                    x = low - wider + u * (side + 2.0 * wider)
-                    place = (x - widest_low) / widest_side
-                    free = True
-                    # From the cell itself on: most places that are taken are found to be so there.
-                    for k in range(27 * (level + 1)):
-                        m, turn = lowest + level - k // 27, (k + 13) % 27
-                        dims = ti.Vector([levels[m, 1], levels[m, 2], levels[m, 3]])
-                        cell = ti.max(0, ti.min(ti.floor(place * dims, ti.i32), dims - 1))
-                        c = cell + ti.Vector([turn // 9 - 1, turn // 3 % 3 - 1, turn % 3 - 1])
-                        c = ti.select(periodic > 0.0, (c + dims) % dims, c)
-                        if free and c.min() >= 0 and (c < dims).all():
-                            j = heads[levels[m, 0] + (c[0] * dims[1] + c[1]) * dims[2] + c[2]]
-                            while j >= 0:
-                                gap = x - ti.Vector([spheres[j, 1], spheres[j, 2], spheres[j, 3]])
-                                gap -= periodic * side * ti.round(gap / side)
-                                apart = radius + spheres[j, 0]
-                                if gap.norm_sqr() < apart * apart:
-                                    free = False
-                                j = chains[j, 1]
-                    if free:
-                        m = lowest + level
-                        dims = ti.Vector([levels[m, 1], levels[m, 2], levels[m, 3]])
-                        cell = ti.max(0, ti.min(ti.floor(place * dims, ti.i32), dims - 1))
-                        at = levels[m, 0] + (cell[0] * dims[1] + cell[1]) * dims[2] + cell[2]
-                        chains[i, 1] = heads[at]
-                        heads[at] = i
-                        for k in ti.static(range(3)):
-                            spheres[i, 1 + k] = x[k]
-            if free:
-                placed += 1
-            else:
-                stuck = True
-        packings[p, 3] = placed
+    for iteration in range(packings.shape[0] * task):
+        if iteration % task == 0:
+            p = iteration // task
+            packings[p, 3] = _placed(spheres, chains, levels, heads, packings, regions, seeds[p], p)
+
+
+@ti.func
+def _placed(
+    spheres: ti.template(),  # type: ignore[valid-type]
+    chains: ti.template(),  # type: ignore[valid-type]
+    levels: ti.template(),  # type: ignore[valid-type]
+    heads: ti.template(),  # type: ignore[valid-type]
+    packings: ti.template(),  # type: ignore[valid-type]
+    regions: ti.template(),  # type: ignore[valid-type]
+    seed,
+    p,
+):
+    """Place the spheres of a packing; return how many found room."""
+    low, side = _row(regions, p, 0), _row(regions, p, 1)
+    widest_low, widest_side = _row(regions, p, 2), _row(regions, p, 3)
+    periodic, rounded, walled = _row(regions, p, 4), _row(regions, p, 5), _row(regions, p, 6)
+    first, lowest = packings[p, 0], packings[p, 2]
+    attempt = ti.cast(0, ti.u64)
+    placed = 0
+    stuck = False
+    for i in range(first, packings[p, 1]):
+        radius, level = spheres[i, 0], chains[i, 0]
+        wider = walled * (spheres[first, 0] - radius)
+        free = False
+        tries = 0
+        while not free and tries < MAX_CONSECUTIVE_FAILURES and not stuck:
+            a = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 0))
+            b = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 1))
+            u = ti.Vector([a[0], a[1], b[0]])
+            attempt += ti.cast(1, ti.u64)
+            if round_box.contains(rounded, ti.Vector([0.5, 0.5, 0.5]), u - 0.5):
+                tries += 1
+                x = low - wider + u * (side + 2.0 * wider)
+                place = (x - widest_low) / widest_side
+                free = True
+                # From the cell itself on: most places that are taken are found to be so there.
+                for k in range(27 * (level + 1)):
+                    m, turn = lowest + level - k // 27, (k + 13) % 27
+                    dims = ti.Vector([levels[m, 1], levels[m, 2], levels[m, 3]])
+                    cell = ti.max(0, ti.min(ti.floor(place * dims, ti.i32), dims - 1))
+                    c = cell + ti.Vector([turn // 9 - 1, turn // 3 % 3 - 1, turn % 3 - 1])
+                    c = ti.select(periodic > 0.0, (c + dims) % dims, c)
+                    if free and c.min() >= 0 and (c < dims).all():
+                        j = heads[levels[m, 0] + (c[0] * dims[1] + c[1]) * dims[2] + c[2]]
+                        while j >= 0:
+                            gap = x - ti.Vector([spheres[j, 1], spheres[j, 2], spheres[j, 3]])
+                            gap -= periodic * side * ti.round(gap / side)
+                            apart = radius + spheres[j, 0]
+                            if gap.norm_sqr() < apart * apart:
+                                free = False
+                            j = chains[j, 1]
+                if free:
+                    m = lowest + level
+                    dims = ti.Vector([levels[m, 1], levels[m, 2], levels[m, 3]])
+                    cell = ti.max(0, ti.min(ti.floor(place * dims, ti.i32), dims - 1))
+                    at = levels[m, 0] + (cell[0] * dims[1] + cell[1]) * dims[2] + cell[2]
+                    chains[i, 1] = heads[at]
+                    heads[at] = i
+                    for k in ti.static(range(3)):
+                        spheres[i, 1 + k] = x[k]
+        if free:
+            placed += 1
+        else:
+            stuck = True
+    return placed
 
 
 @ti.func
@@ -148,7 +168,8 @@ def everywhere(packings: Sequence[Packing]) -> list[np.ndarray]:
     ranges = np.column_stack([starts, ends, lowest, 0 * ends]).astype(np.int32)
     regions = np.stack([packing.rows for packing in packings])
     seeds = np.array([packing.seed for packing in packings], np.uint64)
-    _add(spheres, chains, levels, heads, ranges, regions, seeds, MAX_CONSECUTIVE_FAILURES)
+    task = TASK if runtime.current().device == "cpu" else 1
+    _add(spheres, chains, levels, heads, ranges, regions, seeds, task)
     return [spheres[first : first + placed, 1:] for first, _, _, placed in ranges]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -148,6 +149,7 @@ class Effect(LawHints, Component):
         return ""
 
     @classmethod
+    @functools.cache
     def offers(cls, hook: str) -> bool:
         """Return whether it defines a method that its contract leaves empty."""
         return getattr(cls, hook) is not getattr(cls._promise(hook), hook)
