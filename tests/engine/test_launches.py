@@ -13,6 +13,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.worlds import team
 from tisim.worlds.fields import CORE
 from tisim.worlds.launched_program import LaunchedProgram
+from tisim.worlds.launches import tasks_of
 from tisim.worlds.phases import Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import NEVER, WorldStatus
@@ -208,3 +209,26 @@ def test_teams_are_tried_again_at_little_cost():
     assert not trials.alone
     trials.learn(100, 1000, 0.21, parted=True)
     assert trials.alone == pytest.approx(0.21 / TRIAL_COST / 2e-3 / 2, abs=1)
+
+
+def phase_of(extent, long=False):
+    """A phase that has only a size."""
+    phase = Phase()
+    phase.extent, phase.long = extent, long
+    return phase
+
+
+@pytest.mark.parametrize(
+    ("extent", "long", "worlds", "tasks"),
+    [
+        (2000, False, 1, 2),
+        (2000, True, 1, 8),
+        (500, False, 1, 1),
+        (100, True, 390, 1),
+        (100, True, 3, 2),
+        (3, True, 1, 2),
+    ],
+)
+def test_tasks_of_a_phase_are_as_many_for_each_thread(extent, long, worlds, tasks):
+    """2000 particles are not cut into three for two threads, one of which would wait for the other."""
+    assert tasks_of(phase_of(extent, long), worlds, threads=2) == tasks

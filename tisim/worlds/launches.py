@@ -30,6 +30,13 @@ TASKS_PER_THREAD = 4
 """A loop has so many tasks for each thread of a CPU, so that a thread that comes late has less to do."""
 
 
+def tasks_of(phase: Phase, worlds: int, threads: int) -> int:
+    """Return into how many tasks a phase of a world is cut for threads of a CPU: as many for each of them."""
+    least = TASK if phase.light and not phase.long else 1
+    tasks = max(1, min(-(-TASKS_PER_THREAD * threads // worlds), phase.extent // least))
+    return tasks - tasks % threads if tasks > threads else tasks
+
+
 @ti.data_oriented
 class Launch:
     """A launch takes phases that follow each other: a loop over tasks of each, in every world whose turn it
@@ -43,12 +50,10 @@ class Launch:
         self.program, self.s, self.route = program, program.s, route
         settings = runtime.current()
         self.iterations = TASK if settings.device == "cpu" else 1
-        most = TASKS_PER_THREAD * settings.threads
         self.loops: tuple[tuple[Phase, int, int], ...] = ()
         for phase in phases:
-            tasks = phase.extent
-            if settings.device == "cpu":
-                tasks = max(1, min(most, phase.extent // (TASK if phase.light else 1)))
+            on_cpu = settings.device == "cpu"
+            tasks = tasks_of(phase, self.s.worlds, settings.threads) if on_cpu else phase.extent
             self.loops += ((phase, tasks, -(-phase.extent // tasks)),)
         self.run, self.run_and_look = Launcher(self._run), Launcher(self._run_and_look)
 
