@@ -45,7 +45,6 @@ def test_a_family_has_all_of_its_parts(family):
         "FilledPart",
         "FilledRegion",
         "GrainShapes",
-        "RandomSequential",
     }
     assert missing <= shared | {"LinearSpheres", "Pairwise", "Uniform"}
 

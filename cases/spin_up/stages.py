@@ -93,7 +93,7 @@ class SpinUp:
         return self.steps[int(happened.argmax())].rate if happened.any() else float("nan")
 
 
-def turn(state: ParticleState, rate: float) -> None:
+def turn(state: ParticleState | Arrays, rate: float) -> None:
     """Give the pile in a state an angular velocity (rad/s) about z as a whole: what it lacks is added to the
     velocities and spins of its grains. Its momentum stays."""
     arrays = {name: np.array(state[name]) for name in state}
@@ -106,6 +106,14 @@ def turn(state: ParticleState, rate: float) -> None:
     spin[inside] += change
     state["velocity"] = velocity
     state["spin"] = spin
+
+
+def stage_ends(
+    settled: float, rates: Sequence[float] = RATES, holds: tuple[float, float] = HOLDS
+) -> np.ndarray:
+    """Return when each step of a spin-up ends that begins when a pile has settled, all in s; shape
+    (steps,)."""
+    return settled + np.cumsum([holds[rate > QUICK * (1 + 1e-9)] for rate in rates])
 
 
 def spin_ups(
@@ -125,7 +133,7 @@ def spin_ups(
     wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
     clouds = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]
     settled = clouds[0].duration
-    ends = settled + np.cumsum([holds[rate > QUICK * (1 + 1e-9)] for rate in rates])
+    ends = stage_ends(settled, rates, holds)
     scenes = [one.model_copy(update={"duration": float(ends[-1])}) for one in clouds]
     seen: list[list[SpinStep]] = [[] for _ in scenes]
     with closing(Simulation(scenes[0], len(scenes))) as simulation:

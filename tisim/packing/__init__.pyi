@@ -20,6 +20,9 @@ from .placement import (
 from .placement import (
     RandomInDomain as RandomInDomain,
 )
+from .placement import (
+    RandomSequential as RandomSequential,
+)
 from .size_laws import EqualSizes as EqualSizes
 from .size_laws import LognormalSizes as LognormalSizes
 from .size_laws import NormalSizes as NormalSizes

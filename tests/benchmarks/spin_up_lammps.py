@@ -1,0 +1,168 @@
+"""Piles that are spun up beside LAMMPS, from the same random starts in both.
+
+    python -m pip install ".[bench]"
+    python tests/benchmarks/spin_up_lammps.py [--starts 10]
+
+It is the case spin_up without magnetisation: 80 grains fall together, and their pile is turned faster in
+steps until it breaks, under the laws and the gravity of coalescence_lammps.py. In LAMMPS, too, ``turn`` of
+the case gives a pile its next angular velocity. Paths of grains are chaotic, so the programs are compared by
+means over starts. Printed are both means, the mean of the differences, with half of their 95 % intervals, and
+the largest difference; and the time for a particle and step of both programs, on one thread each, without
+compiling: of a batch of all starts, and of LAMMPS for one after another.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from cases.coalescence import scene as cloud  # noqa: E402
+from cases.coalescence.published import DIAMETERS  # noqa: E402
+from cases.runs import sound  # noqa: E402
+from cases.spin_up.checks import at_least  # noqa: E402
+from cases.spin_up.scene import DEFAULT, NUMBERS, SETTLED, scene  # noqa: E402
+from cases.spin_up.stages import RATES, SpinStep, SpinUp, stage_ends, turn  # noqa: E402
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.coalescence_lammps import FIELDS, machine_of  # noqa: E402
+from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
+from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tisim import Scene, Simulation  # noqa: E402
+from tisim.effects import SelfGravity  # noqa: E402
+
+SPINS = (0.0, *RATES)
+"""The angular velocities that a pile is given, rad/s; 0 while it settles."""
+MATERIAL = cloud.rubble(cloud.scale_of(DEFAULT["number"], NUMBERS[DIAMETERS[1]]), DEFAULT["softened"])
+LAW = TwinLaw((MATERIAL.model_dump(exclude_none=True),), rolling="rolling_sds")
+
+
+def scenes(seeds: Sequence[int]) -> list[Scene]:
+    """The clouds of the package, until the last step ends."""
+    changed = {"effects": (composed(LAW), SelfGravity()), "duration": float(stage_ends(SETTLED)[-1])}
+    made = (scene(**DEFAULT, magnetisation=0.0, seed=seed) for seed in seeds)
+    return [one.model_copy(update=changed) for one in made]
+
+
+def step_ends(dt: float) -> list[int]:
+    """After how many steps of dt (s) each spin has been held."""
+    return [round(end / dt) for end in (SETTLED, *stage_ends(SETTLED))]
+
+
+def particle_steps(made: Sequence[Scene]) -> float:
+    """Steps of some piles, times their particles."""
+    return sum(len(one.start()["mass"]) * step_ends(one.stepper.control.dt)[-1] for one in made)
+
+
+def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
+    """The states of each start at the end of each spin, and the time for a particle and step, s."""
+    simulation = Simulation(made[0], len(made))
+    simulation.load(list(made))
+    found: list[list[State]] = [[] for _ in made]
+    done = 0
+    for spin, end in zip(SPINS, step_ends(made[0].stepper.control.dt), strict=True):
+        if spin:
+            for state in simulation.states:
+                turn(state, spin)
+        simulation.run(steps=end - done)
+        done = end
+        for states, result in zip(found, sound(simulation.results()), strict=True):
+            states.append(result.state)
+    lasted = simulation.wall_s
+    simulation.close()
+    return found, lasted / particle_steps(made)
+
+
+def by_lammps(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
+    """The same in LAMMPS, in a process of its own."""
+    starts = [one.start() for one in made]
+    stacked = {name: np.stack([at[name] for at in starts]) for name in (*FIELDS, "radius", "mass")}
+    found = lammps_peer.apart(__file__, law=lammps_model(LAW), dt=made[0].stepper.control.dt, **stacked)
+    states = [
+        [
+            {**{name: found[name][w, k] for name in FIELDS}, "radius": at["radius"], "mass": at["mass"]}
+            for k in range(len(SPINS))
+        ]
+        for w, at in enumerate(starts)
+    ]
+    return states, float(found["lasted"]) / particle_steps(made)
+
+
+def worker(folder: Path) -> None:
+    """Run LAMMPS on each start of in.npz of a folder, and write out.npz."""
+    with np.load(folder / "in.npz") as given:
+        at = dict(given)
+    found: dict[str, list[list[np.ndarray]]] = {name: [] for name in FIELDS}
+    lasted = 0.0
+    for w in range(len(at["radius"])):
+        start = {name: at[name][w] for name in (*FIELDS, "radius", "mass")}
+        machine = machine_of(start, folder, str(at["law"]))
+        machine.command(f"timestep {float(at['dt'])}")
+        for values in found.values():
+            values.append([])
+        done = 0
+        for spin, end in zip(SPINS, step_ends(float(at["dt"])), strict=True):
+            if spin:
+                pile = {**start, **{name: np.array(values[-1][-1]) for name, values in found.items()}}
+                turn(pile, spin)
+                for name in ("velocity", "spin"):
+                    numbers = np.ascontiguousarray(pile[name]).ravel()
+                    machine.scatter_atoms(FIELDS[name], 1, 3, np.ctypeslib.as_ctypes(numbers))
+            began = time.perf_counter()
+            # With forces at the beginning, as velocities are others.
+            machine.command(f"run {end - done} post no")
+            lasted += time.perf_counter() - began
+            done = end
+            for name, theirs in FIELDS.items():
+                found[name][-1].append(np.array(machine.gather_atoms(theirs, 1, 3)).reshape(-1, 3))
+        machine.close()
+    np.savez(folder / "out.npz", lasted=lasted, **{name: np.array(values) for name, values in found.items()})
+
+
+def statistics(states: list[State]) -> dict[str, float]:
+    """What is compared of one pile."""
+    steps = [SpinStep(spin, state) for spin, state in zip(SPINS, states, strict=True)]
+    pile = SpinUp(0.0, 0, steps)
+    return {
+        "part of the pile at rest": pile.at(0.0).held,
+        "density at rest, kg/m^3": pile.at(0.0).asteroid.density,
+        "width over height at rest": pile.at(0.0).asteroid.flattening,
+        "the same at 500 urad/s": pile.at(5e-4).asteroid.flattening,
+        "the same at 600 urad/s": pile.at(6e-4).asteroid.flattening,
+        "part of the pile at 600 urad/s": pile.at(6e-4).held,
+        "part of the pile at 700 urad/s": pile.at(7e-4).held,
+        "part of the pile at 800 urad/s": pile.at(8e-4).held,
+        "deforms at, urad/s": float(at_least([pile.deformation])[0]),
+        "breaks at, urad/s": float(at_least([pile.disruption])[0]),
+    }
+
+
+def table(piles: Sequence[list[State]]) -> dict[str, np.ndarray]:
+    """Each statistic of every start."""
+    return lammps_peer.columns([statistics(states) for states in piles])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--starts", type=int, default=10)
+    options = parser.parse_args()
+    import tisim
+
+    tisim.init(threads=1)
+    made = scenes(range(options.starts))
+    (here, our_time), (there, their_time) = by_package(made), by_lammps(made)
+    lammps_peer.print_beside(table(here), table(there))
+    lammps_peer.print_times(our_time, their_time)
+
+
+if __name__ == "__main__":
+    lammps_peer.start(main, worker)
