@@ -53,6 +53,21 @@ def forces(x, y, z, a, b, c, scale, fx, fy, fz):
         fx[i], fy[i], fz[i] = scale * sx, scale * sy, scale * sz
 
 
+def scene(n: int) -> Scene:
+    """So many dipoles of random directions on a disturbed lattice."""
+    draw, side = np.random.default_rng(0), int(np.ceil(n ** (1 / 3)))
+    place = np.argwhere(np.ones((side,) * 3))[:n] + draw.uniform(-0.2, 0.2, (n, 3))
+    moment = 1e3 * draw.normal(size=(n, 3))
+    return Scene(
+        particles=Particles(
+            position=place, velocity=0 * place, radius=0.1, mass=1.0, quantities={"moment": moment}
+        ),
+        effects=(DipoleDipole(),),
+        stepper=Verlet(control=FixedStep(dt=1e-12)),
+        duration=1.0,
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--number", type=int, default=1000)
@@ -66,25 +81,10 @@ def main() -> None:
         precision=options.precision, threads=options.threads, arithmetic=options.arithmetic
     ).settings
     numba.set_num_threads(options.threads)
-    draw, n = np.random.default_rng(0), options.number
-    side = int(np.ceil(n ** (1 / 3)))
-    place = np.argwhere(np.ones((side,) * 3))[:n] + draw.uniform(-0.2, 0.2, (n, 3))
-    moment = 1e3 * draw.normal(size=(n, 3))
-    scene = Scene(
-        particles=Particles(
-            position=place,
-            velocity=0 * place,
-            radius=0.1,
-            mass=1.0,
-            density=None,
-            quantities={"moment": moment},
-        ),
-        effects=(DipoleDipole(),),
-        stepper=Verlet(control=FixedStep(dt=1e-12)),
-        duration=1.0,
-    )
-    simulation = Simulation(scene)
-    simulation.load([scene])
+    n, setup = options.number, scene(options.number)
+    place, moment = setup.start()["position"], setup.start()["moment"]
+    simulation = Simulation(setup)
+    simulation.load([setup])
     real = np.float64 if options.precision == "f64" else np.float32
     columns = [np.ascontiguousarray(column, real) for column in (*place.T, *moment.T)]
     out = [np.empty(n, real) for _ in range(3)]

@@ -3,9 +3,10 @@
     python tests/benchmarks/scaling.py [--device cpu] [--precision f64] [--most 1000000] [--worlds 4096]
         [--limit 240]
 
-Bed: a lattice of grains (Hertz and Mindlin, five walls) that falls together, lists included. Near field: all
-pairs. Blast: particles that do not feel each other. Agglomeration: worlds of 60 grains side by side. Each is
-compiled, run for a moment, and timed for about a second. What would begin after the limit (s) is left out.
+Bed: a lattice of grains (Hertz and Mindlin, five walls) that falls together, lists included. Worlds: 60
+grains that agglomerate, side by side. Near field, dipoles: all pairs. Captures: worlds of 100 Brownian
+particles in the field of a cylinder. Blast: particles that do not feel each other. Each is compiled, run for
+a moment, and timed for about a second. What would begin after the limit (s) is left out.
 """
 
 import argparse
@@ -20,6 +21,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+import dipole_dipole
 import granular_bed
 import near_field
 import numpy as np
@@ -27,6 +29,7 @@ import numpy as np
 import tisim
 from cases.agglomeration import CASE as AGGLOMERATION
 from cases.blast.scene import scene as blast
+from cases.capture.scene import scene as capture
 from tisim.backend import runtime
 
 SECONDS = 1.0
@@ -98,10 +101,13 @@ def main() -> None:
     print(f"tisim {tisim.__version__}, python {platform.python_version()}, {options.precision}\n")
     print(f"{'work':14}{'worlds':>8}{'particles':>11}{'ns/particle-step':>18}{'compiling, s':>14}")
     grains = AGGLOMERATION.scene(next(iter(AGGLOMERATION.sizes)), 0)
+    captured = capture(75, 0.0, 20.0, duration=5.0)
     rows: list[tuple[str, int, Callable[[int], list[tisim.Scene]]]] = [
         *(("bed", n, lambda n: [bed(n)]) for n in sizes(options.most, 1000)),
         *(("worlds", n, lambda n: [grains] * n) for n in (1, 16, 256, 4096) if n <= options.worlds),
         *(("near field", n, lambda n: [near(n)]) for n in (1000, 4000) if n <= options.most),
+        *(("dipoles", n, lambda n: [dipole_dipole.scene(n)]) for n in (1000, 4000) if n <= options.most),
+        *(("captures", n, lambda n: [captured] * n) for n in (1, 256) if n <= options.worlds),
         *(("blast", n, lambda n: [blast(number=n)]) for n in sizes(options.most // 10, 1000)),
     ]
     end = time.perf_counter() + options.limit
