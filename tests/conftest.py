@@ -27,7 +27,12 @@ ON_DEVICES = (
     *("effects/test_contract.py", "operators/test_contract.py", "steppers/test_contract.py"),
     *("operators/test_passage.py", "operators/test_peak_displacement.py", "test_testing.py"),
     *("interactions/test_vacated_slots.py", "interactions/test_cell_tree.py"),
-    "effects/gravitation/test_tree_gravity.py",
+    *("effects/gravitation/test_tree_gravity.py", "effects/pair/test_virial.py"),
+    *("effects/magnetic/test_moment.py", "effects/magnetic/test_froehlich.py"),
+    *("effects/magnetic/test_permanent_moment.py", "effects/constraint/test_prescribed_motion.py"),
+    *("steppers/implicit/test_independent.py", "steppers/implicit/test_trapezoid.py"),
+    *("steppers/implicit/test_collocation.py", "steppers/brownian/test_brownian.py"),
+    "packing/test_random_sequential.py",
 )
 """These files hold on every device: the contracts, and the physics of each kind of law. Insertions and
 clumps, whose steps take longest to compile, are left out."""

@@ -1,8 +1,5 @@
 """Brownian particles without hydrodynamic interaction, against closed forms."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -206,51 +203,6 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
     steps = [result.work["particle_steps"] / (70 * 30) for result in runs[0]]
     assert steps[0] == 1.0 < steps[1] < 2.0 < steps[2]
     assert steps[4] == 69 / 70
-
-
-ELSEWHERE = """
-import sys
-import numpy as np
-from tests.steppers.brownian import test_brownian
-from tisim.backend import runtime
-runtime.init(threads=1)
-np.save(sys.argv[1], test_brownian.PLACES[sys.argv[2]]())
-"""
-
-
-def places(run, worlds, number, together=False, **more):
-    """Where particles are at the end. Each phase is a launch over all of them: fewer than a thousand would
-    all be one thread's."""
-    more = {"trap": 200.0, "dt": 1e-3, "drift": 0.3, "steps": 6, **more}
-    draw = np.random.default_rng(1)
-    starts = draw.uniform(-1e-6, 1e-6, (worlds, number, 3))
-    scenes = [colloids(start, together, seed=k, **more) for k, start in enumerate(starts)]
-    results = run(scenes)
-    return np.array([result.state["position"] for result in results])
-
-
-def launched(scenes):
-    return simulate(scenes, worlds=40, capacity=40, schedule="particle")
-
-
-PLACES = {
-    "by themselves": lambda: places(run, 5, 400),
-    "exact": lambda: places(launched, 40, 40, hydrodynamics="rotne-prager"),
-    "fast": lambda: places(launched, 40, 40, True, hydrodynamics="rotne-prager", noise="fast"),
-}
-slow = pytest.mark.slow
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name", ["by themselves", pytest.param("exact", marks=slow), pytest.param("fast", marks=slow)]
-)
-def test_same_bits_with_one_thread_and_two(name, tmp_path):
-    file = tmp_path / "places.npy"
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file), name]
-    completed = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
-    assert completed.returncode == 0, completed.stderr
-    np.testing.assert_array_equal(PLACES[name](), np.load(file))
 
 
 @both
