@@ -34,8 +34,9 @@ ON_DEVICES = (
     *("steppers/implicit/test_collocation.py", "steppers/brownian/test_brownian.py"),
     "packing/test_random_sequential.py",
 )
-"""These files hold on every device: the contracts, and the physics of each kind of law. Insertions and
-clumps, whose steps take longest to compile, are left out."""
+"""These files are to hold on every device: the contracts, and the physics of each kind of law. Where they
+have been seen to, docs/devices.md says. Insertions and clumps, whose steps take longest to compile, are left
+out."""
 
 
 def pytest_collection_modifyitems(items):

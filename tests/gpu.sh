@@ -12,7 +12,7 @@ if [ "$device" = cuda ]; then
     limits=(--most 1000000 --worlds 4096 --limit 180)
     tests=(tests)
 else
-    limits=(--most 1000 --worlds 16 --limit 120)
+    limits=(--most 1000 --worlds 16 --limit 90)
     tests=(tests/device tests/numerics)
 fi
 timeout 270 python -m pytest -q -rs -n 0 -m "gpu and not slow" "${tests[@]}"

@@ -4,8 +4,8 @@
         [--limit 240]
 
 Bed: a lattice of grains (Hertz and Mindlin, five walls) that falls together, lists included. Worlds: 60
-grains that agglomerate, side by side. Near field, dipoles: all pairs. Captures: worlds of 100 Brownian
-particles in the field of a cylinder. Blast: particles that do not feel each other. Each is compiled, run for
+grains that agglomerate, side by side. Near field, dipoles: all pairs. Blast: particles that do not feel
+each other. Captures: worlds of 100 Brownian particles in the field of a cylinder. Each is compiled, run for
 a moment, and timed for about a second. What would begin after the limit (s) is left out.
 """
 
@@ -101,14 +101,14 @@ def main() -> None:
     print(f"tisim {tisim.__version__}, python {platform.python_version()}, {options.precision}\n")
     print(f"{'work':14}{'worlds':>8}{'particles':>11}{'ns/particle-step':>18}{'compiling, s':>14}")
     grains = AGGLOMERATION.scene(next(iter(AGGLOMERATION.sizes)), 0)
-    captured = capture(75, 0.0, 20.0, duration=5.0)
+    captured = capture(75, 0.0, 20.0, duration=500.0)
     rows: list[tuple[str, int, Callable[[int], list[tisim.Scene]]]] = [
         *(("bed", n, lambda n: [bed(n)]) for n in sizes(options.most, 1000)),
         *(("worlds", n, lambda n: [grains] * n) for n in (1, 16, 256, 4096) if n <= options.worlds),
         *(("near field", n, lambda n: [near(n)]) for n in (1000, 4000) if n <= options.most),
+        *(("blast", n, lambda n: [blast(number=n)]) for n in sizes(options.most // 10, 1000)),
         *(("dipoles", n, lambda n: [dipole_dipole.scene(n)]) for n in (1000, 4000) if n <= options.most),
         *(("captures", n, lambda n: [captured] * n) for n in (1, 256) if n <= options.worlds),
-        *(("blast", n, lambda n: [blast(number=n)]) for n in sizes(options.most // 10, 1000)),
     ]
     end = time.perf_counter() + options.limit
     for work, n, make in rows:

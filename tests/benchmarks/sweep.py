@@ -42,12 +42,15 @@ SWEEPS = {
 PROCESSES = 2
 
 
-def timed(simulation: Simulation, scenes: list[Scene]) -> tuple[float, list[Result]]:
-    """Wall seconds, loading included, and results."""
-    began = time.perf_counter()
+def timed(simulation: Simulation, scenes: list[Scene]) -> tuple[np.ndarray, list[Result]]:
+    """Wall seconds for loading, steps and results, and the results."""
+    times = [time.perf_counter()]
     simulation.load(scenes)
+    times.append(time.perf_counter())
     simulation.run()
-    return time.perf_counter() - began, simulation.results()
+    times.append(time.perf_counter())
+    results = simulation.results()
+    return np.diff([*times, time.perf_counter()]), results
 
 
 def worker(case: str, first: int, pipe: Connection) -> None:
@@ -100,10 +103,10 @@ def main() -> None:
     together, apart, side_by_side = [], [], []
     for _ in range(args.repeats):
         side_by_side.append(through(pipes))
-        seconds, results = timed(batch, scenes)
-        together.append(seconds)
+        parts, results = timed(batch, scenes)
+        together.append(parts)
         runs = [timed(single, [one]) for one in scenes]
-        apart.append(sum(seconds for seconds, _ in runs))
+        apart.append(np.sum([parts for parts, _ in runs], axis=0))
     for pipe, process in zip(pipes, processes, strict=True):
         pipe.send(False)
         process.join()
@@ -116,11 +119,15 @@ def main() -> None:
         f"{args.case}, {len(scenes)} runs of {scenes[0].capacity()} particles, "
         f"{steps} particle-steps; {args.repeats} pairs: median (range)"
     )
-    print(f"  one batch, schedule '{batch.schedule}'             {spread(together)} s")
-    print(f"  one after the other, schedule '{single.schedule}'   {spread(apart)} s")
+    for name, ways in (("one batch", together), ("one after the other", apart)):
+        parts = 1e3 * np.median(ways, axis=0) / len(scenes)
+        print(f"  {name}, ms a run: loading {parts[0]:.2f}, steps {parts[1]:.2f}, result {parts[2]:.2f}")
+    batched, alone = np.sum(together, axis=1), np.sum(apart, axis=1)
+    print(f"  one batch, schedule '{batch.schedule}'             {spread(batched)} s")
+    print(f"  one after the other, schedule '{single.schedule}'   {spread(alone)} s")
     print(f"  one after the other in {PROCESSES} processes         {spread(side_by_side)} s")
-    print(f"  one after the other / batch   {spread([b / a for a, b in zip(together, apart, strict=True)])}")
-    reference = [b / a for a, b in zip(together, side_by_side, strict=True)]
+    print(f"  one after the other / batch   {spread(alone / batched)}")
+    reference = np.array(side_by_side) / batched
     print(f"  {PROCESSES} processes / batch           {spread(reference)}")
     print(f"  the same bits: {same}; all reached the end: {all(r.status.ok for r in results)}")
     print(f"{platform.machine()}, {args.threads} threads ({runtime.cores()} cores); {runtime.backend()}")

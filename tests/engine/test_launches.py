@@ -211,24 +211,23 @@ def test_teams_are_tried_again_at_little_cost():
     assert trials.alone == pytest.approx(0.21 / TRIAL_COST / 2e-3 / 2, abs=1)
 
 
-def phase_of(extent, long=False):
-    """A phase that has only a size."""
-    phase = Phase()
-    phase.extent, phase.long = extent, long
-    return phase
-
-
 @pytest.mark.parametrize(
-    ("extent", "long", "worlds", "tasks"),
+    ("extent", "kind", "worlds", "threads", "tasks"),
     [
-        (2000, False, 1, 2),
-        (2000, True, 1, 8),
-        (500, False, 1, 1),
-        (100, True, 390, 1),
-        (100, True, 3, 2),
-        (3, True, 1, 2),
+        (2000, "light", 1, 2, 2),
+        (2000, "long", 1, 2, 8),
+        (2000, "heavy", 1, 2, 8),
+        (500, "light", 1, 2, 1),
+        (100, "long", 8, 2, 2),
+        (100, "heavy", 390, 2, 2),
+        (100, "long", 390, 16, 16),
+        (3, "long", 1, 2, 2),
+        (2000, "light", 1, 16, 3),
     ],
 )
-def test_tasks_of_a_phase_are_as_many_for_each_thread(extent, long, worlds, tasks):
-    """2000 particles are not cut into three for two threads, one of which would wait for the other."""
-    assert tasks_of(phase_of(extent, long), worlds, threads=2) == tasks
+def test_tasks_of_a_phase_are_as_many_for_each_thread(extent, kind, worlds, threads, tasks):
+    """2000 particles are not cut into three for two threads, one of which would wait for the other; a world
+    that is alone in room for many is shared, too."""
+    phase = Phase()
+    phase.extent, phase.long, phase.light = extent, kind == "long", kind != "heavy"
+    assert tasks_of(phase, worlds, threads) == tasks

@@ -27,6 +27,7 @@ from tisim import (
     Scene,
 )
 from tisim.backend import runtime
+from tisim.scene.placed_together import placed_together
 
 BALL = dict(number=2000, radius=0.05, density=7000.0, placement=RandomInBall(radius=1.0, centre=(3.0, 0, 0)))
 """The blast of Z16 section 6.1, off the origin."""
@@ -248,6 +249,8 @@ def test_more_than_the_machine_holds_is_refused_before_it_is_allocated(monkeypat
         message = r"memory for a cloud of 100000000 particles must be within the 1 GB .*; received '30 GB'"
         with pytest.raises(InputError, match=message):
             scene.particles.arrays(scene.domain, 0)
+        with placed_together([scene, scene]), pytest.raises(InputError, match=message):
+            scene.start()
         assert tracemalloc.get_traced_memory()[1] < 10**8
         tracemalloc.stop()
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from tisim import Box, Cloud, InputError, Scene
+from tests.scenes import compiled
+from tisim import Box, Cloud, InputError, RandomInBall, RandomInBox, RandomInCylinder, Scene
 from tisim.engine.batches import Batches
-from tisim.packing import random_sequential
+from tisim.packing import RandomSequential, random_sequential
 from tisim.packing.random_sequential import SATURATION_FRACTION, place, placed_side_by_side
-from tisim.packing.region import box, inside_round
+from tisim.packing.region import box, inside_box, inside_round
 from tisim.packing.saturation import fill
 from tisim.packing.tried_places import Packing
 
@@ -76,50 +77,106 @@ PACKINGS = [
 """Unlike ones, two that are the same, and one with room for a single sphere."""
 
 
-def test_side_by_side_packings_are_those_made_alone(monkeypatch):
-    def made(packing):
-        try:
-            return place(packing.radii, packing.region, packing.seed)
-        except InputError as error:
-            return str(error)
+@pytest.fixture
+def rounds(monkeypatch):
+    """How many packings have been made at once, each time."""
+    made, everywhere = [], random_sequential.everywhere
 
-    alone, rounds = [made(packing) for packing in PACKINGS], []
-    everywhere = random_sequential.everywhere
-    monkeypatch.setattr(
-        random_sequential, "everywhere", lambda some: rounds.append(len(some)) or everywhere(some)
-    )
+    def counted(packings):
+        made.append(len(packings))
+        return everywhere(packings)
+
+    monkeypatch.setattr(random_sequential, "everywhere", counted)
+    return made
+
+
+def made(packing):
+    """Centres of a packing, or why there are none."""
+    try:
+        return place(packing.radii, packing.region, packing.seed)
+    except InputError as error:
+        return str(error)
+
+
+def test_side_by_side_packings_are_those_made_alone(rounds):
+    alone = [made(packing) for packing in PACKINGS]
+    assert rounds == [1] * 6
+    assert "3 were placed" in alone[-1]
     with placed_side_by_side(PACKINGS):
         together = [made(packing) for packing in PACKINGS]
-    assert rounds == [5]
-    assert "3 were placed" in alone[-1]
+    assert rounds[6:] == [5]
     for one, other in zip(alone, together, strict=True):
         np.testing.assert_array_equal(one, other)
     # Nothing is kept beyond.
     made(PACKINGS[0])
-    assert rounds == [5, 1]
+    assert rounds[7:] == [1]
 
 
-def test_spheres_of_a_batch_are_placed_side_by_side(monkeypatch):
-    """Also where one scene has no room for a sphere, which then fails alone."""
-    rounds, everywhere = [], random_sequential.everywhere
-    monkeypatch.setattr(
-        random_sequential, "everywhere", lambda some: rounds.append(len(some)) or everywhere(some)
+def test_many_spheres_are_placed_in_several_goes(rounds, monkeypatch):
+    monkeypatch.setattr(random_sequential, "SPHERES_AT_ONCE", 350)
+    with placed_side_by_side(PACKINGS):
+        together = [made(packing) for packing in PACKINGS]
+    assert rounds == [1, 1, 3]
+    for one, other in zip(map(made, PACKINGS), together, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+TWO_WALLS = Box(low=(0.0,) * 3, high=(1.0,) * 3, periodic=(False, True, True))
+
+
+def cloud(number, radius, seed, placement=None):
+    """A scene of spheres in a box of two walls."""
+    where = {} if placement is None else {"placement": placement}
+    return Scene(
+        particles=Cloud(number=number, radius=radius, density=1.0, **where),
+        domain=TWO_WALLS,
+        duration=1.0,
+        seed=seed,
     )
-    box_of_two_walls = Box(low=(0.0,) * 3, high=(1.0,) * 3, periodic=(False, True, True))
+
+
+def test_spheres_of_a_batch_are_placed_side_by_side(rounds):
+    """Scenes that cannot be made fail alone, before any place is tried: one has no room for a sphere, of
+    another spheres would fill too much."""
     scenes = [
-        Scene(
-            particles=Cloud(number=20, radius=radius, density=1.0),
-            domain=box_of_two_walls,
-            duration=1.0,
-            seed=seed,
-        )
-        for seed, radius in enumerate((0.02, 0.05, 0.6, 0.08))
+        cloud(20, 0.02, 0),
+        cloud(20, 0.05, 1),
+        cloud(20, 0.6, 2),
+        cloud(2000, 0.05, 3),
+        cloud(20, 0.08, 4),
     ]
     results = dict(Batches().run(scenes, strict=False))
     assert rounds == [3]
-    assert [k for k, result in results.items() if not result.status.ok] == [2]
-    for k in (0, 1, 3):
+    assert [k for k, result in results.items() if not result.status.ok] == [2, 3]
+    for k in (0, 1, 4):
         np.testing.assert_array_equal(results[k].start["position"], scenes[k].start()["position"])
+
+
+class InASlab(RandomSequential):
+    """A placement of one's own."""
+
+    def region(self, radii, domain):
+        return inside_box(np.array([0.1, 0.1, 0.1]), np.array([0.9, 0.9, 0.4]), radii.max())
+
+
+@pytest.mark.parametrize(
+    "placement",
+    [
+        RandomInBox(low=(0.1, 0.2, 0.3), high=(0.5, 0.9, 0.8)),
+        RandomInBall(radius=0.3, centre=(0.5, 0.5, 0.5)),
+        RandomInCylinder(centre=(0.5, 0.5, 0.5), axis=(1.0, 2.0, 0.5), radius=0.2, length=0.4),
+        InASlab(),
+    ],
+    ids=lambda one: one.kind(),
+)
+def test_each_kind_is_placed_so_where_a_simulation_is_loaded(placement, rounds):
+    scenes = [cloud(20, 0.03, seed, placement) for seed in (5, 6)]
+    simulation = compiled(scenes[0], 2, 20)
+    rounds.clear()
+    simulation.load(scenes)
+    assert rounds == [2]
+    for start, scene in zip(simulation.starts, scenes, strict=True):
+        np.testing.assert_array_equal(start["position"], scene.start()["position"])
 
 
 def saturated(region, radius, seed=0):

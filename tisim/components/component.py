@@ -131,20 +131,17 @@ class Component(AccuracyHints, Checked):
     @classmethod
     @functools.cache
     def parameters(cls) -> tuple[tuple[str, FieldInfo, int], ...]:
-        """Return name, declaration and number of components of each parameter that may differ per world."""
-        found = []
-        for name, info in cls.model_fields.items():
-            if info.annotation in (float, float | None):
-                found.append((name, info, 1))
-            elif info.annotation == Vector:
-                found.append((name, info, 3))
-        return tuple(found)
+        """Return name, declaration and number of components of each parameter that may differ per world. They
+        are found once: a class that has been asked is complete."""
+        sizes: dict[Any, int] = {float: 1, float | None: 1, Vector: 3}
+        fields = ((name, info, sizes.get(info.annotation, 0)) for name, info in cls.model_fields.items())
+        return tuple(field for field in fields if field[2])
 
     @classmethod
     @functools.cache
     def lists(cls) -> tuple[tuple[str, type[Component]], ...]:
         """Return name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a
-        world may have any number of them."""
+        world may have any number of them. They are found once."""
         found = []
         for name, info in cls.model_fields.items():
             row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)

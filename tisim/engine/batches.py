@@ -61,7 +61,7 @@ class Batches:
         strict: bool = True,
         trajectory: Trajectory | None = None,
     ) -> Iterator[tuple[int, Result]]:
-        """Yield (index into scenes, Result) as worlds end.
+        """Yield (index into scenes, Result) as worlds end, after those whose start cannot be made.
 
         progress : called with the finished fraction of this call, 0..1. strict : raise the InputError of a
         start that cannot be made; otherwise it becomes a failed Result. trajectory : made for these scenes;
@@ -73,12 +73,14 @@ class Batches:
         with placed_together(scenes):
             for index, scene in enumerate(scenes):
                 try:
-                    starts[index] = scene.start()
-                    groups.setdefault(scene.structure(), []).append(index)
+                    start = scene.start()
                 except InputError as error:
                     if strict:
                         raise
                     failures[index] = str(error)
+                else:
+                    starts[index] = start
+                    groups.setdefault(scene.structure(), []).append(index)
         for index, reason in failures.items():
             failed = Status(False, reason)
             yield index, Result(scenes[index], {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)

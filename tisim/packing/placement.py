@@ -35,24 +35,23 @@ class Placement(Component):
         """
         raise NotImplementedError(f"{type(self).__name__} must define centres")
 
-    def packing(self, radii: np.ndarray, domain: Domain, seed: int) -> Packing | None:
-        """Return the random sequential addition that ``centres`` asks for; None where there is none.
-
-        Those of a batch of worlds are placed side by side.
-        """
-        return None
-
 
 class RandomSequential(Placement):
-    """This is the contract of a placement by random sequential addition, within a region."""
+    """This is the contract of a placement by random sequential addition, within a region.
+
+    The spheres of all worlds of a batch are placed side by side, on all threads, where they lie by
+    themselves.
+    """
 
     contract: ClassVar[bool] = True
 
     def region(self, radii: np.ndarray, domain: Domain) -> Region:
-        """Return the region of the centres of the largest of these spheres (m)."""
+        """Return the region of the centres of the largest of these spheres (m), as ``inside_box``,
+        ``inside_round`` or ``in_domain`` of ``tisim.packing.region`` makes it."""
         raise NotImplementedError(f"{type(self).__name__} must define region")
 
     def packing(self, radii: np.ndarray, domain: Domain, seed: int) -> Packing:
+        """Return what ``centres`` places."""
         return Packing(radii, self.region(radii, domain), seed)
 
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:

@@ -9,8 +9,10 @@ Phys. Rev. E 88 (2013) 053312), at less between walls.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
 
 import numpy as np
 
@@ -24,8 +26,10 @@ from tisim.packing.tried_places import Packing, everywhere
 
 SATURATION_FRACTION = 0.3841
 """At this volume fraction no further sphere fits, in the bulk."""
-_placed_ahead: dict[tuple[bytes, bytes, int], np.ndarray] = {}
-"""These are centres of packings that were made side by side with others, while starts are made from them."""
+SPHERES_AT_ONCE = 300_000
+"""So many spheres are placed in one go, which bounds the memory that it takes, and how long it is."""
+_placed_ahead: ContextVar[Mapping[Any, np.ndarray] | None] = ContextVar("_placed_ahead", default=None)
+"""These are the centres of packings that were made side by side, in the thread that makes starts of them."""
 
 
 def place(radii: np.ndarray, region: Region, seed: int) -> np.ndarray:
@@ -35,41 +39,71 @@ def place(radii: np.ndarray, region: Region, seed: int) -> np.ndarray:
     spheres go up to saturation. InputError, which says the volume fraction reached, when no further sphere
     fits.
     """
-    runtime.current()
-    count, largest, smallest = len(radii), float(radii.max()), float(radii.min())
-    check_resolved("places of the packing", np.stack([region.low, region.high]), smallest)
-    spheres = 4 / 3 * np.pi * radii**3
-    fraction, equal = float(spheres.sum()) / region.volume, smallest == largest
-    # Refused at once where no choice of places would do: a few spheres can exceed the limit of many.
-    most = (SATURATION_FRACTION + count**-0.5) * region.reachable_volume(largest) / region.volume
-    rule = f"at most {SATURATION_FRACTION:.3f}, where random sequential addition of many spheres ends"
-    must(fraction <= most or not equal, "volume fraction", rule, float(f"{fraction:.4g}"))
     packing = Packing(radii, region, seed)
-    ahead = _placed_ahead.get(packing.key()) if _placed_ahead else None
-    centres = everywhere([packing])[0] if ahead is None else ahead
-    if len(centres) < count and equal:
+    refuse(packing)
+    ahead = _placed_ahead.get()
+    centres = ahead.get(packing.key()) if ahead else None
+    if centres is None:
+        (centres,) = everywhere([packing])
+    count, largest = len(radii), float(radii.max())
+    if len(centres) < count and packing.equal:
         generator = np.random.Generator(np.random.Philox(key=[seed, SEQUENTIAL_ADDITION]))
         centres = fill(centres, count, 2 * largest, region, generator)
-    order = packing.order
     if len(centres) < count:
-        reached = float(spheres[order][: len(centres)].sum()) / region.volume
+        reached = packing.fraction(len(centres))
         raise InputError(
-            f"volume fraction must be at most {reached:.4f}, where no further "
-            f"sphere fits ({len(centres)} of {count} were placed); received {fraction:.4f}"
+            f"volume fraction must be at most {reached:.4f}, where no further sphere fits "
+            f"({len(centres)} of {count} were placed); received {packing.fraction(count):.4g}"
         )
-    return centres[np.argsort(order, kind="stable")]
+    return centres[np.argsort(packing.order, kind="stable")]
+
+
+def refuse(packing: Packing) -> None:
+    """Raise InputError where no choice of places would do, before any is tried: a few spheres can exceed the
+    limit of many."""
+    runtime.current()
+    region, count, largest = packing.region, len(packing.radii), float(packing.radii.max())
+    smallest = float(packing.radii.min())
+    check_resolved("places of the packing", np.stack([region.low, region.high]), smallest)
+    most = (SATURATION_FRACTION + count**-0.5) * region.reachable_volume(largest) / region.volume
+    rule = f"at most {SATURATION_FRACTION:.3f}, where random sequential addition of many spheres ends"
+    fraction = packing.fraction(count)
+    must(fraction <= most or not packing.equal, "volume fraction", rule, float(f"{fraction:.4g}"))
 
 
 @contextmanager
 def placed_side_by_side(packings: Sequence[Packing]) -> Iterator[None]:
-    """Place the spheres of all packings on all threads at once; within, ``place`` finds them there.
+    """Place the spheres of all packings on all threads; within, ``place`` finds them there, in this thread.
 
-    What no sphere has room for is left to ``place``, which says so.
+    It leaves to ``place`` what that refuses, and to go on with those that have not found room for all.
     """
-    new = {packing.key(): packing for packing in packings}
-    _placed_ahead.update(zip(new, everywhere(list(new.values())), strict=True) if len(new) > 1 else ())
+    new = {packing.key(): packing for packing in packings if _possible(packing)}
+    ahead: dict[Any, np.ndarray] = {}
+    for some in _portions(new) if len(new) > 1 else ():
+        ahead.update(zip(some, everywhere([new[key] for key in some]), strict=True))
+    token = _placed_ahead.set(ahead)
     try:
         yield
     finally:
-        for key in new:
-            _placed_ahead.pop(key, None)
+        _placed_ahead.reset(token)
+
+
+def _possible(packing: Packing) -> bool:
+    try:
+        refuse(packing)
+    except InputError:
+        return False
+    return True
+
+
+def _portions(packings: Mapping[Any, Packing]) -> Iterator[list[Any]]:
+    """Yield the keys of packings of SPHERES_AT_ONCE spheres at most, or of one."""
+    some: list[Any] = []
+    spheres = 0
+    for key, packing in packings.items():
+        if some and spheres + len(packing.radii) > SPHERES_AT_ONCE:
+            yield some
+            some, spheres = [], 0
+        some.append(key)
+        spheres += len(packing.radii)
+    yield some

@@ -123,7 +123,7 @@ def _row(array: ti.template(), p, k):  # type: ignore[valid-type]
     return ti.Vector([array[p, k, 0], array[p, k, 1], array[p, k, 2]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Packing:
     """A packing is of spheres of these radii (m), shape (n,), at least one, by the random numbers of a seed.
 
@@ -139,6 +139,15 @@ class Packing:
         """The order in which the spheres are placed: the largest first."""
         return np.argsort(-self.radii, kind="stable")
 
+    @property
+    def equal(self) -> bool:
+        """Whether all spheres are of one radius."""
+        return bool((self.radii == self.radii[0]).all())
+
+    def fraction(self, count: int) -> float:
+        """Return the part of the region's container that the first ``count`` spheres to be placed take up."""
+        return float((4 / 3 * np.pi * self.radii**3)[self.order][:count].sum()) / self.region.volume
+
     def key(self) -> tuple[bytes, bytes, int]:
         """Return what decides where the spheres lie."""
         return self.radii.tobytes(), self.rows.tobytes(), self.seed
@@ -153,7 +162,8 @@ class Packing:
 
 
 def everywhere(packings: Sequence[Packing]) -> list[np.ndarray]:
-    """Return of each packing the first centres, in its order, found by trying places in all of its region."""
+    """Return of each packing the centres, m, shape (placed, 3), of the first spheres of its order, which are
+    found by trying places in all of its region."""
     grids = [_cells(packing) for packing in packings]
     radii = [packing.radii[packing.order] for packing in packings]
     ends, lowest = np.cumsum([len(one) for one in radii]), np.cumsum([0, *map(len, grids)])[:-1]
@@ -188,5 +198,6 @@ def _cells(packing: Packing) -> np.ndarray:
     levels = int(_levels(np.array([largest, packing.radii.min()]))[1]) + 1
     widths = 2.0 * largest * 0.5 ** np.arange(levels)
     dims = np.clip(np.floor(side / widths[:, None]), 1, MAX_CELLS)
-    too_many = np.cbrt(np.maximum(dims.prod(axis=1) / (CELLS_OF_A_SPHERE * len(packing.radii)), 1.0))
-    return np.maximum(np.floor(dims / too_many[:, None]), 1).astype(np.int32)
+    too_many = np.maximum(dims.prod(axis=1) / (CELLS_OF_A_SPHERE * len(packing.radii)), 1.0)
+    several = np.maximum((dims > 1).sum(axis=1), 1)
+    return np.maximum(np.floor(dims / (too_many ** (1 / several))[:, None]), 1).astype(np.int32)

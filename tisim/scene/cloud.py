@@ -21,7 +21,7 @@ from tisim.packing.grains import (
     masses,
     quantity,
 )
-from tisim.packing.placement import Placement, RandomInDomain
+from tisim.packing.placement import Placement, RandomInDomain, RandomSequential
 from tisim.packing.tried_places import Packing
 from tisim.scene.initial_state import Arrays, Start, worst
 from tisim.scene.initial_velocity import Pulse
@@ -139,7 +139,11 @@ class Cloud(Start):
         return {"radius": radius, "mass": masses(self.grains, which, radius), **further}
 
     def packing(self, domain: Domain, seed: int) -> Packing | None:
-        return self.placement.packing(self._spheres(self.count(), seed)["radius"], domain, seed)
+        if not isinstance(self.placement, RandomSequential):
+            return None
+        n = self.count()
+        check_memory(f"a cloud of {n} particles", n)
+        return self.placement.packing(self._spheres(n, seed)["radius"], domain, seed)
 
     def structure(self) -> tuple[Any, ...]:
         return (type(self),)

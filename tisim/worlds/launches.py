@@ -31,9 +31,11 @@ TASKS_PER_THREAD = 4
 
 
 def tasks_of(phase: Phase, worlds: int, threads: int) -> int:
-    """Return into how many tasks a phase of a world is cut for threads of a CPU: as many for each of them."""
+    """Return into how many tasks a phase of a world is cut for threads of a CPU: a multiple of these, where
+    there are more. Only few of the worlds that there is room for may have work."""
     least = TASK if phase.light and not phase.long else 1
-    tasks = max(1, min(-(-TASKS_PER_THREAD * threads // worlds), phase.extent // least))
+    wanted = max(-(-TASKS_PER_THREAD * threads // worlds), threads)
+    tasks = max(1, min(wanted, phase.extent // least))
     return tasks - tasks % threads if tasks > threads else tasks
 
 

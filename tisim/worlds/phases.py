@@ -15,7 +15,7 @@ class Phase:
     """A phase is one loop: ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds
     size.
 
-    ``long`` says that one item is work enough for a launch, ``light`` that a task has many items, on a CPU;
+    ``long`` says that one item is work enough for a launch, ``light`` that else a task has many, on a CPU;
     ``others`` how many other particles an item goes through one by one: by it the schedule is chosen
     (engine/schedule_choice.py), and how long a team waits for a thread.
     """
