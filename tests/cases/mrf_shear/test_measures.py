@@ -125,7 +125,7 @@ def test_a_figure_says_by_how_much_a_mixture_yields_later():
     rates = np.array([1e3, 2e3, 4e3])
     of_starts = 40e3 * np.array([0.9, 1.0, 1.1])
     whole = Curve(rates, [group(rate, of_starts + rate) for rate in rates])
-    mixed = Curve(rates, [group(rate, of_starts * np.array([1.2, 1.3, 1.4])) for rate in rates])
+    mixed = Curve(rates, [group(rate, of_starts * np.array([1.2, 1.3, 1.4]) + rate) for rate in rates])
     np.testing.assert_allclose(whole.yield_stresses(), of_starts)
     parts = {name: group(1e4, of_starts) for name in VARIATIONS}
     curves = figures.stress_figure(whole, mixed, Curve(rates, whole.groups), parts).axes[0]
