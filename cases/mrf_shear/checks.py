@@ -8,7 +8,7 @@ import numpy as np
 
 from cases.case import Check
 from cases.mrf_shear import published
-from cases.mrf_shear.flow_curve import COMPARED, MIXED, VARIATIONS, WHOLE, Curve
+from cases.mrf_shear.flow_curve import AS_PUBLISHED, COMPARED, MIXED, VARIATIONS, Curve
 from cases.mrf_shear.measures import magnetised_part, order, raft_force
 from cases.mrf_shear.regime import regime
 from cases.mrf_shear.runs import cells, paired
@@ -50,7 +50,7 @@ def check() -> Iterator[Check | Claim | Shown]:
     groups = cells(settings, CHECK_STARTS)
     curve = Curve(np.array([one["rate"] for one in rates]), groups[: len(rates)])
     weak, parts = groups[len(rates)], dict(zip(VARIATIONS, groups[len(rates) + 1 :], strict=True))
-    whole = parts[WHOLE]
+    whole = parts[AS_PUBLISHED]
     yield from balances(whole)
     yield from chains(whole)
     yield from as_magnetised(whole)

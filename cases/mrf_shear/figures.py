@@ -11,13 +11,12 @@ from matplotlib.figure import Figure
 
 from cases.case import size_named
 from cases.mrf_shear import published
-from cases.mrf_shear.flow_curve import MIXED, VARIATIONS, WHOLE, Curve, by_field, by_part, flow_curve, table
+from cases.mrf_shear.flow_curve import Curve, by_field, by_part, flow_curve, table
 from cases.mrf_shear.measures import order
 from cases.mrf_shear.runs import magnetised, paired
 from cases.mrf_shear.scene import RATES, SIZES
-from cases.statistics import Mean
 from tisim import Result, run
-from tisim.engine.batches import Progress, progress_of_part
+from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.plotting.cloud import corners, panel, view
 from tisim.plotting.style import empty, letters, plain, si
@@ -29,42 +28,35 @@ KILO = 1e3
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """flow_curve.png, flow_curve.csv, flow_curve_mixture.csv, field.csv: stress by shear rate, of equal
-    grains and of a mixture, by field and by part of the model; chains.png: grains before, in the field, and
-    sheared."""
+    """flow_curve.png, flow_curve.csv, field.csv: stress by shear rate, by field and by part of the model;
+    chains.png: grains before, in the field, and sheared."""
     must(not size_named(size, SIZES).scene, "size", "default, which is run", size)
-    curve, mixed = (
-        flow_curve(STARTS, VARIATIONS[part], progress=progress_of_part(progress, k, 2))
-        for k, part in enumerate((WHOLE, MIXED))
-    )
+    curve = flow_curve(STARTS, progress=progress)
     fields, parts = by_field(STARTS), by_part(STARTS)
     slow = curve.groups[0][0]
     (chained,) = run([magnetised({"rate": RATES[0]}, slow.scene.seed)])
     return {
-        "flow_curve.png": stress_figure(curve, mixed, fields, parts),
+        "flow_curve.png": stress_figure(curve, fields, parts),
         "flow_curve.csv": table(curve, "shear_rate_per_s"),
-        "flow_curve_mixture.csv": table(mixed, "shear_rate_per_s"),
         "field.csv": table(fields, "flux_density_T"),
         "chains.png": chain_figure(chained, slow),
     }
 
 
-def stress_figure(whole: Curve, mixed: Curve, fields: Curve, parts: Mapping[str, Sequence[Result]]) -> Figure:
-    """Draw stress by shear rate with fluids of Bingham that fit, by field, and by part of the model."""
+def stress_figure(curve: Curve, fields: Curve, parts: Mapping[str, Sequence[Result]]) -> Figure:
+    """Draw stress by shear rate with the fluid of Bingham that fits, by field, and by part of the model."""
     figure = empty(12.6, 3.9)
     rates, flux, bars = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
+    fit = curve.bingham()
     style: Any = {"fmt": "o", "ms": 5, "capsize": 3}
-    for curve, name, colour in ((whole, WHOLE, "C0"), (mixed, MIXED, "#44aa99")):
-        rates.errorbar(curve.x, curve.values / KILO, curve.halves / KILO, **style, color=colour, label=name)
-        fit, line = curve.bingham(), np.linspace(0.0, curve.x.max(), 2)
-        yields, half = fit.yield_stress.value / KILO, fit.yield_stress.half / KILO
-        rates.plot(line, fit.stress(line) / KILO, color=colour, lw=1.0,
-                   label=f"Bingham: {yields:.1f} ± {half:.1f} kPa")  # fmt: skip
-    rise = Mean.of(mixed.yield_stresses() / whole.yield_stresses())
-    rates.plot([], [], " ", label=f"yield stress of the mixture: {rise} times")
+    rates.errorbar(curve.x, curve.values / KILO, curve.halves / KILO, **style, label="as run")
+    line = np.linspace(0.0, curve.x.max(), 2)
+    yields, half = fit.yield_stress.value / KILO, fit.yield_stress.half / KILO
+    rates.plot(line, fit.stress(line) / KILO, color="0.2", lw=1.0,
+               label=f"Bingham: {yields:.1f} ± {half:.1f} kPa")  # fmt: skip
     beside = published.MEASURED_YIELD["00:100"] / KILO
     rates.axhline(beside, color="#cc6677", lw=1.0, ls="--", label=f"measured yield stress, {beside:g} kPa")
-    rates.set(xlabel="shear rate (1/s)", ylabel="shear stress (kPa)", title="flow curves at 0.6 T")
+    rates.set(xlabel="shear rate (1/s)", ylabel="shear stress (kPa)", title="flow curve at 0.6 T")
     rates.set_ylim(bottom=0.0)
     flux.errorbar(fields.x, fields.values / KILO, fields.halves / KILO, **style)
     scale = fields.values[-1] / fields.x[-1] ** 2 / KILO

@@ -27,9 +27,9 @@ COMPARED = {"rate": RATES[-1]}
 """Variants and fields are compared at the fastest of the rates, which is the quickest to run."""
 FLUXES = (0.1, 0.2, 0.3, 0.45, 0.6)
 """Flux densities of the sweep, T."""
-WHOLE, MIXED = "as L21 has it", "a third of small grains"
+AS_PUBLISHED, MIXED = "as L21 has it", "a third of small grains"
 VARIATIONS: dict[str, Settings] = {
-    WHOLE: {},
+    AS_PUBLISHED: {},
     "no resistance to rolling": {"rolling": 0.0},
     "no cohesion": {"cohesion": 0.0},
     "oil at rest": {"still": True},
@@ -87,11 +87,9 @@ class Curve:
         return Mean.of([np.polyfit(x, np.log(start), 1)[0] for start in self.of_starts.T])
 
 
-def flow_curve(
-    starts: int, part: Settings, rates: Sequence[float] = RATES, progress: Progress | None = None
-) -> Curve:
-    """Return stress by shear rate of a variant; one world for each rate and start, all as one batch."""
-    groups = cells([{**part, "rate": rate} for rate in rates], starts, progress)
+def flow_curve(starts: int, rates: Sequence[float] = RATES, progress: Progress | None = None) -> Curve:
+    """Return stress by shear rate; one world for each rate and start, all as one batch."""
+    groups = cells([{"rate": rate} for rate in rates], starts, progress)
     return Curve(np.array([shear_rate(group[0]) for group in groups]), groups)
 
 

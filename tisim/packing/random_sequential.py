@@ -19,7 +19,6 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.components.ranges import check_resolved
 from tisim.errors import InputError, must
-from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
 from tisim.packing.region import Region
 from tisim.packing.saturation import fill
 from tisim.packing.tried_places import Packing, everywhere
@@ -47,8 +46,7 @@ def place(radii: np.ndarray, region: Region, seed: int) -> np.ndarray:
         (centres,) = everywhere([packing])
     count, largest = len(radii), float(radii.max())
     if len(centres) < count and packing.equal:
-        generator = np.random.Generator(np.random.Philox(key=[seed, SEQUENTIAL_ADDITION]))
-        centres = fill(centres, count, 2 * largest, region, generator)
+        centres = fill(centres, count, 2 * largest, region, packing.generator())
     if len(centres) < count:
         reached = packing.fraction(len(centres))
         raise InputError(

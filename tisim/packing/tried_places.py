@@ -148,6 +148,10 @@ class Packing:
         """Return the part of the region's container that the first ``count`` spheres to be placed take up."""
         return float((4 / 3 * np.pi * self.radii**3)[self.order][:count].sum()) / self.region.volume
 
+    def generator(self) -> np.random.Generator:
+        """Return a generator of further random numbers, for what trying places everywhere leaves."""
+        return np.random.Generator(np.random.Philox(key=[self.seed, SEQUENTIAL_ADDITION]))
+
     def key(self) -> tuple[bytes, bytes, int]:
         """Return what decides where the spheres lie."""
         return self.radii.tobytes(), self.rows.tobytes(), self.seed
