@@ -5,7 +5,7 @@
 The cell of a search of mrf_shear, of equal grains and with a third of the volume in grains half as large, at
 each shear rate (1/s). Printed are the stresses, the yield stress and the plastic viscosity of Bingham's law,
 and the yield stress of the mixture over that of equal grains; means over starts with half of their 95 %
-intervals. Mixtures have three times as many grains, and steps half as long: about half an hour.
+intervals. Mixtures have three times as many grains, and steps half as long: a quarter of an hour.
 """
 
 import argparse
