@@ -10,6 +10,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -28,6 +29,8 @@ COMPARED = {"rate": RATES[-1]}
 FLUXES = (0.1, 0.2, 0.3, 0.45, 0.6)
 """Flux densities of the sweep, T."""
 AS_PUBLISHED, MIXED = "as L21 has it", "a third of small grains"
+"""The model that variants are compared with, and the mixture among these; the small grains are a third by
+volume."""
 VARIATIONS: dict[str, Settings] = {
     AS_PUBLISHED: {},
     "no resistance to rolling": {"rolling": 0.0},
@@ -72,14 +75,17 @@ class Curve:
         All settings begin from the same starts: their errors go together, and a fit to their means, to which
         they are errors of their own, would not know how far off it is.
         """
-        fits = [fit_bingham(self.x, start) for start in self.of_starts.T]
+        viscosity = Mean.of([one.plastic_viscosity.value for one in self._fits])
         yields = Mean.of(self.yield_stresses())
-        viscosity = Mean.of([one.plastic_viscosity.value for one in fits])
         return BinghamFit(*(Estimate(one.value, one.half) for one in (yields, viscosity)))
 
     def yield_stresses(self) -> np.ndarray:
         """Return the yield stress of the fluid of Bingham that fits the curve of each start, Pa."""
-        return np.array([fit_bingham(self.x, start).yield_stress.value for start in self.of_starts.T])
+        return np.array([one.yield_stress.value for one in self._fits])
+
+    @cached_property
+    def _fits(self) -> list[BinghamFit]:
+        return [fit_bingham(self.x, start) for start in self.of_starts.T]
 
     def power(self) -> Mean:
         """Return the mean over starts of the exponent of the power law that fits the curve of each."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,7 @@ LAW = TwinLaw(
     rolling="rolling_sds",
 )
 FIELDS = {"position": "x", "velocity": "v", "spin": "omega"}
+KEPT = ("radius", "mass")
 
 
 def scenes(seeds: Sequence[int]) -> list[Scene]:
@@ -77,45 +78,71 @@ def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
 
 def by_lammps(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
     """The same in LAMMPS, in a process of its own."""
-    starts = [one.start() for one in made]
-    stacked = {name: np.stack([at[name] for at in starts]) for name in (*FIELDS, "radius", "mass")}
     steps = [round(look / made[0].stepper.control.dt) for look in LOOKS]
-    found = lammps_peer.apart(
-        __file__, law=lammps_model(LAW), steps=steps, dt=made[0].stepper.control.dt, **stacked
-    )
+    states, lasted = apart(__file__, made, law=lammps_model(LAW), steps=steps)
+    return states, lasted / particle_steps(made)
+
+
+def apart(script: str, made: Sequence[Scene], **given: Any) -> tuple[list[list[State]], float]:
+    """What a script's ``worker`` finds from the starts of some scenes, look by look, and how long its steps
+    have taken, s."""
+    starts = [one.start() for one in made]
+    stacked = {name: np.stack([at[name] for at in starts]) for name in (*FIELDS, *KEPT)}
+    found = lammps_peer.apart(script, dt=made[0].stepper.control.dt, **given, **stacked)
     states = [
         [
-            {**{name: found[name][w, k] for name in FIELDS}, "radius": at["radius"], "mass": at["mass"]}
-            for k in range(len(LOOKS))
+            {**{name: found[name][w, k] for name in FIELDS}, **{name: at[name] for name in KEPT}}
+            for k in range(found["position"].shape[1])
         ]
         for w, at in enumerate(starts)
     ]
-    return states, float(found["lasted"]) / particle_steps(made)
+    return states, float(found["lasted"])
+
+
+def run_each(folder: Path, run: Callable[[Any, State, State], tuple[list[State], float]]) -> None:
+    """Run LAMMPS on each start of in.npz of a folder, and write out.npz.
+
+    run : takes a LAMMPS with a cloud, that start, and all that is given; returns the states where it has
+    looked and the seconds that steps have taken.
+    """
+    with np.load(folder / "in.npz") as given:
+        at = dict(given)
+    states, lasted = [], 0.0
+    for w in range(len(at["radius"])):
+        start = {name: at[name][w] for name in (*FIELDS, *KEPT)}
+        machine = machine_of(start, folder, str(at["law"]))
+        machine.command(f"timestep {float(at['dt'])}")
+        looks, seconds = run(machine, start, at)
+        machine.close()
+        states.append(looks)
+        lasted += seconds
+    columns = {name: np.array([[look[name] for look in looks] for looks in states]) for name in FIELDS}
+    np.savez(folder / "out.npz", lasted=lasted, **columns)
+
+
+def state_of(machine: Any) -> State:
+    """Where the grains of LAMMPS are, and how they move."""
+    return {
+        name: np.array(machine.gather_atoms(theirs, 1, 3)).reshape(-1, 3) for name, theirs in FIELDS.items()
+    }
+
+
+def fall_together(machine: Any, start: State, at: State) -> tuple[list[State], float]:
+    """Let a cloud of LAMMPS fall together; see ``run_each``."""
+    machine.command("run 0")
+    looks, lasted, done = [], 0.0, 0
+    for steps in at["steps"]:
+        began = time.perf_counter()
+        machine.command(f"run {steps - done} pre no post no")
+        lasted += time.perf_counter() - began
+        done = steps
+        looks.append(state_of(machine))
+    return looks, lasted
 
 
 def worker(folder: Path) -> None:
-    """Run LAMMPS on each start of in.npz of a folder, and write out.npz."""
-    with np.load(folder / "in.npz") as given:
-        at = dict(given)
-    found: dict[str, list[list[np.ndarray]]] = {name: [] for name in FIELDS}
-    lasted = 0.0
-    for w in range(len(at["radius"])):
-        machine = machine_of(
-            {name: at[name][w] for name in (*FIELDS, "radius", "mass")}, folder, str(at["law"])
-        )
-        machine.commands_list([f"timestep {float(at['dt'])}", "run 0"])
-        for values in found.values():
-            values.append([])
-        done = 0
-        for steps in at["steps"]:
-            began = time.perf_counter()
-            machine.command(f"run {steps - done} pre no post no")
-            lasted += time.perf_counter() - began
-            done = steps
-            for name, theirs in FIELDS.items():
-                found[name][-1].append(np.array(machine.gather_atoms(theirs, 1, 3)).reshape(-1, 3))
-        machine.close()
-    np.savez(folder / "out.npz", lasted=lasted, **{name: np.array(values) for name, values in found.items()})
+    """Run LAMMPS for ``apart``."""
+    run_each(folder, fall_together)
 
 
 def machine_of(at: State, folder: Path, model: str) -> Any:

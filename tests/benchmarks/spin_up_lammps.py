@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +32,8 @@ from cases.runs import sound  # noqa: E402
 from cases.spin_up.checks import at_least  # noqa: E402
 from cases.spin_up.scene import DEFAULT, NUMBERS, SETTLED, scene  # noqa: E402
 from cases.spin_up.stages import RATES, SpinStep, SpinUp, stage_ends, turn  # noqa: E402
-from tests.benchmarks import lammps_peer  # noqa: E402
-from tests.benchmarks.coalescence_lammps import FIELDS, machine_of  # noqa: E402
+from tests.benchmarks import coalescence_lammps, lammps_peer  # noqa: E402
+from tests.benchmarks.coalescence_lammps import FIELDS, run_each, state_of  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
@@ -83,48 +84,33 @@ def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
 
 def by_lammps(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
     """The same in LAMMPS, in a process of its own."""
-    starts = [one.start() for one in made]
-    stacked = {name: np.stack([at[name] for at in starts]) for name in (*FIELDS, "radius", "mass")}
-    found = lammps_peer.apart(__file__, law=lammps_model(LAW), dt=made[0].stepper.control.dt, **stacked)
-    states = [
-        [
-            {**{name: found[name][w, k] for name in FIELDS}, "radius": at["radius"], "mass": at["mass"]}
-            for k in range(len(SPINS))
-        ]
-        for w, at in enumerate(starts)
-    ]
-    return states, float(found["lasted"]) / particle_steps(made)
+    states, lasted = coalescence_lammps.apart(__file__, made, law=lammps_model(LAW))
+    return states, lasted / particle_steps(made)
+
+
+def spin_up(machine: Any, start: State, at: State) -> tuple[list[State], float]:
+    """Let a pile of LAMMPS settle and turn it; see ``coalescence_lammps.run_each``."""
+    looks: list[State] = []
+    lasted, done = 0.0, 0
+    for spin, end in zip(SPINS, step_ends(float(at["dt"])), strict=True):
+        if spin:
+            pile = {**start, **looks[-1]}
+            turn(pile, spin)
+            for name in ("velocity", "spin"):
+                numbers = np.ascontiguousarray(pile[name]).ravel()
+                machine.scatter_atoms(FIELDS[name], 1, 3, np.ctypeslib.as_ctypes(numbers))
+        began = time.perf_counter()
+        # With forces at the beginning, as velocities are others.
+        machine.command(f"run {end - done} post no")
+        lasted += time.perf_counter() - began
+        done = end
+        looks.append(state_of(machine))
+    return looks, lasted
 
 
 def worker(folder: Path) -> None:
-    """Run LAMMPS on each start of in.npz of a folder, and write out.npz."""
-    with np.load(folder / "in.npz") as given:
-        at = dict(given)
-    found: dict[str, list[list[np.ndarray]]] = {name: [] for name in FIELDS}
-    lasted = 0.0
-    for w in range(len(at["radius"])):
-        start = {name: at[name][w] for name in (*FIELDS, "radius", "mass")}
-        machine = machine_of(start, folder, str(at["law"]))
-        machine.command(f"timestep {float(at['dt'])}")
-        for values in found.values():
-            values.append([])
-        done = 0
-        for spin, end in zip(SPINS, step_ends(float(at["dt"])), strict=True):
-            if spin:
-                pile = {**start, **{name: np.array(values[-1][-1]) for name, values in found.items()}}
-                turn(pile, spin)
-                for name in ("velocity", "spin"):
-                    numbers = np.ascontiguousarray(pile[name]).ravel()
-                    machine.scatter_atoms(FIELDS[name], 1, 3, np.ctypeslib.as_ctypes(numbers))
-            began = time.perf_counter()
-            # With forces at the beginning, as velocities are others.
-            machine.command(f"run {end - done} post no")
-            lasted += time.perf_counter() - began
-            done = end
-            for name, theirs in FIELDS.items():
-                found[name][-1].append(np.array(machine.gather_atoms(theirs, 1, 3)).reshape(-1, 3))
-        machine.close()
-    np.savez(folder / "out.npz", lasted=lasted, **{name: np.array(values) for name, values in found.items()})
+    """Run LAMMPS for ``by_lammps``."""
+    run_each(folder, spin_up)
 
 
 def statistics(states: list[State]) -> dict[str, float]:

@@ -6,14 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
-from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.geometry import round_box
 from tisim.numerics import philox
 from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
 from tisim.packing.region import Region
-from tisim.worlds.launches import TASK
+from tisim.worlds.launches import iterations_of_task
 
 MAX_CONSECUTIVE_FAILURES = 5_000
 """After so many failures in a row places are no longer tried everywhere, only where there is room."""
@@ -44,7 +43,7 @@ def _add(
     cell; -1 where there is none. packings : the first sphere of each, the one after the last, its first
     level, and then how many found room. regions : the corner and sides of the region of the largest sphere,
     and of the smallest, and whether each axis is periodic, round and walled. task : a thread takes so many
-    iterations of a loop at least.
+    iterations of a loop at least (tisim/worlds/launches.py).
     """
     for iteration in range(packings.shape[0] * task):
         if iteration % task == 0:
@@ -182,8 +181,7 @@ def everywhere(packings: Sequence[Packing]) -> list[np.ndarray]:
     ranges = np.column_stack([starts, ends, lowest, 0 * ends]).astype(np.int32)
     regions = np.stack([packing.rows for packing in packings])
     seeds = np.array([packing.seed for packing in packings], np.uint64)
-    task = TASK if runtime.current().device == "cpu" else 1
-    _add(spheres, chains, levels, heads, ranges, regions, seeds, task)
+    _add(spheres, chains, levels, heads, ranges, regions, seeds, iterations_of_task())
     return [spheres[first : first + placed, 1:] for first, _, _, placed in ranges]
 
 

@@ -30,6 +30,11 @@ TASKS_PER_THREAD = 4
 """A loop has so many tasks for each thread of a CPU, so that a thread that comes late has less to do."""
 
 
+def iterations_of_task() -> int:
+    """Return how many iterations of a loop a task takes up, so that each may have a thread of its own."""
+    return TASK if runtime.current().device == "cpu" else 1
+
+
 def tasks_of(phase: Phase, worlds: int, threads: int) -> int:
     """Return into how many tasks a phase of a world is cut for threads of a CPU: a multiple of these, where
     there are more. Only few of the worlds that there is room for may have work."""
@@ -51,7 +56,7 @@ class Launch:
     def __init__(self, program: "LaunchedProgram", phases: tuple[Phase, ...], route: Route) -> None:
         self.program, self.s, self.route = program, program.s, route
         settings = runtime.current()
-        self.iterations = TASK if settings.device == "cpu" else 1
+        self.iterations = iterations_of_task()
         self.loops: tuple[tuple[Phase, int, int], ...] = ()
         for phase in phases:
             on_cpu = settings.device == "cpu"
