@@ -20,8 +20,8 @@ np.save(sys.argv[1], test_threads.PLACES[sys.argv[2]]())
 
 
 def places(run, worlds, number, together=False, **more):
-    """Where particles are at the end. Each phase is a launch over all of them: fewer than a thousand would
-    all be one thread's."""
+    """Where particles are at the end. Each phase is a launch over all of them: of phases with little to do
+    for each, fewer than a thousand would all be one thread's."""
     more = {"trap": 200.0, "dt": 1e-3, "drift": 0.3, "steps": 6, **more}
     draw = np.random.default_rng(1)
     starts = draw.uniform(-1e-6, 1e-6, (worlds, number, 3))
