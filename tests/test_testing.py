@@ -138,7 +138,7 @@ class Silent(Stepper):
 
     control: FixedStep = FixedStep(dt=0.02)
 
-    def fields(self, turning, independent):
+    def fields(self, effects):
         return (FORCE,)
 
     def step(self, context):

@@ -22,6 +22,10 @@ class RunError(RuntimeError):
     """A run could not go on. The message says when, where and why; the last good state is kept."""
 
 
+class RunWarning(UserWarning):
+    """A run has failed, and its results are used, or dropped, without a look at its status."""
+
+
 class _Short(reprlib.Repr):
     """This repr bounds the length and the depth of what it returns, however large the value is."""
 

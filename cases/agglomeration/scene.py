@@ -14,6 +14,7 @@ from cases.case import Size, size_named
 from tisim import Box, Cloud, Scene
 from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
 from tisim.operators import Cooling, Fragmentation
+from tisim.steppers import ApproachTime, Verlet
 
 TITLE = "Agglomeration in thermochemically reacting granular flow"
 
@@ -72,6 +73,7 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
             Cooling(),
         ),
         domain=Box(low=(-HALF_SIDE,) * 3, high=(HALF_SIDE,) * 3, images=False),
+        stepper=Verlet(control=ApproachTime()),
         duration=duration,
         seed=seed,
     )  # fmt: skip

@@ -148,7 +148,7 @@ class TestReplace:
                 "nonsense",
                 1,
                 "scene.nonsense must be a known key: name, particles, materials, material_pairs, effects, "
-                "domain, stepper, duration, skin or seed; received 1",
+                "domain, stepper, accuracy, duration, skin or seed; received 1",
             ),
         ],
     )

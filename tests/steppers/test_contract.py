@@ -94,7 +94,7 @@ class Implicit(Stepper):
     control: Controller
     tolerance: float = parameter("m", "tolerance", 1e-14, gt=0)
 
-    def fields(self, turning, independent):
+    def fields(self, effects):
         return (
             Field("position_before", "m", 3, "keep"),
             Field("velocity_before", "m/s", 3, "keep"),

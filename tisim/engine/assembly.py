@@ -60,8 +60,7 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
             needed += [(field, effect.label) for field in memory_fields(effect)]
         if isinstance(effect, Force):
             needed += [(field, effect.label) for field in effect.memory_fields(effects)]
-    wanted = stepper.fields(turning(effects), stepper.independent(effects))
-    needed += [(need, stepper.kind()) for need in wanted]
+    needed += [(need, stepper.kind()) for need in stepper.fields(effects)]
     users: dict[str | Field, list[str]] = {}
     for need, who in needed:
         users.setdefault(need, []).append(who)

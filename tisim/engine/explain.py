@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from rich.console import Group, RenderableType
@@ -32,7 +32,9 @@ class Memory:
 class Explanation:
     """An explanation describes a scene, as one world of it is compiled.
 
-    particles, capacity : at the start, and room for. steps : that a run takes at least. materials : by name,
+    particles, capacity : at the start, and room for. steps : that a run takes at least. reason : why the
+    stepper is what it is, where the scene names none; else empty. critical : critical time steps (s) by
+    effect, the shortest first. materials : by name,
     then what each two of them are to each other, by both names. memory : every allocation, fields first.
     phases : of a step, in order; those with * are repeated until nothing waits. absent_effects : known, and
     left out. absent_fields : (field, effects that would need it), not allocated.
@@ -46,6 +48,8 @@ class Explanation:
     precision: str
     effects: tuple[Part, ...]
     others: tuple[Part, ...]
+    reason: str
+    critical: Mapping[str, float]
     materials: tuple[Part, ...]
     memory: tuple[Memory, ...]
     phases: tuple[str, ...]
@@ -80,6 +84,8 @@ def explain(scene: Scene) -> Explanation:
         precision=precision,
         effects=tuple(explained(effect) for effect in scene.acting()),
         others=(explained(scene.domain), explained(scene.stepper)),
+        reason="" if "stepper" in scene.model_fields_set else scene.choice().reason,
+        critical=scene.critical_steps(),
         materials=tuple(explained_materials(Materials(scene.materials, scene.material_pairs))),
         memory=memory,
         phases=phases,
@@ -154,7 +160,36 @@ def render(explanation: Explanation) -> RenderableType:
     lacking = Text.assemble(("Fields it does without  ", "italic"), "; ".join(fields) or "none")
     left_out = absent if explanation.absent_effects else Text("It leaves out no effect that tisim knows.")
     of_materials = (materials, "") if explanation.materials else ()
-    return Group(head, "", what, "", *of_materials, memory, "", phases, "", left_out, lacking)
+    return Group(
+        head,
+        "",
+        _time_steps(explanation),
+        "",
+        what,
+        "",
+        *of_materials,
+        memory,
+        "",
+        phases,
+        "",
+        left_out,
+        lacking,
+    )
+
+
+def _time_steps(explanation: Explanation) -> RenderableType:
+    """Return the stepper, the reason for it where it was chosen, and the critical time steps."""
+    stepper = explanation.others[1].name
+    why = (
+        f"{stepper}, chosen: {explanation.reason}" if explanation.reason else f"{stepper}, as the scene says"
+    )
+    head = Text.assemble(("Stepper  ", "italic"), why)
+    if not explanation.critical:
+        return head
+    steps = "; ".join(f"{label} {step:.3g} s" for label, step in explanation.critical.items())
+    return Group(
+        head, Text.assemble(("Critical time steps, 2/omega of the stiffest motion  ", "italic"), steps)
+    )
 
 
 def _add(table: Table, part: Part) -> None:

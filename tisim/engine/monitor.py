@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tisim.engine.replay import Image, Replay
-from tisim.engine.result import Status
+from tisim.engine.result import RUNNING, Status
 from tisim.worlds.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tisim.engine.simulation import Simulation
 
 REASONS: dict[int, str] = {
-    WorldStatus.RUNNING: "running",
+    WorldStatus.RUNNING: RUNNING,
     WorldStatus.ENDED: "reached its end",
     WorldStatus.NOT_FINITE: "a quantity is not finite",
     WorldStatus.OUT_OF_ROOM: "more particles than there is room for",
@@ -26,6 +26,7 @@ REASONS: dict[int, str] = {
     WorldStatus.STEP_TOO_SHORT: "the implicit equations of a step cannot be solved even at the shortest step",
     WorldStatus.FORCE_TOO_STEEP: "a force so strong that it asks for a step shorter than the shortest",
     WorldStatus.NOT_POSITIVE_DEFINITE: "the diffusion matrix is not positive definite",
+    WorldStatus.STEP_TOO_LONG: "a step longer than half of the critical time step (2/omega) of the forces",
     WorldStatus.LIST_OVERFLOW: "more near pairs than their list has room for",
 }
 
@@ -169,6 +170,10 @@ class Monitor:
         reason = REASONS[code or WorldStatus.NOT_FINITE]
         if code == WorldStatus.NOT_CONVERGED:
             reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
+        if code == WorldStatus.STEP_TOO_LONG:
+            step = float(then["dt"][w])
+            critical = 2 * step / float(then["step_excess"][w]) ** 0.5
+            reason += f": the step is {step:.3g} s, the critical one at most {critical:.3g} s"
         where = ""
         if failing_effect < len(scene.effects):
             effect = scene.effects[failing_effect]

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, Self
 
+from tisim.errors import RunError, RunWarning
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
+
+RUNNING = "running"
+"""This is the reason of a world that has not come to its end yet."""
+RESULTS = ("state", "measures")
+"""To read these of a failed run warns, unless its status has been read before."""
 
 
 @dataclass(frozen=True)
@@ -16,10 +26,19 @@ class Status:
     ok: bool
     reason: str
 
+    @property
+    def failed(self) -> bool:
+        """Return whether the world has failed; one that still runs has neither failed nor ended."""
+        return not self.ok and self.reason != RUNNING
+
 
 @dataclass(frozen=True)
 class Result:
     """A result is what a run has made of one scene.
+
+    Who uses the ``state`` or the ``measures`` of a result of ``tisim.run`` that has failed, or drops it,
+    without having read its ``status`` gets a ``RunWarning``. ``check()`` raises instead, and returns the
+    result where all is well: ``tisim.run(scene).check().state``.
 
     state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, that
         of the last good step; for particles that do not feel each other and take implicit or Brownian steps
@@ -41,3 +60,35 @@ class Result:
     wall_s: float
     settings: dict[str, str] = field(default_factory=dict)
     measures: dict[str, float] = field(default_factory=dict)
+
+    def check(self) -> Self:
+        """Return the result itself; raise RunError, with the reason, where the run has failed."""
+        if self.status.failed:
+            raise RunError(f"{self.scene.name}: {self.status.reason}")
+        return self
+
+    def watched(self) -> Self:
+        """Return the result itself, which from now on warns who does not read its status."""
+        self.__dict__["_unread"] = True
+        return self
+
+    def __getattribute__(self, name: str) -> Any:
+        if name == "status":
+            object.__getattribute__(self, "__dict__")["_unread"] = False
+        elif name in RESULTS:
+            object.__getattribute__(self, "_warn")(f"its {name} is that of the last good step")
+        return object.__getattribute__(self, name)
+
+    def __del__(self, at_exit: Callable[[], bool] = sys.is_finalizing) -> None:
+        # At exit there may be no modules any more.
+        if not at_exit():
+            self._warn("its result has been dropped")
+
+    def _warn(self, what: str) -> None:
+        """Warn, once, where the run has failed and nobody has read its status."""
+        own = object.__getattribute__(self, "__dict__")
+        if own.get("_unread") and own["status"].failed:
+            own["_unread"] = False
+            told = "read result.status, or call result.check(), to be told otherwise"
+            text = f"the run of {own['scene'].name!r} failed, and {what} ({told}): {own['status'].reason}"
+            warnings.warn(text, RunWarning, stacklevel=3)

@@ -36,7 +36,8 @@ def run(
     write, such as ``Recording("flow.h5", frames=100)``; it does not change the results.
     What has been compiled is kept for later calls. A world's result is the same bits alone or in a batch.
     Several threads may call at once: each waits for its turn. ``progress`` may call this in turn.
-    Raises InputError when a start cannot be made or lacks what an effect needs.
+    Raises InputError when a start cannot be made or lacks what an effect needs. A run that fails on its way
+    returns a Result, whose ``status`` says so: who does not read that is warned (see Result).
     """
     if isinstance(scenes, Scene):
         return run([scenes], progress, record)[0]
@@ -48,4 +49,4 @@ def run(
         else:
             with record.create(scenes, runtime.current().precision) as trajectory:
                 results = dict(_batches.run(scenes, progress, trajectory=trajectory))
-    return [results[index] for index in range(len(scenes))]
+    return [results[index].watched() for index in range(len(scenes))]

@@ -109,12 +109,20 @@ class Cloud(Start):
 
     @np.errstate(over="ignore", invalid="ignore")
     def arrays(self, domain: Domain, seed: int) -> Arrays:
+        arrays = self.unplaced(seed)
+        arrays = {"position": self.placement.centres(arrays["radius"], domain, seed), **arrays}
+        if self.pulse is not None:
+            arrays["velocity"] = arrays["velocity"] + self.pulse.velocity(arrays["position"], arrays["mass"])
+        for name, values in arrays.items():
+            must(bool(np.isfinite(values).all()), f"{name} of the cloud", "finite", worst(values))
+        return arrays
+
+    def unplaced(self, seed: int) -> Arrays:
         n = self.count()
         check_memory(f"a cloud of {n} particles", n)
         draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (n, 3))
         spheres = self._spheres(n, seed)
         arrays = {
-            "position": self.placement.centres(spheres["radius"], domain, seed),
             "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
             "temperature": np.full(n, self.temperature),
             **{name: np.repeat([value], n, axis=0).astype(float) for name, value in self.quantities.items()},
@@ -122,10 +130,6 @@ class Cloud(Start):
         }
         if self.specific_charge is not None:
             arrays["charge"] = arrays["mass"] * self.specific_charge
-        if self.pulse is not None:
-            arrays["velocity"] = arrays["velocity"] + self.pulse.velocity(arrays["position"], arrays["mass"])
-        for name, values in arrays.items():
-            must(bool(np.isfinite(values).all()), f"{name} of the cloud", "finite", worst(values))
         return arrays
 
     def _spheres(self, n: int, seed: int) -> Arrays:

@@ -30,6 +30,11 @@ class Start(Component):
         """Return the mass of each particle, kg, shape (n,), which is known without placing them."""
         raise NotImplementedError(f"{type(self).__name__} must define masses")
 
+    def unplaced(self, seed: int) -> Arrays:
+        """Return what is known of the particles without placing them, n of each: velocity (m/s), mass (kg),
+        radius (m) and further quantities."""
+        raise NotImplementedError(f"{type(self).__name__} must define unplaced")
+
     def arrays(self, domain: Domain, seed: int) -> Arrays:
         """Return position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
@@ -188,6 +193,9 @@ class Particles(Start):
 
     def masses(self, seed: int) -> np.ndarray:
         return self._arrays()["mass"]
+
+    def unplaced(self, seed: int) -> Arrays:
+        return self._arrays()
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:
         return self._arrays()

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 def scene_table(scene: Scene, particles: dict[str, Any]) -> dict[str, Any]:
     """Return the plain data of a scene, given those of its particles."""
+    stepper: dict[str, Any] = {"accuracy": scene.accuracy}
+    if "stepper" in scene.model_fields_set:
+        stepper = {"stepper": serialization.to_dict(scene.stepper)}
     return {
         "name": scene.name,
         "duration": scene.duration,
@@ -31,7 +34,7 @@ def scene_table(scene: Scene, particles: dict[str, Any]) -> dict[str, Any]:
         **_tables("materials", scene.materials),
         **_tables("material_pairs", scene.material_pairs),
         "domain": serialization.to_dict(scene.domain),
-        "stepper": serialization.to_dict(scene.stepper),
+        **stepper,
         "effects": {effect.label: _effect_table(effect) for effect in scene.effects},
     }
 

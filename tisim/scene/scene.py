@@ -24,7 +24,7 @@ from tisim.scene import plain_data
 from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
-from tisim.steppers.verlet import Verlet
+from tisim.steppers.choice import ACCURACY, StepperChoice, choose, critical_steps
 
 PHYSICS_VERSION = 9
 """This number is raised whenever a change of code changes the result of a scene; it is part of its digest."""
@@ -50,7 +50,18 @@ class Scene(Component):
     )
     effects: tuple[Effect, ...] = option("effects, sources and operators, which act in this order", ())
     domain: Domain = option("space that it lives in, such as Open or Box", Open())
-    stepper: Stepper = option("how time advances; tolerances and limits are stated here", Verlet())
+    stepper: Stepper = option(
+        "how time advances, with tolerances and limits; chosen for the accuracy unless given",
+        None,
+    )
+    accuracy: float = parameter(
+        "",
+        "relative accuracy for which a stepper is chosen: of places at the end, over the size of the motion; "
+        "with contacts, of the energy and the rebound of each",
+        ACCURACY,
+        gt=0,
+        lt=1,
+    )
     duration: float = parameter("s", "simulated time", gt=0)
     skin: float | None = parameter(
         "m",
@@ -69,6 +80,24 @@ class Scene(Component):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
+        self._check_effects()
+        self._check_materials()
+        for effect in self.effects:
+            effect.suits(self.domain)
+            effect.suits_others(self.effects)
+        rule = "at least one, or put in by an effect such as insertion_by_flux"
+        must(self.capacity() > 0, "particles", rule, "none")
+        if "stepper" in self.model_fields_set:
+            rule = "left out where a stepper is given, which has settings of its own"
+            must(self.accuracy == ACCURACY, "scene.accuracy", rule, self.accuracy)
+        else:
+            # Not a field that is set: ``replace`` chooses anew.
+            self.__dict__["stepper"] = self.choice().stepper
+        self._check_stepper()
+        return self
+
+    def _check_effects(self) -> None:
+        """Raise InputError unless all effects have what they need of each other."""
         present = [type(effect) for effect in self.effects]
         labels = [effect.label for effect in self.effects]
         for effect, kind, label in zip(self.effects, present, labels, strict=True):
@@ -87,12 +116,6 @@ class Scene(Component):
                 must(apart, f"effects.{label}", f"used without {other.kind()}", other_label)
                 late = issubclass(other, kind.precedes) and labels.index(other_label) < labels.index(label)
                 must(not late, f"effects.{label}", f"before effects.{other_label}", ", ".join(labels))
-            must(
-                self.stepper.control.kind() not in kind.incompatible_controls,
-                "stepper.control",
-                f"one that suits {label}, such as fixed_step or that of an implicit stepper",
-                self.stepper.control.kind(),
-            )
             quantities = {other.quantity for other in present if issubclass(other, Source)}
             must(
                 not kind.requires_source or not quantities.isdisjoint(kind.requires_source),
@@ -100,15 +123,18 @@ class Scene(Component):
                 f"used together with a source of {' or '.join(kind.requires_source)}",
                 ", ".join(labels),
             )
-        self._check_materials()
+
+    def _check_stepper(self) -> None:
+        """Raise InputError unless the stepper can step the effects in the domain."""
         for effect in self.effects:
-            effect.suits(self.domain)
-            effect.suits_others(self.effects)
+            must(
+                self.stepper.control.kind() not in effect.incompatible_controls,
+                "stepper.control",
+                f"one that suits {effect.label}, such as fixed_step or that of an implicit stepper",
+                self.stepper.control.kind(),
+            )
         self.stepper.suits(self.effects, self.domain)
         self.stepper.fewest(self.effects, self.duration)
-        rule = "at least one, or put in by an effect such as insertion_by_flux"
-        must(self.capacity() > 0, "particles", rule, "none")
-        return self
 
     def _check_materials(self) -> None:
         """Raise InputError unless the materials have what effects need of them, and all names are known."""
@@ -117,6 +143,24 @@ class Scene(Component):
         for part in (part for effect in self.effects for part in effect.parts()):
             if isinstance(part, UsesMaterials):
                 part.check_materials(materials)
+
+    def choice(self) -> StepperChoice:
+        """Return the stepper that is chosen for the effects, the start and the accuracy, with the reason;
+        InputError where none can be chosen."""
+        return choose(*self._unplaced(), self.duration, self.accuracy)
+
+    def critical_steps(self) -> dict[str, float]:
+        """Return the critical time steps (s), 2/omega of the stiffest motion that an effect causes, by the
+        label of the effect, the shortest first; of those effects that have and know one."""
+        return critical_steps(*self._unplaced(), self.duration)
+
+    def _unplaced(self) -> tuple[list[Effect], Domain, Arrays]:
+        """Return the effects, which know the materials, the domain, and the start without its places."""
+        materials = Materials(self.materials, self.material_pairs)
+        start = self.particles.unplaced(self.seed)
+        indices = self.particles.material_indices(materials, self.seed)
+        start = start if indices is None else {**start, "material": indices}
+        return [_of(effect, materials) for effect in self.effects], self.domain, start
 
     def structure(self) -> tuple[Any, ...]:
         """Return what is compiled in; scenes that agree in it can run as one batch."""
@@ -150,7 +194,9 @@ class Scene(Component):
         files = python_file.module_checksums(*dict.fromkeys(map(type, self.parts())))
         digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
         data = plain_data.scene_table(self, serialization.to_dict(self.particles, arrays=True))
-        data.pop("skin", None)
+        for name in ("skin", "accuracy"):
+            data.pop(name, None)
+        data["stepper"] = serialization.to_dict(self.stepper)
         for piece in json_pieces(data):
             digest.update(piece.encode())
         digest.update((f", {json.dumps(files, sort_keys=True)}]" if files else "]").encode())

@@ -24,6 +24,10 @@ class Source(Effect):
     homogeneous: ClassVar[bool] = False
     quantity: ClassVar[str]
 
+    def strongest(self) -> float | None:
+        """Return a bound of the magnitude of the field anywhere, in its unit; None where none is known."""
+        return None
+
     @ti.func
     def value(self, w, r, t):
         """Return the field at r (m) and time t (s)."""

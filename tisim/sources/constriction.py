@@ -51,6 +51,14 @@ class ConstrictionFlow(Directed, Source):
     length: float = parameter("m", "length L of the constriction", examples=[1e-3], ge=0)
     transition: float = parameter("m", "length b of the transitions; 0 for jumps", 0.0, ge=0)
 
+    kinked: ClassVar[bool] = True
+
+    def strongest(self) -> float:
+        return abs(self.speed) * (self.duct_radius / self.throat_radius) ** 2
+
+    def shortest_length(self) -> float:
+        return min(filter(None, (self.transition, self.length, self.throat_radius)))
+
     @model_validator(mode="after")
     def _narrow(self) -> ConstrictionFlow:
         rule = f"below {self.label}.duct_radius"

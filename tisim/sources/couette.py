@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 from pydantic import model_validator
@@ -37,6 +38,14 @@ class CouetteFlow(Directed, Source):
     second_velocity: Vector = parameter("m/s", "velocity v_2 of the second wall", examples=[(0.1, 0.0, 0.0)])
 
     begin: float = parameter("s", "time at which the walls begin to move", 0.0, ge=0)
+
+    kinked: ClassVar[bool] = True
+
+    def strongest(self) -> float:
+        return max(math.hypot(*self.first_velocity), math.hypot(*self.second_velocity))
+
+    def shortest_length(self) -> float:
+        return self.second - self.first
 
     @model_validator(mode="after")
     def _apart(self) -> CouetteFlow:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from tisim.backend.taichi import ti
@@ -18,6 +19,9 @@ class UniformFlow(Source):
     quantity = "flow_velocity"
 
     velocity: Vector = parameter("m/s", "velocity of the fluid", examples=[(1e-3, 0.0, 0.0)])
+
+    def strongest(self) -> float:
+        return math.hypot(*self.velocity)
 
     @ti.func
     def value(self, w, r, t):
@@ -62,6 +66,11 @@ class DarcyFlow(Source):
     constant: float = parameter("", "constant C of Kozeny and Carman; about 5 in random packings", 5.0, gt=0)
     packed: Literal["fibres", "spheres"] = option("what is packed", "fibres")
     mean: Literal["packing", "pores"] = option("what the velocity is the mean over", "packing")
+
+    def strongest(self) -> float:
+        size = self.diameter / (4 if self.packed == "fibres" else 6)
+        mean = kozeny_carman(self.porosity, size, self.constant) / self.viscosity
+        return float(math.hypot(*self.pressure_gradient) * mean / self.porosity)
 
     @ti.func
     def value(self, w, r, t):

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
+from tisim.effects.base import Effect
 from tisim.numerics import elementary
 from tisim.sources.base import Source, parameter
 
@@ -18,6 +23,27 @@ class Uniform(Source):
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = True
+
+    if TYPE_CHECKING:
+        constant: Vector
+        amplitude: Vector
+        omega: Vector
+        begin: float
+
+    @property
+    def kinked(self) -> bool:  # type: ignore[override]
+        """Return whether the field is switched on in the course of a run."""
+        return self.begin > 0
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float:
+        rates = [omega for omega, size in zip(self.omega, self.amplitude, strict=True) if size != 0]
+        fastest = max(map(abs, rates), default=0.0)
+        return 2 / fastest if fastest > 0 else math.inf
+
+    def strongest(self) -> float:
+        return math.hypot(*self.constant) + math.hypot(*self.amplitude)
 
     @ti.func
     def value(self, w, r, t):

@@ -100,9 +100,8 @@ class Stepper(StepperHints, Component):
         own = tuple(option for option in super().structure() if option != ("control", self.control))
         return (*own, *self.control.structure())
 
-    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        """Return the fields that the stepper reads or writes in a scene with torques (``turning``), or whose
-        particles do not feel each other (``independent``)."""
+    def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
+        """Return the fields that the stepper reads or writes in a scene of these effects."""
         return ()
 
     def step(self, context: StepContext) -> Step:

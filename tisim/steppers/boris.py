@@ -18,7 +18,9 @@ from tisim.steppers.common import (
 )
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
+from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import Controller, FixedStep
+from tisim.steppers.step_guard import EXCESS, check_step, guard_fields
 from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 
@@ -39,7 +41,7 @@ class Boris(Stepper):
 
     control: Controller = option("step control", examples=[FixedStep(dt=1e-6)])
 
-    world_quantities: ClassVar = ("time_before",)
+    world_quantities: ClassVar = ("time_before", EXCESS)
     follows_shear: ClassVar = True
 
     @classmethod
@@ -47,8 +49,8 @@ class Boris(Stepper):
         linear = any(effect.offers("velocity_jacobian") for effect in effects if isinstance(effect, Force))
         return (cls(control=FixedStep(dt=dt)),) if linear else ()
 
-    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        return (FORCE,)
+    def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
+        return (FORCE, *guard_fields(effects))
 
     def step(self, context: StepContext) -> Step:
         report = report_displacement(context)
@@ -93,20 +95,38 @@ class BorisRotation(PerParticle):
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
         self.linear, self.turning = with_jacobian(context.single_forces), context.turning
+        self.guarded = FORCE_BEFORE in context.s.fields
 
     @ti.func
     def run(self, w, i):
         s = self.s
         dt, m = ti.cast(s.dt[w], s.real), s.mass[w, i]
-        half = 0.5 * dt / m
+        half, free = 0.5 * dt / m, s.force[w, i]
         if ti.static(len(self.linear) > 0):
             jacobian = summed_jacobian(self.linear, s, w, i, s.time[w])
-            rest = half * (s.force[w, i] - jacobian @ s.velocity[w, i])
+            free -= jacobian @ s.velocity[w, i]
+            rest = half * free
             one, turn = ti.Matrix.identity(s.real, 3), half * jacobian
+            self.guard(w, i, free)
             minus = s.velocity[w, i] + rest
             s.velocity[w, i] = solved(one - turn, (one + turn) @ minus) + rest
         else:
-            s.velocity[w, i] = s.velocity[w, i] + 2.0 * half * s.force[w, i]
+            self.guard(w, i, free)
+            s.velocity[w, i] = s.velocity[w, i] + 2.0 * half * free
         if ti.static(self.turning):
             turn = dt / (0.4 * m * s.radius[w, i]) * (s.torque[w, i] / s.radius[w, i])
             s.spin[w, i] = s.spin[w, i] + turn
+
+    @ti.func
+    def guard(self, w, i, free):
+        """Compare what does not go with velocity, which is stepped exactly, with that of the last step."""
+        s = self.s
+        if ti.static(self.guarded):
+            torque = 0.0 * free
+            if ti.static(self.turning):
+                torque = s.torque[w, i]
+            if s.steps[w] > 1:
+                check_step(s, w, i, free, torque, self.turning)
+            s.force_before[w, i] = free
+            if ti.static(self.turning):
+                s.torque_before[w, i] = torque

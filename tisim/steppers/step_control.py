@@ -22,6 +22,14 @@ MOST_STEPS = 2.0**53
 
 
 @ti.func
+def note_speed(s, w, i):
+    """Note the speed (m/s, f64) of a particle relative to the world's frame, of which the largest counts."""
+    speed = (ti.cast(s.velocity[w, i], ti.f64) - s.axes(s.frame, w)).norm()
+    if speed > s.fastest[w]:
+        ti.atomic_max(s.fastest[w], speed)
+
+
+@ti.func
 def shortest_representable(s, w, shortest):
     """Return the shortest step (s, f64), where ``shortest`` is asked for, that the time at the end still
     tells."""
@@ -136,9 +144,7 @@ class ApproachTime(Controller):
     def note(self, s, w, i, soonest):
         if soonest < s.approach_time[w]:
             ti.atomic_min(s.approach_time[w], soonest)
-        speed = (ti.cast(s.velocity[w, i], ti.f64) - s.axes(s.frame, w)).norm()
-        if speed > s.fastest[w]:
-            ti.atomic_max(s.fastest[w], speed)
+        note_speed(s, w, i)
 
     @ti.func
     def next(self, s, w, horizon):

@@ -9,12 +9,17 @@ from typing import ClassVar, Self
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option
+from tisim.components.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent
+from tisim.errors import must
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import BeginStep, advance_clock, apply_displacement, drift
 from tisim.steppers.constraints import advance_bodies, kick_bodies, put_held, steer_held
 from tisim.steppers.context import Step, StepContext
+from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
+from tisim.steppers.step_guard import EXCESS, check_step, guard_fields
+from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 
 
@@ -24,13 +29,15 @@ class Verlet(Stepper):
         v += dt/2 F/m,    r += dt v,    v += dt/2 F'/m
 
     It is of second order in dt for forces that depend on position only. A scene without forces drifts in
-    straight lines, and has no kick at all. Operators and pair events follow the drift.
+    straight lines, and has no kick at all. Operators and pair events follow the drift. A step of more than
+    half of the critical one, 2/omega of the stiffest motion, stops the world.
 
     Source: L. Verlet, Phys. Rev. 159 (1967) 98; W. C. Swope et al., J. Chem. Phys. 76 (1982) 637.
     """
 
     control: Controller = option("step control", ApproachTime())
 
+    world_quantities: ClassVar = (EXCESS,)
     follows_shear: ClassVar = True
     follows_constraints: ClassVar = True
 
@@ -41,6 +48,15 @@ class Verlet(Stepper):
             return ()
         events = any(isinstance(effect, PairEvent) for effect in effects)
         return (cls(control=FixedStep(dt=dt)), *((cls(),) if events else ()))
+
+    def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
+        super().suits(effects, domain)
+        for effect in effects:
+            rule = f"one that turns velocities, such as boris or collocation, with effects.{effect.label}"
+            must(not effect.gyrates(effects), "stepper", rule, self.kind())
+
+    def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
+        return guard_fields(effects)
 
     def step(self, context: StepContext) -> Step:
         kick = (*kick_bodies(context), Kick(context)) if context.forced else ()
@@ -68,7 +84,7 @@ class Move(PerParticle):
         super().__init__(context.s)
         self.domain, self.operators = context.domain, context.operators
         self.forced, self.turning = context.forced, context.turning
-        self.constraints = context.constraints
+        self.constraints, self.guarded = context.constraints, FORCE_BEFORE in context.s.fields
 
     @ti.func
     def run(self, w, i):
@@ -77,6 +93,10 @@ class Move(PerParticle):
         before, size, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
         held = put_held(s, self.domain, self.constraints, w, i, end)
         if held == 0:
+            if ti.static(self.guarded):
+                s.force_before[w, i] = s.force[w, i]
+                if ti.static(self.turning):
+                    s.torque_before[w, i] = s.torque[w, i]
             if ti.static(self.forced):
                 half_kick(s, w, i, self.turning)
             s.position[w, i] = before + dt * s.velocity[w, i]
@@ -99,10 +119,16 @@ class Kick(PerParticle):
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
         self.turning, self.constraints = context.turning, context.constraints
+        self.guarded = FORCE_BEFORE in context.s.fields
 
     @ti.func
     def run(self, w, i):
         if steer_held(self.s, self.constraints, w, i, self.s.time[w]) == 0:
+            if ti.static(self.guarded):
+                torque = 0.0 * self.s.force[w, i]
+                if ti.static(self.turning):
+                    torque = self.s.torque[w, i]
+                check_step(self.s, w, i, self.s.force[w, i], torque, self.turning)
             half_kick(self.s, w, i, self.turning)
 
 

@@ -26,7 +26,9 @@ class WorldStatus(IntEnum):
     """A force asks for a step shorter than the shortest."""
     NOT_POSITIVE_DEFINITE = 9
     """A diffusion matrix is not positive definite."""
-    LIST_OVERFLOW = 10
+    STEP_TOO_LONG = 10
+    """A step is longer than half of the critical step of the forces on a particle."""
+    LIST_OVERFLOW = 11
     """There are more near pairs than their list has room for; it is made longer, and the world goes on."""
 
 

@@ -74,7 +74,7 @@ from tisim.effects.base.effect import Effect
 from tisim.effects.base.force import Force
 from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
-from tisim.effects.base.pair_force import PairForce
+from tisim.effects.base.pair_force import PairForce, keeps_apart
 from tisim.effects.base.pairwise import Pairwise
 from tisim.worlds.fields import Field
 
@@ -91,6 +91,7 @@ __all__ = [
     "Pairwise",
     "SelfConsistentQuantity",
     "Vector",
+    "keeps_apart",
     "option",
     "parameter",
 ]

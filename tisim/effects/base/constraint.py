@@ -33,6 +33,7 @@ class Constraint(Effect):
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = False
+    leapfrog: ClassVar[bool] = True
     depends_on_velocity: ClassVar[bool] = True
     excludes: ClassVar = (PairEvent,)
     fields: ClassVar[tuple[str | Field, ...]] = ("velocity", "spin", BODY_MASS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -34,6 +35,12 @@ class Effect(LawHints, Component):
     particles add in a step, in any order (``ti.atomic_add``), and that no Result has. requires_source : the
     quantities of which a scene must have at least one source. repeatable : whether a scene can hold two of
     its kind. ends : what has come about when it ends a world.
+
+    kinked : whether its force, or the field that it gives, has kinks or jumps on the way, by which steppers
+    of high order lose their order. leapfrog : whether only explicit steppers step it to second order, as it
+    has a memory, turns with its particle, or moves it. guards_steps : whether it stops its world itself where
+    a step is too long for it, or no step is. step_dependent : whether the length of the step is part of its
+    law, so that no accuracy can be asked for.
     """
 
     contract: ClassVar[bool] = True
@@ -53,6 +60,10 @@ class Effect(LawHints, Component):
     totals: ClassVar[tuple[str, ...]] = ()
     ends: ClassVar[str] = "it ends"
     requires_source: ClassVar[tuple[str, ...]] = ()
+    kinked: ClassVar[bool] = False
+    leapfrog: ClassVar[bool] = False
+    guards_steps: ClassVar[bool] = False
+    step_dependent: ClassVar[bool] = False
 
     @classmethod
     def called(cls, data: Mapping[str, Any]) -> str:
@@ -66,6 +77,36 @@ class Effect(LawHints, Component):
     def required_effects(self) -> tuple[type[Component], ...]:
         """Return the effects without which it means nothing, given its options; by default ``requires``."""
         return self.requires
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        """Return the critical time step (s) of a leapfrog with it, 2/omega of the stiffest motion that it
+        causes; infinity where it has none, as by default, and None where it is not known.
+
+        start : quantities of the particles by field name, without their places. speed : up to which (m/s)
+        they are expected to meet. effects : all of the scene.
+        """
+        return math.inf
+
+    def part_of_critical_step(self, accuracy: float) -> float:
+        """Return how long a leapfrog's steps may be, over the critical step, to be as accurate (relative): by
+        default so that the energy of what swings is off by half of that at most, (omega dt)^2 / 8."""
+        return math.sqrt(accuracy)
+
+    def gyrates(self, effects: Sequence[Effect]) -> bool:
+        """Return whether it turns velocities, as a magnetic field does those of charges, given all effects of
+        the scene: Verlet's steps then gain energy however short they are."""
+        return False
+
+    def reached_speed(self, duration: float, extent: float) -> float:
+        """Return the speed (m/s) to which it is expected to bring particles in a run of a duration (s), over
+        an extent (m, infinite in open space); 0 by default."""
+        return 0.0
+
+    def shortest_length(self) -> float:
+        """Return the smallest length (m) over which the field that it gives changes; infinity by default."""
+        return math.inf
 
     def suits(self, domain: Domain) -> None:
         """Raise InputError where it cannot act in a domain; by default it can in any."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.base.effect import Effect
@@ -16,6 +18,12 @@ class Force(Effect):
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = False
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Not known of a law that does not say it.
+        return None
 
     def turns(self, effects: Sequence[Effect]) -> bool:
         """Return whether it exerts torques, given its options and all effects of the scene."""

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import is_device_function, ti
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pairwise import Pairwise
+
+
+def keeps_apart(effects: Sequence[Effect]) -> bool:
+    """Return whether a scene has a law of contact with a memory, which is far stiffer than what draws
+    particles together."""
+    return any(isinstance(one, PairForce) and one.short_ranged and one.leapfrog for one in effects)
 
 
 class PairForce(Pairwise):
@@ -24,6 +32,12 @@ class PairForce(Pairwise):
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
     memory: ClassVar[int] = 0
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Not known of a law that does not say it.
+        return None
 
     def turns(self, effects: Sequence[Effect]) -> bool:
         """Return whether it exerts torques, given its options and all effects of the scene."""

@@ -60,6 +60,9 @@ class PrescribedMotion(Constraint):
     def marks(self) -> str:
         return str(self.group)
 
+    def reached_speed(self, duration: float, extent: float) -> float:
+        return self.motion.top_speed(extent)
+
     def remembers(self, s: Any) -> dict[str, Any]:
         return {"kept": MotionState({})}
 

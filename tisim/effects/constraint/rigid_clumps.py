@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.effects.base import Constraint, Field
+from tisim.effects.base import Constraint, Effect, Field
 from tisim.effects.constraint.clump_fields import BODY, MEMBERSHIP, NO_CLUMP, check_clumps
 from tisim.effects.constraint.rigid_rotation import angular_velocity, free_rotation
 from tisim.numerics.quaternions import rotated
@@ -45,6 +46,13 @@ class RigidClumps(Constraint):
         check_clumps(start, domain)
         held: np.ndarray = start["clump"] != NO_CLUMP
         return held
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Of a body that tumbles; what presses it tells its own.
+        fastest = float(np.linalg.norm(start.get("spin", np.zeros((1, 3))), axis=1).max(initial=0.0))
+        return 2 / fastest if fastest > 0 else math.inf
 
     @ti.func
     def holds(self, s, w, i):

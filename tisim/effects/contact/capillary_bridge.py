@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
-from tisim.effects.base import parameter
+from tisim.effects.base import Effect, parameter
 from tisim.effects.contact.granular.contact import GranularContact
 
 
@@ -26,6 +28,13 @@ class CapillaryBridge(GranularContact):
     """
 
     memory: ClassVar[int] = 1
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Its slope is far below that of a contact, beside which it acts.
+        return math.inf
+
     depends_on_velocity: ClassVar[bool] = False
 
     surface_tension: float = parameter("N/m", "surface tension gamma", examples=[0.072], ge=0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.contact.normal import NormalContact, overlap
@@ -21,6 +23,11 @@ class Hertz(NormalContact):
 
     young: float = parameter("Pa", "Young's modulus E of the material", examples=[1e7], gt=0)
     poisson: float = parameter("", "Poisson's ratio nu of the material", examples=[0.25], gt=-1, le=0.5)
+
+    def push(self, radius: float, overlap: np.ndarray) -> np.ndarray:
+        modulus = self.young / (2 * (1 - self.poisson**2))
+        push: np.ndarray = 4 / 3 * modulus * np.sqrt(radius / 2) * overlap**1.5
+        return push
 
     @ti.func
     def compression(self, s, w, i, j, distance):

@@ -16,10 +16,21 @@ L_j n x F of a force F and its reaction balance the moment of the two, and angul
 (With the radii in place of L it would not be: they add up to more than d.)
 """
 
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
-from tisim.effects.base import PairForce
+from tisim.effects.base import Effect, PairForce
+from tisim.effects.base.critical_step import (
+    critical_step,
+    elastic_contact,
+    impact_stiffness,
+    smallest_grains,
+)
 
 
 @ti.func
@@ -66,9 +77,28 @@ class NormalContact(PairForce):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
+    # Contacts begin and end.
+    kinked: ClassVar[bool] = True
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
     fields = ("radius",)
+
+    def push(self, radius: float, overlap: np.ndarray) -> np.ndarray:
+        """Return the force (N) with which two equal spheres of a radius (m) push each other apart, at an
+        array of overlaps (m); infinite where a law does not say it."""
+        return np.full_like(overlap, math.inf)
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        shortest = math.inf
+        for _, mass, radius in smallest_grains(start):
+            stiffness = impact_stiffness(partial(self.push, radius), 0.5 * mass, 0.5 * radius, speed)
+            shortest = min(shortest, critical_step(stiffness, 0.5 * mass))
+        return shortest if shortest > 0 else None
+
+    def part_of_critical_step(self, accuracy: float) -> float:
+        return elastic_contact(accuracy)
 
     @ti.func
     def compression(self, s, w, i, j, distance):

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect, PairForce, parameter
+from tisim.effects.base.critical_step import critical_step, smallest_grains
 from tisim.effects.contact.granular.spring import turned
-from tisim.effects.contact.granular.step_limit import can_follow, can_follow_both, least_mass
+from tisim.effects.contact.granular.step_limit import SLIDING, can_follow, can_follow_both, least_mass
 from tisim.numerics.vectors import piece
 
 
@@ -54,6 +58,8 @@ class ParallelBond(PairForce):
     depends_on_velocity: ClassVar[bool] = True
     # It breaks.
     smooth: ClassVar[bool] = False
+    leapfrog: ClassVar[bool] = True
+    guards_steps: ClassVar[bool] = True
     # Its steps know nothing of how stiff bonds are.
     incompatible_controls = ("approach_time",)
     memory: ClassVar[int] = 8
@@ -67,6 +73,17 @@ class ParallelBond(PairForce):
     tensile_strength: float = parameter("Pa", "strength sigma_c", examples=[1e7], gt=0)
     shear_strength: float = parameter("Pa", "strength tau_c", examples=[1e7], gt=0)
     damping_ratio: float = parameter("", "damping of each spring over the critical one", 0.0, ge=0)
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        shortest = math.inf
+        for _, mass, radius in smallest_grains(start):
+            stiffness = self.young / (2 * radius) * math.pi * (self.radius_ratio * radius) ** 2
+            # Grains that are sheared turn too.
+            stiffest = stiffness * max(1.0, SLIDING / self.stiffness_ratio)
+            shortest = min(shortest, critical_step(stiffest, 0.5 * mass))
+        return shortest
 
     def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
         return "a step is too long for the springs and dashpots of a bond"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
@@ -38,6 +41,11 @@ class Contact(NormalContact):
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {"laws": peers.of(ContactLaw)}
+
+    def push(self, radius: float, overlap: np.ndarray) -> np.ndarray:
+        area = math.pi * overlap * (radius - 0.25 * overlap)
+        push: np.ndarray = self.stiffness * (overlap / (2 * radius)) ** self.exponent * area
+        return push
 
     @ti.func
     def stiffness_of(self, s, w, i):

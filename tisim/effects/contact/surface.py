@@ -11,6 +11,8 @@ class SurfaceContact(PairForce):
     """This is the contract of a force at the point of contact of touching spheres, which turns both."""
 
     contract: ClassVar[bool] = True
+    kinked: ClassVar[bool] = True
+    step_dependent: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
     fields = ("radius", "velocity", "spin")
     depends_on_velocity: ClassVar[bool] = True

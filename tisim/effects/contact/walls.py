@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -51,6 +52,8 @@ class Walls(WallContacts, UsesMaterials, Force):
 
     fields = ("radius", "velocity", "spin")
     depends_on_velocity: ClassVar[bool] = True
+    leapfrog: ClassVar[bool] = True
+    guards_steps: ClassVar[bool] = True
     requires: ClassVar = (GranularContact,)
 
     planes: tuple[Plane, ...] = option(
@@ -82,6 +85,15 @@ class Walls(WallContacts, UsesMaterials, Force):
         for law in effects:
             if isinstance(law, GranularContact):
                 law.suits_wall(start, effects, self.material_index(self._materials), self.label)
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Its laws of contact tell it, of the materials of walls too.
+        return math.inf
+
+    def reached_speed(self, duration: float, extent: float) -> float:
+        return self.motion.top_speed(extent)
 
     def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
         laws = (law.may_stop(effects, domain) for law in effects if isinstance(law, GranularContact))

@@ -10,14 +10,21 @@ the unit of viscosity as Pa/s; it is Pa s.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, parameter
+from tisim.effects.base import Effect, Force, parameter
 from tisim.numerics import elementary
-from tisim.sources.base import sources
+from tisim.sources.base import Source, sources
 from tisim.worlds.bound import Peers
 
+LAG = 0.1
+"""Verlet takes the drag of half a step ago, which is an error of dt g / (2 m): the critical step is shorter
+by this factor, so that drag is as accurate as oscillations are."""
 LEAST_SPEED = 1e-30
 """This speed, in m/s, stands for zero where a direction is needed that then has no effect."""
 
@@ -31,6 +38,24 @@ class Drag(Force):
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {"flow": sources(peers, "flow_velocity")}
+
+    def resistance_of(self, radius: np.ndarray, speed: float) -> np.ndarray:
+        """Return a bound of g (N s/m) of spheres of some radii (m) up to a speed (m/s) past the fluid."""
+        raise NotImplementedError(f"{type(self).__name__} must define resistance_of")
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        if not self.offers("resistance_of"):
+            return None
+        flows = [one for one in effects if isinstance(one, Source) and one.quantity == "flow_velocity"]
+        bounds = [one.strongest() for one in flows]
+        if None in bounds:
+            return None
+        past = speed + float(np.linalg.norm(start["velocity"], axis=1).max(initial=0.0))
+        g = self.resistance_of(start["radius"], past + sum(filter(None, bounds)))
+        fastest = float((g / start["mass"]).max(initial=0.0))
+        return LAG * 2 / fastest if fastest > 0 else math.inf
 
     @ti.func
     def resistance(self, s, w, i, speed):
@@ -75,6 +100,9 @@ class ConstantDrag(Drag):
     density: float = parameter("kg/m^3", "density rho_a of the fluid", examples=[1.2], gt=0)
     coefficient: float = parameter("", "drag coefficient C_D", examples=[0.5], ge=0)
 
+    def resistance_of(self, radius: np.ndarray, speed: float) -> np.ndarray:
+        return 0.5 * self.density * self.coefficient * np.pi * radius**2 * speed
+
     @ti.func
     def resistance(self, s, w, i, speed):
         area = ti.math.pi * s.radius[w, i] ** 2
@@ -97,8 +125,15 @@ class ChowDrag(Drag):
     Source: Z16 section 4.2, after Chow (1979).
     """
 
+    # Its coefficient jumps.
+    kinked: ClassVar[bool] = True
+
     density: float = parameter("kg/m^3", "density rho_a of the fluid", examples=[1.2], gt=0)
     viscosity: float = parameter("Pa s", "dynamic viscosity mu of the fluid", examples=[1.8e-5], gt=0)
+
+    def resistance_of(self, radius: np.ndarray, speed: float) -> np.ndarray:
+        # C_D is nowhere above the sum of those of Stokes and of Newton, with 1 for the coefficient.
+        return np.pi * radius * (6 * self.viscosity + 0.5 * self.density * radius * speed)
 
     @ti.func
     def resistance(self, s, w, i, speed):
@@ -135,8 +170,16 @@ class SchillerNaumannDrag(Drag):
     Source: L. Schiller, A. Naumann, Zeitschrift des VDI 77 (1933) 318.
     """
 
+    # Its coefficient jumps.
+    kinked: ClassVar[bool] = True
+
     density: float = parameter("kg/m^3", "density rho_f of the fluid", examples=[1000.0], gt=0)
     viscosity: float = parameter("Pa s", "dynamic viscosity mu of the fluid", examples=[1e-3], gt=0)
+
+    def resistance_of(self, radius: np.ndarray, speed: float) -> np.ndarray:
+        reynolds = np.minimum(2 * radius * self.density / self.viscosity * speed, 1000.0)
+        stokes = 6 * np.pi * self.viscosity * radius * (1 + 0.15 * reynolds**0.687)
+        return np.maximum(stokes, 0.22 * self.density * np.pi * radius**2 * speed)
 
     @ti.func
     def resistance(self, s, w, i, speed):
@@ -162,6 +205,9 @@ class StokesDrag(Drag):
     """
 
     viscosity: float = parameter("Pa s", "dynamic viscosity mu of the fluid", examples=[1e-3], gt=0)
+
+    def resistance_of(self, radius: np.ndarray, speed: float) -> np.ndarray:
+        return 6 * np.pi * self.viscosity * radius
 
     @ti.func
     def resistance(self, s, w, i, speed):

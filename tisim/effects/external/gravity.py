@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
 from scipy.constants import g
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Force, parameter
+from tisim.effects.base import Effect, Force, parameter
 
 
 class Gravity(Force):
@@ -18,8 +21,18 @@ class Gravity(Force):
     """
 
     homogeneous: ClassVar[bool] = True
+    guards_steps: ClassVar[bool] = True
 
     acceleration: Vector = parameter("m/s^2", "acceleration g of free fall", (0.0, 0.0, -g))
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        return math.inf
+
+    def reached_speed(self, duration: float, extent: float) -> float:
+        size = math.hypot(*self.acceleration)
+        return min(size * duration, math.sqrt(2 * size * extent))
 
     @ti.func
     def force(self, s, w, i, t):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force
-from tisim.sources.base import sources
+from tisim.effects.base import Effect, Force
+from tisim.sources.base import Source, sources
 from tisim.worlds.bound import Peers
 
 
@@ -26,8 +30,23 @@ class Lorentz(Force):
     fields = ("charge", "velocity")
     requires_source = ("electric_field", "magnetic_flux_density")
 
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        fields = [one for one in effects if isinstance(one, Source)]
+        bounds = [one.strongest() for one in fields if one.quantity == "magnetic_flux_density"]
+        if None in bounds:
+            return None
+        specific = float(np.abs(start["charge"] / start["mass"]).max(initial=0.0))
+        rate = specific * sum(filter(None, bounds))
+        return 2 / rate if rate > 0 else math.inf
+
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {name: sources(peers, name) for name in self.requires_source}
+
+    def gyrates(self, effects: Sequence[Effect]) -> bool:
+        sources = [one for one in effects if isinstance(one, Source)]
+        return any(one.quantity == "magnetic_flux_density" and one.strongest() != 0 for one in sources)
 
     @ti.func
     def flux_density(self, s, w, i, t):

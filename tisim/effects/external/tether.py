@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Force, parameter
+from tisim.effects.base import Effect, Force, parameter
 from tisim.worlds.fields import Field
 
 
@@ -28,6 +33,13 @@ class Tether(Force):
         "stiffness k of the binder along each axis; 0 leaves that direction free",
         examples=[(0.5, 0.5, 0.5)],
     )
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        stiffest = max(self.stiffness)
+        lightest = float(start["mass"].min(initial=math.inf))
+        return 2 * math.sqrt(lightest / stiffest) if stiffest > 0 else math.inf
 
     @ti.func
     def force(self, s, w, i, t):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 from scipy.constants import G
 
 from tisim.backend.taichi import ti
 from tisim.components.component import parameter
 from tisim.effects.base import Effect, PairForce
-from tisim.effects.gravitation.tree_gravity import TreeGravity
+from tisim.effects.gravitation.tree_gravity import TreeGravity, fall_step
 
 ROOT_G = G**0.5
 """The square root of the constant of gravitation, N^(1/2) m/kg: m ROOT_G is to it what a charge is to
@@ -35,6 +38,11 @@ class SelfGravity(PairForce):
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return tuple(TreeGravity(opening_angle=theta) for theta in OPENING_ANGLES)
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        return fall_step(start)
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

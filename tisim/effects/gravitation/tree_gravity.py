@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.constants import G
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
-from tisim.effects.base import Force, LongRange
+from tisim.effects.base import Effect, Force, LongRange
 from tisim.effects.gravitation.tree_walk import TreeSum
 from tisim.errors import must
 
@@ -15,6 +20,12 @@ if TYPE_CHECKING:
     from tisim.components.domain import Domain
     from tisim.worlds.bound import Bound
     from tisim.worlds.state import State
+
+
+def fall_step(start: Mapping[str, np.ndarray]) -> float:
+    """Return the critical step (s) of two that go round each other where they touch; infinity for none."""
+    densest = float((start["mass"] / start["radius"] ** 3).max(initial=0.0))
+    return 2 / math.sqrt(G * densest) if densest > 0 else math.inf
 
 
 class TreeGravity(LongRange, Force):
@@ -46,6 +57,11 @@ class TreeGravity(LongRange, Force):
     softening_length: float = parameter("m", "softening length eps; 0 for points", 0.0, ge=0)
 
     accuracy_parameters = (AccuracyParameter(opening_angle=3),)
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        return fall_step(start)
 
     def suits(self, domain: Domain) -> None:
         rule = f"one in which particles do not see images of each other, with effects.{self.label}"

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, parameter
+from tisim.effects.base import Effect, Force, keeps_apart, parameter
 from tisim.sources.base import sources
 from tisim.worlds.bound import Peers
 
@@ -24,6 +28,12 @@ class MagneticBodyForce(Force):
     requires_source = ("magnetic_flux_density",)
 
     gamma: float = parameter("J/T^2", "magnetic parameter gamma of each particle", examples=[1e-6])
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Contacts are far stiffer.
+        return math.inf if keeps_apart(effects) else None
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {"applied": sources(peers, "magnetic_flux_density")}

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
+import numpy as np
 from pydantic import model_validator
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, PairForce, SelfConsistentQuantity, option, parameter
+from tisim.effects.base import (
+    Effect,
+    PairForce,
+    SelfConsistentQuantity,
+    keeps_apart,
+    option,
+    parameter,
+)
 from tisim.effects.base.pairwise import Pairwise
+from tisim.effects.magnetic.permanent_moment import PermanentMoment
 from tisim.errors import must
 
 
@@ -42,6 +52,14 @@ class Dipoles(Pairwise):
     def summed(self) -> dict[str, Any]:
         """Return the settings that say what is summed, by name."""
         return {name: getattr(self, name, 0) for name in self.alike}
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        if keeps_apart(effects) or any(isinstance(one, PermanentMoment) for one in effects):
+            # Contacts are far stiffer; of permanent moments their own effect tells it.
+            return math.inf
+        return None
 
     def suits_others(self, effects: Sequence[Effect]) -> None:
         if not isinstance(self, SelfConsistentQuantity):

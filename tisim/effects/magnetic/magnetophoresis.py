@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, Force
+from tisim.effects.base import Effect, Force, keeps_apart
 from tisim.effects.magnetic.moment import MOMENT
 from tisim.effects.magnetic.permanent_moment import PermanentMoment
 from tisim.sources.base import sources
@@ -29,6 +32,13 @@ class Magnetophoresis(Force):
 
     fields = (MOMENT,)
     requires_source = ("magnetic_flux_density",)
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Contacts are far stiffer; of permanent moments their own effect tells it.
+        permanent = any(isinstance(one, PermanentMoment) for one in effects)
+        return math.inf if permanent or keeps_apart(effects) else None
 
     def turns(self, effects: Sequence[Effect]) -> bool:
         return any(isinstance(effect, PermanentMoment) for effect in effects)

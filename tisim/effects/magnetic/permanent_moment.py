@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
+from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import parameter
+from tisim.effects.base import Effect, PairForce, parameter
 from tisim.effects.magnetic.moment import MOMENT, Moment
 from tisim.errors import must
 from tisim.numerics.quaternions import turned
 from tisim.numerics.random_streams import MOMENTS
 from tisim.operators.base import Operator
+from tisim.sources.base import Source
 
 
 class PermanentMoment(Operator):
@@ -37,6 +40,7 @@ class PermanentMoment(Operator):
     excludes: ClassVar = (Moment,)
     depends_on_velocity = True
     homogeneous = True
+    leapfrog: ClassVar[bool] = True
 
     magnetisation: float = parameter(
         "A/m", "magnetisation M, along a direction drawn for each; 0 where the start gives moments", 0.0, ge=0
@@ -52,6 +56,25 @@ class PermanentMoment(Operator):
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         volume = 4 / 3 * np.pi * start["radius"] ** 3
         return {"moment": self.magnetisation * volume[:, None] * direction}
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        volume = 4 / 3 * np.pi * start["radius"] ** 3
+        moment = self.magnetisation * volume
+        if "moment" in start:
+            moment = np.linalg.norm(start["moment"], axis=1)
+        sources = [one for one in effects if isinstance(one, Source)]
+        bounds = [one.strongest() for one in sources if one.quantity == "magnetic_flux_density"]
+        if None in bounds or not len(moment):
+            return None
+        # The field of the strongest other that touches, and of all sources.
+        pairs = any(isinstance(one, PairForce) for one in effects)
+        near = mu_0 / (4 * np.pi) * 2 * float(moment.max()) / (2 * start["radius"]) ** 3 if pairs else 0.0
+        torque = moment * (sum(filter(None, bounds)) + near)
+        rate = np.sqrt(torque / (0.4 * start["mass"] * start["radius"] ** 2))
+        fastest = float((rate + np.linalg.norm(start.get("spin", np.zeros((1, 3))), axis=1)).max())
+        return 2 / fastest if fastest > 0 else math.inf
 
     @ti.func
     def particle(self, s, w, i, t, dt):

@@ -34,6 +34,11 @@ class Motion(Component):
         """Return the place (m) about which the torque on the body is told; by default the origin."""
         return 0.0, 0.0, 0.0
 
+    def top_speed(self, extent: float) -> float:
+        """Return the largest speed (m/s) of the body, which is no larger than an extent (m); 0 where it is
+        not known ahead."""
+        return 0.0
+
     @ti.func
     def to_body(self, kept, w, r, t):
         """Return where a place r (m) in space is among the shapes of the body at time t (s, f64)."""

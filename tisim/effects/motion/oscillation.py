@@ -18,6 +18,9 @@ class Oscillation(Motion):
     frequency: float = parameter("Hz", "frequency f", examples=[50.0], gt=0)
     phase: float = parameter("rad", "phase at t = 0", 0.0)
 
+    def top_speed(self, extent: float) -> float:
+        return 2 * math.pi * self.frequency * math.hypot(*self.amplitude)
+
     @ti.func
     def angle(self, w, t):
         # In f64, whatever the precision: it grows without bound.

@@ -33,6 +33,10 @@ class Rotation(Motion):
         axis = [component / size for component in self.rate] if size > 0 else [0.0, 0.0, 1.0]
         return [*super().values(), *axis, size]
 
+    def top_speed(self, extent: float) -> float:
+        # Where the body ends is not known in open space.
+        return math.hypot(*self.rate) * extent if math.isfinite(extent) else 0.0
+
     @ti.func
     def turned(self, w, d, t):
         """Return a vector d turned about the axis by Omega t (O. Rodrigues, 1840)."""

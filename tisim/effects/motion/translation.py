@@ -1,5 +1,7 @@
 """Translation at a constant velocity, at once or from a time on, such as that of a gate."""
 
+import math
+
 from tisim.backend.taichi import ti
 from tisim.effects.base import Vector, parameter
 from tisim.effects.motion.base import Motion
@@ -13,6 +15,9 @@ class Translation(Motion):
 
     velocity: Vector = parameter("m/s", "velocity v", examples=[(0.1, 0.0, 0.0)])
     begin: float = parameter("s", "time at which the body begins to move", 0.0, ge=0)
+
+    def top_speed(self, extent: float) -> float:
+        return math.hypot(*self.velocity)
 
     @ti.func
     def displacement(self, w, t):

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Self
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import PairForce, option, parameter
+from tisim.effects.base import Effect, PairForce, option, parameter
+from tisim.effects.base.critical_step import critical_step, impact_stiffness, smallest_grains
 from tisim.errors import must
 from tisim.numerics.powers import Exponent, power
 
@@ -21,13 +24,14 @@ class Mie(PairForce):
     C = n/(n - m) (n/m)^(m/(n - m)) makes eps the depth of the well, at d = sigma (n/m)^(1/(n - m)). U is
     shifted to vanish at the cut-off, which changes no force. Exponents of 30 and 15 stand for hard spheres in
     B16 (section 6.3), with eps = 100 k T and repulsion alone; 12 and 6 are Lennard-Jones's. With the cut-off
-    at the bottom of the well, where it is unless given, the force ends smoothly; elsewhere it jumps there.
+    at the bottom of the well, where it is unless given, the force ends there with a kink; elsewhere it jumps.
 
     Source: B16 Eqs (6.18), (6.19), after Mie (1903).
     """
 
     fields = ("radius",)
     short_ranged = True
+    kinked: ClassVar[bool] = True
 
     epsilon: float = parameter("J", "depth eps of the potential well", examples=[4e-19], gt=0)
     n: Exponent = option("exponent n of the repulsion, above m; whole ones are fastest", 30, gt=0)
@@ -49,6 +53,22 @@ class Mie(PairForce):
     def at_start(self, masses: np.ndarray) -> Self:
         bottom = (self.n / self.m) ** (1 / (self.n - self.m))
         return self if self.cutoff else self.model_copy(update={"cutoff": bottom})
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        shortest, cutoff = math.inf, self.at_start(start["mass"]).cutoff or 1.0
+        for _, mass, radius in smallest_grains(start):
+            sigma = 2 * radius
+
+            def push(overlap: np.ndarray, sigma: float = sigma) -> np.ndarray:
+                q = sigma / np.maximum(cutoff * sigma - overlap, 1e-3 * sigma)
+                slope = self.n * q**self.n - self.m * q**self.m
+                return np.asarray(self.prefactor * self.epsilon * slope * q / sigma)
+
+            stiffness = impact_stiffness(push, 0.5 * mass, cutoff * sigma, speed)
+            shortest = min(shortest, critical_step(stiffness, 0.5 * mass))
+        return shortest
 
     @ti.func
     def reach(self, s, w, i):

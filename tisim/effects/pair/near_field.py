@@ -12,11 +12,16 @@ With strengths of charge, beta_2 = 2 and abar_2 = 1/(4 pi epsilon) alone this is
 lacks the minus sign that its n_ij, from i to j, asks for: like charges repel.)
 """
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects.base import Effect, PairForce, option, parameter
+from tisim.effects.base.critical_step import critical_step
 from tisim.numerics.powers import Exponent, power
 from tisim.worlds.fields import Field
 
@@ -55,6 +60,25 @@ class NearField(PairForce):
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         own = {name: getattr(self, name) for name in NearField.model_fields}
         return tuple(TruncatedNearField(**own, cutoff=three_digits(part * extent)) for part in CUTOFF_PARTS)
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        strength = {
+            "plain": np.ones_like(start["mass"]),
+            "mass": start["mass"],
+            "area": 4 * np.pi * start["radius"] ** 2,
+            "volume": 4 / 3 * np.pi * start["radius"] ** 3,
+            "charge": np.abs(start.get("charge", np.zeros_like(start["mass"]))),
+        }[self.strength]
+        # Of two like the lightest, the smallest and the strongest, where they touch.
+        contact = 2 * float(start["radius"].min(initial=math.inf))
+        steepest = sum(
+            alpha * beta / contact ** (beta + 1)
+            for alpha, beta in ((self.alpha1, self.beta1), (self.alpha2, self.beta2))
+        )
+        stiffness = steepest * float(strength.max(initial=0.0)) ** 2
+        return critical_step(stiffness, 0.5 * float(start["mass"].min(initial=math.inf)))
 
     def required_fields(self) -> tuple[str | Field, ...]:
         charge, polarity = self.fields
@@ -107,6 +131,8 @@ class TruncatedNearField(NearField):
 
     short_ranged = True
     truncated: ClassVar[bool] = True
+    # The force jumps at the cut-off.
+    kinked: ClassVar[bool] = True
 
     cutoff: float = parameter("m", "cut-off distance of the centres", examples=[0.1], gt=0)
 

@@ -1,6 +1,10 @@
 """What uniformly magnetised bodies have in common, whatever their shape."""
 
+import math
+from collections.abc import Sequence
 from typing import Any, ClassVar
+
+from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector
@@ -47,6 +51,17 @@ class Magnets(Source):
     quantity: ClassVar[str] = "magnetic_flux_density"
     each: ClassVar[Any]
     """The bodies, where this is bound."""
+
+    def bodies(self) -> Sequence[Any]:
+        """Return the bodies, those of all its lists."""
+        return [body for name, _ in self.lists() for body in getattr(self, name)]
+
+    def strongest(self) -> float:
+        # Of a body alone it is at most mu_0 M, wherever it is.
+        return mu_0 * sum(math.hypot(*body.magnetisation) for body in self.bodies())
+
+    def shortest_length(self) -> float:
+        return min((body.radius for body in self.bodies()), default=math.inf)
 
     @ti.func
     def value(self, w, r, t):

@@ -97,8 +97,8 @@ class Brownian(Stepper):
             return ()
         return (self.model_copy(update={"noise": "fast" if self.noise == "exact" else "exact"}),)
 
-    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        if independent:
+    def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
+        if self.independent(effects):
             return (FORCE, *OWN_BROWNIAN_FIELDS)
         if self.hydrodynamics == "none":
             return (FORCE,)

@@ -4,6 +4,7 @@ from tisim.backend.taichi import ti
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.saved_state import SavedState
+from tisim.steppers.step_control import note_speed
 from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 from tisim.worlds.status import WorldStatus
 
@@ -36,15 +37,18 @@ class Begin(Phase):
 
 
 class SaveState(PerParticle):
-    """This phase keeps the state at the beginning of the step."""
+    """This phase keeps the state at the beginning of the step, and finds the largest speed where that limits
+    the step."""
 
-    def __init__(self, saved_state: SavedState) -> None:
+    def __init__(self, context: StepContext, saved_state: SavedState) -> None:
         super().__init__(saved_state.s)
-        self.saved_state = saved_state
+        self.saved_state, self.control = saved_state, context.control
 
     @ti.func
     def run(self, w, i):
         self.saved_state.save(w, i)
+        if self.control.stride(w) > 0.0:
+            note_speed(self.s, w, i)
 
 
 class StepAttempt(Repeat):
@@ -62,7 +66,7 @@ class StepAttempt(Repeat):
 @ti.func
 def length(s, control: ti.template(), w):  # type: ignore[valid-type]
     """Return the length (s, f64) of the next attempt; the last step ends exactly on time."""
-    dt = control.step(s, w, s.next_dt[w])
+    dt = control.step(s, w, s.next_dt[w], s.fastest[w])
     remaining = s.end[w] - s.time_before[w]
     # A remainder as small as rounding leaves is not worth a step of its own.
     if dt * (1.0 + 1e-6) >= remaining:

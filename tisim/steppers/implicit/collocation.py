@@ -6,6 +6,7 @@ from typing import ClassVar, Self
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairForce
+from tisim.interactions.force_sum import turning
 from tisim.interactions.loads import FORCE
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
@@ -74,13 +75,14 @@ class Collocation(Stepper):
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"]
 
-    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+    def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
+        turns = turning(effects)
         return (
             FORCE,
-            *saved_fields(turning),
+            *saved_fields(turns),
             CHANGE,
             *excursion_fields(self.control.at_end),
-            *Stages.fields(self.stages, turning),
+            *Stages.fields(self.stages, turns),
         )
 
     def step(self, context: StepContext) -> Step:
@@ -97,7 +99,7 @@ class Collocation(Stepper):
             *report,
             Decide(context),
         )
-        begin = (Forget(context), Begin(context), SaveState(stages))
+        begin = (Forget(context), Begin(context), SaveState(context, stages))
         note = (NoteExcursion(stages),) if self.control.at_end else ()
         end = (*note, *context.advance_memory, *apply_operators(context), AdvanceClock(context))
         return Step(

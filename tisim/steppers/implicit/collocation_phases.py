@@ -115,20 +115,29 @@ class TakeStages(PerBlock):
         dt, stage = ti.cast(s.dt[w], s.real), s.stage[w]
         new = stages.newest(w, i, stage, dt, s.time[w])
         change = self.take(s.stage_acceleration, w, i, stage, new)
-        error, scale, rounding = ti.cast(0.0, s.real), ti.cast(0.0, s.real), ti.cast(0.0, s.real)
+        error, rounding = ti.cast(0.0, s.real), ti.cast(0.0, s.real)
         if ti.static(stages.turning):
             change += s.radius[w, i] * self.take(
                 s.stage_turning, w, i, stage, s.torque[w, i] / stages.inertia(w, i)
             )
         s.iterate_change[w, i] = dt * dt * change
-        if stage == stages.number - 1:
+        last, scale = stage == stages.number - 1, ti.cast(0.0, s.real)
+        if ti.static(self.control.norm == "each") or last:
+            scale = self.scale(w, i, dt)
+        if last:
             error = dt * dt * self.estimate(s.stage_acceleration, w, i)
             if ti.static(stages.turning):
                 error += dt * dt * s.radius[w, i] * self.estimate(s.stage_turning, w, i)
-            scale = self.control.scale(s, w, i, stages.displacement(w, i, stage, dt).norm(), dt)
             # Of the place, and of what the force there adds to it.
             rounding = self.eps * (s.position[w, i].norm() + dt * dt * new.norm())
-        return ti.cast(ti.Vector([dt * dt * change, error, scale, rounding]), ti.f64)
+        return self.control.terms(dt * dt * change, error, scale, rounding)
+
+    @ti.func
+    def scale(self, w, i, dt):
+        """Return what the error of a particle is compared with (m), given where it will be at the end as far
+        as is known."""
+        moved = self.stages.displacement(w, i, self.stages.number - 1, dt).norm()
+        return self.control.scale(self.s, w, i, moved, dt)
 
     @ti.func
     def take(self, rate: ti.template(), w, i, stage, new):  # type: ignore[valid-type]

@@ -24,7 +24,7 @@ class JudgeStages(Phase):
     @ti.func
     def run(self, w, _k):
         s, last = self.s, self.stages.number - 1
-        total = self.sums.total(w)
+        total = self.control.norms(self.sums.total(w))
         s.force_evaluations[w] += 1
         # A maximum would lose NaN.
         if not finite(total[0]) or s.out_of_range[w] > 0:

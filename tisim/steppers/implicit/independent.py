@@ -78,7 +78,8 @@ class IndependentSteps(PerParticle):
             self.solve.save(w, i)
             verdict = RETRY
             while verdict == RETRY:
-                target = self.control.step(s, w, s.own_dt[w, i])
+                speed = ti.cast(s.velocity_before[w, i].norm(), ti.f64)
+                target = self.control.step(s, w, s.own_dt[w, i], speed)
                 last = target * (1.0 + LITTLE) >= length - elapsed
                 dt = ti.select(last, length - elapsed, target)
                 verdict, k = self.attempt(w, i, begin + elapsed, dt, aim)

@@ -5,17 +5,16 @@ from tisim.numerics.ieee import finite
 from tisim.steppers.context import StepContext
 from tisim.worlds.fields import Field
 
+FORCE_BEFORE = Field("force_before", "N", 3, "keep", scratch=True)
+TORQUE_BEFORE = Field("torque_before", "N m", 3, "keep", scratch=True)
 STATE_BEFORE = (
     Field("position_before", "m", 3, "keep", scratch=True),
     Field("velocity_before", "m/s", 3, "keep", scratch=True),
-    Field("force_before", "N", 3, "keep", scratch=True),
+    FORCE_BEFORE,
 )
 CHANGE = Field("iterate_change", "m", 1, "keep", scratch=True)
 """This field is how much the last iterate differs from the one before."""
-TURNING_BEFORE = (
-    Field("spin_before", "rad/s", 3, "keep", scratch=True),
-    Field("torque_before", "N m", 3, "keep", scratch=True),
-)
+TURNING_BEFORE = (Field("spin_before", "rad/s", 3, "keep", scratch=True), TORQUE_BEFORE)
 
 
 def saved_fields(turning: bool) -> tuple[Field, ...]:

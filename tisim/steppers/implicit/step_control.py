@@ -34,6 +34,12 @@ class ImplicitControl(StepControl):
     )
     most: float = parameter("", "largest factor by which the step grows in one go", 4.0, ge=1)
     least: float = parameter("", "smallest factor by which the step shrinks in one go", 0.1, gt=0, lt=1)
+    stride: float = parameter(
+        "m",
+        "longest way of a particle in a step, at the speed of its beginning; 0 for no limit",
+        0.0,
+        ge=0,
+    )
 
     @property
     def at_end(self) -> bool:
@@ -58,10 +64,15 @@ class ImplicitControl(StepControl):
         return max(duration / self.longest, float(growing))
 
     @ti.func
-    def step(self, s, w, target):
-        """Return the step (s, f64) to take where ``target`` was wanted; that is 0 for the first of all."""
+    def step(self, s, w, target, speed):
+        """Return the step (s, f64) to take where ``target`` was wanted, which is 0 for the first step of all;
+        ``speed`` (m/s, f64) is that of the fastest particle that takes it."""
         longest = ti.cast(self.longest(w), ti.f64)
         step = ti.min(ti.select(target > 0.0, target, ti.cast(self.first(w), ti.f64)), longest)
+        stride = ti.cast(self.stride(w), ti.f64)
+        if stride > 0.0:
+            # No speed at all sets no limit.
+            step = ti.min(step, stride / (speed + 1e-300))
         return ti.max(shortest_representable(s, w, self.shortest(w)), step)
 
     @ti.func

@@ -6,6 +6,7 @@ from typing import ClassVar, Literal, Self
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, Force, PairForce
+from tisim.interactions.force_sum import turning
 from tisim.interactions.loads import FORCE
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
@@ -90,12 +91,12 @@ class Trapezoid(Stepper):
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"] / (particles if independent else 1)
 
-    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        if independent:
+    def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
+        if self.independent(effects):
             return (FORCE, *OWN_STEP_FIELDS, *excursion_fields(self.control.at_end))
-        accelerated = self.acceleration == "anderson"
-        more = (*excursion_fields(self.control.at_end), *(memory_of_iterates(turning) if accelerated else ()))
-        return (FORCE, *saved_fields(turning), CHANGE, *more)
+        turns, accelerated = turning(effects), self.acceleration == "anderson"
+        more = (*excursion_fields(self.control.at_end), *(memory_of_iterates(turns) if accelerated else ()))
+        return (FORCE, *saved_fields(turns), CHANGE, *more)
 
     def step(self, context: StepContext) -> Step:
         s, solve = context.s, Solve(context, context.stepper.phi)
@@ -121,4 +122,4 @@ class Trapezoid(Stepper):
         )
         note = (NoteExcursion(solve),) if self.control.at_end else ()
         end = (*note, *context.advance_memory, *apply_operators(context), AdvanceClock(context))
-        return Step((Begin(context), SaveState(solve), StepAttempt(context, attempt), *end), buffers)
+        return Step((Begin(context), SaveState(context, solve), StepAttempt(context, attempt), *end), buffers)

@@ -29,6 +29,8 @@ class GranularContact(MaterialLaw, PairForce):
     depends_on_velocity: ClassVar[bool] = True
     # Contacts begin, slip and end.
     smooth: ClassVar[bool] = False
+    leapfrog: ClassVar[bool] = True
+    guards_steps: ClassVar[bool] = True
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
 

@@ -1,6 +1,8 @@
 """The contact law that is composed of parts."""
 
+import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -11,6 +13,13 @@ from tisim.components.component import Component
 from tisim.components.domain import Domain
 from tisim.components.material_law import MaterialLaw
 from tisim.effects.base import Effect, option
+from tisim.effects.base.critical_step import (
+    critical_step,
+    elastic_contact,
+    impact_stiffness,
+    lagging_contact,
+    smallest_grains,
+)
 from tisim.effects.contact.granular.cohesion_limit import check_grains, check_wall, with_newcomers
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.granular.guards import ContactGuards
@@ -25,6 +34,7 @@ from tisim.effects.contact.granular.parts import (
     TangentialForce,
     TwistingResistance,
 )
+from tisim.effects.contact.granular.step_limit import SLIDING
 from tisim.errors import must
 from tisim.numerics.vectors import piece
 
@@ -103,6 +113,25 @@ class Granular(ContactGuards, GranularContact):
     def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
         if self.by_overlap:
             check_grains(self, self._materials, with_newcomers(start, effects))
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        number, shortest = self.number_of_materials, math.inf
+        pairs = self._materials.touching()
+        for material, mass, radius in smallest_grains(start):
+            # With grains of its own material, and with grains and walls of others.
+            for pair in pairs[material * number : (material + 1) * number]:
+                push = partial(self.normal.push, pair, 0.5 * radius)
+                stiffness = impact_stiffness(push, 0.5 * mass, 0.5 * radius, speed)
+                sliding = self.tangential.ratio(pair) if self.tangential else 0.0
+                step = critical_step(max(1.0, SLIDING * sliding) * stiffness, 0.5 * mass)
+                shortest = min(shortest, step)
+        return shortest if shortest > 0 else None
+
+    def part_of_critical_step(self, accuracy: float) -> float:
+        lags = (self.damping, self.tangential, self.rolling, self.twisting) != (None,) * 4
+        return lagging_contact(accuracy) if lags else elastic_contact(accuracy)
 
     def suits_wall(
         self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], material: int, label: str

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
-from tisim.effects.contact.granular.parts import NormalForce
+from tisim.effects.contact.granular.parts import NormalForce, Overlap
 
 
 class HertzMaterial(NormalForce):
@@ -25,8 +25,8 @@ class HertzMaterial(NormalForce):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"modulus": 2 * pair.effective_young}
 
-    def deepest_push(self, pair: Touching, radius: float) -> float:
-        return 4 / 3 * pair.effective_young * radius * radius
+    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+        return 4 / 3 * pair.effective_young * (radius * overlap) ** 0.5 * overlap
 
     @ti.func
     def stiffness(self, w, pair, circle):

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
-from tisim.effects.contact.granular.parts import NormalForce
+from tisim.effects.contact.granular.parts import NormalForce, Overlap
 
 
 class Hooke(NormalForce):
@@ -25,8 +25,8 @@ class Hooke(NormalForce):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"constant": pair.mixed("stiffness")}
 
-    def deepest_push(self, pair: Touching, radius: float) -> float:
-        return pair.mixed("stiffness") * radius
+    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+        return pair.mixed("stiffness") * overlap
 
     @ti.func
     def stiffness(self, w, pair, circle):

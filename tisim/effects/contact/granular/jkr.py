@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
-from tisim.effects.contact.granular.parts import NormalForce
+from tisim.effects.contact.granular.parts import NormalForce, Overlap
 from tisim.numerics.roots import cube_root
 
 LEAST_ROOT = 1e-9
@@ -45,6 +45,12 @@ class JKR(NormalForce):
             "most": 3 * math.pi * energy,
             "stretch": 1.5 * (ratio * ratio / 2) ** (1 / 3),
         }
+
+    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+        # At the overlap that a circle of contact would have without adhesion, and at rest at least.
+        rest = (math.pi * pair.mixed("surface_energy") / pair.effective_young) ** (2 / 3)
+        deep = overlap + rest * (3 * radius) ** (1 / 3)
+        return 4 / 3 * pair.effective_young * (radius * deep) ** 0.5 * deep
 
     @ti.func
     def circle(self, w, pair, radius, overlap):

@@ -10,11 +10,15 @@ do: where no step can follow these, and there is friction, the world stops (see 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, TypeVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.material_law import MaterialLaw
 from tisim.components.materials import Touching
+
+Overlap = TypeVar("Overlap", float, np.ndarray)
 
 
 class ContactPart(MaterialLaw):
@@ -37,10 +41,11 @@ class NormalForce(ContactPart):
     beyond_contact: ClassVar[bool] = False
     memory: ClassVar[int] = 0
 
-    def deepest_push(self, pair: Touching, radius: float) -> float:
-        """Return the elastic force (N) at an overlap of R* (m), which cohesion by the overlap must not reach;
-        where a law does not say it, none is refused before a run."""
-        return math.inf
+    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+        """Return the elastic force (N) at an overlap (m), or at an array of them, at this R* (m); infinity
+        where a law does not say it. At an overlap of R* cohesion by the overlap must not reach it, and its
+        slope tells the critical time step."""
+        return overlap * math.inf
 
     @ti.func
     def circle(self, w, pair, radius, overlap):
@@ -90,6 +95,10 @@ class TangentialForce(ContactPart):
 
     contract: ClassVar[bool] = True
     memory: ClassVar[int] = 0
+
+    def ratio(self, pair: Touching) -> float:
+        """Return the tangential stiffness over the normal one; 0 where there is no spring."""
+        return 0.0
 
     @ti.func
     def force(self, w, pair, normal, stiffness, damping, limit, sliding, past, dt):

@@ -1,0 +1,624 @@
+"""Random small scenes that name no stepper, of every family, each with an exact reference.
+
+A family is a function of a generator of random numbers. It returns a scene, and a function that returns how
+far a result is from the reference, over the size of the motion or the energy at hand. Sizes, masses, forces
+and times are drawn over decades.
+"""
+
+import numpy as np
+from scipy.constants import G, mu_0
+from scipy.integrate import solve_ivp
+
+import tisim
+from tisim import effects as laws
+from tisim import sources
+from tisim.geometry import Plane
+
+FAMILIES = {}
+
+
+def family(function):
+    """Register a family by the name of its function."""
+    FAMILIES[function.__name__] = function
+    return function
+
+
+def decades(draw, low, high):
+    """Return a number whose logarithm is even between those of two numbers."""
+    return float(np.exp(draw.uniform(np.log(low), np.log(high))))
+
+
+def direction(draw):
+    """Return a unit vector."""
+    v = draw.normal(size=3)
+    return v / np.linalg.norm(v)
+
+
+def particles(position, velocity, radius, mass, **quantities):
+    """Return particles given one by one."""
+    return tisim.Particles(
+        position=np.atleast_2d(position),
+        velocity=np.atleast_2d(velocity),
+        radius=radius,
+        mass=mass,
+        quantities=quantities,
+    )
+
+
+def kinetic(state, turning=True):
+    """Return the kinetic energy (J) of solid spheres."""
+    energy = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
+    if turning and "spin" in state:
+        inertia = 0.4 * state["mass"] * state["radius"] ** 2
+        energy += 0.5 * (inertia * (state["spin"] ** 2).sum(axis=1)).sum()
+    return energy
+
+
+def by_path(acceleration, start, duration, **tolerances):
+    """Return the error of a result against an integration to 1e-11, over the largest distance from the start.
+
+    acceleration : of (t, r, v), arrays of shape (n, 3).
+    """
+    r, v = start["position"], start["velocity"]
+    n = len(r)
+
+    def rates(t, y):
+        y = y.reshape(2, n, 3)
+        return np.concatenate([y[1], acceleration(t, y[0], y[1])]).ravel()
+
+    speed = np.abs(v).max() + 1e-3 * duration * np.abs(acceleration(0.0, r, v)).max()
+    resolved = 1e-12 * np.repeat([speed * duration, speed], 3 * n)
+    exact = solve_ivp(
+        rates, (0, duration), np.concatenate([r, v]).ravel(), method="DOP853", rtol=1e-10, atol=resolved,
+        t_eval=np.linspace(0, duration, 65), **tolerances,
+    )  # fmt: skip
+    paths = exact.y.reshape(2, n, 3, -1)[0]
+    sizes = np.linalg.norm(paths - r[:, :, None], axis=1).max(axis=1)
+
+    def error(result):
+        off = np.linalg.norm(result.state["position"] - paths[..., -1], axis=1)
+        return float((off / sizes).max())
+
+    return error
+
+
+@family
+def tether(draw):
+    mass, omega = decades(draw, 1e-15, 1.0), draw.uniform(0.3, 1, 3) * decades(draw, 1e-2, 1e8)
+    speed, duration = decades(draw, 1e-6, 1e2), draw.uniform(0.3, 50) / omega.max()
+    v = speed * direction(draw)
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [v], 0.1 * speed / omega.max(), mass),
+        effects=(laws.Tether(stiffness=tuple(mass * omega**2)),),
+        duration=duration,
+    )
+
+    def error(result):
+        exact = v / omega * np.sin(omega * duration)
+        size = np.abs(v / omega).max()
+        return float(np.linalg.norm(result.state["position"][0] - exact) / size)
+
+    return scene, error
+
+
+@family
+def lorentz(draw):
+    rate, speed = decades(draw, 1e-2, 1e9), decades(draw, 1e-3, 1e3)
+    mass, b = decades(draw, 1e-18, 1e-3), direction(draw)
+    e = draw.uniform(-0.3, 0.3, 3) * speed
+    v, duration = speed * direction(draw), draw.uniform(0.5, 60) / rate
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [v], 1e-6, mass, charge=[mass * rate]),
+        effects=(
+            laws.Lorentz(),
+            sources.MagneticField(constant=tuple(b)),
+            sources.ElectricField(constant=tuple(e)),
+        ),
+        duration=duration,
+    )
+    start = {"position": np.zeros((1, 3)), "velocity": v[None]}
+    return scene, by_path(lambda t, r, u: rate * (e + np.cross(u, b)), start, duration)
+
+
+@family
+def driven_charge(draw):
+    """A charge in a field that oscillates, and may begin later."""
+    omega, specific = decades(draw, 1e-1, 1e6), decades(draw, 1e-3, 1e3)
+    amplitude, phase = direction(draw), draw.uniform(0, 6, 3)
+    periods = draw.uniform(0.3, 8)
+    duration, begin = periods * 2 * np.pi / omega, 0.0
+    if draw.uniform() < 0.5:
+        begin = float(draw.uniform(0, 0.5) * duration)
+    speed = specific / omega * draw.uniform(0.1, 3)
+    v = speed * direction(draw)
+    field = sources.ElectricField(
+        amplitude=tuple(amplitude), omega=(omega,) * 3, phase=tuple(phase), begin=begin
+    )
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [v], 1e-3 * speed / omega, 1e-9, charge=[1e-9 * specific]),
+        effects=(laws.Lorentz(), field),
+        duration=duration,
+    )
+
+    def at(t):
+        """Place after a time t from when the field begins, at rest then."""
+        a, b = omega * begin + phase, omega * (begin + t) + phase
+        return specific * amplitude / omega**2 * (omega * t * np.cos(a) - np.sin(b) + np.sin(a))
+
+    times = np.linspace(0, duration, 257)
+    paths = np.array([v * t + (at(t - begin) if t > begin else 0) for t in times])
+    size = np.linalg.norm(paths, axis=1).max()
+    return scene, lambda result: float(np.linalg.norm(result.state["position"][0] - paths[-1]) / size)
+
+
+@family
+def stokes_drag(draw):
+    radius, mu = decades(draw, 1e-7, 1e-2), decades(draw, 1e-5, 1e1)
+    mass = decades(draw, 1e2, 1e4) * 4 / 3 * np.pi * radius**3
+    rate = 6 * np.pi * mu * radius / mass
+    duration, flow = draw.uniform(0.1, 20) / rate, decades(draw, 1e-4, 10) * direction(draw)
+    v, g = decades(draw, 1e-4, 10) * direction(draw), np.array([0, 0, -9.81])
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [v], radius, mass),
+        effects=(
+            laws.StokesDrag(viscosity=mu),
+            sources.UniformFlow(velocity=tuple(flow)),
+            laws.Gravity(acceleration=tuple(g)),
+        ),
+        duration=duration,
+    )
+    end = flow + g / rate
+    times = np.linspace(0, duration, 257)[:, None]
+    paths = end * times + (v - end) / rate * (1 - np.exp(-rate * times))
+    size = np.linalg.norm(paths, axis=1).max()
+    return scene, lambda result: float(np.linalg.norm(result.state["position"][0] - paths[-1]) / size)
+
+
+@family
+def quadratic_drag(draw):
+    """Drag by Reynolds number, with the jumps of the laws of Schiller and Naumann and of Chow on the way."""
+    law = laws.SchillerNaumannDrag
+    radius, rho = decades(draw, 1e-4, 1e-1), decades(draw, 1.0, 1e3)
+    mass = decades(draw, 1e2, 1e4) * 4 / 3 * np.pi * radius**3
+    reynolds = decades(draw, 1e2, 1e5)
+    speed = decades(draw, 1e-2, 50)
+    mu = 2 * radius * rho * speed / reynolds
+    time = mass / (0.5 * rho * 0.44 * np.pi * radius**2 * speed)
+    duration, v = draw.uniform(0.3, 10) * time, speed * direction(draw)
+
+    def acceleration(t, r, u):
+        w = np.linalg.norm(u)
+        re = 2 * radius * rho * w / mu
+        drag = 0.44 * re if re > 1000 else 24 * (1 + 0.15 * re**0.687)
+        return -0.25 * np.pi * mu * radius * drag * u / mass
+
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [v], radius, mass),
+        effects=(law(density=rho, viscosity=mu),),
+        duration=duration,
+    )
+    start = {"position": np.zeros((1, 3)), "velocity": v[None]}
+    return scene, by_path(acceleration, start, duration, max_step=duration / 2000)
+
+
+@family
+def self_gravity(draw):
+    """Two bodies in orbits of all eccentricities up to 0.9, and a light third one far out."""
+    size, total = decades(draw, 1e-2, 1e6), decades(draw, 1e-3, 1e20)
+    ratio, e = draw.uniform(0.05, 0.5), draw.uniform(0, 0.9)
+    m = total * np.array([ratio, 1 - ratio])
+    period = 2 * np.pi * np.sqrt(size**3 / (G * total))
+    far, speed = size * (1 + e), np.sqrt(G * total / size * (1 - e) / (1 + e))
+    r = np.array([[-m[1], 0, 0], [m[0], 0, 0]]) / total * far
+    v = np.array([[0, -m[1], 0], [0, m[0], 0]]) / total * speed
+    duration = draw.uniform(0.2, 6) * period
+    scene = tisim.Scene(
+        particles=particles(r, v, 1e-3 * size, m), effects=(laws.SelfGravity(),), duration=duration
+    )
+
+    def acceleration(t, x, u):
+        d = x[1] - x[0]
+        pull = G * d / np.linalg.norm(d) ** 3
+        return np.array([m[1] * pull, -m[0] * pull])
+
+    return scene, by_path(acceleration, {"position": r, "velocity": v}, duration)
+
+
+@family
+def near_field(draw):
+    """Like charges that fly apart, and particles that swing in the well of two powers."""
+    n, size, mass = 4, decades(draw, 1e-6, 1e1), decades(draw, 1e-12, 1.0)
+    r = size * (np.indices((2, 2, 1)).reshape(3, -1).T + 0.2 * draw.uniform(-1, 1, (n, 3)))
+    strength = decades(draw, 1e-12, 1e3)
+    rate = np.sqrt(strength / (mass * size))
+    v = 0.3 * size * rate * draw.uniform(-1, 1, (n, 3))
+    alpha1, alpha2 = strength * size, strength * size**2
+    duration = draw.uniform(0.5, 6) / rate
+    scene = tisim.Scene(
+        particles=particles(r, v, 1e-3 * size, mass),
+        effects=(laws.NearField(alpha1=alpha1, beta1=1, alpha2=alpha2, beta2=2),),
+        duration=duration,
+    )
+
+    def acceleration(t, x, u):
+        d = x[None] - x[:, None]
+        q = np.linalg.norm(d, axis=2) + np.eye(n)
+        pull = (alpha1 / q - alpha2 / q**2) / q
+        np.fill_diagonal(pull, 0)
+        return (pull[:, :, None] * d).sum(axis=1) / mass
+
+    return scene, by_path(acceleration, {"position": r, "velocity": v}, duration)
+
+
+@family
+def mie(draw):
+    """Two that meet, head on or off centre, and part again."""
+    radius, mass = decades(draw, 1e-9, 1e-2), decades(draw, 1e-20, 1e-3)
+    sigma, well = 2 * radius, decades(draw, 0.1, 30.0)
+    speed = decades(draw, 1e-3, 1e2)
+    eps = 0.25 * mass * speed**2 * well
+    c, cutoff = 4.0, 2 ** (1 / 15)
+    half = sigma * draw.uniform(0.8, 1.5)
+    r = np.array([[-half, 0, 0], [half, draw.uniform(0, 0.9) * sigma, 0]])
+    v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
+    duration = 4 * half / speed
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass), effects=(laws.Mie(epsilon=eps),), duration=duration
+    )
+
+    def acceleration(t, x, u):
+        d = x[1] - x[0]
+        q = np.linalg.norm(d)
+        push = c * eps * (30 * (sigma / q) ** 30 - 15 * (sigma / q) ** 15) / q if q < cutoff * sigma else 0.0
+        a = push / mass * d / q
+        return np.array([-a, a])
+
+    return scene, by_path(
+        acceleration, {"position": r, "velocity": v}, duration, max_step=0.01 * sigma / speed
+    )
+
+
+@family
+def permanent_magnet(draw):
+    """A magnet swings in a uniform field: its energy stays."""
+    radius, rho = decades(draw, 1e-7, 1e-1), decades(draw, 1e3, 8e3)
+    magnetisation, b = decades(draw, 1e3, 1e6), decades(draw, 1e-5, 5.0) * direction(draw)
+    mass, volume = rho * 4 / 3 * np.pi * radius**3, 4 / 3 * np.pi * radius**3
+    moment = magnetisation * volume * direction(draw)
+    inertia = 0.4 * mass * radius**2
+    rate = np.sqrt(magnetisation * volume * np.linalg.norm(b) / inertia)
+    spin = draw.uniform(0, 2) * rate * direction(draw)
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [(0, 0, 0)], radius, mass, moment=[moment], spin=[spin]),
+        effects=(laws.PermanentMoment(), sources.MagneticField(constant=tuple(b)), laws.Magnetophoresis()),
+        duration=draw.uniform(1, 200) / rate,
+    )
+
+    def energy(state):
+        return kinetic(state) - (state["moment"] @ b).sum()
+
+    scale = np.linalg.norm(moment) * np.linalg.norm(b)
+    return scene, lambda result: float(abs(energy(result.state) - energy(result.start)) / scale)
+
+
+def grains_of(draw, number=2):
+    """Return radius (m), density (kg/m^3), mass (kg) and a material of soft to hard grains."""
+    radius, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
+    young = decades(draw, 1e6, 1e11)
+    return radius, rho, rho * 4 / 3 * np.pi * radius**3, young
+
+
+@family
+def elastic_grains(draw):
+    """Two elastic grains of Hertz's law hit off centre, without friction: the energy stays."""
+    radius, rho, mass, young = grains_of(draw)
+    # Up to overlaps of some hundredths of a radius.
+    speed = decades(draw, 1e-4, 3e-2) * np.sqrt(young / rho)
+    r = np.array([[-1.1 * radius, 0, 0], [1.1 * radius, draw.uniform(0, 1.5) * radius, 0]])
+    v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass),
+        materials={"grain": tisim.Material(young=young, poisson=0.25)},
+        effects=(laws.Granular(),),
+        duration=8 * radius / speed,
+    )
+    return scene, lambda result: float(abs(kinetic(result.state) / kinetic(result.start) - 1))
+
+
+@family
+def damped_grains(draw):
+    """Two damped grains hit each other head on: their restitution is that of the material."""
+    radius, rho, mass, young = grains_of(draw)
+    speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
+    restitution = draw.uniform(0.3, 0.95)
+    r, v = [[-1.1 * radius, 0, 0], [1.1 * radius, 0, 0]], [[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]]
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass),
+        materials={"grain": tisim.Material(young=young, poisson=0.25, restitution=restitution, friction=0.5)},
+        effects=(laws.Granular(damping=laws.RestitutionDamping(), tangential=laws.MindlinForce()),),
+        duration=3 * radius / speed,
+    )
+
+    def error(result):
+        u = result.state["velocity"][:, 0]
+        return float(abs((u[1] - u[0]) / speed - restitution))
+
+    return scene, error
+
+
+@family
+def grain_on_floor(draw):
+    """An elastic grain bounces on a floor under gravity: the energy stays."""
+    radius, rho, mass, young = grains_of(draw)
+    g = 9.81
+    height = min(decades(draw, 0.1, 20) * radius, 1e-4 * young / (rho * g))
+    speed = np.sqrt(2 * g * height)
+    scene = tisim.Scene(
+        particles=particles([(0, 0, radius + height)], [(0.3 * speed, 0, 0)], radius, mass),
+        materials={"grain": tisim.Material(young=young, poisson=0.25)},
+        effects=(laws.Granular(), laws.Walls(planes=[Plane()]), laws.Gravity(acceleration=(0, 0, -g))),
+        duration=2.5 * speed / g,
+    )
+
+    def energy(state):
+        return kinetic(state) + mass * g * (state["position"][:, 2] - radius).sum()
+
+    return scene, lambda result: float(abs(energy(result.state) / energy(result.start) - 1))
+
+
+@family
+def bonded_pair(draw):
+    """A free bonded pair swings along and across its bond: its energy, at rest in the bond, stays bounded."""
+    radius, rho, mass, young = grains_of(draw)
+    speed = decades(draw, 1e-6, 1e-4) * np.sqrt(young / rho)
+    r = [[-radius, 0, 0], [radius, 0, 0]]
+    v = speed * draw.uniform(-1, 1, (2, 3))
+    stiffness = young / (2 * radius) * np.pi * radius**2
+    period = 2 * np.pi * np.sqrt(0.5 * mass / stiffness)
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass),
+        effects=(
+            laws.ParallelBond(gap=1e-6 * radius, young=young, tensile_strength=1e30, shear_strength=1e30),
+        ),
+        duration=draw.uniform(1, 30) * period,
+    )
+
+    def error(result):
+        # No more than the energy of the start, and the centre of mass where it must be.
+        more = kinetic(result.state) / kinetic(result.start) - 1
+        centre = result.state["position"].mean(axis=0) - v.mean(axis=0) * result.time
+        off = np.linalg.norm(centre) / max(np.linalg.norm(v.mean(axis=0)) * result.time, 1e-3 * radius)
+        return float(max(more, off))
+
+    return scene, error
+
+
+@family
+def zohdi_contact(draw):
+    """Two soft spheres of Z16 hit each other: the energy stays."""
+    radius, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
+    mass, young = rho * 4 / 3 * np.pi * radius**3, decades(draw, 1e5, 1e10)
+    speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
+    law = laws.Hertz(young=young, poisson=0.3)
+    r, v = [[-1.1 * radius, 0, 0], [1.1 * radius, 0, 0]], [[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]]
+    scene = tisim.Scene(particles=particles(r, v, radius, mass), effects=(law,), duration=3 * radius / speed)
+    return scene, lambda result: float(abs(kinetic(result.state) / kinetic(result.start) - 1))
+
+
+@family
+def impact(draw):
+    """Two hard spheres collide off centre, without friction or loss: where they are afterwards."""
+    radius, speed = decades(draw, 1e-7, 1e2), decades(draw, 1e-6, 1e3)
+    mass = decades(draw, 1e-15, 1e3) * draw.uniform(0.5, 1, 2)
+    offset, gap = draw.uniform(0, 1.2) * radius, draw.uniform(1.5, 4)
+    r = np.array([[-gap * radius, 0, 0], [gap * radius, offset, 0]])
+    v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
+    duration = 3 * gap * radius / speed
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass), effects=(laws.Impact(hardness=1e30),), duration=duration
+    )
+    d, u = r[1] - r[0], v[1] - v[0]
+    b, c = d @ u, d @ d - 4 * radius**2
+    meet = (-b - np.sqrt(b * b - u @ u * c)) / (u @ u)
+    n = (d + meet * u) / (2 * radius)
+    pulse = 2 / (1 / mass).sum() * (u @ n) * n
+    after = v + np.array([pulse / mass[0], -pulse / mass[1]])
+    exact = r + meet * v + (duration - meet) * after
+    size = speed * duration
+    return scene, lambda result: float(np.linalg.norm(result.state["position"] - exact, axis=1).max() / size)
+
+
+@family
+def free_clump(draw):
+    """A rigid body of unlike spheres turns freely: energy and angular momentum stay."""
+    size, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
+    centres = size * draw.uniform(-1, 1, (4, 3))
+    clump = tisim.Clump(centres=centres, radii=size * draw.uniform(0.3, 0.6, 4), density=rho)
+    rate = decades(draw, 1e-2, 1e3)
+    spin = rate * draw.normal(size=3)
+    bodies = tisim.Particles.of_clumps(clump, position=[(0, 0, 0)], angular_velocity=[spin])
+    scene = tisim.Scene(
+        particles=bodies,
+        effects=(laws.RigidClumps(),),
+        duration=draw.uniform(0.5, 4) / rate,
+    )
+
+    def error(result):
+        before, after = (tisim.analysis.clump_bodies(s) for s in (result.start, result.state))
+        return float(abs(np.sum(after.energy) / np.sum(before.energy) - 1))
+
+    return scene, error
+
+
+@family
+def charged_grains(draw):
+    """Two elastic grains of like or unlike charge meet, by Coulomb's and Hertz's laws: the energy stays."""
+    radius, rho, mass, young = grains_of(draw)
+    speed = decades(draw, 1e-3, 1e-2) * np.sqrt(young / rho)
+    # From next to nothing up to half of the energy of motion, at contact.
+    charge = draw.choice([-1, 1]) * decades(draw, 1e-2, 0.5) * 0.25 * mass * speed**2 * 2 * radius
+    r = np.array([[-1.5 * radius, 0, 0], [1.5 * radius, draw.uniform(0, 1.0) * radius, 0]])
+    v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
+    signs = [1, int(np.sign(charge))]
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass, polarity=signs),
+        materials={"grain": tisim.Material(young=young, poisson=0.25)},
+        effects=(laws.Granular(), laws.NearField(alpha2=abs(charge), beta2=2, signed=True)),
+        duration=8 * radius / speed,
+    )
+
+    def energy(state):
+        d = np.linalg.norm(state["position"][1] - state["position"][0])
+        overlap = max(0.0, 2 * radius - d)
+        modulus = young / (2 * (1 - 0.25**2))
+        return kinetic(state) + charge / d + 8 / 15 * modulus * np.sqrt(radius / 2) * overlap**2.5
+
+    return scene, lambda result: float(abs(energy(result.state) / energy(result.start) - 1))
+
+
+@family
+def grains_in_magnetic_field(draw):
+    """Charged elastic grains go round in a magnetic field and hit a floor: their kinetic energy stays."""
+    radius, rho, mass, young = grains_of(draw)
+    speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
+    orbit = radius * decades(draw, 1, 20)
+    rate = speed / orbit
+    scene = tisim.Scene(
+        particles=particles(
+            [(0, 0, 1.3 * radius)], [(0.1 * speed, 0, -speed)], radius, mass, charge=[mass * rate]
+        ),
+        materials={"grain": tisim.Material(young=young, poisson=0.25)},
+        effects=(
+            laws.Granular(), laws.Walls(planes=[Plane()]), laws.Lorentz(),
+            sources.MagneticField(constant=(0, 1.0, 0)),
+        ),
+        duration=draw.uniform(0.1, 1) * 2 * np.pi / rate,
+    )  # fmt: skip
+
+    def error(result):
+        if result.state["position"][0, 2] < radius:
+            return 0.0
+        return float(abs(kinetic(result.state) / kinetic(result.start) - 1))
+
+    return scene, error
+
+
+def dipole_force(a, b, d):
+    """Return the force (N) on the dipole a by b, which is at d (m) from it."""
+    size = np.linalg.norm(d)
+    n = d / size
+    factor = -3 * mu_0 / (4 * np.pi * size**4)
+    return factor * ((a @ n) * b + (b @ n) * a + (a @ b) * n - 5 * (a @ n) * (b @ n) * n)
+
+
+@family
+def dipoles(draw):
+    """Two dipoles of fixed moments pass each other."""
+    radius, mass = decades(draw, 1e-7, 1e-2), decades(draw, 1e-15, 1e-3)
+    moment = decades(draw, 1e-15, 1e-3) * direction(draw)
+    r = radius * np.array([[-3, 0, 0], [3, 4 + draw.uniform(0, 2), 0]])
+    force = mu_0 * 3 * (moment @ moment) / (4 * np.pi * (6 * radius) ** 4)
+    speed = np.sqrt(force / mass * radius) * draw.uniform(4, 10)
+    v = np.array([[speed, 0, 0], [-speed, 0, 0]])
+    duration, size = 4 * radius / speed, np.linalg.norm(moment)
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass, saturation_moment=[size, size]),
+        effects=(
+            sources.MagneticField(constant=tuple(moment / size)),
+            laws.FixedMoment(),
+            laws.DipoleDipole(),
+        ),
+        duration=duration,
+    )
+
+    def acceleration(t, x, u):
+        f = dipole_force(moment, moment, x[1] - x[0])
+        return np.array([f, -f]) / mass
+
+    return scene, by_path(acceleration, {"position": r, "velocity": v}, duration)
+
+
+@family
+def moment_past_magnet(draw):
+    """A saturated grain is drawn past a magnetised ball, whose field outside is that of a dipole."""
+    size, mass = decades(draw, 1e-5, 1e-1), decades(draw, 1e-15, 1e-3)
+    magnetisation = 1e5 * direction(draw)
+    ball = 4 / 3 * np.pi * size**3 * magnetisation
+    moment = decades(draw, 1e-15, 1e-6)
+    force = moment * mu_0 * np.linalg.norm(magnetisation) / size
+    speed = np.sqrt(force * size / mass) * draw.uniform(1.5, 5)
+    r = size * np.array([[-4, 2.5, draw.uniform(-1, 1)]])
+    v, duration = np.array([[speed, 0, 0]]), 8 * size / speed
+    scene = tisim.Scene(
+        particles=particles(r, v, 1e-3 * size, mass, saturation_moment=[moment]),
+        effects=(
+            laws.FixedMoment(),
+            sources.MagneticSpheres(
+                spheres=[sources.Sphere(radius=size, magnetisation=tuple(magnetisation))]
+            ),
+            laws.Magnetophoresis(),
+        ),
+        duration=duration,
+    )
+    start = {"position": r, "velocity": v}
+
+    def acceleration(t, x, u):
+        n = x[0] / np.linalg.norm(x[0])
+        field = 3 * (ball @ n) * n - ball
+        along = moment * field / np.linalg.norm(field)
+        return dipole_force(along, ball, -x[0])[None] / mass
+
+    return scene, by_path(acceleration, start, duration)
+
+
+@family
+def drag_in_constriction(draw):
+    """A sphere is dragged along the axis of a constriction, whose flow has four kinks on the way."""
+    radius, mu = 5e-3, 1e-2 * decades(draw, 0.1, 10)
+    mass = 500.0 * 4 / 3 * np.pi * radius**3
+    rate, speed = 6 * np.pi * mu * radius / mass, draw.uniform(0.5, 2)
+    size = decades(draw, 0.1, 100)
+    flow = sources.ConstrictionFlow(
+        centre=(0, 0, 0.3 * size), speed=1.0, throat_radius=0.05 * size, duct_radius=0.15 * size,
+        length=0.1 * size, transition=0.05 * size,
+    )  # fmt: skip
+    duration = 0.4 * size
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [(0, 0, speed)], radius, mass),
+        effects=(flow, laws.StokesDrag(viscosity=mu)),
+        duration=duration,
+    )
+
+    def acceleration(t, x, u):
+        inside = 1 - (abs(x[0, 2] / size - 0.3) - 0.05) / 0.05
+        along = 1 + 8 * min(1.0, max(0.0, inside))
+        return rate * (np.array([[0, 0, along]]) - u)
+
+    start = {"position": np.zeros((1, 3)), "velocity": np.array([[0, 0, speed]])}
+    return scene, by_path(acceleration, start, duration, max_step=duration / 2000)
+
+
+@family
+def drag_in_couette(draw):
+    """A sphere crosses a shear flow that begins later."""
+    radius, mu = decades(draw, 1e-5, 1e-2), decades(draw, 1e-4, 1e0)
+    mass = 1e3 * 4 / 3 * np.pi * radius**3
+    rate = 6 * np.pi * mu * radius / mass
+    duration, gap = draw.uniform(0.3, 8) / rate, decades(draw, 1e1, 1e4) * radius
+    begin, wall = float(draw.uniform(0.1, 0.6) * duration), decades(draw, 1e-3, 1.0)
+    v = np.array([0.0, 0.0, 0.3 * gap * rate])
+    flow = sources.CouetteFlow(
+        first=-gap, second=gap, first_velocity=(-wall, 0, 0), second_velocity=(wall, 0, 0), begin=begin
+    )
+    scene = tisim.Scene(
+        particles=particles([(0, 0, 0)], [v], radius, mass),
+        effects=(flow, laws.StokesDrag(viscosity=mu)),
+        duration=duration,
+    )
+
+    def acceleration(t, x, u):
+        moving = wall * np.clip(x[0, 2] / gap, -1, 1) if t >= begin else 0.0
+        return rate * (np.array([[moving, 0, 0]]) - u)
+
+    start = {"position": np.zeros((1, 3)), "velocity": v[None]}
+    return scene, by_path(acceleration, start, duration, max_step=duration / 2000)

@@ -1,0 +1,307 @@
+"""A scene that names no stepper is as accurate as it says, or is refused: none is wrong with status ok.
+
+    python -m pytest -n 0 -m slow -s tests/hard/test_default_stepper.py
+
+prints the errors of 100 random scenes of each family (tests/hard/default_scenes.py), and the work beside that
+of the coarsest settings of any stepper that keep all scenes of the family within the same accuracy.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import tisim
+from tests.hard.default_scenes import FAMILIES
+from tisim import effects as laws
+from tisim import sources
+from tisim.steppers import (
+    ApproachTime,
+    Boris,
+    Collocation,
+    ErrorControl,
+    FixedStep,
+    StageControl,
+    Trapezoid,
+    Verlet,
+)
+from tisim.steppers.choice import ACCURACY
+
+QUICK = ("tether", "lorentz", "permanent_magnet", "damped_grains", "impact", "driven_charge")
+"""These families stand for the rules in the quick tests."""
+
+
+def drawn(name, number):
+    """Return scenes of a family with the functions that tell their errors, and how many were refused."""
+    scenes, refused = [], 0
+    for k in range(number):
+        draw = np.random.Generator(np.random.Philox(key=[k, sorted(FAMILIES).index(name)]))
+        try:
+            scenes.append(FAMILIES[name](draw))
+        except tisim.InputError:
+            refused += 1
+    return scenes, refused
+
+
+def errors_of(scenes, results):
+    """Return the error of each result; infinite where it has failed."""
+    return np.array(
+        [error(r) if r.status.ok else math.inf for (_, error), r in zip(scenes, results, strict=True)]
+    )
+
+
+def work_of(results):
+    """Return how often forces were summed, the mean over runs."""
+    return float(np.mean([r.work.get("force_evaluations", 0) or r.work["steps"] for r in results]))
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_scene_without_a_stepper_is_as_accurate_as_it_says(name):
+    scenes, refused = drawn(name, 12)
+    assert refused == 0
+    errors = errors_of(scenes, tisim.run([scene for scene, _ in scenes]))
+    assert errors.max() <= ACCURACY
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAMILIES)
+def test_100_random_scenes_of_each_family(name, capsys):
+    scenes, refused = drawn(name, 100)
+    results = tisim.run([scene for scene, _ in scenes])
+    errors = errors_of(scenes, results)
+    right, failed = errors[np.isfinite(errors)], int(np.isinf(errors).sum())
+    with capsys.disabled():
+        print(
+            f"\n{name:25s} refused {refused}, failed {failed}, error median {np.median(right):.1e} "
+            f"largest {right.max():.1e}, {work_of(results):.0f} sums of forces"
+        )
+    assert right.max() <= ACCURACY
+    # What is neither refused nor right must say so; in these families nothing has to.
+    assert refused + failed <= 3
+
+
+ERRORS = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
+PARTS = (0.4, 0.28, 0.2, 0.14, 0.1, 0.07, 0.05)
+"""By hand one of these is chosen for all scenes of a family: an error that is asked for, or the part of the
+critical step that a step is."""
+
+
+def by_hand(scene, error=None, part=None, kind=None):
+    """Return a scene with the stepper that somebody chooses who knows its scales."""
+    chosen = scene.choice()
+    if part is not None:
+        gyrates = any(effect.gyrates(scene.effects) for effect in scene.effects)
+        dt = min(part * min(chosen.critical.values()), scene.duration)
+        stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
+    else:
+        limits = {
+            "first": min(1e-6, 1e-4 * scene.duration),
+            "longest": 0.1 * scene.duration,
+            "shortest": min(1e-12, 1e-10 * scene.duration),
+            "stride": getattr(chosen.stepper.control, "stride", 0.0),
+        }
+        if kind == "trapezoid":
+            stepper = Trapezoid(
+                control=ErrorControl(error=error, tolerance=1e-2 * error, per="run", **limits)
+            )
+        else:
+            stages = int(kind[-1])
+            stepper = Collocation(stages=stages, control=StageControl(error=error, per="run", **limits))
+    return tisim.Scene(
+        particles=scene.particles,
+        materials=scene.materials,
+        effects=scene.effects,
+        domain=scene.domain,
+        duration=scene.duration,
+        stepper=stepper,
+    )
+
+
+def settings(scene):
+    """Return what may be chosen by hand for scenes like one, from coarse to fine, by the kind of stepper."""
+    choice, adaptive = scene.choice(), not any(effect.leapfrog for effect in scene.effects)
+    tried = {}
+    if choice.critical:
+        tried["leapfrog"] = [{"part": part} for part in PARTS]
+    if adaptive:
+        for kind in ("trapezoid", "collocation 3", "collocation 5"):
+            tried[kind] = [{"error": error, "kind": kind} for error in ERRORS]
+    return tried
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(set(FAMILIES) - {"impact"}))
+def test_what_the_choice_costs_beside_the_best_by_hand(name, capsys):
+    # Collisions of hard particles have no other stepper: there is nothing to compare.
+    scenes, _ = drawn(name, 20)
+    own = work_of(tisim.run([scene for scene, _ in scenes]))
+    best, which = math.inf, "none"
+    for kind, choices in settings(scenes[0][0]).items():
+        for choice in choices:
+            results = tisim.run([by_hand(scene, **choice) for scene, _ in scenes])
+            if errors_of(scenes, results).max() <= ACCURACY:
+                if (work := work_of(results)) < best:
+                    best, which = work, f"{kind}, {choice.get('part', choice.get('error'))}"
+                break
+    with capsys.disabled():
+        print(f"\n{name:25s} {own:.0f} sums of forces, best by hand {best:.0f} ({which}): {own / best:.2f}")
+    assert own <= 1.5 * best
+
+
+def magnet(**more):
+    """Return a scene of a magnet that swings with a period of 2.8 ms."""
+    radius, moment = 1e-2, 1e6 * 4 / 3 * np.pi * 1e-6 * np.array([math.sin(0.3), 0, math.cos(0.3)])
+    return tisim.Scene(
+        particles=tisim.Particles(
+            position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=radius, density=5000.0,
+            quantities={"moment": [moment], "spin": [(0, 0, 0)]},
+        ),
+        effects=(
+            laws.PermanentMoment(),
+            sources.MagneticField(constant=(0, 0, 1.0)),
+            laws.Magnetophoresis(),
+        ),
+        duration=0.1,
+        **more,
+    )  # fmt: skip
+
+
+def tethered(**more):
+    """Return a scene of a particle on a spring, with a period of 1 ms."""
+    return tisim.Scene(
+        particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(0.1, 0, 0)], radius=1e-4, mass=1e-6),
+        effects=(laws.Tether(stiffness=(4 * np.pi**2,) * 3),),
+        duration=0.1,
+        **more,
+    )
+
+
+class TestTheGuard:
+    """A named step beyond the critical step stops the world, whatever the law."""
+
+    @pytest.mark.parametrize(("factor", "ok"), [(0.49, True), (0.52, False)])
+    def test_a_spring_is_followed_up_to_half_of_the_critical_step(self, factor, ok):
+        critical = 2 / (2 * np.pi * 1e3)
+        result = tisim.run(tethered(stepper=Verlet(control=FixedStep(dt=factor * critical))))
+        assert result.status.ok == ok, result.status.reason
+        if not ok:
+            assert "critical time step" in result.status.reason
+            assert "effects.tether" in result.status.reason
+            told = float(result.status.reason.split("critical one at most ")[1].split(" s")[0])
+            assert told == pytest.approx(critical, rel=0.05)
+
+    def test_a_magnet_that_turns_in_long_steps_stops_its_world(self):
+        result = tisim.run(magnet(stepper=Verlet(control=ApproachTime())))
+        assert not result.status.ok
+        assert "critical time step" in result.status.reason
+
+    @pytest.mark.parametrize("part", [0.3, 0.5, 1.0, 3.0])
+    def test_two_bodies_in_orbit_in_long_steps_stop_their_world(self, part):
+        d, period = 0.01, 1e-3
+        total = 4 * np.pi**2 * d**3 / (6.6743e-11 * period**2)
+        v = math.sqrt(6.6743e-11 * total / d)
+        scene = tisim.Scene(
+            particles=tisim.Particles(
+                position=[(-d / 2, 0, 0), (d / 2, 0, 0)], velocity=[(0, -v / 2, 0), (0, v / 2, 0)],
+                radius=1e-4, mass=total / 2,
+            ),
+            effects=(laws.SelfGravity(),),
+            stepper=Verlet(control=FixedStep(dt=part * period)),
+            duration=0.02,
+        )  # fmt: skip
+        assert "critical time step" in tisim.run(scene).status.reason
+
+    def test_verlet_is_refused_beside_a_magnetic_force(self):
+        with pytest.raises(tisim.InputError, match=r"stepper must be one that turns velocities"):
+            tisim.Scene(
+                particles=tisim.Particles(
+                    position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=1e-4, mass=1e-9,
+                    quantities={"charge": [1e-6]},
+                ),
+                effects=(laws.Lorentz(), sources.MagneticField(constant=(0, 0, 1.0))),
+                stepper=Verlet(control=FixedStep(dt=1e-6)),
+                duration=0.1,
+            )  # fmt: skip
+
+
+class TestTheChoice:
+    def test_a_scene_that_changes_is_chosen_for_anew(self):
+        assert tethered().replace({"duration": 1.0}).stepper.control.longest == pytest.approx(0.1)
+
+    def test_a_scene_keeps_its_accuracy_and_not_its_stepper_in_a_file(self):
+        scene = tethered(accuracy=1e-5)
+        text = scene.to_toml()
+        assert "[stepper" not in text
+        assert tisim.Scene.from_dict(scene.to_dict()).stepper == scene.stepper
+
+    def test_accuracy_is_refused_beside_a_stepper(self):
+        with pytest.raises(tisim.InputError, match=r"scene.accuracy must be left out"):
+            tethered(accuracy=1e-3, stepper=Verlet(control=FixedStep(dt=1e-6)))
+
+    def test_more_accuracy_is_less_error(self):
+        exact = 0.1 / (2e3 * np.pi) * math.sin(2e3 * np.pi * 0.1)
+        errors = []
+        for accuracy in (1e-1, 1e-4, 1e-8):
+            result = tisim.run(tethered(accuracy=accuracy))
+            errors.append(abs(result.state["position"][0, 0] - exact) / (0.1 / (2e3 * np.pi)))
+            assert errors[-1] <= accuracy
+        assert errors[0] > errors[-1]
+
+    def test_what_depends_on_its_step_is_refused(self):
+        with pytest.raises(tisim.InputError, match=r"scene.stepper must be given, as the length of a step"):
+            tisim.Scene(
+                particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, mass=1e-6),
+                effects=(
+                    laws.Hertz(young=1e6, poisson=0.3),
+                    laws.ContactFriction(stiffness=1, static=0.5, dynamic=0.4),
+                ),
+                duration=1.0,
+            )
+
+    def test_a_law_that_tells_no_critical_step_is_refused_beside_grains(self):
+        class Unknown(laws.Tether):
+            def critical_step(self, start, speed, effects):
+                return None
+
+        with pytest.raises(tisim.InputError, match=r"effects.unknown does not tell the critical time step"):
+            tisim.Scene(
+                particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, mass=1e-6),
+                materials={"a": tisim.Material(young=1e6, poisson=0.3)},
+                effects=(laws.Granular(), Unknown(stiffness=(1, 1, 1))),
+                duration=1.0,
+            )
+
+
+class TestFailedResults:
+    """Who uses a failed run without a look at its status is warned."""
+
+    failing = staticmethod(lambda: tisim.run(tethered(stepper=Verlet(control=FixedStep(dt=1e-3)))))
+
+    def test_reading_the_state_warns_once(self):
+        result = self.failing()
+        with pytest.warns(tisim.RunWarning, match=r"failed, and its state is that of the last good step"):
+            assert len(result.state["mass"]) == 1
+        assert len(result.state["mass"]) == 1
+
+    def test_reading_the_status_first_does_not(self):
+        result = self.failing()
+        assert not result.status.ok
+        assert len(result.state["mass"]) == 1
+
+    def test_check_raises(self):
+        with pytest.raises(tisim.RunError, match="critical time step"):
+            self.failing().check()
+        assert tisim.run(tethered()).check().state["mass"][0] == 1e-6
+
+    def test_a_result_that_is_dropped_warns(self):
+        result = self.failing()
+        with pytest.warns(tisim.RunWarning, match="dropped"):
+            del result
+
+    def test_a_world_that_still_runs_has_not_failed(self):
+        simulation = tisim.Simulation(tethered())
+        simulation.load(tethered())
+        simulation.run(steps=1)
+        (result,) = simulation.results()
+        assert result.check() is result
+        simulation.close()

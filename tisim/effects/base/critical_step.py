@@ -1,0 +1,75 @@
+"""The critical time step of contacts, known before a run from masses, stiffness and the speed of impact.
+
+Two that touch swing against each other with the angular frequency omega = sqrt(S / m*), with S the slope of
+the force at the deepest overlap that an impact reaches, and m* the reduced mass. A leapfrog follows that in
+steps below 2 / omega. Of Hertz's contact it is 1/2.01 of the time of an impact.
+
+Source: P. A. Cundall, O. D. L. Strack, Geotechnique 29 (1979) 47; C. O'Sullivan, J. D. Bray, Eng. Comput. 21
+(2004) 278.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+LEAST_OVERLAP = 1e-3
+"""Grains at rest under load overlap by some such part of R*: the stiffness is asked for at this overlap at
+least."""
+LONGEST_PART = 0.35
+"""Steps are not chosen longer than this part of the critical one: in rows of grains energy grows in steps of
+0.7 of it."""
+OVERLAPS = np.geomspace(1e-9, 1.0, 512)
+"""Forces are asked for at these overlaps, over R*."""
+
+
+def critical_step(stiffness: float, mass: float) -> float:
+    """Return 2/omega (s) of a spring (N/m) and a reduced mass (kg); infinity without a spring."""
+    return 2.0 * math.sqrt(mass / stiffness) if stiffness > 0 else math.inf
+
+
+def elastic_contact(accuracy: float) -> float:
+    """Return how long steps may be, over the critical one, for impacts without loss that return their energy
+    to some accuracy: it was off by at most 0.15 of the square of that (tests/hard/test_default_stepper.py),
+    and more is allowed for."""
+    return min(math.sqrt(accuracy / 0.25), LONGEST_PART)
+
+
+def lagging_contact(accuracy: float) -> float:
+    """Return the same for impacts with damping or friction, whose velocities are those of half a step ago:
+    the coefficient of restitution was off by at most 0.08 of the step over the critical one."""
+    return min(accuracy / 0.1, elastic_contact(accuracy))
+
+
+def impact_stiffness(
+    push: Callable[[np.ndarray], np.ndarray], mass: float, radius: float, speed: float
+) -> float:
+    """Return the largest slope (N/m) of a force that two meet in an impact.
+
+    push : the force (N) at overlaps (m), an array of them; it may pull at first. mass : m* (kg). radius : R*
+    (m). speed : at which they meet (m/s).
+    """
+    overlap = radius * OVERLAPS
+    force = push(overlap)
+    steps, means = np.diff(overlap, prepend=0.0), 0.5 * (force + np.append(0.0, force[:-1]))
+    work = np.cumsum(steps * means)
+    stopped = np.flatnonzero(work >= 0.5 * mass * speed * speed)
+    deepest = max(int(stopped[0]) if len(stopped) else len(overlap) - 1, _least())
+    return float(np.gradient(force, overlap)[: deepest + 1].max())
+
+
+def _least() -> int:
+    return int(np.searchsorted(OVERLAPS, LEAST_OVERLAP))
+
+
+def smallest_grains(start: Mapping[str, np.ndarray]) -> Iterator[tuple[int, float, float]]:
+    """Yield material, mass (kg) and radius (m) of the lightest and of the smallest grain of each material:
+    two of these swing fastest."""
+    mass, radius = start["mass"], start["radius"]
+    material = start.get("material", np.zeros(len(mass), int))
+    for index in np.unique(material):
+        own = np.flatnonzero(material == index)
+        for i in {int(own[np.argmin(mass[own])]), int(own[np.argmin(radius[own])])}:
+            yield int(index), float(mass[i]), float(radius[i])

@@ -1,0 +1,224 @@
+"""The stepper of a scene that names none: chosen by its effects, for an accuracy that is asked for.
+
+The rule, in this order:
+
+1. Particles that only drift, and hard particles that collide, step from one meeting of surfaces to the next
+   (``approach_time``).
+2. Effects that remember, turn with their particles or move them, and laws of contact, are stepped by a
+   leapfrog (``verlet``, or ``boris`` with a Lorentz force) in steps of one length: a part of the critical
+   time step, 2/omega of the stiffest motion that an effect of the scene tells (``Effect.critical_step``).
+3. All other forces are stepped with the error that is asked for: by collocation of order 8 where they are
+   smooth, and by the trapezoidal rule where they have kinks or jumps.
+
+What cannot be chosen so is refused, with the effect at fault.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tisim.components.accuracy_parameter import three_digits
+from tisim.components.domain import Domain
+from tisim.effects.base import Effect, Force, PairEvent, PairForce
+from tisim.errors import must
+from tisim.sources.base import Source
+from tisim.steppers.base import Stepper
+from tisim.steppers.boris import Boris
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import ErrorControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import SHORTEST_STEP, ApproachTime, FixedStep
+from tisim.steppers.verlet import Verlet
+
+ACCURACY = 1e-2
+"""This accuracy is aimed at unless another is asked for: results are good to a hundredth."""
+SMOOTH_SAFETY, KINKED_SAFETY = 100.0, 3.0
+"""The error of a run was up to some such factor above the one that is asked of collocation, and of the
+trapezoidal rule, in the scenes of docs/steppers.md: they are asked for so much less."""
+LONGEST_MEETING = 1e3
+"""Steps between collisions are at most this many times the shortest, as in Z04."""
+UNRESOLVED = 1e-6
+"""Motions below this part of a radius need not be accurate; rounding would be taken for an error of them."""
+
+
+@dataclass(frozen=True)
+class StepperChoice:
+    """A choice is a stepper, and the reason for it. critical : the critical time step (s) by the label of the
+    effect that it is of, the shortest first; of the effects that have one."""
+
+    stepper: Stepper
+    reason: str
+    critical: Mapping[str, float]
+
+
+def choose(
+    effects: Sequence[Effect],
+    domain: Domain,
+    start: Mapping[str, np.ndarray],
+    duration: float,
+    accuracy: float = ACCURACY,
+) -> StepperChoice:
+    """Return a stepper for effects, which know the materials, in a domain, for an accuracy (relative).
+
+    start : quantities of the particles by field name, SI, without their places. duration : s. Raises
+    InputError where no stepper can be chosen.
+    """
+    for effect in effects:
+        rule = f"given, as the length of a step is part of the law of effects.{effect.label}"
+        must(not effect.step_dependent, "scene.stepper", rule, "none")
+    forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
+    speed = meeting_speed(effects, domain, start, duration)
+    steps = {effect.label: effect.critical_step(start, speed, effects) for effect in effects}
+    critical = finite_steps(steps)
+    needed = [effect for effect in effects if effect.leapfrog]
+    if not (forces or needed) or any(isinstance(effect, PairEvent) for effect in effects):
+        return _meetings(effects, start, speed, critical, steps, accuracy)
+    contacts = [one for one in forces if one.kinked and isinstance(one, PairForce) and one.short_ranged]
+    told = None not in steps.values() and bool(critical)
+    if needed or domain.shears() or (contacts and told):
+        why = (needed or contacts or [domain])[0].label
+        return _leapfrog(effects, why, critical, steps, duration, accuracy)
+    return _error_controlled(effects, domain, start, critical, duration, accuracy)
+
+
+def critical_steps(
+    effects: Sequence[Effect], domain: Domain, start: Mapping[str, np.ndarray], duration: float
+) -> dict[str, float]:
+    """Return the critical time steps (s) of the effects that have one, by label, the shortest first."""
+    speed = meeting_speed(effects, domain, start, duration)
+    return finite_steps({effect.label: effect.critical_step(start, speed, effects) for effect in effects})
+
+
+def finite_steps(steps: Mapping[str, float | None]) -> dict[str, float]:
+    """Return those steps (s) that are known and finite, the shortest first."""
+    known = {label: step for label, step in steps.items() if step is not None and math.isfinite(step)}
+    return dict(sorted(known.items(), key=lambda item: item[1]))
+
+
+def meeting_speed(
+    effects: Sequence[Effect], domain: Domain, start: Mapping[str, np.ndarray], duration: float
+) -> float:
+    """Return the speed (m/s) at which particles are expected to meet each other, or a wall."""
+    velocity, (low, high) = start["velocity"], domain.bounds()
+    extent = math.inf if low is None or high is None else float(np.linalg.norm(high - low))
+    own = velocity - velocity.mean(axis=0) if len(velocity) > 1 else velocity
+    speed = 2 * float(np.linalg.norm(own, axis=1).max(initial=0.0)) if len(velocity) else 0.0
+    return speed + sum(effect.reached_speed(duration, extent) for effect in effects)
+
+
+def leapfrog_step(
+    effects: Sequence[Effect], critical: Mapping[str, float], accuracy: float
+) -> tuple[float, str]:
+    """Return the longest step (s) of a leapfrog that is as accurate with all effects, and the label of that
+    which sets it; infinity where none has a critical step."""
+    steps = {
+        effect.label: effect.part_of_critical_step(accuracy) * critical[effect.label]
+        for effect in effects
+        if effect.label in critical
+    }
+    label = min(steps, key=lambda name: steps[name], default="")
+    return steps.get(label, math.inf), label
+
+
+def _meetings(
+    effects: Sequence[Effect],
+    start: Mapping[str, np.ndarray],
+    speed: float,
+    critical: Mapping[str, float],
+    steps: Mapping[str, float | None],
+    accuracy: float,
+) -> StepperChoice:
+    _check_told(steps, "collisions")
+    control, events = ApproachTime(), any(isinstance(effect, PairEvent) for effect in effects)
+    smallest = float(start["radius"].min(initial=math.inf))
+    shortest, longest = control.shortest, control.longest
+    if events and speed > 0 and math.isfinite(smallest):
+        # Those that meet within the shortest step are moved into each other by this part of a radius.
+        shortest = accuracy * smallest / speed
+        longest = LONGEST_MEETING * shortest
+    longest = min(longest, leapfrog_step(effects, critical, accuracy)[0])
+    control = ApproachTime(shortest=_length(min(shortest, longest)), longest=_length(longest))
+    what = "particles collide" if events else "no force acts"
+    reason = f"{what}: steps from one meeting of surfaces to the next, {control.shortest:.3g} s at least"
+    return StepperChoice(Verlet(control=control), reason, critical)
+
+
+def _leapfrog(
+    effects: Sequence[Effect],
+    why: str,
+    critical: Mapping[str, float],
+    steps: Mapping[str, float | None],
+    duration: float,
+    accuracy: float,
+) -> StepperChoice:
+    _check_told(steps, f"effects.{why}")
+    must(bool(critical), "scene.stepper", f"given, as no effect beside {why} tells a critical step", "none")
+    longest, label = leapfrog_step(effects, critical, accuracy)
+    dt = min(_length(longest), duration)
+    gyrates = any(effect.gyrates(effects) for effect in effects)
+    others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
+    if gyrates and others:
+        rule = f"given, as none steps a magnetic force and effects.{others[0]} to second order"
+        must(False, "scene.stepper", rule, "none")
+    stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
+    reason = (
+        f"a leapfrog, for {why}: steps of {dt / critical[label]:.3g} of the critical time step, "
+        f"{critical[label]:.3g} s, of {label}"
+    )
+    return StepperChoice(stepper, reason, critical)
+
+
+def _error_controlled(
+    effects: Sequence[Effect],
+    domain: Domain,
+    start: Mapping[str, np.ndarray],
+    critical: Mapping[str, float],
+    duration: float,
+    accuracy: float,
+) -> StepperChoice:
+    pairwise = [effect for effect in effects if isinstance(effect, PairForce)]
+    kinked = [effect.label for effect in effects if effect.kinked]
+    if pairwise and any(domain.imaged()):
+        kinked.append(domain.label)
+    limits = {
+        "first": _length(min(1e-6, 1e-4 * duration)),
+        "longest": _length(0.1 * duration),
+        "shortest": max(SHORTEST_STEP, min(1e-12, 1e-10 * duration)),
+        "stride": _stride(effects, start),
+        "resolution": UNRESOLVED,
+    }
+    if not kinked:
+        control = StageControl(error=accuracy / SMOOTH_SAFETY, per="run", norm="each", **limits)
+        reason = f"forces are smooth: steps of order 8 with an error of {control.error:.3g} at the end"
+        return StepperChoice(Collocation(control=control), reason, critical)
+    error = accuracy / KINKED_SAFETY
+    bound = ErrorControl(error=error, tolerance=1e-2 * error, per="run", **limits)
+    acceleration = "anderson" if pairwise else "none"
+    reason = f"forces have kinks, of {kinked[0]}: implicit steps with an error of {error:.3g} at the end"
+    return StepperChoice(Trapezoid(control=bound, acceleration=acceleration), reason, critical)
+
+
+def _stride(effects: Sequence[Effect], start: Mapping[str, np.ndarray]) -> float:
+    """Return how far (m) a particle may go in a step without missing what it passes; 0 for any distance."""
+    lengths = [effect.shortest_length() for effect in effects if isinstance(effect, Source)]
+    if any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects):
+        lengths.append(float(start["radius"].min(initial=math.inf)))
+    shortest = min(lengths, default=math.inf)
+    return 0.5 * shortest if math.isfinite(shortest) else 0.0
+
+
+def _check_told(steps: Mapping[str, float | None], what: str) -> None:
+    """Raise InputError where an effect does not tell its critical step, which one with ``what`` goes by."""
+    for label, step in steps.items():
+        rule = f"given, as effects.{label} does not tell the critical time step that {what} would go by"
+        must(step is not None, "scene.stepper", rule, "none")
+
+
+def _length(step: float) -> float:
+    """Return a step (s) of three digits that is not below the shortest."""
+    return max(SHORTEST_STEP, three_digits(step))

@@ -1,0 +1,59 @@
+"""The guard of explicit steppers: a step of more than half of the critical step of a force stops its world.
+
+A leapfrog follows a motion of angular frequency omega in steps below the critical one, 2/omega; in longer
+ones it alternates and grows. From one step to the next such a motion changes the acceleration of a particle
+by omega^2 times its displacement, whatever the law. So the guard needs no knowledge of laws: it compares the
+two. The limit is half of the critical step, 1/omega, as a force that falls off with distance, such as
+gravity, throws particles out of its reach in a single step of the critical length, and is not seen again.
+Laws that ask for their own critical step at each contact, such as those of grains, are not asked again.
+
+Source: M. P. Allen, D. J. Tildesley, Computer Simulation of Liquids (2017), section 3.2.
+"""
+
+from collections.abc import Sequence
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Force, PairForce
+from tisim.interactions.force_sum import turning
+from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
+from tisim.worlds.fields import Field
+from tisim.worlds.status import WorldStatus
+
+LIMIT = 1.0
+"""(omega dt)^2 must be below this; a leapfrog is stable where it is below 4."""
+UNRESOLVED = 1e-2
+"""A change of the force that moves a particle by less than this part of its radius in a step, or turns it by
+less than this angle (rad), is let pass: where a particle hardly moves, others change the force on it."""
+EXCESS = "step_excess"
+"""This quantity of a world is the largest (omega dt)^2 that has been found where it is above the limit."""
+
+
+def guards(effects: Sequence[Effect]) -> bool:
+    """Return whether a scene has a force that does not guard its own steps."""
+    return any(isinstance(e, Force | PairForce) and not e.guards_steps for e in effects)
+
+
+def guard_fields(effects: Sequence[Effect]) -> tuple[Field, ...]:
+    """Return the fields that the guard reads in a scene of these effects."""
+    if not guards(effects):
+        return ()
+    return (FORCE_BEFORE, TORQUE_BEFORE) if turning(effects) else (FORCE_BEFORE,)
+
+
+@ti.func
+def check_step(s, w, i, force, torque, turns: ti.template()):  # type: ignore[valid-type]
+    """Stop the world where dt is beyond the critical step of particle i, which has moved by dt v and, where
+    it ``turns``, by dt spin since the last forces; ``force`` (N) and ``torque`` (N m) are the new ones."""
+    dt, radius = ti.cast(s.dt[w], s.real), s.radius[w, i]
+    moved = dt * s.velocity[w, i].norm()
+    bent = dt * dt / s.mass[w, i] * (force - s.force_before[w, i]).norm()
+    excess = bent / (LIMIT * (moved + UNRESOLVED * radius))
+    if ti.static(turns):
+        turned = dt * s.spin[w, i].norm()
+        # Of grains of nanometres m R^2 is below f32.
+        couple = (torque - s.torque_before[w, i]).norm() / radius
+        twisted = dt * dt / (0.4 * s.mass[w, i] * radius) * couple
+        excess = ti.max(excess, twisted / (LIMIT * (turned + UNRESOLVED)))
+    if excess > 1.0:
+        s.fail_by_force(w, WorldStatus.STEP_TOO_LONG, i)
+        ti.atomic_max(s.step_excess[w], ti.cast(LIMIT * excess, ti.f64))
