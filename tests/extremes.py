@@ -219,7 +219,11 @@ def _scene(effects: dict[str, Any], stepper: dict[str, Any] | None = None) -> di
             "mass": [1e-5, 1e-5, 2e-6],
         },
         "domain": PERIODIC if any(name.startswith("ewald_") for name in effects) else {"kind": "open"},
-        "stepper": stepper or {"kind": "verlet", "control": {"kind": "fixed_step", "dt": DT}},
+        "stepper": stepper
+        or {
+            "kind": "boris" if "lorentz" in effects else "verlet",
+            "control": {"kind": "fixed_step", "dt": DT},
+        },
         "effects": effects,
     }
     if "granular" in effects:

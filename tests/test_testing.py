@@ -229,9 +229,9 @@ def joined(kinds):
     particles = {**every[0]["particles"], "quantities": carried}
     materials = {name: values for data in every for name, values in data.get("materials", {}).items()}
     domain = next((data["domain"] for data in every if data["domain"]["kind"] != "open"), every[0]["domain"])
-    return Scene.from_dict(
-        {**every[0], "effects": effects, "particles": particles, "materials": materials, "domain": domain}
-    )
+    gyrating = {"stepper": extremes.scenes()["effects.lorentz"]["stepper"]} if "lorentz" in effects else {}
+    more = {"effects": effects, "particles": particles, "materials": materials, "domain": domain}
+    return Scene.from_dict({**every[0], **more, **gyrating})
 
 
 def is_short_ranged(kind):

@@ -115,8 +115,8 @@ def test_what_no_effect_needs_is_not_allocated():
 
 def test_other_designs_compile_nothing():
     """Loading and running a second design takes a small part of what the first took."""
-    first = scene([[1, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), dt=0.1, steps=3)
-    second = scene([[2, 0, 0], [3, 0, 0]], np.zeros((2, 3)), (Trap(stiffness=7.0),), dt=0.2, steps=3)
+    first = scene([[1, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), dt=1e-3, steps=3)
+    second = scene([[2, 0, 0], [3, 0, 0]], np.zeros((2, 3)), (Trap(stiffness=7.0),), dt=5e-4, steps=3)
     simulation = Simulation(first, worlds=2, capacity=2)
     seconds = []
     for setup in (first, second):

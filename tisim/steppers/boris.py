@@ -20,7 +20,7 @@ from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import Controller, FixedStep
-from tisim.steppers.step_guard import EXCESS, check_step, guard_fields
+from tisim.steppers.step_guard import STEP_EXCESS, check_step, guard_fields
 from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 
@@ -41,7 +41,7 @@ class Boris(Stepper):
 
     control: Controller = option("step control", examples=[FixedStep(dt=1e-6)])
 
-    world_quantities: ClassVar = ("time_before", EXCESS)
+    world_quantities: ClassVar = ("time_before", STEP_EXCESS)
     follows_shear: ClassVar = True
 
     @classmethod

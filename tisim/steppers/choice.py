@@ -42,7 +42,7 @@ SMOOTH_SAFETY, KINKED_SAFETY = 100.0, 3.0
 trapezoidal rule, in the scenes of docs/steppers.md: they are asked for so much less."""
 LONGEST_MEETING = 1e3
 """Steps between collisions are at most this many times the shortest, as in Z04."""
-UNRESOLVED = 1e-6
+RESOLUTION = 1e-6
 """Motions below this part of a radius need not be accurate; rounding would be taken for an error of them."""
 
 
@@ -190,7 +190,7 @@ def _error_controlled(
         "longest": _length(0.1 * duration),
         "shortest": max(SHORTEST_STEP, min(1e-12, 1e-10 * duration)),
         "stride": _stride(effects, start),
-        "resolution": UNRESOLVED,
+        "resolution": RESOLUTION,
     }
     if not kinked:
         control = StageControl(error=accuracy / SMOOTH_SAFETY, per="run", norm="each", **limits)

@@ -19,12 +19,12 @@ from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
 from tisim.worlds.fields import Field
 from tisim.worlds.status import WorldStatus
 
-LIMIT = 1.0
+STEP_LIMIT = 1.0
 """(omega dt)^2 must be below this; a leapfrog is stable where it is below 4."""
-UNRESOLVED = 1e-2
+HARDLY = 1e-2
 """A change of the force that moves a particle by less than this part of its radius in a step, or turns it by
 less than this angle (rad), is let pass: where a particle hardly moves, others change the force on it."""
-EXCESS = "step_excess"
+STEP_EXCESS = "step_excess"
 """This quantity of a world is the largest (omega dt)^2 that has been found where it is above the limit."""
 
 
@@ -47,13 +47,13 @@ def check_step(s, w, i, force, torque, turns: ti.template()):  # type: ignore[va
     dt, radius = ti.cast(s.dt[w], s.real), s.radius[w, i]
     moved = dt * s.velocity[w, i].norm()
     bent = dt * dt / s.mass[w, i] * (force - s.force_before[w, i]).norm()
-    excess = bent / (LIMIT * (moved + UNRESOLVED * radius))
+    excess = bent / (STEP_LIMIT * (moved + HARDLY * radius))
     if ti.static(turns):
         turned = dt * s.spin[w, i].norm()
         # Of grains of nanometres m R^2 is below f32.
         couple = (torque - s.torque_before[w, i]).norm() / radius
         twisted = dt * dt / (0.4 * s.mass[w, i] * radius) * couple
-        excess = ti.max(excess, twisted / (LIMIT * (turned + UNRESOLVED)))
+        excess = ti.max(excess, twisted / (STEP_LIMIT * (turned + HARDLY)))
     if excess > 1.0:
         s.fail_by_force(w, WorldStatus.STEP_TOO_LONG, i)
-        ti.atomic_max(s.step_excess[w], ti.cast(LIMIT * excess, ti.f64))
+        ti.atomic_max(s.step_excess[w], ti.cast(STEP_LIMIT * excess, ti.f64))

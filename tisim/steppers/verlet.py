@@ -18,7 +18,7 @@ from tisim.steppers.constraints import advance_bodies, kick_bodies, put_held, st
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
-from tisim.steppers.step_guard import EXCESS, check_step, guard_fields
+from tisim.steppers.step_guard import STEP_EXCESS, check_step, guard_fields
 from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 
@@ -37,7 +37,7 @@ class Verlet(Stepper):
 
     control: Controller = option("step control", ApproachTime())
 
-    world_quantities: ClassVar = (EXCESS,)
+    world_quantities: ClassVar = (STEP_EXCESS,)
     follows_shear: ClassVar = True
     follows_constraints: ClassVar = True
 
