@@ -11,9 +11,9 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
-from tisim.backend import kernel_cache, loops
+from tisim.backend import kernel_cache, loops, surroundings
 from tisim.backend.taichi import BACKEND, check_backend, ti
-from tisim.backend.thread import in_taichi_thread
+from tisim.backend.thread import forked, in_taichi_thread, require_own_process
 from tisim.errors import InputError, is_whole, must
 
 DEVICES = ("cpu", "cuda", "vulkan")
@@ -78,6 +78,16 @@ _current: Runtime | None = None
 _generation = 0
 
 
+def _after_fork() -> None:
+    """Let go of a turn that another thread of the parent has, as that thread is not in the child."""
+    global turn
+    turn = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
 def cores() -> int:
     """Return the number of CPU cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -100,8 +110,10 @@ def init(
     threads : CPU threads; 0 for all cores. arithmetic : "strict" or "fast"; see ``Runtime``.
     Raises InputError when a setting is unknown or the device is absent. A change of settings waits until what
     ``tisim.run``, ``tisim.accuracy.study`` or ``optimize.run`` do in other threads is over. It invalidates
-    every Simulation made before; those say so when used.
+    every Simulation made before; those say so when used. Raises RunError in a process that was forked from
+    one where Taichi had been started.
     """
+    require_own_process()
     requested = Runtime(device, precision, threads or cores(), arithmetic)
     if requested == _current:
         return requested
@@ -119,7 +131,11 @@ def _start(requested: Runtime) -> None:
     _current, _generation = None, _generation + 1
     try:
         # Taichi announces the device on standard output, where results go.
-        with kernel_cache.exclusive_access(), contextlib.redirect_stdout(io.StringIO()):
+        with (
+            surroundings.existing_folder(),
+            kernel_cache.exclusive_access(),
+            contextlib.redirect_stdout(io.StringIO()),
+        ):
             ti.init(
                 arch=getattr(ti, requested.device),
                 default_fp=requested.real,
@@ -152,6 +168,8 @@ def _compile_first():
 
 def _stop() -> None:
     """Stop Taichi at the end of the process, which has it write down what it has compiled."""
+    if forked():
+        return
     with kernel_cache.exclusive_access():
         ti.reset()
 
@@ -162,7 +180,8 @@ def restart() -> None:
 
 
 def current() -> Runtime:
-    """Return the running settings; start the defaults (cpu, f64, all cores) on first use."""
+    """Return the running settings; start the defaults (cpu, f64, all cores) on first use; see ``init``."""
+    require_own_process()
     return _current or init()
 
 
