@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import ctypes
 import io
 import os
 import sys
@@ -79,9 +80,12 @@ _generation = 0
 
 
 def _after_fork() -> None:
-    """Let go of a turn that another thread of the parent has, as that thread is not in the child."""
+    """Let go, in a child, of the turn of a thread of the parent, and never take Taichi's program apart there:
+    at the end of the process it would wait for its threads, which the child does not have, for ever."""
     global turn
     turn = threading.RLock()
+    if _current is not None:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
 
 
 if hasattr(os, "register_at_fork"):
