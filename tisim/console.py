@@ -27,14 +27,18 @@ TERMINAL_WIDTH = 80
 class PrintableConsole(Console):
     """This console prints characters that control a terminal as escapes, such as \\x1b, but for its own."""
 
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(_escaped(text), **options)
+
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         for segment in super().render(renderable, options):
-            plain = segment.is_control or all(c.isprintable() or c == "\n" for c in segment.text)
-            yield segment if plain else Segment(_escaped(segment.text), segment.style)
+            yield segment if segment.is_control else Segment(_escaped(segment.text), segment.style)
 
 
 def _escaped(text: str) -> str:
     """Return text with an escape for each character that is not printable, but ends of lines."""
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
 
 

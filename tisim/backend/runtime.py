@@ -15,7 +15,7 @@ from typing import Any
 from tisim.backend import kernel_cache, loops, surroundings
 from tisim.backend.taichi import BACKEND, check_backend, ti
 from tisim.backend.thread import forked, in_taichi_thread, require_own_process
-from tisim.errors import InputError, is_whole, must
+from tisim.errors import InputError, RunError, is_whole, must
 
 DEVICES = ("cpu", "cuda", "vulkan")
 PRECISIONS = ("f64", "f32")
@@ -98,12 +98,13 @@ def cores() -> int:
 
 
 def memory() -> int:
-    """Return the memory of this machine, bytes; where the system does not say, as much as a number of bytes
-    can be."""
+    """Return the memory that this process may have, bytes: that of this machine, or less where there is a
+    limit; where the system does not say, as much as a number of bytes can be."""
     try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
-        return sys.maxsize
+        there = sys.maxsize
+    return min(there, surroundings.memory_limit())
 
 
 def init(
@@ -156,6 +157,11 @@ def _start(requested: Runtime) -> None:
             )
             _compile_first()
     except RuntimeError as failure:
+        if "memory" in str(failure):
+            raise RunError(
+                f"memory must be enough to start {BACKEND}; received no more than {memory() / 1e9:.3g} GB "
+                "(ulimit -v, or a limit of the container or batch system)"
+            ) from failure
         raise InputError(
             f"device must be present on this machine; received {requested.device!r} ({failure})"
         ) from failure

@@ -2,15 +2,25 @@
 
 Taichi 1.7.4 and Quadrants 1.3.3 end the process where HOME is not set. They take options from variables of
 the environment, such as TI_ARCH or QD_DEBUG, which go before those that tisim gives, and end the process or
-raise where they make no sense. They ask for the working directory, which may have been removed.
+raise where they make no sense. They ask for the working directory, which may have been removed; and Taichi
+for the locale, which may be one that Python does not know.
 """
 
 from __future__ import annotations
 
+import locale
 import os
+import sys
+import tempfile
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+try:
+    import resource
+except ImportError:
+    resource = None  # type: ignore[assignment]
 
 from tisim.streams import fill_standard_descriptors
 
@@ -31,6 +41,8 @@ def prepare() -> None:
     fill_standard_descriptors()
     _replace_options()
     _name_cache_folder()
+    _name_locale()
+    _name_temporary_folder()
 
 
 def _replace_options() -> None:
@@ -57,6 +69,27 @@ def _name_cache_folder() -> None:
             os.environ["XDG_CACHE_HOME"] = str(_home() / ".cache")
 
 
+def _name_locale() -> None:
+    """Name the plain locale where the environment names one that Python has never heard of."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        try:
+            locale.getdefaultlocale()
+        except ValueError:
+            os.environ["LC_ALL"] = "C.UTF-8"
+
+
+def _name_temporary_folder() -> None:
+    """Name the null device as the folder for temporary files where there is none.
+
+    Packages that the compilers import ask for its name; whoever makes a file in it is told that it cannot.
+    """
+    try:
+        tempfile.gettempdir()
+    except FileNotFoundError:
+        tempfile.tempdir = os.devnull
+
+
 def _home() -> Path:
     """Return the home folder of the user by the system; a folder that cannot be where it knows of none."""
     try:
@@ -65,6 +98,40 @@ def _home() -> Path:
         return Path(pwd.getpwuid(os.getuid()).pw_dir)
     except (ImportError, KeyError):
         return Path(os.devnull) / "home"
+
+
+CONTROL_GROUPS = Path("/sys/fs/cgroup")
+"""The folder of Linux that has the limits of containers and of batch systems."""
+
+
+def memory_limit() -> int:
+    """Return the memory that this process may have, bytes, whatever the machine has: the limit of its address
+    space (ulimit -v) or of its control group; ``sys.maxsize`` where there is none."""
+    limits = [sys.maxsize]
+    if resource is not None and (most := resource.getrlimit(resource.RLIMIT_AS)[0]) >= 0:
+        limits.append(most)
+    try:
+        groups = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        groups = []
+    for controllers, path in (line.split(":", 2)[1:] for line in groups):
+        if controllers == "":
+            limits += _group_limits(CONTROL_GROUPS, path, "memory.max")
+        elif "memory" in controllers.split(","):
+            limits += _group_limits(CONTROL_GROUPS / "memory", path, "memory.limit_in_bytes")
+    return min(limits)
+
+
+def _group_limits(root: Path, path: str, name: str) -> Iterator[int]:
+    """Yield the limits of a control group and of those that it is in; in a container its own is the root."""
+    group = Path(path.lstrip("/"))
+    for folder in (group, *group.parents):
+        try:
+            text = (root / folder / name).read_text(encoding="utf-8").strip()
+        except OSError:
+            continue
+        if text.isdecimal():
+            yield int(text)
 
 
 @contextmanager

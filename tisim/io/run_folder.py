@@ -125,6 +125,8 @@ def write(result: Result, folder: RunFolder) -> list[Path]:
 
     The picture comes last: where it cannot be drawn, that is said on standard error, and it is left out.
     """
+    # It may have been removed while the run went on.
+    folder.path.mkdir(parents=True, exist_ok=True)
     folder.result.unlink(missing_ok=True)
     paths = {name: folder.path / name for name in ("scene.toml", "versions.json")}
     replace_file(paths["scene.toml"], result.scene.to_toml().encode())
