@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def outcome(environment, folder, plain):
     """Run an environment in a folder; return what is wrong, nothing where all is well, and the exit code."""
     (folder / "tiny.toml").write_text(SCENE)
     (folder / "my_drift.py").write_text(PROBLEM)
-    site = os.pathsep.join(filter(None, sys.path))
+    site = os.pathsep.join(str(Path(part).absolute()) for part in sys.path if part)
     command = f"{sys.executable} -m tisim"
     variables = {
         **os.environ, "PYTHONPATH": site, "SITE": site, "PYTHON": sys.executable, "TISIM": command,

@@ -181,8 +181,8 @@ def compare(
             message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all that is done."
             err().print(f"{message} {resume_hint(fresh, overwrite)}")
             raise
-    out().print(comparison.table(problem, results))
     replace_file(out_folder / comparison.CSV, comparison.as_csv(problem, results))
+    out().print(comparison.table(problem, results))
     out().print(f"written  {out_folder / comparison.CSV}", highlight=False, markup=False)
 
 
