@@ -160,14 +160,14 @@ STREAMS = (
     ("cost: all three closed", f"{COST} {CLOSED} && [ -s k/cost.csv -a -s k/cost.png ]", {"result": None}),
     ("cost: output full", f"{COST} >/dev/full && [ -s k/cost.csv -a -s k/cost.png ]",
      {"result": None, "says": FULL}),
-    ("new: output full", "$TISIM new force pull > /dev/full; code=$?; ls *pull*.py && exit $code",
+    ("new: output full", "$TISIM new effect pull > /dev/full; code=$?; ls *pull*.py && exit $code",
      {"result": None, "says": FULL, "prints": "pull.py"}),
 )  # fmt: skip
 TEXTS = (
     ("ASCII by LC_ALL=C", f"{ASCII} $RUN", {"quick": True}),
     ("ASCII by PYTHONIOENCODING", "PYTHONIOENCODING=ascii:strict $RUN"),
     ("ASCII: explain", f"{ASCII} $TISIM explain tiny.toml", {"result": None, "says": ""}),
-    ("ASCII: effects", f"{ASCII} $TISIM effects", {"result": None, "prints": r"\\x"}),
+    ("ASCII: effects", f"{ASCII} $TISIM effects > list && ! LC_ALL=C grep '[^ -~]' list", {"result": None}),
     ("ASCII: export",
      f"$RUN --frames 2 && {ASCII} $TISIM export out --format xyz && [ -s out/trajectory.xyz ]"),
     ("ASCII, folder with an umlaut", f"mkdir Zürich; cp tiny.toml Zürich; {ASCII} $TISIM run Zürich/tiny.toml"

@@ -102,6 +102,8 @@ def _home() -> Path:
 
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 """The folder of Linux that has the limits of containers and of batch systems."""
+NO_LIMIT = 2**62
+"""Control groups of version 1 say a number of bytes above this where there is no limit."""
 
 
 def memory_limit() -> int:
@@ -130,7 +132,7 @@ def _group_limits(root: Path, path: str, name: str) -> Iterator[int]:
             text = (root / folder / name).read_text(encoding="utf-8").strip()
         except OSError:
             continue
-        if text.isdecimal():
+        if text.isdecimal() and int(text) < NO_LIMIT:
             yield int(text)
 
 
