@@ -170,8 +170,10 @@ TEXTS = (
     ("ASCII: effects", f"{ASCII} $TISIM effects > list && ! LC_ALL=C grep '[^ -~]' list", {"result": None}),
     ("ASCII: export",
      f"$RUN --frames 2 && {ASCII} $TISIM export out --format xyz && [ -s out/trajectory.xyz ]"),
-    ("ASCII, folder with an umlaut", f"mkdir Zürich; cp tiny.toml Zürich; {ASCII} $TISIM run Zürich/tiny.toml"
-     " --out Zürich/out && mv Zürich/out ."),
+    ("ASCII, scene in a folder with an umlaut",
+     f"mkdir Zürich; cp tiny.toml Zürich; {ASCII} $TISIM run Zürich/tiny.toml --out out"),
+    ("ASCII, output folder with an umlaut", f"{ASCII} $TISIM run tiny.toml --out Zürich",
+     {"code": 2, "result": False, "says": "^path must be one that this system can have"}),
     ("locale that is not known", "LC_ALL=xx_YY $RUN"),
     ("name of a scene with escapes", "printf 'name = \"\\\\u001b[31mRED\"\\n' | cat - tiny.toml > red.toml; "
      "! $TISIM explain red.toml | grep $'\\x1b'", {"result": None, "says": ""}),
