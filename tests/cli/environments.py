@@ -237,10 +237,11 @@ LIMITS = (
     *((f"kernels cut at 4 kB, then used, {backend}", f"export TISIM_BACKEND={backend} {prefix}_OFFLINE_CACHE_"
        "FILE_PATH=$PWD/k; (ulimit -f 4; $RUN); [ $? = 1 ] && $RUN", {"says": ""})
       for backend, prefix in (("taichi", "TI"), ("quadrants", "QD"))),
-    ("killed before the first checkpoint", "$RUN --frames 2 --set duration=1e6 & "
+    ("killed before the first checkpoint, then again", "$RUN --frames 2 --set duration=1e6 & "
      "while [ ! -e out/trajectory.h5 ]; do sleep 0.1; done; kill -9 $!; wait $!; "
-     "timeout -s INT 20 $RUN --frames 2 --set duration=1e6",
-     {"code": 130, "result": False, "says": "stopped at"}),
+     "TISIM_CHECKPOINT_SECONDS=0 $RUN --frames 2 --set duration=1e6 & "
+     "while [ ! -e out/checkpoint.h5 ] && kill -0 $!; do sleep 0.1; done; kill $!; wait $!",
+     {"code": 143, "result": False, "says": "To go on, give the same command again"}),
 )  # fmt: skip
 PYTHONS = (
     ("python -", "$PYTHON - < script.py", {"prints": "^0.02$"}),

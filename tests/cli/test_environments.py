@@ -21,7 +21,7 @@ import tisim
 from tests.cli.environments import ENVIRONMENTS, SCENE
 from tests.own_files import PROBLEM
 
-TIMEOUT = 300.0
+TIMEOUT = 900.0
 """No environment takes so long, s."""
 FAULTS = re.compile(
     r"Traceback|terminate called|Aborted|core dumped|Segmentation fault|Exception ignored|Assertion"

@@ -24,7 +24,7 @@ except ImportError:
 
 from tisim.streams import fill_standard_descriptors
 
-PREFIXES = ("TI_", "QD_", "TAICHI_", "QUADRANTS_", "_QD_", "ENABLE_TAICHI_", "ENABLE_QUADRANTS_")
+OPTION_PREFIXES = ("TI_", "QD_", "TAICHI_", "QUADRANTS_", "_QD_", "ENABLE_TAICHI_", "ENABLE_QUADRANTS_")
 """Variables of these names are options of the compilers. They are removed from the environment of the
 process, as tisim has options of its own for what they set."""
 COMPILERS = ("TI", "QD")
@@ -47,7 +47,7 @@ def prepare() -> None:
 
 def _replace_options() -> None:
     """Remove the compilers' options from the environment but those that stay, and set those of tisim."""
-    for name in [name for name in os.environ if name.startswith(PREFIXES)]:
+    for name in [name for name in os.environ if name.startswith(OPTION_PREFIXES)]:
         option = name.partition("_")[2]
         allowed = KEPT.get(option, ())
         if not (name.startswith(("TI_", "QD_")) and (allowed is None or os.environ[name] in allowed)):
