@@ -24,7 +24,7 @@ from optimize.storage.cache import Cache
 from tisim.backend import runtime
 from tisim.console import err, print_stopping
 from tisim.console import out as standard_output
-from tisim.files import lock
+from tisim.files import lock, pictures
 from tisim.files.atomic import replace_file
 from tisim.files.ownership import claim
 from tisim.interrupt import Interrupt
@@ -100,11 +100,11 @@ def session(
             outcome = _search_with_display(problem, settings, evaluator, cache, bar, stopping)
         paths = [folder / SEARCH_FILE]
         if outcome.best is not None:
+            paths += report.write(outcome, folder).values()
             say.print(report.best_table(outcome))
             say.print(report.notes(outcome))
             if problem.met_at is not None:
                 say.print(report.met_table(outcome))
-            paths += report.write(outcome, folder).values()
             if not outcome.interrupted:
                 paths += _show_best(outcome.best, outcome, evaluator, folder, say)
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
@@ -145,10 +145,9 @@ def _show_best(
     _, result = next(evaluator.evaluate([scene]))
     if problem.details is not None:
         details = problem.details(design, result)
-        say.print(report.details_table(details))
         paths.append(folder / "best_run.csv")
         replace_file(paths[-1], report.details_csv(details))
-    if problem.picture is not None:
-        paths.append(folder / "best_cloud.png")
-        replace_file(paths[-1], report.figure_bytes(problem.picture(scene, result), "png", dpi=150))
+        say.print(report.details_table(details))
+    if (draw := problem.picture) is not None:
+        paths += pictures.write_beside_data(folder / "best_cloud.png", lambda: draw(scene, result))
     return paths

@@ -13,7 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOMS = (
-    "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.compiling", "tisim.console", "tisim.files",
+    "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.compiling", "tisim.streams", "tisim.console",
+    "tisim.files",
     "tisim.backend",
     "tisim.numerics", "tisim.components", "tisim.geometry", "tisim.worlds", "tisim.packing",
     "tisim.effects.base", "tisim.operators.base", "tisim.neighbours", "tisim.interactions", "tisim.sources",

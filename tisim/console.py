@@ -1,16 +1,22 @@
 """Consoles, progress bars and tables that runs and searches print with.
 
-Text is printed as it is: names of files and of extras may have brackets, which are no markup here.
+Text is printed as it is: names of files and of extras may have brackets, which are no markup here. Characters
+that would control the terminal, as the name of a scene may have them, are printed as escapes. Where a stream
+is closed, full, or no file at all, the text is lost and nothing else.
 """
 
 import sys
+from collections.abc import Iterable
+from typing import Any
 
 from rich import progress as bars
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 from tisim.compiling import is_compiling
+from tisim.streams import safe, say
 
 FILE_WIDTH = 110
 """Width of tables that do not go to a terminal, characters; rich would assume 80."""
@@ -18,14 +24,37 @@ TERMINAL_WIDTH = 80
 """Largest width of tables for a terminal, characters: every terminal has as many."""
 
 
+class PrintableConsole(Console):
+    """This console prints characters that control a terminal as escapes, such as \\x1b, but for its own."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(_escaped(text), **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        for segment in super().render(renderable, options):
+            yield segment if segment.is_control else Segment(_escaped(segment.text), segment.style)
+
+
+def _escaped(text: str) -> str:
+    """Return text with an escape for each character that is not printable, but ends of lines."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+
+
+def _console(stream: Any) -> Console:
+    file = safe(stream)
+    return PrintableConsole(file=file, markup=False, width=None if file.isatty() else FILE_WIDTH)  # type: ignore[arg-type]
+
+
 def out() -> Console:
     """Return the console for results, which writes to standard output."""
-    return Console(markup=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
+    return _console(sys.stdout)
 
 
 def err() -> Console:
     """Return the console for progress, which writes to standard error."""
-    return Console(stderr=True, markup=False, width=None if sys.stderr.isatty() else FILE_WIDTH)
+    return _console(sys.stderr)
 
 
 class Compiling(bars.ProgressColumn):
@@ -54,4 +83,4 @@ def plain_table(*headings: str) -> Table:
 
 def print_stopping() -> None:
     """Print, after Ctrl-C, that the command will stop at the next good moment."""
-    print("stopping at the next good moment; Ctrl-C again stops at once", file=sys.stderr)
+    say("stopping at the next good moment; Ctrl-C again stops at once")

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import csv
+import functools
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from optimize.outcome import Outcome
-from optimize.report.convergence import convergence_figure
-from optimize.report.front import front_figure
 from optimize.tables import best_columns, met_columns, met_strings
 from tisim.console import TERMINAL_WIDTH
+from tisim.files import pictures
 from tisim.files.atomic import replace_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHARP = 200
+"""The resolution of pictures as they go into papers, dots per inch."""
 
 
 def best_table(outcome: Outcome) -> RenderableType:
@@ -131,31 +136,42 @@ def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
     """Write best.csv, met.csv (where the problem says which designs meet it), convergence and front (of
     several objectives) as .png and .pdf into a folder (made if missing); name -> path.
 
-    Each file is, at every instant, the old one or the new one. RunError if the disk is full.
+    Each file is, at every instant, the old one or the new one. RunError if the disk is full. A picture that
+    cannot be drawn is left out, which is said on standard error.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    figures = {"convergence": convergence_figure(outcome)}
-    if outcome.problem.several:
-        figures["front"] = front_figure(outcome)
     contents = {"best.csv": best_csv(outcome)}
     if outcome.problem.met_at is not None:
         contents["met.csv"] = met_csv(outcome)
-    for name, figure in figures.items():
-        contents |= {
-            f"{name}.png": figure_bytes(figure, "png", dpi=200),
-            f"{name}.pdf": figure_bytes(figure, "pdf"),
-        }
     for name, content in contents.items():
         replace_file(folder / name, content)
-    return {name: folder / name for name in contents}
+    paths = [folder / name for name in contents]
+    figures = {"convergence": _convergence}
+    if outcome.problem.several:
+        figures["front"] = _front
+    for name, draw in figures.items():
+        paths += _picture(outcome, folder / name, draw)
+    return {path.name: path for path in paths}
 
 
-def figure_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
-    """Return a figure as the bytes of a file of that kind."""
-    file = io.BytesIO()
-    figure.savefig(file, format=kind, **options)
-    return file.getvalue()
+def _picture(outcome: Outcome, path: Path, draw: Callable[[Outcome], Figure]) -> list[Path]:
+    """Write a picture as .png and .pdf; return their paths, none where it cannot be drawn."""
+    figure = functools.cache(lambda: draw(outcome))
+    written = pictures.write_beside_data(path.with_suffix(".png"), figure, SHARP)
+    return written and written + pictures.write_beside_data(path.with_suffix(".pdf"), figure)
+
+
+def _convergence(outcome: Outcome) -> Figure:
+    from optimize.report.convergence import convergence_figure
+
+    return convergence_figure(outcome)
+
+
+def _front(outcome: Outcome) -> Figure:
+    from optimize.report.front import front_figure
+
+    return front_figure(outcome)
 
 
 def _text(value: Any) -> str:

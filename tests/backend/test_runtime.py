@@ -14,7 +14,7 @@ import tisim
 from tests.scenes import scene
 from tests.throwaway import Trap
 from tisim import InputError, RunError, Scene, Simulation
-from tisim.backend import diagnostics, memory, runtime
+from tisim.backend import diagnostics, memory, runtime, surroundings
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
@@ -46,6 +46,7 @@ def test_starting_again_with_the_same_settings_changes_nothing():
 
 
 def test_a_system_that_does_not_say_how_much_memory_it_has_refuses_nothing(monkeypatch):
+    monkeypatch.setattr(surroundings, "memory_limit", lambda: sys.maxsize)
     there = runtime.memory()
     assert diagnostics._memory() == f"{there / 2**30:.1f} GiB"
     monkeypatch.delattr(os, "sysconf")

@@ -9,6 +9,27 @@ from tisim.cli.main import main
 from tisim.files import python_file
 from tisim.steppers import Collocation, Trapezoid
 
+TYPED_IN = """
+from tisim.backend.taichi import ti
+from tisim.effects import Force
+
+class TypedIn(Force):
+    @ti.func
+    def force(self, s, w, i, t):
+        return -s.position[w, i]
+"""
+
+
+def test_a_law_without_a_source_is_told_so():
+    """As those are that are typed in, or read from standard input or the command line."""
+    names = {"__name__": "typed_in"}
+    exec(TYPED_IN, names)
+    bare = scene([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], (names["TypedIn"](),))
+    message = r"TypedIn\.force must be defined in a file or in a cell of a notebook, .*; received one without"
+    with pytest.raises(InputError, match=message):
+        tisim.run(bare)
+
+
 LAWS = """
 from tisim.backend.taichi import ti
 from tisim.effects import Force, parameter

@@ -8,19 +8,37 @@ import numpy as np
 import pytest
 
 from tests.scenes import scene, simulate
-from tisim import InputError, RunError, Scene
+from tisim import InputError, RunError, Scene, read
 from tisim.backend import runtime
 from tisim.files import lock, ownership
 from tisim.files.ownership import MARKER, ensure_writable
+from tisim.io.recording import Recording
 from tisim.io.run_folder import DATA, RUN_FILES, RunFolder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]
+SCENE = scene(ONE, ONE, dt=1e-6, steps=5)
 
 
 @pytest.fixture(scope="module")
 def result():
     return simulate([scene([(0, 0, 0), (5e-3, 0, 0)], [(1, 0, 0), (0, 0, 0)], dt=1e-6, steps=5)])[0]
+
+
+@pytest.mark.parametrize("failure", [ValueError("Key backend: 'x' is not\na valid value"), MemoryError()])
+def test_a_picture_that_cannot_be_drawn_costs_no_data(result, tmp_path, monkeypatch, capsys, failure):
+    def fails(result):
+        assert read(tmp_path / "result.h5").time == result.time, "the data are there before anything is drawn"
+        raise failure
+
+    (tmp_path / "cloud.png").write_bytes(b"of an earlier run")
+    monkeypatch.setattr("tisim.plotting.cloud.cloud", fails)
+    paths = write(result, RunFolder(tmp_path))
+    names = {"result.h5", "scene.toml", "versions.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths} == names
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{tmp_path / 'cloud.png'} could not be drawn: {type(failure).__name__}")
+    assert line.endswith("The picture is left out; the data are written.")
 
 
 def test_whole_run_is_in_the_folder(result, tmp_path):
@@ -52,40 +70,40 @@ def test_whole_run_is_in_the_folder(result, tmp_path):
 
 def test_folder_that_holds_a_run_is_refused(tmp_path):
     folder = RunFolder(tmp_path / "out")
-    folder.check()
+    folder.check(SCENE)
     assert not folder.path.exists()
     with pytest.raises(InputError, match="one that an interrupted run has left"):
-        folder.check(fresh=False)
+        folder.check(SCENE, fresh=False)
     ownership.claim(folder.path, RUN_FILES)
     folder.checkpoint.touch()
-    assert folder.check()
-    assert folder.check(fresh=False)
-    assert not folder.check(fresh=True)
-    assert not folder.check(overwrite=True)
+    assert folder.check(SCENE)
+    assert folder.check(SCENE, fresh=False)
+    assert not folder.check(SCENE, fresh=True)
+    assert not folder.check(SCENE, overwrite=True)
     folder.checkpoint.unlink()
     folder.trajectory.touch()
-    with pytest.raises(InputError, match=r"\(or give --fresh; there is no checkpoint to go on from\)"):
-        folder.check()
-    assert not folder.check(fresh=True)
+    with pytest.raises(InputError, match=r"without frames of another scene \(or give --fresh\)"):
+        folder.check(SCENE)
+    assert not folder.check(SCENE, fresh=True)
     folder.trajectory.unlink()
     folder.result.touch()
     folder.checkpoint.touch()  # of a run that was killed at its very end
     for fresh in (None, True):
         with pytest.raises(InputError, match="without a finished run"):
-            folder.check(fresh)
+            folder.check(SCENE, fresh)
     with pytest.raises(InputError, match="one that an interrupted run has left"):
-        folder.check(fresh=False)
-    assert not folder.check(overwrite=True)
+        folder.check(SCENE, fresh=False)
+    assert not folder.check(SCENE, overwrite=True)
 
 
 def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
     folder = RunFolder(tmp_path / "out")
-    with folder.claim():
+    with folder.claim(SCENE):
         folder.checkpoint.touch()
-        for call in (folder.check, lambda: folder.claim(overwrite=True).__enter__()):
+        for call in (lambda: folder.check(SCENE), lambda: folder.claim(SCENE, overwrite=True).__enter__()):
             with pytest.raises(InputError, match="must be without a command that is still at work there"):
                 call()
-    assert folder.check()
+    assert folder.check(SCENE)
 
 
 @pytest.mark.parametrize("options", [{"fresh": True}, {"overwrite": True}])
@@ -95,28 +113,46 @@ def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp
         (tmp_path / name).touch()
     ownership.claim(tmp_path, RUN_FILES, overwrite=True)
     folder.result.unlink()
-    with folder.claim() as goes_on:
+    with folder.claim(SCENE) as goes_on:
         assert (goes_on, folder.checkpoint.exists()) == (True, True)
-    with folder.claim(**options) as goes_on:
+    with folder.claim(SCENE, **options) as goes_on:
         assert not goes_on
         assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, lock.LOCK}
 
 
 def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):
-    RunFolder(tmp_path).check()
+    RunFolder(tmp_path).check(SCENE)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
     folder = RunFolder(tmp_path)
-    folder.check()
-    with folder.claim():
+    folder.check(SCENE)
+    with folder.claim(SCENE):
         folder.result.touch()
-    with pytest.raises(InputError, match="without a finished run"), folder.claim():
+    with pytest.raises(InputError, match="without a finished run"), folder.claim(SCENE):
         pass
     folder.result.unlink()
-    with pytest.raises(InputError, match="one that an interrupted run has left"), folder.claim(fresh=False):
+    with (
+        pytest.raises(InputError, match="one that an interrupted run has left"),
+        folder.claim(SCENE, fresh=False),
+    ):
         pass
+
+
+def test_frames_of_a_run_that_was_killed_before_its_first_checkpoint_are_made_again(tmp_path):
+    """The same command begins anew by itself; frames of another scene, or damaged ones, are kept."""
+    folder = RunFolder(tmp_path)
+    ownership.claim(tmp_path, RUN_FILES)
+    Recording(folder.trajectory, frames=3).create([SCENE], "f64").close()
+    assert not folder.check(SCENE)
+    other = SCENE.model_copy(update={"seed": 7})
+    for scene_, damage in ((other, b""), (SCENE, b"damage")):
+        if damage:
+            folder.trajectory.write_bytes(damage)
+        with pytest.raises(InputError, match=r"without frames of another scene \(or give --fresh\)"):
+            folder.check(scene_)
+    assert not folder.check(SCENE, fresh=True)
 
 
 def test_unwritable_folder_is_an_input_error(tmp_path):

@@ -16,7 +16,7 @@ from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
 from optimize.problem.objective import Objective
 from optimize.report import report
-from optimize.report.front import others
+from optimize.report.front import front_figure, others
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage import hdf5_store
@@ -124,7 +124,7 @@ def test_log_and_report(outcome, tmp_path):
         rows = list(csv.DictReader(file))
     assert [float(row["gain (1/s)"]) for row in rows] == list(values(outcome)[:, 0])
     assert [float(row["price"]) for row in rows] == list(values(outcome)[:, 1])
-    (axis,) = report.front_figure(outcome).axes
+    (axis,) = front_figure(outcome).axes
     series = {bars.get_label(): bars.lines[0].get_xydata() for bars in axis.containers}
     np.testing.assert_array_equal(series["front, 1 start"], values(outcome))
     assert len(series["other designs, 1 start"]) == len(outcome.estimates) - len(outcome.hall)
@@ -146,7 +146,7 @@ def test_designs_of_few_starts_are_distinguished_from_those_that_are_known(outco
     other = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
     other.estimates = {tuple(string): string.estimates for string in (front, precise, lucky)}
     assert others(other) == ([precise.estimates], [lucky.estimates])
-    (axis,) = report.front_figure(other).axes
+    (axis,) = front_figure(other).axes
     lines = {bars.get_label(): bars for bars in axis.containers}
     assert list(lines) == [
         "other designs, 9 starts, 95 % intervals",

@@ -14,6 +14,7 @@ from tisim.accuracy.row import Row, decades, tied
 from tisim.accuracy.runner import Progress, StudyRunner
 from tisim.backend import runtime
 from tisim.errors import RunError, is_whole, must
+from tisim.files import pictures
 from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -165,10 +166,10 @@ class Study:
         return write(self, Path(folder))
 
     def picture(self, path: str | Path) -> Path:
-        """Draw error against time, a line for each method, as a PNG file."""
-        from tisim.accuracy.plot import save
+        """Draw error against time, a line for each method, in the format of the suffix, such as .png."""
+        from tisim.accuracy.plot import picture
 
-        return save(self, Path(path))
+        return pictures.write(Path(path), lambda: picture(self))
 
     def line(self, method: str) -> list[Row]:
         """Return the rows of a method, in the order of its settings."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import re
-from pathlib import Path
 from textwrap import fill
 
 import numpy as np
@@ -15,7 +13,6 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 from tisim.accuracy.cost_study import Study
 from tisim.accuracy.row import Row, decades
 from tisim.accuracy.sweep import USUAL_NUMBERS
-from tisim.files.atomic import replace_file
 from tisim.plotting.style import empty, letters, plain
 
 METHOD_COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
@@ -26,14 +23,6 @@ STYLES = {USUAL_NUMBERS: "-", ("f64", "fast"): ":"}
 """The lines of precisions and arithmetics; others are dashed."""
 LEGEND_WIDTH = 80
 """A line of the legend has so many characters at most, which a panel has room for."""
-
-
-def save(study: Study, path: Path) -> Path:
-    """Write the picture of a study as a PNG file, in place of any before. RunError on a full disk."""
-    image = io.BytesIO()
-    picture(study).savefig(image, dpi=150, format="png")
-    replace_file(path, image.getvalue())
-    return path
 
 
 def picture(study: Study) -> Figure:

@@ -19,6 +19,7 @@ from pathlib import Path
 from tisim.backend.taichi import BACKEND, ti
 from tisim.errors import InputError, RunError
 from tisim.files.atomic import locked
+from tisim.streams import say
 
 STALE = 60.0
 """This time (s) is longer than any process holds a lock."""
@@ -38,23 +39,43 @@ def lock() -> Path:
     return Path(os.environ.get(variable) or ti.lang.impl.default_cfg().offline_cache_file_path) / name
 
 
-def options() -> dict[str, str]:
+def options() -> dict[str, str | bool]:
     """Return the options of the compiler that name the folder for kernels; none where that is its own one.
 
     The compiler stops where it may not enter its folder. A process that may not gets a temporary one, which
-    is removed when the process ends.
+    is removed when the process ends, and keeps no kernels where it may not have that either.
     """
     folder = lock().parent
-    with suppress(OSError):
+    try:
         folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+        with tempfile.TemporaryFile(dir=folder):
             return {}
-    return {"offline_cache_file_path": _own().name}
+    except OSError as failure:
+        return _without(folder, failure.strerror or str(failure))
 
 
 @cache
-def _own() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="tisim-kernels-")
+def _without(folder: Path, why: str) -> dict[str, str | bool]:
+    """Return the options of a process that may not use its folder for kernels, and say so."""
+    say(
+        f"compiled kernels are not kept for the next process: {folder} cannot be written ({why}); "
+        "set HOME or XDG_CACHE_HOME to a folder that can"
+    )
+    # The compiler warns of a variable whose option is given.
+    os.environ.pop(LOCKS[BACKEND][0], None)
+    try:
+        return {"offline_cache_file_path": _temporary().name}
+    except OSError:
+        return {"offline_cache": False}
+
+
+@cache
+def _temporary() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder that is removed when this process ends, but not when one forked from it does."""
+    folder = tempfile.TemporaryDirectory(prefix="tisim-kernels-")
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=folder._finalizer.detach)  # type: ignore[attr-defined]
+    return folder
 
 
 def unlock() -> None:

@@ -50,7 +50,9 @@ def require_memory(needed: int) -> None:
     """Raise NoRoom unless this machine has so many bytes of memory."""
     there = runtime.memory()
     if needed > there:
-        raise NoRoom("memory", f"within the {there / 1e9:.0f} GB of this machine", f"{needed / 1e9:.3g} GB")
+        raise NoRoom(
+            "memory", f"within the {there / 1e9:.0f} GB that this process may have", f"{needed / 1e9:.3g} GB"
+        )
 
 
 def _require_entries(longest: int) -> None:

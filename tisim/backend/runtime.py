@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import ctypes
 import io
 import os
 import sys
@@ -11,10 +12,10 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
-from tisim.backend import kernel_cache, loops
+from tisim.backend import kernel_cache, loops, surroundings
 from tisim.backend.taichi import BACKEND, check_backend, ti
-from tisim.backend.thread import in_taichi_thread
-from tisim.errors import InputError, is_whole, must
+from tisim.backend.thread import forked, in_taichi_thread, require_own_process
+from tisim.errors import InputError, RunError, is_whole, must
 
 DEVICES = ("cpu", "cuda", "vulkan")
 PRECISIONS = ("f64", "f32")
@@ -78,18 +79,32 @@ _current: Runtime | None = None
 _generation = 0
 
 
+def _after_fork() -> None:
+    """Let go, in a child, of the turn of a thread of the parent, and never take Taichi's program apart there:
+    at the end of the process it would wait for its threads, which the child does not have, for ever."""
+    global turn
+    turn = threading.RLock()
+    if _current is not None:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
 def cores() -> int:
     """Return the number of CPU cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory() -> int:
-    """Return the memory of this machine, bytes; where the system does not say, as much as a number of bytes
-    can be."""
+    """Return the memory that this process may have, bytes: that of this machine, or less where there is a
+    limit; where the system does not say, as much as a number of bytes can be."""
     try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
-        return sys.maxsize
+        there = sys.maxsize
+    return min(there, surroundings.memory_limit())
 
 
 def init(
@@ -100,8 +115,10 @@ def init(
     threads : CPU threads; 0 for all cores. arithmetic : "strict" or "fast"; see ``Runtime``.
     Raises InputError when a setting is unknown or the device is absent. A change of settings waits until what
     ``tisim.run``, ``tisim.accuracy.study`` or ``optimize.run`` do in other threads is over. It invalidates
-    every Simulation made before; those say so when used.
+    every Simulation made before; those say so when used. Raises RunError in a process that was forked from
+    one where Taichi had been started.
     """
+    require_own_process()
     requested = Runtime(device, precision, threads or cores(), arithmetic)
     if requested == _current:
         return requested
@@ -119,7 +136,11 @@ def _start(requested: Runtime) -> None:
     _current, _generation = None, _generation + 1
     try:
         # Taichi announces the device on standard output, where results go.
-        with kernel_cache.exclusive_access(), contextlib.redirect_stdout(io.StringIO()):
+        with (
+            surroundings.existing_folder(),
+            kernel_cache.exclusive_access(),
+            contextlib.redirect_stdout(io.StringIO()),
+        ):
             ti.init(
                 arch=getattr(ti, requested.device),
                 default_fp=requested.real,
@@ -136,6 +157,11 @@ def _start(requested: Runtime) -> None:
             )
             _compile_first()
     except RuntimeError as failure:
+        if "memory" in str(failure):
+            raise RunError(
+                f"memory must be enough to start {BACKEND}; received no more than {memory() / 1e9:.3g} GB "
+                "(ulimit -v, or a limit of the container or batch system)"
+            ) from failure
         raise InputError(
             f"device must be present on this machine; received {requested.device!r} ({failure})"
         ) from failure
@@ -152,6 +178,8 @@ def _compile_first():
 
 def _stop() -> None:
     """Stop Taichi at the end of the process, which has it write down what it has compiled."""
+    if forked():
+        return
     with kernel_cache.exclusive_access():
         ti.reset()
 
@@ -162,7 +190,8 @@ def restart() -> None:
 
 
 def current() -> Runtime:
-    """Return the running settings; start the defaults (cpu, f64, all cores) on first use."""
+    """Return the running settings; start the defaults (cpu, f64, all cores) on first use; see ``init``."""
+    require_own_process()
     return _current or init()
 
 

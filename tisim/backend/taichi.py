@@ -9,7 +9,7 @@ import importlib.util
 import os
 import warnings
 
-from tisim.backend import front_end
+from tisim.backend import front_end, surroundings
 from tisim.errors import must
 
 BACKEND = os.environ.get("TISIM_BACKEND", "taichi")
@@ -26,13 +26,7 @@ def check_backend() -> None:
     must(importlib.util.find_spec(BACKEND) is not None, "TISIM_BACKEND", rule, BACKEND)
 
 
-# No banner, and no call over the network for the newest version.
-for prefix in ("TI", "QD"):
-    os.environ.setdefault(f"{prefix}_SKIP_VERSION_CHECK", "ON")
-    os.environ.setdefault(f"{prefix}_LOG_LEVEL", "warn")
-os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
-
+surroundings.prepare()
 if BACKEND == "quadrants" and importlib.util.find_spec("quadrants") is not None:
     import quadrants as ti
 else:

@@ -26,11 +26,13 @@ from tisim.cli.options import (
 )
 from tisim.console import err, out, print_stopping
 from tisim.errors import must
-from tisim.files import lock, ownership
+from tisim.files import lock, ownership, pictures
 from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tisim.accuracy import Quantity, Row, Study
     from tisim.scene.scene import Scene
 
@@ -105,7 +107,6 @@ def cost(
     The same command, given again, goes on where it was stopped, and answers --error from what is measured.
     """
     from tisim.accuracy import Study, storage, table
-    from tisim.accuracy.plot import save
 
     must(error is None or error > 0, "--error", "greater than 0", error)
     runtime.init(device, "f64", threads)
@@ -136,8 +137,9 @@ def cost(
             storage.clear(out_folder)
         finished = _measure(study, out_folder)
         if study.truths and study.rows:
+            paths = storage.write(study, out_folder)
+            paths += pictures.write_beside_data(out_folder / storage.PICTURE, lambda: _picture(study))
             out().print(table.table(study))
-            paths = [*storage.write(study, out_folder), save(study, out_folder / storage.PICTURE)]
             out().print("\n".join([*table.notes(study), *map(str, paths)]))
     if not finished:
         err().print(f"stopped; {out_folder / storage.HDF5} has what is done. {resume_hint(fresh, overwrite)}")
@@ -146,6 +148,12 @@ def cost(
         row = study.cheapest(error, quantity)
         commands = answer(row, quantity_index, scene, target, size, seed, changes, device, threads, plugins)
         print(f"cheapest with an error of at most {error:g}:\n{commands}")
+
+
+def _picture(study: Study) -> Figure:
+    from tisim.accuracy.plot import picture
+
+    return picture(study)
 
 
 def answer(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Sequence
 from textwrap import fill, shorten
 from typing import TYPE_CHECKING, Annotated
@@ -52,7 +51,7 @@ def _print_list(entries: Sequence[Entry]) -> None:
     """Print a line for each entry, family by family: whole into a file, as much as fits on a terminal."""
     from tisim.engine.reference import FAMILIES
 
-    width = out().width if sys.stdout.isatty() else None
+    width = out().width if out().is_terminal else None
     columns = [max(map(len, column)) for column in zip(*map(_names, entries), strict=True)]
     for family in dict.fromkeys(entry.family for entry in entries):
         out().print(Text(FAMILIES[family].title, "bold"))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,13 +25,16 @@ from tisim.cli.options import (
 )
 from tisim.console import err, progress_bar
 from tisim.errors import InputError
-from tisim.files import lock, ownership, regular_file
+from tisim.files import lock, ownership, pictures, regular_file
 from tisim.files.resuming import resumes
+from tisim.streams import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from matplotlib.figure import Figure
+
+    from tisim.io.reader import Frames
 
 File = Annotated[
     Path,
@@ -61,28 +62,36 @@ def plot(
 ) -> None:
     """Draw the cloud, energy, centre of gravity and number of particles in time, forces on walls and driven
     groups, and what its case shows."""
-    from cases.case import every
     from tisim.io.reader import frames
-    from tisim.plotting import loads, time_series
 
     file = _trajectory_file(file)
     out_folder = folder or file.parent
     with frames(file, world) as trajectory:
-        pictures = {
-            "cloud.png": time_series.clouds(trajectory),
-            "time_series.png": time_series.quantities(trajectory),
-        }
-        if loads.bodies(trajectory):
-            pictures["loads.png"] = loads.loads(trajectory)
-        case = every().get(trajectory.scene.name)
-        if case and case.pictures:
-            pictures |= case.pictures(trajectory)
-        for figure in pictures.values():
-            time_series.mark_missing(figure, trajectory)
+        with pictures.drawing(f"{file}"):
+            drawn = _pictures(trajectory)
         _print_missing(trajectory.missing)
-    ownership.claim(out_folder, pictures, overwrite)
-    for name, figure in pictures.items():
-        print(_save_figure(figure, out_folder / name))
+    ownership.claim(out_folder, drawn, overwrite)
+    for name, figure in drawn.items():
+        print(_save(figure, out_folder / name))
+
+
+def _pictures(trajectory: Frames) -> dict[str, Figure]:
+    """Return the figures of a trajectory by the names of their files."""
+    from cases.case import every
+    from tisim.plotting import loads, time_series
+
+    drawn = {
+        "cloud.png": time_series.clouds(trajectory),
+        "time_series.png": time_series.quantities(trajectory),
+    }
+    if loads.bodies(trajectory):
+        drawn["loads.png"] = loads.loads(trajectory)
+    case = every().get(trajectory.scene.name)
+    if case and case.pictures:
+        drawn |= case.pictures(trajectory)
+    for figure in drawn.values():
+        time_series.mark_missing(figure, trajectory)
+    return drawn
 
 
 def figures(
@@ -102,6 +111,11 @@ def figures(
     chosen_case.size(size_name)
     if chosen_case.figures is None:
         raise InputError(f"case must be one with figures; received {case!r}")
+    # Whether anything can be drawn is known before the runs, not after.
+    with pictures.drawing(f"figures of {chosen_case.name}"):
+        from tisim.plotting import style
+
+        pictures.image(style.empty(1.0, 1.0))
     runtime.init(device, precision, threads, arithmetic)
     out_folder = folder or Path("out") / f"{chosen_case.name}-figures"
     ownership.check_all(out_folder, overwrite)
@@ -113,12 +127,13 @@ def figures(
         with _progress("running") as progress:
             results = chosen_case.figures(size_name, progress)
         ownership.claim(out_folder, results, overwrite)
-        for name, content in results.items():
+        # Numbers first: a figure that cannot be drawn takes none with it.
+        for name, content in sorted(results.items(), key=lambda item: not isinstance(item[1], str)):
             if isinstance(content, str):
                 replace_file(out_folder / name, content.encode())
                 print(out_folder / name)
             else:
-                print(_save_figure(content, out_folder / name))
+                print(_save(content, out_folder / name))
 
 
 def movie(
@@ -134,12 +149,13 @@ def movie(
 ) -> None:
     """Draw a trajectory as a moving picture."""
     from tisim.io.reader import frames
-    from tisim.plotting.movie import check, while_drawn
-    from tisim.plotting.movie import movie as draw
 
     file = _trajectory_file(file)
     path = to or file.with_suffix(".gif")
-    with frames(file, world) as trajectory:
+    with frames(file, world) as trajectory, pictures.drawing(str(path)):
+        from tisim.plotting.movie import check, while_drawn
+        from tisim.plotting.movie import movie as draw
+
         check(trajectory, path, rate)
         ownership.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with _progress("drawing") as progress:
@@ -176,9 +192,13 @@ def export(
     print(path)
 
 
+def _save(figure: Figure, path: Path) -> Path:
+    return pictures.write(path, lambda: figure)
+
+
 def _print_missing(missing: str) -> None:
     if missing:
-        print(missing, file=sys.stderr)
+        say(missing)
 
 
 def _trajectory_file(path: Path) -> Path:
@@ -197,15 +217,6 @@ def _trajectory_file(path: Path) -> Path:
                 f"folder must be that of a run; received that of {what}, whose pictures are: {pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
-
-
-def _save_figure(figure: Figure, path: Path) -> Path:
-    from tisim.files.atomic import replace_file
-
-    image = io.BytesIO()
-    figure.savefig(image, dpi=150, format="png")
-    replace_file(path, image.getvalue())
-    return path
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from tisim.cli import cost, describe, effects, inspect, new, run, search
 from tisim.cli.usage import Command, CommandGroup, UsageError
 from tisim.errors import InputError, RunError
 from tisim.interrupt import exit_code, handle_signals, raise_interrupt
+from tisim.streams import safe_standard_streams, say
 from tisim.version import __version__
 
 COMMANDS = (
@@ -22,6 +23,8 @@ COMMANDS = (
     inspect.plot, inspect.figures, inspect.movie, inspect.export,
 )  # fmt: skip
 """The functions of all commands, whose names they have, in the order of ``tisim --help``."""
+WRITERS = ("run", "new", "cost", "optimize", "compare", "plot", "figures", "movie", "export")
+"""The commands whose results are files: they have done their work also where nothing can be printed."""
 
 app = typer.Typer(
     cls=CommandGroup,
@@ -35,27 +38,47 @@ for _command in COMMANDS:
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit: with 0 when it is done; 1 when a run or check failed; 2 at wrong input, when
     nothing was run; 130, 143, 129 when stopped by Ctrl-C, SIGTERM, SIGHUP.
+
+    Standard streams that are closed, or whose reader has gone, change nothing. One that is full is reported
+    on standard error, and makes 1 of 0 where the result was to be printed, and not in files.
     """
-    code = 0
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    with safe_standard_streams() as (out, _):
+        code = _exit_code(words)
+        out.flush()
+        if out.complaint:
+            say(f"standard output could not be written: {out.complaint}")
+            command = next((word for word in words if not word.startswith("-")), "")
+            code = code or int(command not in WRITERS)
+    sys.exit(code)
+
+
+def _exit_code(words: list[str]) -> int:
+    """Run a command; return its exit code, and print why where it is not 0."""
     with handle_signals(raise_interrupt):
         try:
             check_backend()
-            code = app(arguments, prog_name="tisim", standalone_mode=False)
+            code = app(words, prog_name="tisim", standalone_mode=False)
             # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
-            code = exit_code() if code == 130 else code
+            return exit_code() if code == 130 else code or 0
         except UsageError as error:
             # No command was named: this is the help.
-            print(error.format_message(), file=sys.stderr)
-            code = 2
+            say(error.format_message())
+            return 2
         except InputError as error:
-            print(error, file=sys.stderr)
-            code = 2
+            say(str(error))
+            return 2
         except RunError as error:
-            print(error, file=sys.stderr)
-            code = 1
+            say(str(error))
+            return 1
+        except MemoryError:
+            say("memory must be enough for this; received no more from the system (a limit, as of ulimit -v)")
+            return 1
+        except OSError as error:
+            say(f"{error.filename or 'a file'} could not be used: {error.strerror or error}")
+            return 1
         except KeyboardInterrupt:
-            code = exit_code()
-    sys.exit(code or 0)
+            return exit_code()
 
 
 def _print_version(wanted: bool) -> None:

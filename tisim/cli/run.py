@@ -52,12 +52,12 @@ def run(
     runtime.init(device, precision, threads, arithmetic)
     name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
     out_folder = run_folder.RunFolder(folder or Path("out") / name)
-    resume = out_folder.check(fresh, overwrite)
+    resume = out_folder.check(scene, fresh, overwrite)
     recording = recording_from_options(out_folder.trajectory, frames, every, resume)
     with err().status("compiling"):
         simulation = Simulation(scene)
         simulation.load([scene])
-    with out_folder.claim(fresh, overwrite) as resume_now:
+    with out_folder.claim(scene, fresh, overwrite) as resume_now:
         must(resume_now == resume, "output folder", "as it was when the command began", str(out_folder.path))
         if resume:
             _restore(simulation, out_folder.checkpoint)

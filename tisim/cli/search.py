@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
@@ -28,6 +27,7 @@ from tisim.errors import RunError
 from tisim.files.atomic import replace_file
 from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt
+from tisim.streams import say
 
 Executor = Annotated[
     str, typer.Option(help="Where runs are made: batch (this process), processes:N or dask://HOST:PORT.")
@@ -181,8 +181,8 @@ def compare(
             message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all that is done."
             err().print(f"{message} {resume_hint(fresh, overwrite)}")
             raise
-    out().print(comparison.table(problem, results))
     replace_file(out_folder / comparison.CSV, comparison.as_csv(problem, results))
+    out().print(comparison.table(problem, results))
     out().print(f"written  {out_folder / comparison.CSV}", highlight=False, markup=False)
 
 
@@ -206,7 +206,7 @@ def cache(
             f"{len(report.conflicts)} in conflict, {report.duplicates} double, {report.torn} bytes unfinished"
         )
         for damage in (*report.damaged, *(f"in conflict: {key}" for key in report.conflicts)):
-            print(damage, file=sys.stderr)
+            say(damage)
         if not report.ok:
             raise typer.Exit(1)
     if not (compact or verify):

@@ -50,7 +50,7 @@ def check_memory(what: str, number: int, bytes_each: float = BYTES) -> None:
     from tisim.backend import runtime
 
     there = runtime.memory()
-    rule = f"within the {there / 1e9:.0f} GB of this machine"
+    rule = f"within the {there / 1e9:.0f} GB that this process may have"
     must(number * bytes_each <= there, f"memory for {what}", rule, f"{number * bytes_each / 1e9:.3g} GB")
 
 

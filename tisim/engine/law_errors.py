@@ -16,6 +16,8 @@ from tisim.errors import InputError
 
 PACKAGE = Path(__file__).parents[1]
 PLACE = re.compile(r'File "(.+?)", line (\d+), in (\w+):')
+NO_SOURCE = re.compile(r"Cannot find source code for Object: <function (?:.*<locals>\.)?([\w.]+)")
+"""A compiler says this of a function that was typed in, or read from standard input or a command line."""
 
 
 @contextmanager
@@ -27,6 +29,9 @@ def in_a_line() -> Iterator[None]:
         raise
     except Exception as error:
         message = str(error)
+        if unread := NO_SOURCE.search(message):
+            rule = "defined in a file or in a cell of a notebook, where its source can be read"
+            raise InputError(f"{unread[1]} must be {rule}; received one without a source") from error
         places = PLACE.findall(message)
         file, line, function = places[-1] if places else ("", "", "")
         if not places or PACKAGE in Path(file).parents:

@@ -16,6 +16,19 @@ try:
 except ImportError:
     fcntl = None  # type: ignore[assignment]
 
+_held: set[int] = set()
+"""The handles of the locks that this process holds."""
+
+
+def _after_fork() -> None:
+    """Close the locks of the parent in a child, which would hold them for as long as it lives."""
+    while _held:
+        os.close(_held.pop())
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
 LOCK_TIMEOUT = 60.0
 """This time, in s, is longer than any process at work holds a lock; one that is stopped holds it for good."""
 
@@ -32,12 +45,17 @@ def locked(path: Path, *, exclusive: bool, timeout: float | None = None) -> Iter
     if fcntl is None:
         raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
     handle = open_descriptor(path, os.O_RDWR | os.O_CREAT) if exclusive else _open_for_reading(path)
+    _held.add(handle)
+    process = os.getpid()
     try:
         kind = fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH
         _wait_for_lock(handle, path, kind, LOCK_TIMEOUT if timeout is None else timeout)
         yield handle
     finally:
-        os.close(handle)
+        # A child that was forked meanwhile, and leaves by this way, has closed it already.
+        if process == os.getpid():
+            _held.discard(handle)
+            os.close(handle)
 
 
 def _open_for_reading(path: Path) -> int:

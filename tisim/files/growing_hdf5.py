@@ -21,10 +21,14 @@ class GrowingFile(Seekable):
     """A growing file is the HDF5 file at path, with a superblock of version 3, as h5py.File writes to it.
 
     failure : why something could not be written, after which nothing is; None while all is well.
+
+    A process that is forked while it is open has the same file, and writes nothing to it: what HDF5 writes as
+    that process ends would be of the moment of the fork.
     """
 
     def __init__(self, path: Path) -> None:
         self.failure: OSError | None = None
+        self._process = os.getpid()
         super().__init__(os.open(path, os.O_RDWR | os.O_CLOEXEC))
         self._end = os.fstat(self._handle).st_size
         self._superblock = os.pread(self._handle, SIZE, 0)
@@ -33,6 +37,8 @@ class GrowingFile(Seekable):
     def write(self, data: bytes) -> int:  # type: ignore[override]
         offset, piece = self._position, bytes(data)
         self._position += len(piece)
+        if self._process != os.getpid():
+            return len(piece)
         if self.failure is None:
             try:
                 self._write_piece(offset, piece)
@@ -63,7 +69,7 @@ class GrowingFile(Seekable):
     def truncate(self, size: int | None = None) -> int:
         """Make the file at least this long, bytes; HDF5 asks for it once all is written."""
         end = self._end if size is None else size
-        if self.failure is None and end > self._end:
+        if self.failure is None and end > self._end and self._process == os.getpid():
             try:
                 os.ftruncate(self._handle, end)
                 self._publish_end(end)

@@ -156,7 +156,7 @@ def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
     """
     path = folder / f"{name}.xyz"
     temporary = path.with_name(temporary_name(path.name))
-    with replacing(path, temporary), temporary.open("w") as file:
+    with replacing(path, temporary), temporary.open("w", encoding="utf-8") as file:
         for frame in frames_to_write:
             columns, properties = _columns(frame.arrays)
             box = _lattice(trajectory.scene.domain, frame.time)

@@ -1,7 +1,8 @@
 """A run writes result.h5, scene.toml, versions.json and cloud.png to its folder; trajectory.h5 if asked.
 
-result.h5 is written last, so a folder that holds one holds a whole run. Its groups ``start`` and ``end`` have
-one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts, ``measures``
+result.h5 is written after the other data, so a folder that holds one holds a whole run; only the picture
+comes after it. Its groups ``start`` and ``end`` have one array per particle quantity, shape (n,) or (n, 3),
+with its unit; ``work`` has the counts, ``measures``
 what effects keep of the world; the attributes say how the run ended and under which settings, and hold the
 scene as TOML. A checksum of the whole file stands behind its end (see checksum.py).
 """
@@ -10,11 +11,11 @@ from __future__ import annotations
 
 import json
 import platform
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -24,15 +25,18 @@ from tisim.backend import runtime
 from tisim.components import serialization
 from tisim.engine.assembly import needed_fields
 from tisim.engine.result import Result, Status
-from tisim.errors import must
-from tisim.files import checksum, lock, ownership, regular_file
+from tisim.errors import InputError, must
+from tisim.files import checksum, lock, ownership, pictures, regular_file
 from tisim.files.atomic import replace_file
 from tisim.files.resuming import resumes
-from tisim.io.reader import RESULT, refuse_damage
+from tisim.io.reader import RESULT, frames, refuse_damage, world_count
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import SHARED, resolve_fields
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
 """These are the names of the files that are about one run, in the order in which a new run removes them:
@@ -60,26 +64,35 @@ class RunFolder:
     def checkpoint(self) -> Path:
         return self.path / "checkpoint.h5"
 
-    def check(self, fresh: bool | None = None, overwrite: bool = False) -> bool:
-        """Return whether a run resumes what is here (see ``resuming.resumes``); touch nothing.
+    def check(self, scene: Scene, fresh: bool | None = None, overwrite: bool = False) -> bool:
+        """Return whether a run of a scene resumes what is here (see ``resuming.resumes``); touch nothing.
 
         Raise InputError when a run is under way here, or writing here would lose what is not to be lost.
+        Frames of a run that was killed before its first checkpoint are not: the same scene makes them again.
         """
         lock.check(self.path)
-        return self._check(fresh, overwrite)
+        return self._check(scene, fresh, overwrite)
 
-    def _check(self, fresh: bool | None, overwrite: bool) -> bool:
+    def _check(self, scene: Scene, fresh: bool | None, overwrite: bool) -> bool:
         finished = regular_file.exists(self.result)
         resumable = regular_file.exists(self.checkpoint) and not finished
         resume = resumes(self.path, "run", resumable, "a finished run" * finished, fresh, overwrite)
-        frames_lost = regular_file.exists(self.trajectory) and not (resume or fresh or overwrite)
-        rule = "without an interrupted run (or give --fresh; there is no checkpoint to go on from)"
-        must(not frames_lost, "output folder", rule, str(self.path))
         ownership.check(self.path, RUN_FILES, overwrite)
+        if regular_file.exists(self.trajectory) and not (resume or fresh or overwrite):
+            rule = "without frames of another scene (or give --fresh)"
+            must(self._has_frames_of(scene), "output folder", rule, str(self.path))
         return resume
 
+    def _has_frames_of(self, scene: Scene) -> bool:
+        """Return whether the trajectory here is of this scene alone."""
+        try:
+            with frames(self.trajectory) as trajectory:
+                return world_count(self.trajectory) == 1 and trajectory.scene.digest() == scene.digest()
+        except InputError:
+            return False
+
     @contextmanager
-    def claim(self, fresh: bool | None = None, overwrite: bool = False) -> Iterator[bool]:
+    def claim(self, scene: Scene, fresh: bool | None = None, overwrite: bool = False) -> Iterator[bool]:
         """Make the folder, mark it as one of tisim's, and hold its lock.
 
         It yields whether the run resumes what is here. Where it does not, what an earlier one has left is
@@ -88,7 +101,7 @@ class RunFolder:
         """
         ownership.claim(self.path, RUN_FILES, overwrite)
         with lock.acquire(self.path):
-            resume = self._check(fresh, overwrite)  # another run may have come and gone since then
+            resume = self._check(scene, fresh, overwrite)  # another run may have come and gone since then
             for name in () if resume else DATA:
                 (self.path / name).unlink(missing_ok=True)
             yield resume
@@ -108,22 +121,28 @@ def versions() -> dict[str, str]:
 
 
 def write(result: Result, folder: RunFolder) -> list[Path]:
-    """Write all files of a run, in place of any before; return their paths. Raise RunError on a full disk."""
-    from tisim.plotting import cloud
+    """Write all files of a run, in place of any before; return their paths. Raise RunError on a full disk.
 
+    The picture comes last: where it cannot be drawn, that is said on standard error, and it is left out.
+    """
+    # It may have been removed while the run went on.
+    folder.path.mkdir(parents=True, exist_ok=True)
     folder.result.unlink(missing_ok=True)
-    paths = {name: folder.path / name for name in ("scene.toml", "versions.json", "cloud.png")}
+    paths = {name: folder.path / name for name in ("scene.toml", "versions.json")}
     replace_file(paths["scene.toml"], result.scene.to_toml().encode())
     replace_file(
         paths["versions.json"], (json.dumps({**versions(), **result.settings}, indent=2) + "\n").encode()
     )
-    with tempfile.SpooledTemporaryFile() as image:
-        cloud.cloud(result).savefig(image, dpi=150, format="png")
-        image.seek(0)
-        replace_file(paths["cloud.png"], image.read())
     write_result(result, folder.result)
     folder.checkpoint.unlink(missing_ok=True)
-    return [folder.result, *paths.values()]
+    picture = pictures.write_beside_data(folder.path / "cloud.png", lambda: _cloud(result))
+    return [folder.result, *paths.values(), *picture]
+
+
+def _cloud(result: Result) -> Figure:
+    from tisim.plotting import cloud
+
+    return cloud.cloud(result)
 
 
 def write_result(result: Result, path: Path) -> None:

@@ -10,7 +10,7 @@ from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
 from optimize.problem.objective import Objective
-from optimize.report import report
+from optimize.report import convergence, report
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
@@ -154,11 +154,11 @@ def moves(figure):
 def test_a_move_of_the_search_box_after_the_end_is_not_marked(tmp_path):
     outcome = outcome_of(tmp_path, generations=4)
     assert outcome.logbook.select("recentred")[-1]
-    assert moves(report.convergence_figure(outcome)) == []
+    assert moves(convergence.convergence_figure(outcome)) == []
 
 
 def test_convergence_figure_shows_the_logbook(outcome, tmp_path):
-    figure = report.convergence_figure(outcome)
+    figure = convergence.convergence_figure(outcome)
     top, bottom = figure.axes
     curves = {line.get_label(): list(line.get_ydata()) for line in top.get_lines()}
     assert curves["best"] == outcome.logbook.select("best")

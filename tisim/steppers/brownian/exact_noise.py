@@ -34,7 +34,7 @@ class Exact:
         self.s, self.fluid, self.mobility, self.domain = fluid.s, fluid, mobility, domain
         # The last columns that are reduced together may reach past those of particles.
         self.rows = -(-(3 * self.s.capacity + COLUMNS) // TILE_ROWS) * TILE_ROWS
-        rule = f"within the {runtime.memory() / 1e9:.0f} GB of this machine"
+        rule = f"within the {runtime.memory() / 1e9:.0f} GB that this process may have"
         fits = self.bytes() <= runtime.memory()
         must(fits, "memory for diffusion matrices", rule, f"{self.bytes() / 1e9:.0f} GB")
         self.matrix = ti.field(self.s.real)
