@@ -72,6 +72,15 @@ def exists(path: Path) -> bool:
     return _stat_following_links(path) is not None
 
 
+def check_readable(path: Path) -> None:
+    """Raise InputError unless there is a regular file of this name, links followed: others may have no
+    end."""
+    info = _stat_following_links(path)
+    if info is None or (fault := _irregular_kind(info)) is not None:
+        received = "nothing" if info is None else fault
+        raise InputError(f"{printable(str(path))} must be a regular file; received {received}")
+
+
 def is_folder(path: Path) -> bool:
     """Return whether a folder of this name exists, links followed; raise InputError where that is
     forbidden."""

@@ -13,7 +13,7 @@ from tisim.components.component import parameter
 from tisim.errors import InputError, is_number, must
 from tisim.files import regular_file
 from tisim.geometry.shape import Shape
-from tisim.geometry.triangle_grid import TriangleGrid
+from tisim.geometry.triangle_grid import MOST_LISTED, TriangleGrid
 
 
 class TriangulatedSurface(Shape):
@@ -48,6 +48,7 @@ class TriangulatedSurface(Shape):
         except ImportError:
             rule = 'there to read a surface (python -m pip install "tisim[mesh]")'
             raise InputError(f"meshio must be {rule}; received none") from None
+        regular_file.check_readable(Path(path))
         try:
             # For an ASCII file of STL it multiplies what four letters would be as a number.
             with np.errstate(over="ignore"):
@@ -81,7 +82,9 @@ class TriangulatedSurface(Shape):
         whole = (self.faces == np.rint(self.faces)) & (self.faces >= 0) & (self.faces < count)
         rule = f"whole numbers below the number of vertices, {count}"
         must(bool(whole.all()), f"{label}.faces", rule, self.faces[~whole][:1].tolist())
-        must(len(self.corners()) > 0, f"{label}.faces", "triangles with an area", "none")
+        number = len(self.corners())
+        must(number > 0, f"{label}.faces", "triangles with an area", "none")
+        must(number <= MOST_LISTED, f"{label}.faces", f"at most {MOST_LISTED} triangles", number)
         return self
 
     def __eq__(self, other: object) -> bool:
@@ -177,7 +180,9 @@ class TriangulatedSurface(Shape):
         """Return whether triangle m, which may be in several of the cells from ``low`` on, has not been in
         those before x, y, z."""
         first = [ti.max(ti.cast(self.first[m, axis], ti.i32), low[axis]) for axis in ti.static(range(3))]
-        return x == first[0] and y == first[1] and z == first[2]
+        # A large one is not in all cells of its box, and is looked at in each that has it.
+        large = self.first[m, 0] < 0.0
+        return large or (x == first[0] and y == first[1] and z == first[2])
 
 
 @ti.func

@@ -28,6 +28,8 @@ class WorldStatus(IntEnum):
     """A diffusion matrix is not positive definite."""
     LIST_OVERFLOW = 10
     """There are more near pairs than their list has room for; it is made longer, and the world goes on."""
+    STEP_TOO_LONG = 11
+    """Grains move so far in a step that they may pass through each other unseen."""
 
 
 NO_ONE = 2**31 - 1

@@ -160,7 +160,7 @@ def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
 def test_walls_say_what_the_laws_of_the_scene_say():
     """Of cohesion where a law has one that grows with the overlap; a bridge holds on to what parts."""
     long, held = (
-        "a step is too long for the springs and dashpots of a contact",
+        "a step is too long for the springs and dashpots of a contact, or for how fast surfaces meet",
         "or no elastic force holds the cohesion there",
     )
     bridge = CapillaryBridge(surface_tension=1.0, volume=1e-3)

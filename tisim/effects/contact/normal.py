@@ -66,6 +66,7 @@ class NormalContact(PairForce):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
+    solid: ClassVar[bool] = True
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
     fields = ("radius",)

@@ -55,6 +55,8 @@ class WallContacts(WallSearch):
                     push, turn = self.touch_surfaces(s, w, i, number + before, number, found, t, dt, commit)
                     force, torque, touching = force + push, torque + turn, touching + number
                     clear = ti.min(clear, beside)
+                    if touching == 0 and self.may_have_passed(s, w, i, beside, t, dt):
+                        force[0] = ti.math.nan
                 if commit:
                     self.note_clearance(s, w, i, ti.select(touching > 0, 0.0, clear), t)
             if commit and touching + before > 0:
@@ -88,6 +90,14 @@ class WallContacts(WallSearch):
             moved = (s.position[w, i] - seen).norm() + self.clear[w, i, 4] * ti.cast(t, s.real)
             near = moved + self.reach(s, w, i) >= self.clear[w, i, 3]
         return near
+
+    @ti.func
+    def may_have_passed(self, s, w, i, beside, t, dt):
+        """Return whether grain i, so far ``beside`` (m) sheets that it does not touch, may have gone through
+        one in this step: by less than its reach it would be seen to touch it."""
+        at = s.position[w, i]
+        path = dt * (s.velocity[w, i] - self.motion.velocity_at(self.kept, w, at, t)).norm()
+        return (path > self.reach(s, w, i)) & (path > beside)
 
     @ti.func
     def note_clearance(self, s, w, i, clear, t):

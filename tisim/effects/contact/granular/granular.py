@@ -1,7 +1,7 @@
 """The contact law that is composed of parts."""
 
 from collections.abc import Mapping, Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -69,6 +69,8 @@ class Granular(ContactGuards, GranularContact):
     J. Plimpton, I. Srivastava and L. E. Silbert, Phys. Rev. E 102 (2020) 032903.
     """
 
+    solid: ClassVar[bool] = True
+
     normal: NormalForce = option("elastic force along the line of centres", HertzMaterial())
     damping: Damping | None = option("damping, of the normal and the tangential force", None)
     tangential: TangentialForce | None = option("friction of surfaces that slide", None)
@@ -112,7 +114,8 @@ class Granular(ContactGuards, GranularContact):
 
     def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
         cohesion = ", or no elastic force holds the cohesion there" if self.by_overlap else ""
-        return f"a step is too long for the springs and dashpots of a contact{cohesion}"
+        long = "a step is too long for the springs and dashpots of a contact, or for how fast surfaces meet"
+        return f"{long}{cohesion}"
 
     def members(self) -> dict[str, Component]:
         names = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
