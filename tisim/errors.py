@@ -22,6 +22,11 @@ class RunError(RuntimeError):
     """A run could not go on. The message says when, where and why; the last good state is kept."""
 
 
+class StartWarning(UserWarning):
+    """A start is as it can hardly be meant, as where grains lie in each other or behind a wall. The scene runs
+    all the same."""
+
+
 class _Short(reprlib.Repr):
     """This repr bounds the length and the depth of what it returns, however large the value is."""
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Sequence
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -37,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     nothing was run; 130, 143, 129 when stopped by Ctrl-C, SIGTERM, SIGHUP.
     """
     code = 0
+    warnings.showwarning = _print_warning
     with handle_signals(raise_interrupt):
         try:
             check_backend()
@@ -56,6 +58,11 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         except KeyboardInterrupt:
             code = exit_code()
     sys.exit(code or 0)
+
+
+def _print_warning(message: Warning | str, category: type[Warning], *_where: Any, **_more: Any) -> None:
+    """Print a warning on one line."""
+    print(f"warning: {message}", file=sys.stderr)
 
 
 def _print_version(wanted: bool) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from tisim.engine.allocation import parts
 from tisim.engine.compiled_worlds import CompiledWorlds
+from tisim.engine.crowding import check_places, warn_of_overlaps
 from tisim.engine.loading import check_reach, check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
@@ -73,6 +74,7 @@ class Simulation(CompiledWorlds):
         starts = list(starts)
         for scene, start in zip(scenes, starts, strict=True):
             check_start(self.s.fields, scene, start)
+        warn_of_overlaps([check_places(scene, start) for scene, start in zip(scenes, starts, strict=True)])
         self.table.write([parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.edits = [[] for _ in scenes]

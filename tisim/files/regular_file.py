@@ -72,13 +72,11 @@ def exists(path: Path) -> bool:
     return _stat_following_links(path) is not None
 
 
-def check_readable(path: Path) -> None:
-    """Raise InputError unless there is a regular file of this name, links followed: others may have no
-    end."""
+def irregular(path: Path) -> str | None:
+    """Return what there is of this name that is no regular file, links followed, in words; None where there is
+    a regular file or nothing."""
     info = _stat_following_links(path)
-    if info is None or (fault := _irregular_kind(info)) is not None:
-        received = "nothing" if info is None else fault
-        raise InputError(f"{printable(str(path))} must be a regular file; received {received}")
+    return None if info is None else _irregular_kind(info)
 
 
 def is_folder(path: Path) -> bool:

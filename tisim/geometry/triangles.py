@@ -15,6 +15,9 @@ from tisim.files import regular_file
 from tisim.geometry.shape import Shape
 from tisim.geometry.triangle_grid import MOST_LISTED, TriangleGrid
 
+MOST_DISTANCES = 2_000_000
+"""Where places and triangles make more pairs, ``distances`` says of all places that they are far away."""
+
 
 class TriangulatedSurface(Shape):
     """A surface of triangles, with particles on either side of it, such as that of an STL file.
@@ -48,13 +51,14 @@ class TriangulatedSurface(Shape):
         except ImportError:
             rule = 'there to read a surface (python -m pip install "tisim[mesh]")'
             raise InputError(f"meshio must be {rule}; received none") from None
-        regular_file.check_readable(Path(path))
+        # What is none may have no end.
+        rule, other = "a file that meshio reads", regular_file.irregular(Path(path))
+        must(other is None, where, rule, f"{path!s} ({other})")
         try:
             # For an ASCII file of STL it multiplies what four letters would be as a number.
             with np.errstate(over="ignore"):
                 mesh = meshio.read(path)
         except (OSError, ValueError, meshio.ReadError, SystemExit) as fault:
-            rule = "a file that meshio reads"
             raise InputError(f"{where} must be {rule}; received {path!s} ({fault})") from None
         # Without the others there would be holes in it.
         others = {block.type for block in mesh.cells if block.dim == 2} - {"triangle"}
@@ -115,6 +119,23 @@ class TriangulatedSurface(Shape):
             "listed": grid.members[:, None],
             "clear": grid.clear[:, None],
         }
+
+    def distances(self, places: np.ndarray) -> np.ndarray:
+        corners = self.corners()
+        least: np.ndarray = np.full(len(places), np.inf)
+        if len(places) * len(corners) > MOST_DISTANCES:
+            return least
+        for a, b, c in corners:
+            sides, normal = (b - a, c - b, a - c), np.cross(b - a, c - a)
+            normal = normal / np.linalg.norm(normal)
+            over = np.ones(len(places), bool)
+            for begin, side in zip((a, b, c), sides, strict=True):
+                out = places - begin
+                over &= out @ np.cross(normal, side) >= 0.0
+                along = np.clip(out @ side / (side @ side), 0.0, 1.0)
+                least = np.minimum(least, np.linalg.norm(out - along[:, None] * side, axis=1))
+            least = np.where(over, np.minimum(least, np.abs((places - a) @ normal)), least)
+        return least
 
     @ti.func
     def nearest(self, m, r):

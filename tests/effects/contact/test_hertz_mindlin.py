@@ -26,7 +26,7 @@ def _along(law: ti.template(), normal: ti.types.ndarray(), path: ti.types.ndarra
     """Forces along a path of overlap and slip, of R* = 1 m and m* = 1 kg."""
     ti.loop_config(serialize=True)
     for _ in range(1):
-        at_wall = ti.Vector([2.5, 2.5])
+        at_wall = ti.Vector([1.0, 3.5, 2.5, 2.5])
         past = ti.Vector.zero(ti.f64, 4)
         for k in range(path.shape[0]):
             n = ti.Vector([normal[k, 0], normal[k, 1], normal[k, 2]])

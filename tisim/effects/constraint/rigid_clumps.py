@@ -46,6 +46,9 @@ class RigidClumps(Constraint):
         held: np.ndarray = start["clump"] != NO_CLUMP
         return held
 
+    def bodies(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        return start.get("clump", np.full(len(start["mass"]), NO_CLUMP))
+
     @ti.func
     def holds(self, s, w, i):
         return s.clump[w, i] != NO_CLUMP

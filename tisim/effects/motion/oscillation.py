@@ -18,6 +18,10 @@ class Oscillation(Motion):
     frequency: float = parameter("Hz", "frequency f", examples=[50.0], gt=0)
     phase: float = parameter("rad", "phase at t = 0", 0.0)
 
+    def shift(self) -> Vector:
+        x, y, z = (math.sin(self.phase) * part for part in self.amplitude)
+        return x, y, z
+
     @ti.func
     def angle(self, w, t):
         # In f64, whatever the precision: it grows without bound.
