@@ -23,8 +23,7 @@ class RunError(RuntimeError):
 
 
 class StartWarning(UserWarning):
-    """A start is as it can hardly be meant, as where grains lie in each other or behind a wall. The scene runs
-    all the same."""
+    """Grains of a start lie deep in each other, or behind a wall. The scene runs all the same."""
 
 
 class _Short(reprlib.Repr):

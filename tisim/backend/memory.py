@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import weakref
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from tisim.backend import runtime
@@ -25,6 +27,13 @@ hundred kB to each tree, and takes longer to compile the more there are."""
 
 MOST_ENTRIES = 2**31 - 1
 """A field has at most so many numbers: the kernel compiler counts them with 32 bits."""
+
+LISTS_PART = 0.5
+"""Fields and lists of pairs together may take this part of the memory, where lists are to grow; copies of the
+fields and the compiler need the rest."""
+
+CONTAINER_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+"""Linux says here how much memory a container may have; "max", where it is not limited."""
 
 reclaimers: list[Callable[[], None]] = []
 """These functions give back memory that is kept for later only."""
@@ -46,11 +55,35 @@ class NoRoom(RunError):
         super().__init__(f"{what} of all fields must be {rule}; received {received}")
 
 
+def allowed() -> int:
+    """Return the memory (bytes) that this process may have: that of the machine, or of its container or its
+    address space (``ulimit -v``), where that is less."""
+    there = runtime.memory()
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        there = there if limit == resource.RLIM_INFINITY else min(there, limit)
+    for file in CONTAINER_LIMITS:
+        with contextlib.suppress(ValueError, OSError):
+            there = min(there, int(Path(file).read_text()))
+    return there
+
+
+def require_lists(needed: int, instead_of: int) -> None:
+    """Raise NoRoom unless there is room for lists of so many bytes, in place of some that are there."""
+    there = int(LISTS_PART * allowed()) - (bytes_in_use() - instead_of)
+    if needed > there:
+        rule = f"within {max(there, 0) / 1e9:.3g} GB for lists of pairs"
+        raise NoRoom("memory", rule, f"{needed / 1e9:.3g} GB")
+
+
 def require_memory(needed: int) -> None:
     """Raise NoRoom unless this machine has so many bytes of memory."""
-    there = runtime.memory()
+    there = allowed()
     if needed > there:
-        raise NoRoom("memory", f"within the {there / 1e9:.0f} GB of this machine", f"{needed / 1e9:.3g} GB")
+        rule = f"within the {there / 1e9:.0f} GB that this process may have"
+        raise NoRoom("memory", rule, f"{needed / 1e9:.3g} GB")
 
 
 def _require_entries(longest: int) -> None:

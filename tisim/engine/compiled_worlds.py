@@ -112,9 +112,15 @@ class CompiledWorlds:
     def grow_lists(self, sizes: ListSizes) -> None:
         """Make lists of pairs of these sizes, and compile the step anew for them.
 
-        Raise RunError where there is no room for them; lists are then as they were.
+        Raise RunError where there is no room for them, which is asked before any is made; lists are then as
+        they were.
         """
-        began, image, before = time.perf_counter(), self.s.image(), self.assembly.sizes
+        before = self.assembly.sizes
+        try:
+            memory.require_lists(self.assembly.list_bytes(sizes), self.assembly.list_bytes(before))
+        except NoRoom as no:
+            raise RunError(f"lists of pairs need {no.received}, and must be {no.rule}") from None
+        began, image = time.perf_counter(), self.s.image()
         self.s.write("status", WorldStatus.ENDED)
         try:
             try:

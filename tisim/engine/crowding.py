@@ -85,6 +85,12 @@ class _Crowd:
         if low is not None and high is not None:
             self.low, self.side = low, np.where(scene.domain.imaged(), high - low, 0.0)
 
+    def nearest(self, apart: np.ndarray) -> np.ndarray:
+        """Return the shortest of the vectors (m) between particles, across joined faces where there are
+        any."""
+        sides = np.where(self.side > 0, self.side, np.inf)
+        return apart - np.rint(apart / sides) * self.side
+
     def joined(self, i: Any, j: Any) -> np.ndarray:
         """Return which pairs are of one rigid body, within which they are not held apart."""
         joined: np.ndarray = np.zeros(np.broadcast(i, j).shape, bool)
@@ -137,16 +143,17 @@ class _Crowd:
             number, listed = self.overlapped(lister)
             where = f"particle {lister} at {_place(self.position[lister])}, which overlaps {number} others"
             if remembers is not None and listed > PARTNERS:
-                rule = f"so far apart that each overlaps few others, as effects.{remembers.label} has room for"
-                raise InputError(f"particles must be {rule} {PARTNERS} contacts; received {where}")
+                rule = f"so far apart that each overlaps at most the {PARTNERS} others"
+                rule += f" that effects.{remembers.label} has room for"
+                raise InputError(f"particles must be {rule}; received {where}")
             if hard and self.pairs > CONTACTS_PER_PARTICLE * self.number:
                 rule = f"so far apart that at most {CONTACTS_PER_PARTICLE} pairs overlap for each of them"
-                raise InputError(f"particles must be {rule}; received {self.pairs} pairs at least, and {where}")
+                received = f"at least {self.pairs} pairs, and {where}"
+                raise InputError(f"particles must be {rule}; received {received}")
 
     def overlapped(self, i: int) -> tuple[int, int]:
         """Return how many others particle i overlaps, and how many of these are larger or follow it."""
-        apart = self.position - self.position[i]
-        apart -= np.where(self.side > 0, np.rint(apart / np.where(self.side > 0, self.side, 1.0)), 0) * self.side
+        apart = self.nearest(self.position - self.position[i])
         others = np.arange(self.number)
         near = (apart**2).sum(axis=1) < (self.radius + self.radius[i]) ** 2
         near &= (others != i) & ~self.joined(others, i)
@@ -165,17 +172,17 @@ class _Crowd:
         levels = self.levels()
         trees = [self.tree(members) for members in levels]
         for a, (larger, tree) in enumerate(zip(levels, trees, strict=True)):
-            found.append(larger[tree.query_pairs((2 - DEEP) * self.radius[larger].max(), output_type="ndarray")])
+            reach = (2 - DEEP) * self.radius[larger].max()
+            found.append(larger[tree.query_pairs(reach, output_type="ndarray")])
             for smaller, other in zip(levels[:a], trees[:a], strict=True):
-                reach = self.radius[larger] + (1 - DEEP) * self.radius[smaller].max()
-                near = other.query_ball_point(tree.data, reach)
+                reaches = self.radius[larger] + (1 - DEEP) * self.radius[smaller].max()
+                near = other.query_ball_point(tree.data, reaches)
                 sizes = [len(one) for one in near]
                 inner = np.concatenate([np.asarray(one, int) for one in near])
                 found.append(np.column_stack([np.repeat(larger, sizes), smaller[inner]]))
         pairs = np.concatenate(found)
         i, j = pairs.T
-        apart = self.position[i] - self.position[j]
-        apart -= np.where(self.side > 0, np.rint(apart / np.where(self.side > 0, self.side, 1.0)), 0) * self.side
+        apart = self.nearest(self.position[i] - self.position[j])
         overlap = self.radius[i] + self.radius[j] - np.sqrt((apart**2).sum(axis=1))
         deep = (overlap >= DEEP * np.minimum(self.radius[i], self.radius[j])) & ~self.joined(i, j)
         return pairs[deep], overlap[deep]
@@ -194,7 +201,7 @@ def _overlaps(scene: Scene, start: Arrays, laws: Sequence[Any]) -> list[Deep]:
         crowd.check_coincident(laws[0].label)
         crowd.check_overlaps(laws)
         if crowd.pairs > MOST_PAIRS:
-            return [Deep(1.0, f"{crowd.pairs} pairs of particles overlap", crowd.pairs)]
+            return [Deep(1.0, f"at least {crowd.pairs} pairs of particles overlap", 1)]
     if pairs is None or overlap is None:
         pairs, overlap = crowd.deep_pairs()
     if not len(pairs):
@@ -216,9 +223,8 @@ def _in_walls(scene: Scene, start: Arrays) -> list[Deep]:
             if deep.any():
                 part = overlap / start["radius"]
                 k = int(part.argmax())
-                lies = "behind" if part[k] > 1 else "in"
-                what = f"particle {k} lies {lies} effects.{wall.label} by {overlap[k]:.3g} m, {part[k]:.3g} of its"
-                found.append(
-                    Deep(float(part[k]), f"{what} radius, at {_place(start['position'][k])}", int(deep.sum()))
-                )
+                what = f"particle {k} lies {'behind' if part[k] > 1 else 'in'} effects.{wall.label}"
+                what += f" by {overlap[k]:.3g} m, {part[k]:.3g} of its radius"
+                place = _place(start["position"][k])
+                found.append(Deep(float(part[k]), f"{what}, at {place}", int(deep.sum())))
     return found

@@ -8,6 +8,8 @@ import numpy as np
 
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import Status
+from tisim.errors import RunError
+from tisim.neighbours.half_list import ListSizes
 from tisim.worlds.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
@@ -131,7 +133,22 @@ class Monitor:
         for name, good_values in self._last_good.items():
             good_values[worlds] = good[name][worlds]
         if len(crowded):
+            self._grow(crowded, sizes, then)
+
+    def _grow(self, crowded: np.ndarray, sizes: ListSizes, then: Image) -> None:
+        """Make lists longer for crowded worlds, which go on with them; where there is no room these have
+        failed."""
+        try:
             self.simulation.grow_lists(sizes)
+        except RunError as full:
+            status, failed = self.s.read("status"), then["failed"]
+            status[crowded] = WorldStatus.LIST_OVERFLOW
+            self.s.write("status", status)
+            for w in map(int, crowded):
+                who = ""
+                if failed[w] == WorldStatus.LIST_OVERFLOW:
+                    who = f", at particle {then['failing_particle'][w]}"
+                self.faults[w] = float(then["time"][w]), f"{REASONS[WorldStatus.LIST_OVERFLOW]}{who}: {full}"
 
     def _not_finite(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
         """Yield each quantity with the live particles, (worlds, capacity), of which it is not finite."""

@@ -16,7 +16,7 @@ from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
-from tisim.errors import InputError, is_number, is_whole, must
+from tisim.errors import InputError, RunError, is_number, is_whole, must
 from tisim.neighbours import near_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.placed_together import placed_together
@@ -109,8 +109,15 @@ class Simulation(CompiledWorlds):
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
         self._begin()
-        while (self.s.read("failed") == WorldStatus.LIST_OVERFLOW).any():
-            self.grow_lists(self.list_sizes())
+        while (overflowed := self.s.read("failed") == WorldStatus.LIST_OVERFLOW).any():
+            try:
+                self.grow_lists(self.list_sizes())
+            except RunError as full:
+                crowded = np.flatnonzero(overflowed)[0]
+                who = self.assembly.crowding(crowded)
+                self.scenes = []
+                rule = "so far apart that lists of those within reach of each other find room"
+                raise InputError(f"particles must be {rule}; received {who}: {full}") from None
             self._begin()
 
     def _begin(self) -> None:

@@ -73,8 +73,8 @@ def exists(path: Path) -> bool:
 
 
 def irregular(path: Path) -> str | None:
-    """Return what there is of this name that is no regular file, links followed, in words; None where there is
-    a regular file or nothing."""
+    """Return in words which kind of file other than a regular one has this name, links followed; None where
+    none has."""
     info = _stat_following_links(path)
     return None if info is None else _irregular_kind(info)
 

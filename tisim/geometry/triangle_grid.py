@@ -52,7 +52,8 @@ class TriangleGrid:
         width = WIDTH * float(np.sqrt(area / len(corners)))
         reach = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
         # One that reaches across a number of cells meets as many at least.
-        while np.prod((high - low) / width + 1) > CELLS or (reach / width + 1).sum() > MOST_LISTED + len(reach):
+        width = max(width, float(reach.sum()) / MOST_LISTED)
+        while np.prod((high - low) / width + 1) > CELLS:
             width *= 2 ** (1 / 3)
         while (listed := _Listing(corners, low, high, width).pairs()) is None:
             width *= 2

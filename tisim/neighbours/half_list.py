@@ -181,10 +181,10 @@ class HalfList(NeighbourRows):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
             square += self.since[w, k] ** 2
             step += self.s.displacement[w, k] ** 2
-        if ti.static(self.solid):
-            # Two that meet head on move past each other by twice as much.
-            if self.s.count[w] > 1 and step > ti.cast(self.grid.smallest[w], ti.f64) ** 2:
-                ti.atomic_max(self.s.failed[w], WorldStatus.STEP_TOO_LONG)
+        # Two that meet head on move past each other by twice as much.
+        smallest = ti.cast(self.grid.smallest[w], ti.f64)
+        if ti.static(self.solid) and self.s.count[w] > 1 and step > smallest * smallest:
+            ti.atomic_max(self.s.failed[w], WorldStatus.STEP_TOO_LONG)
         apart = 2.0 * ti.sqrt(square)
         if ti.static(self.images > 0):
             apart += self.sheared(w, self.s.time[w] + self.s.dt[w] - self.made[w])

@@ -52,8 +52,8 @@ class GranularContact(MaterialLaw, PairForce):
         (s), given ``past``.
 
         pair : which materials touch (see tisim/components/material_law.py). normal : unit vector from i to
-        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses : of
-        what is pressed, slides and rolls, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of the other
+        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses :
+        inverse masses, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of the other
         past that of i. spinning : spin (rad/s) of the other relative to i. Where there is no contact what it
         returns is not used, and may be no number.
         """
