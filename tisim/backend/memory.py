@@ -74,7 +74,7 @@ def require_lists(needed: int, instead_of: int) -> None:
     """Raise NoRoom unless there is room for lists of so many bytes, in place of some that are there."""
     there = int(LISTS_PART * allowed()) - (bytes_in_use() - instead_of)
     if needed > there:
-        rule = f"within {max(there, 0) / 1e9:.3g} GB for lists of pairs"
+        rule = f"within the {max(there, 0) / 1e9:.3g} GB that are left for lists of pairs"
         raise NoRoom("memory", rule, f"{needed / 1e9:.3g} GB")
 
 

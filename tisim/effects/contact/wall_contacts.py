@@ -171,6 +171,8 @@ class WallContacts(WallSearch):
                 past[c] = ti.select(new > 0, 0.0, self.surface_past[w, i, at + 3 + first + c])
             push, turn, known = self.touch(s, w, i, law, outward, found[q, 3], past, t, dt)
             force, torque = force + push, torque + turn
+            if self.goes_through(s, w, i, outward, found[q, 3], t, dt):
+                force[0] = ti.math.nan
             if commit:
                 for c in ti.static(range(size)):
                     self.surface_past[w, i, at + 3 + first + c] = known[c]
@@ -179,6 +181,14 @@ class WallContacts(WallSearch):
             for axis in ti.static(range(3)):
                 self.surface_past[w, i, at + axis] = direction[axis]
         return force, torque
+
+    @ti.func
+    def goes_through(self, s, w, i, outward, distance, t, dt):
+        """Return whether the centre of grain i would be behind a sheet after another such step, which then
+        would push it out there; it is ``distance`` (m) from it, along ``outward``."""
+        away = self.motion.to_space(self.kept, w, outward, t)
+        sheet = self.motion.velocity_at(self.kept, w, s.position[w, i] - distance * away, t)
+        return dt * (sheet - s.velocity[w, i]).dot(away) > distance
 
     @ti.func
     def slots(self, s, w, i, number, found, t):
