@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.effects.contact.grains import HERTZ_MINDLIN
-from tests.scenes import compiled, scene
+from tests.scenes import compiled, fixed, scene
 from tisim import Box, Cloud, GrainClass, InputError, Material, RandomInBall, RandomInBox, Scene, StartWarning
 from tisim.backend import memory
 from tisim.effects import Gravity, Hertz, Impact, Oscillation, PrescribedMotion, Walls
@@ -172,7 +172,9 @@ def test_the_packings_of_the_package_are_apart(placement):
     classes = tuple(GrainClass(sizes=EqualSizes(radius=r), density=2e3) for r in (R, 0.1 * R))
     for grains in (classes, classes[:1]):
         cloud = Cloud(number=300, grains=grains, placement=placement)
-        one = Scene(particles=cloud, effects=(HERTZ_MINDLIN,), materials=MATERIALS, duration=1.0)
+        one = Scene(
+            particles=cloud, effects=(HERTZ_MINDLIN,), materials=MATERIALS, duration=1.0, stepper=fixed(1e-3)
+        )
         assert check_places(one, one.start()) == []
 
 

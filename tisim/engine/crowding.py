@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tisim.backend import runtime
+from tisim.backend.memory import LISTS_PART, allowed
 from tisim.effects.base import Constraint, PairEvent, Pairwise
 from tisim.effects.contact.walls import Walls
 from tisim.errors import InputError, StartWarning
@@ -22,6 +23,8 @@ from tisim.interactions.contact_memory import PARTNERS
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
+PAIR_BYTES = 32
+"""A listed pair takes at least so much memory."""
 DEEP = 0.5
 """Overlaps are deep from this part of the smaller radius on."""
 SUSPECT = 3
@@ -134,14 +137,12 @@ class _Crowd:
         for members in self.levels():
             # All in one cell overlap, as it is no wider than two of the smallest from corner to corner.
             width = 2.0 * self.radius[members].min() / np.sqrt(3.0)
-            cells = np.floor((self.position[members] - self.low) / width).astype(np.int64)
+            with np.errstate(invalid="ignore"):
+                cells = np.floor((self.position[members] - self.low) / width).astype(np.int64)
             keys = (cells * np.array([73856093, 19349663, 83492791])).sum(axis=1)
             _, whose, counts = np.unique(keys, return_inverse=True, return_counts=True)
             if counts.max() < SUSPECT:
                 continue
-            sample = members[:: -(-len(members) // SAMPLE)]
-            each = float(np.mean([self.overlapped(int(i))[0] for i in sample]))
-            self.pairs += int(0.5 * each * len(members))
             crowded = members[whose == counts.argmax()]
             lister = int(crowded[0])
             number, listed = self.overlapped(lister)
@@ -150,6 +151,13 @@ class _Crowd:
                 rule = f"so far apart that each overlaps at most the {PARTNERS} others"
                 rule += f" that effects.{remembers.label} has room for"
                 raise InputError(f"particles must be {rule}; received {where}")
+            sample = members[:: -(-len(members) // SAMPLE)]
+            each = float(np.mean([self.overlapped(int(i))[0] for i in sample]))
+            self.pairs += int(0.5 * each * len(members))
+            if self.pairs * PAIR_BYTES > LISTS_PART * allowed():
+                rule = "so far apart that lists of those that overlap find room in memory"
+                received = f"about {self.pairs} pairs, and {where}"
+                raise InputError(f"particles must be {rule}; received {received}")
             # Twice as many, as it is an estimate; of fewer a kernel counts all.
             if hard and self.pairs > 2 * CONTACTS_PER_PARTICLE * self.number:
                 rule = f"so far apart that at most {CONTACTS_PER_PARTICLE} pairs overlap for each of them"

@@ -12,6 +12,9 @@ from tisim.components.materials import Materials, Touching
 from tisim.effects import Granular, RestitutionDamping
 from tisim.interactions.contact_memory import NO_PARTNER, PARTNERS
 
+# Grains overlap deeply at the start here, on purpose.
+pytestmark = pytest.mark.filterwarnings("ignore::tisim.errors.StartWarning")
+
 E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
 G_STAR = USUAL["young"] / (4 * (2 - USUAL["poisson"]) * (1 + USUAL["poisson"]))
 DT = 1e-5
