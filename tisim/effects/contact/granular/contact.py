@@ -82,7 +82,7 @@ class GranularContact(MaterialLaw, PairForce):
         )
         lasts = self.lasts(w, pair, overlap, radius, past)
         # Else two would be deep in each other, or past each other, before either is felt.
-        outrun = (overlap >= 0.0) & ((free * dt * passing).norm_sqr() > (TRAVEL * radius) ** 2)
+        outrun = (overlap >= 0.0) & ((free * dt * passing).norm_sqr() > (TRAVEL * ti.min(a, b)) ** 2)
         force = ti.select(outrun, ti.math.nan, force)
         force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
         # n x F is the same seen from either: both turn round at once.

@@ -6,11 +6,10 @@ from tisim.backend.taichi import ti
 
 TURNING = 2.5
 """m R^2 over the moment of inertia of a solid sphere."""
-TRAVEL = 0.5
-"""In a step two that touch may move past each other by this part of R*, and a grain may come nearer a wall by
-this part of its radius. In longer ones a contact is over, or deeper than a radius, before it is first seen.
-Steps that resolve an impact are far shorter: at a fiftieth of it surfaces meet at 0.06 of the largest overlap
-in a step."""
+TRAVEL = 1.0
+"""In a step two that touch may move past each other by this part of the smaller radius, and a grain may come
+nearer a wall by this part of its own. In longer ones a contact may be over, or deeper than a radius, before
+it is first seen. Steps of a fiftieth of an impact move surfaces by 0.06 of its largest overlap."""
 
 
 @ti.func
