@@ -19,9 +19,9 @@ MOST_LISTED = 2**22
 """All cells together list at most so many triangles: 34 MB, and numbers that single precision tells apart."""
 WIDTH = 1.5
 """A cell is so many times as wide as the triangles are in the mean."""
-LARGE = 64
+LARGE_SPAN = 64
 """A triangle whose box reaches into more cells than this is large."""
-SPARE = 1e-6
+WIDER = 1e-6
 """Cells are taken to be wider by this part, as places round."""
 
 
@@ -82,7 +82,7 @@ class _Listing:
         """Return cell and triangle of each pair of the two that meet, the first cells of triangles, and the
         number of cells along each axis; None where there are too many pairs."""
         number = (self.last - self.first + 1).prod(axis=1)
-        large = number > LARGE
+        large = number > LARGE_SPAN
         found, total = [], int(number[~large].sum())
         if total > MOST_LISTED:
             return None
@@ -141,7 +141,7 @@ class _Listing:
 
         Source: T. Akenine-Moeller, J. Graphics Tools 6 (2001) 29.
         """
-        half = 0.5 * self.width * (1.0 + SPARE) * (last - first + 1)
+        half = 0.5 * self.width * (1.0 + WIDER) * (last - first + 1)
         centre = self.low + 0.5 * self.width * (first + last + 1)
         number, meets = self.number[triangle], np.arange(len(triangle))
         for axis, least, most in self.axes:
