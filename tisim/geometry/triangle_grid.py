@@ -21,7 +21,7 @@ WIDTH = 1.5
 """A cell is so many times as wide as the triangles are in the mean."""
 LARGE_SPAN = 64
 """A triangle whose box reaches into more cells than this is large."""
-WIDER = 1e-6
+CELL_MARGIN = 1e-6
 """Cells are taken to be wider by this part, as places round."""
 
 
@@ -141,7 +141,7 @@ class _Listing:
 
         Source: T. Akenine-Moeller, J. Graphics Tools 6 (2001) 29.
         """
-        half = 0.5 * self.width * (1.0 + WIDER) * (last - first + 1)
+        half = 0.5 * self.width * (1.0 + CELL_MARGIN) * (last - first + 1)
         centre = self.low + 0.5 * self.width * (first + last + 1)
         number, meets = self.number[triangle], np.arange(len(triangle))
         for axis, least, most in self.axes:
