@@ -52,7 +52,7 @@ class TriangleGrid:
         width = WIDTH * float(np.sqrt(area / len(corners)))
         reach = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
         # One that reaches across a number of cells meets as many at least.
-        width = max(width, float(reach.sum()) / MOST_LISTED)
+        width = max(width, float(reach.sum()) / CELLS)
         while np.prod((high - low) / width + 1) > CELLS:
             width *= 2 ** (1 / 3)
         while (listed := _Listing(corners, low, high, width).pairs()) is None:
