@@ -34,6 +34,7 @@ from .engine.simulation import Simulation as Simulation
 from .errors import InputError as InputError
 from .errors import RunError as RunError
 from .errors import RunWarning as RunWarning
+from .errors import StartWarning as StartWarning
 from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.read import read as read
 from .io.recording import Recording as Recording

@@ -26,6 +26,10 @@ class RunWarning(UserWarning):
     """A run has failed, and its results are used, or dropped, without a look at its status."""
 
 
+class StartWarning(UserWarning):
+    """Grains of a start lie deep in each other, or behind a wall. The scene runs all the same."""
+
+
 class _Short(reprlib.Repr):
     """This repr bounds the length and the depth of what it returns, however large the value is."""
 

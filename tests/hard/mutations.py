@@ -154,7 +154,9 @@ SHARED = {
         f"{LAW}/step_limit.py", "> (both * first) * (both * second)", "> 0.0 * both * first * second",
         f"{STEPS}[jkr]",
     ),
-    "can_follow_what_slides": (f"{LAW}/step_limit.py", "SLIDING = 3.5", "SLIDING = 3.0", f"{STEPS}[hooke]"),
+    "can_follow_what_slides": (
+        f"{LAW}/step_limit.py", "slides = 1.0 + TURNING", "slides = 0.5 + TURNING", f"{STEPS}[hooke]",
+    ),
     "can_follow_what_rolls": (
         f"{LAW}/step_limit.py", "return TURNING * ti", "return 2.0 * ti", f"{STEPS}[jkr]",
     ),

@@ -72,15 +72,14 @@ def test_a_wall_throws_back_what_is_as_fast(name):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_steps_that_cannot_follow_are_named(name):
-    """Two that a step brings together whose spring would throw them apart in the next: the world stops, says
-    which law it was, and keeps what it was."""
+    """Two that a step of hundreds of radii brings together: the world stops, says who moves so far, and keeps
+    what it was."""
     law = ELASTIC[name]
     v, dt = fast(law), 0.03
     made = head_on(name, law, 1.0 + 2 * v * dt, dt, 5)
     simulation = loaded([made])
     simulation.run()
     (result,) = simulation.results()
-    for word in ("not finite", "effects.granular", "particle 0"):
-        assert word in result.status.reason
+    assert "a step so long that grains may pass through each other: particle 0" in result.status.reason
     assert kinetic(result.state).sum() <= kinetic(made.start()).sum()
     assert np.isfinite(result.state["position"]).all()

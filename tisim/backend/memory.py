@@ -26,6 +26,10 @@ hundred kB to each tree, and takes longer to compile the more there are."""
 MOST_ENTRIES = 2**31 - 1
 """A field has at most so many numbers: the kernel compiler counts them with 32 bits."""
 
+LISTS_PART = 0.5
+"""Fields and lists of pairs together may take this part of the memory, where lists are to grow; copies of the
+fields and the compiler need the rest."""
+
 reclaimers: list[Callable[[], None]] = []
 """These functions give back memory that is kept for later only."""
 
@@ -46,13 +50,20 @@ class NoRoom(RunError):
         super().__init__(f"{what} of all fields must be {rule}; received {received}")
 
 
+def require_lists(needed: int, instead_of: int) -> None:
+    """Raise NoRoom unless there is room for lists of so many bytes, in place of some that are there."""
+    there = int(LISTS_PART * runtime.memory()) - (bytes_in_use() - instead_of)
+    if needed > there:
+        rule = f"within the {max(there, 0) / 1e9:.3g} GB that are left for lists of pairs"
+        raise NoRoom("memory", rule, f"{needed / 1e9:.3g} GB")
+
+
 def require_memory(needed: int) -> None:
     """Raise NoRoom unless this machine has so many bytes of memory."""
     there = runtime.memory()
     if needed > there:
-        raise NoRoom(
-            "memory", f"within the {there / 1e9:.0f} GB that this process may have", f"{needed / 1e9:.3g} GB"
-        )
+        rule = f"within the {there / 1e9:.0f} GB that this process may have"
+        raise NoRoom("memory", rule, f"{needed / 1e9:.3g} GB")
 
 
 def _require_entries(longest: int) -> None:

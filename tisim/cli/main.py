@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Sequence
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -55,6 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 def _exit_code(words: list[str]) -> int:
     """Run a command; return its exit code, and print why where it is not 0."""
+    warnings.showwarning = _print_warning
     with handle_signals(raise_interrupt):
         try:
             check_backend()
@@ -79,6 +81,11 @@ def _exit_code(words: list[str]) -> int:
             return 1
         except KeyboardInterrupt:
             return exit_code()
+
+
+def _print_warning(message: Warning | str, category: type[Warning], *_where: Any, **_more: Any) -> None:
+    """Print a warning on one line."""
+    say(f"warning: {message}")
 
 
 def _print_version(wanted: bool) -> None:

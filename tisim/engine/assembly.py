@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import (
     Constraint,
@@ -45,6 +46,9 @@ from tisim.worlds.fields import Field
 from tisim.worlds.occasion import Enter, EnterAfterEvents, Occasion
 from tisim.worlds.phases import Item
 from tisim.worlds.state import State
+
+INTEGER = 4
+"""Bytes of an index."""
 
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
@@ -197,6 +201,28 @@ class Assembly:
             *(Buffer(one.action, "action on worlds", one.data.label) for one in active(operators)),
             *own.buffers,
         )
+
+    def crowding(self, w: int) -> str:
+        """Return in words which particle of a world, whose lists have overflowed, has how many near it."""
+        s, lists = self.s, self.lists
+        longest = [int(one.longest.to_numpy()[w]) for one in lists.rows()] if lists else [0]
+        who = int(s.read("failing_particle")[w])
+        place = s.snapshot(("id", "position"))
+        rows = place["position"][w][place["id"][w] == who]
+        where = "at ({:.4g}, {:.4g}, {:.4g}) m".format(*rows[0]) if len(rows) else "that has left"
+        return f"particle {who} {where}, one of those that have up to {max(longest)} others near them"
+
+    def list_bytes(self, sizes: ListSizes) -> int:
+        """Return the device memory (bytes) of the lists of pairs, were they of these sizes."""
+        s, each = self.s, 0
+        if self.lists and self.lists.near:
+            each += INTEGER * sizes.near
+        if self.pairs:
+            values = sum(one.size for one in self.pairs.memories)
+            values += self.exported.components if self.exported else 0
+            of_pair = 4 * INTEGER + (8 if s.real == ti.f64 else 4) * values
+            each += INTEGER * sizes.row + of_pair * sizes.mean
+        return each * s.worlds * s.capacity
 
     def _sweeps(self) -> Iterator[Buffer]:
         for one in self.derived_solvers:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from tisim.backend import memory, runtime
+from tisim.engine.crowding import check_places
 from tisim.engine.result import Result, Status
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, must
@@ -74,6 +75,8 @@ class Batches:
             for index, scene in enumerate(scenes):
                 try:
                     start = scene.start()
+                    # Before anything is compiled, and so that a search goes on without it.
+                    check_places(scene, start)
                 except InputError as error:
                     if strict:
                         raise

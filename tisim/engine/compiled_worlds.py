@@ -112,9 +112,17 @@ class CompiledWorlds:
     def grow_lists(self, sizes: ListSizes) -> None:
         """Make lists of pairs of these sizes, and compile the step anew for them.
 
-        Raise RunError where there is no room for them; lists are then as they were.
+        Raise RunError where there is no room for them, which is asked before any is made; lists are then as
+        they were.
         """
-        began, image, before = time.perf_counter(), self.s.image(), self.assembly.sizes
+        before = self.assembly.sizes
+        rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean, and of {sizes.near}"
+        rows += " for events and step control, are needed, and there is no room for them"
+        try:
+            memory.require_lists(self.assembly.list_bytes(sizes), self.assembly.list_bytes(before))
+        except NoRoom as no:
+            raise RunError(f"{rows}: {no}") from None
+        began, image = time.perf_counter(), self.s.image()
         self.s.write("status", WorldStatus.ENDED)
         try:
             try:
@@ -125,9 +133,7 @@ class CompiledWorlds:
                 self._assemble(sizes)
         except RunError as full:
             self._assemble(before)
-            rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean"
-            rows += f", and of {sizes.near} for events and step control"
-            raise RunError(f"{rows}, are needed, and there is no room for them: {full}") from None
+            raise RunError(f"{rows}: {full}") from None
         finally:
             self.put(image)
             self.setup_s += time.perf_counter() - began

@@ -8,6 +8,8 @@ import numpy as np
 
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import RUNNING, Status
+from tisim.errors import RunError
+from tisim.neighbours.half_list import ListSizes
 from tisim.worlds.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ REASONS: dict[int, str] = {
     WorldStatus.NOT_POSITIVE_DEFINITE: "the diffusion matrix is not positive definite",
     WorldStatus.STEP_TOO_LONG: "a step longer than half of the critical time step (2/omega) of the forces",
     WorldStatus.LIST_OVERFLOW: "more near pairs than their list has room for",
+    WorldStatus.OUTRUN: "a step so long that grains may pass through each other",
 }
 
 
@@ -106,8 +109,9 @@ class Monitor:
         goals, overflowed = live["goal"].copy(), live["failed"][worlds] == WorldStatus.LIST_OVERFLOW
         try:
             good = self.replay.last_good(worlds, self._finite)
+            longest = np.zeros(self.s.worlds)
             if (self.s.read("failing_effect") == ASKED).any():
-                self.simulation.assembly.failure_attribution.name_failing_effect()
+                longest = self.simulation.assembly.failure_attribution.name_failing_effect()
             then = self._snapshot()
             for name, values in live.items():
                 values[worlds] = good[name][worlds]
@@ -125,12 +129,27 @@ class Monitor:
             self.simulation.put(live)
         sizes = sizes.joined(self.simulation.list_sizes())
         for w in map(int, np.setdiff1d(worlds, crowded)):
-            self.faults[w] = float(then["time"][w]), self._fault(w, then)
+            self.faults[w] = float(then["time"][w]), self._fault(w, then, float(longest[w]))
         self._outdated[worlds] = False
         for name, good_values in self._last_good.items():
             good_values[worlds] = good[name][worlds]
         if len(crowded):
+            self._grow(crowded, sizes, then)
+
+    def _grow(self, crowded: np.ndarray, sizes: ListSizes, then: Image) -> None:
+        """Make lists longer for crowded worlds, which go on with them; where there is no room these have
+        failed."""
+        try:
             self.simulation.grow_lists(sizes)
+        except RunError as full:
+            status, failed = self.s.read("status"), then["failed"]
+            status[crowded] = WorldStatus.LIST_OVERFLOW
+            self.s.write("status", status)
+            for w in map(int, crowded):
+                who = ""
+                if failed[w] == WorldStatus.LIST_OVERFLOW:
+                    who = f", at particle {then['failing_particle'][w]}"
+                self.faults[w] = float(then["time"][w]), f"{REASONS[WorldStatus.LIST_OVERFLOW]}{who}: {full}"
 
     def _not_finite(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
         """Yield each quantity with the live particles, (worlds, capacity), of which it is not finite."""
@@ -158,8 +177,12 @@ class Monitor:
             return Status(True, f"{effects[by].ends}, by effects.{effects[by].label}")
         return Status(code == WorldStatus.ENDED, REASONS[code])
 
-    def _fault(self, w: int, then: Image) -> str:
-        """Return what is wrong with a world: what the kernels have recorded of it, or what is not finite."""
+    def _fault(self, w: int, then: Image, longest: float) -> str:
+        """Return what is wrong with a world: what the kernels have recorded of it, or what is not finite.
+
+        longest : the step (s) up to which the force that has stopped it would be finite; 0 where there is
+        none.
+        """
         code = int(then["failed"][w])
         if code == 0:
             for name, broken in self._not_finite(then):
@@ -168,6 +191,8 @@ class Monitor:
         failing_effect, who = int(then["failing_effect"][w]), int(then["failing_particle"][w])
         scene = self.simulation.scenes[w]
         reason = REASONS[code or WorldStatus.NOT_FINITE]
+        if code == WorldStatus.OUTRUN:
+            return f"{reason}: {self._outrun(w, then)}"
         if code == WorldStatus.NOT_CONVERGED:
             reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
         if code == WorldStatus.STEP_TOO_LONG:
@@ -180,4 +205,17 @@ class Monitor:
             reason += f", by effects.{effect.label}"
             stops = effect.may_stop(scene.effects, scene.domain) if code == WorldStatus.NOT_FINITE else ""
             where = f" (it is so where {stops})" if stops else ""
+            if 0.0 < longest < 0.999 * then["dt"][w]:
+                where += f"; the step is {then['dt'][w]:.4g} s, and at most {longest:.3g} s would do there"
         return f"{reason}{where}" if who == NO_ONE else f"{reason}, at particle {who}{where}"
+
+    def _outrun(self, w: int, then: Image) -> str:
+        """Return which particle of a world moves too far in a step, and below which length it does not."""
+        n, dt = int(then["count"][w]), float(then["dt"][w])
+        speed = np.linalg.norm(then["velocity"][w, :n] - then["frame"][w], axis=1)
+        who, smallest = int(np.argmax(speed)), float(then["radius"][w, :n].min())
+        moved = f"particle {then['id'][w][who]} moves by {speed[who] * dt:.3g} m beside the others"
+        passed = f"{moved} in {dt:.4g} s, and the smallest radius is {smallest:.3g} m"
+        if speed[who] == 0.0:
+            return passed
+        return f"{passed}; it must be below {smallest / speed[who]:.3g} s, and far shorter where they touch"

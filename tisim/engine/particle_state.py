@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tisim.effects.base import DerivedQuantity
+from tisim.engine.crowding import check_places, warn_of_overlaps
 from tisim.engine.loading import check_field, check_start
 from tisim.engine.monitor import Monitor
 from tisim.errors import must
@@ -61,6 +62,7 @@ class ParticleState(Mapping[str, np.ndarray]):
             check_sizes(name, fields[name].unit, new)
         scene = self._simulation.scenes[self._world]
         check_start(self._simulation.s.fields, scene, {**whole, name: new})
+        warn_of_overlaps([check_places(scene, {**whole, name: new})])
         _edit(self._simulation, self._world, name, new)
 
     def __contains__(self, name: object) -> bool:

@@ -10,12 +10,13 @@ import numpy as np
 
 from tisim.engine.allocation import parts
 from tisim.engine.compiled_worlds import CompiledWorlds
+from tisim.engine.crowding import check_places, warn_of_overlaps
 from tisim.engine.loading import check_reach, check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
-from tisim.errors import InputError, is_number, is_whole, must
+from tisim.errors import InputError, RunError, is_number, is_whole, must
 from tisim.neighbours import near_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.placed_together import placed_together
@@ -73,6 +74,7 @@ class Simulation(CompiledWorlds):
         starts = list(starts)
         for scene, start in zip(scenes, starts, strict=True):
             check_start(self.s.fields, scene, start)
+        warn_of_overlaps([check_places(scene, start) for scene, start in zip(scenes, starts, strict=True)])
         self.table.write([parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.edits = [[] for _ in scenes]
@@ -107,8 +109,15 @@ class Simulation(CompiledWorlds):
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
         self._begin()
-        while (self.s.read("failed") == WorldStatus.LIST_OVERFLOW).any():
-            self.grow_lists(self.list_sizes())
+        while (overflowed := self.s.read("failed") == WorldStatus.LIST_OVERFLOW).any():
+            try:
+                self.grow_lists(self.list_sizes())
+            except RunError as full:
+                crowded = np.flatnonzero(overflowed)[0]
+                who = self.assembly.crowding(crowded)
+                self.scenes = []
+                rule = "so far apart that lists of those within reach of each other find room"
+                raise InputError(f"particles must be {rule}; received {who}: {full}") from None
             self._begin()
 
     def _begin(self) -> None:

@@ -72,6 +72,13 @@ def exists(path: Path) -> bool:
     return _stat_following_links(path) is not None
 
 
+def irregular(path: Path) -> str | None:
+    """Return in words which kind of file other than a regular one has this name, links followed; None where
+    none has."""
+    info = _stat_following_links(path)
+    return None if info is None else _irregular_kind(info)
+
+
 def is_folder(path: Path) -> bool:
     """Return whether a folder of this name exists, links followed; raise InputError where that is
     forbidden."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
@@ -25,6 +26,12 @@ class BoxSurface(Surface):
     @property
     def face_count(self) -> int:
         return 6
+
+    def distances(self, places: np.ndarray) -> np.ndarray:
+        low, high = np.array(self.low), np.array(self.high)
+        beyond = np.maximum(low - places, places - high)
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+        return np.where(outside > 0.0, outside, -beyond.max(axis=1))
 
     @ti.func
     def nearest(self, w, k, c, r):

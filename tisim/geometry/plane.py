@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from operator import mul
 from typing import ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, parameter
 from tisim.components.directed import Directed
@@ -34,6 +36,10 @@ class Plane(Directed, Shape):
 
     def values(self) -> list[float]:
         return [*super().values(), math.fsum(map(mul, self.point, self.unit_vector()))]
+
+    def distances(self, places: np.ndarray) -> np.ndarray:
+        away: np.ndarray = (places - np.array(self.point)) @ np.array(self.unit_vector())
+        return away
 
     @ti.func
     def distance(self, w, k, r):

@@ -42,6 +42,22 @@ class RevolvedSurface(Surface):
         axis = np.array(direction) / math.hypot(*direction)
         return [*super().values(), *origin, *axis.tolist(), *across(axis)[0].tolist(), *sizes]
 
+    def distances(self, places: np.ndarray) -> np.ndarray:
+        origin, direction, length, low, high = self.generator()
+        axis = np.array(direction) / math.hypot(*direction)
+        out = places - np.array(origin)
+        z = out @ axis
+        rho = np.linalg.norm(out - z[:, None] * axis, axis=1)
+        # Each face as it is met in the plane through the axis: from where to where, along rho and z.
+        lines = ((low, 0.0, high, length), (0.0, 0.0, low, 0.0), (0.0, length, high, length))
+        least: np.ndarray = np.full(len(places), np.inf)
+        for near, begin, far, end in lines[: self.face_count]:
+            wide, tall = far - near, end - begin
+            square = wide * wide + tall * tall
+            u = np.clip(((rho - near) * wide + (z - begin) * tall) / (square or 1.0), 0.0, 1.0)
+            least = np.minimum(least, np.hypot(rho - near - u * wide, z - begin - u * tall))
+        return least
+
     @ti.func
     def nearest(self, w, k, c, r):
         out, axis, length = r - self.origin(w, k), self.axis(w, k), self.length(w, k)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.components.component import Component
 
@@ -17,6 +19,11 @@ class Shape(Component):
     def room(cls, rows: int) -> int:
         # A kind of which there is none costs nothing.
         return super().room(rows) if rows else 0
+
+    def distances(self, places: np.ndarray) -> np.ndarray:
+        """Return the distance (m) of each of some places (m, shape (n, 3)) from its surface, positive where
+        particles are, shape (n,)."""
+        raise NotImplementedError(f"{type(self).__name__} must define distances")
 
     @ti.func
     def distance(self, w, k, r):

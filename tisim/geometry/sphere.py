@@ -1,5 +1,7 @@
 """The surface of a sphere, and the distance from a ball."""
 
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, parameter
 from tisim.geometry.surface import Surface
@@ -24,6 +26,10 @@ class SphericalSurface(Surface):
 
     centre: Vector = parameter("m", "centre c", (0.0, 0.0, 0.0))
     radius: float = parameter("m", "radius R", examples=[0.1], gt=0)
+
+    def distances(self, places: np.ndarray) -> np.ndarray:
+        away: np.ndarray = np.linalg.norm(places - np.array(self.centre), axis=1) - self.radius
+        return np.abs(away)
 
     @ti.func
     def nearest(self, w, k, c, r):

@@ -1,7 +1,13 @@
-"""Cells in which triangles near a place are found, and how far away they are elsewhere."""
+"""Cells in which triangles near a place are found, and how far away they are elsewhere.
+
+A small triangle is listed in all cells that its box reaches into. A large one, such as a facet from end to
+end of a sheet that lies aslant, would fill most of the grid: it is listed in the cells that it meets itself,
+which are found by halving its box.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,18 +15,24 @@ from scipy.ndimage import distance_transform_edt
 
 CELLS = 2**20
 """A grid has at most so many cells."""
+MOST_LISTED = 2**22
+"""All cells together list at most so many triangles: 34 MB, and numbers that single precision tells apart."""
 WIDTH = 1.5
 """A cell is so many times as wide as the triangles are in the mean."""
+LARGE_SPAN = 64
+"""A triangle whose box reaches into more cells than this is large."""
+CELL_MARGIN = 1e-6
+"""Cells are taken to be wider by this part, as places round."""
 
 
 @dataclass(frozen=True)
 class TriangleGrid:
-    """A triangle grid lists with each cell the triangles whose boxes reach into it.
+    """A triangle grid lists with each cell the triangles that may reach into it.
 
     low : corner of the grid, m. width : of a cell, m. dims : cells along each axis. first : the first cell of
-    each triangle along each axis, shape (triangles, 3). begin : where the list of each cell begins in
-    ``members``, with the end of the last. clear : how far (m) each place of a cell is from all triangles at
-    least.
+    each triangle along each axis, shape (triangles, 3); -1 of large ones. begin : where the list of each cell
+    begins in ``members``, with the end of the last. clear : how far (m) each place of a cell is from all
+    triangles at least.
     """
 
     low: np.ndarray
@@ -38,14 +50,14 @@ class TriangleGrid:
         area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         width = WIDTH * float(np.sqrt(area / len(corners)))
+        reach = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
+        # One that reaches across a number of cells meets as many at least.
+        width = max(width, float(reach.sum()) / CELLS)
         while np.prod((high - low) / width + 1) > CELLS:
             width *= 2 ** (1 / 3)
-        dims = ((high - low) / width).astype(int) + 1
-        first, last = (
-            np.minimum(((ends - low) / width).astype(int), dims - 1)
-            for ends in (corners.min(axis=1), corners.max(axis=1))
-        )
-        cells, members = _listed(first, last, dims)
+        while (listed := _Listing(corners, low, high, width).pairs()) is None:
+            width *= 2
+        cells, members, first, dims = listed
         order = np.argsort(cells, kind="stable")
         counts = np.bincount(cells, minlength=int(np.prod(dims)))
         # Two places in cells whose centres are so far apart are nearer by a diagonal at most.
@@ -55,14 +67,97 @@ class TriangleGrid:
         return cls(low, width, dims, first, begin, members[order], clear)
 
 
-def _listed(first: np.ndarray, last: np.ndarray, dims: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return cell and triangle of each pair of the two that meet."""
-    spans = last - first + 1
-    number = spans.prod(axis=1)
-    triangle = np.repeat(np.arange(len(first)), number)
-    place = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
-    span = spans[triangle]
-    rest, z = np.divmod(place, span[:, 2])
-    x, y = np.divmod(rest, span[:, 1])
-    at = first[triangle] + np.stack([x, y, z], axis=1)
-    return (at[:, 0] * dims[1] + at[:, 1]) * dims[2] + at[:, 2], triangle
+class _Listing:
+    """A listing finds the cells of each triangle in a grid of a width (m)."""
+
+    def __init__(self, corners: np.ndarray, low: np.ndarray, high: np.ndarray, width: float) -> None:
+        self.corners, self.low, self.width = corners, low, width
+        self.dims = ((high - low) / width).astype(int) + 1
+        self.first, self.last = (
+            np.minimum(((ends - low) / width).astype(int), self.dims - 1)
+            for ends in (corners.min(axis=1), corners.max(axis=1))
+        )
+
+    def pairs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+        """Return cell and triangle of each pair of the two that meet, the first cells of triangles, and the
+        number of cells along each axis; None where there are too many pairs."""
+        number = (self.last - self.first + 1).prod(axis=1)
+        large = number > LARGE_SPAN
+        found, total = [], int(number[~large].sum())
+        if total > MOST_LISTED:
+            return None
+        small = np.flatnonzero(~large)
+        found.append(self._in_boxes(small))
+        for cells, triangle in self._by_halves(np.flatnonzero(large)):
+            total += len(cells)
+            if total > MOST_LISTED:
+                return None
+            found.append((cells, triangle))
+        cells, members = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return cells, members, np.where(large[:, None], -1, self.first), self.dims
+
+    def _index(self, at: np.ndarray) -> np.ndarray:
+        index: np.ndarray = (at[:, 0] * self.dims[1] + at[:, 1]) * self.dims[2] + at[:, 2]
+        return index
+
+    def _in_boxes(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the pairs of some triangles with all cells that their boxes reach into."""
+        spans = self.last[which] - self.first[which] + 1
+        number = spans.prod(axis=1)
+        row = np.repeat(np.arange(len(which)), number)
+        place = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+        rest, z = np.divmod(place, spans[row, 2])
+        x, y = np.divmod(rest, spans[row, 1])
+        return self._index(self.first[which[row]] + np.stack([x, y, z], axis=1)), which[row]
+
+    def _by_halves(self, which: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield the pairs of some triangles with the cells that they meet: blocks of cells are halved, and
+        those left out that a triangle does not meet."""
+        self.axes, self.number = self._parting(which), np.zeros(len(self.corners), int)
+        self.number[which] = np.arange(len(which))
+        waiting = [(which, self.first[which], self.last[which])] if len(which) else []
+        while waiting:
+            triangle, first, last = waiting.pop()
+            half = len(triangle) // 2
+            if half >= MOST_LISTED // 32:
+                # In parts, the last one first: so what waits takes little memory.
+                parts = (slice(None, half), slice(half, None))
+                waiting += [(triangle[part], first[part], last[part]) for part in parts]
+                continue
+            meets = self._meet(triangle, first, last)
+            triangle, first, last = triangle[meets], first[meets], last[meets]
+            whole = (first == last).all(axis=1)
+            yield self._index(first[whole]), triangle[whole]
+            triangle, first, last = triangle[~whole], first[~whole], last[~whole]
+            if len(triangle):
+                rows, axis = np.arange(len(triangle)), (last - first).argmax(axis=1)
+                middle, upper, lower = (first + last)[rows, axis] // 2, first.copy(), last.copy()
+                lower[rows, axis], upper[rows, axis] = middle, middle + 1
+                blocks = (np.concatenate([first, upper]), np.concatenate([lower, last]))
+                waiting.append((np.concatenate([triangle, triangle]), *blocks))
+
+    def _meet(self, triangle: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+        """Return whether triangles meet blocks of cells: unless an axis parts them.
+
+        Source: T. Akenine-Moeller, J. Graphics Tools 6 (2001) 29.
+        """
+        half = 0.5 * self.width * (1.0 + CELL_MARGIN) * (last - first + 1)
+        centre = self.low + 0.5 * self.width * (first + last + 1)
+        number, meets = self.number[triangle], np.arange(len(triangle))
+        for axis, least, most in self.axes:
+            which = number[meets]
+            along, size = axis[which], (np.abs(axis[which]) * half[meets]).sum(axis=1)
+            place = (along * centre[meets]).sum(axis=1)
+            meets = meets[(least[which] <= place + size) & (most[which] >= place - size)]
+        return meets
+
+    def _parting(self, which: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Return the axes that may part some triangles from blocks along x, y and z, each with where the
+        triangles begin and end along it."""
+        corners = self.corners[which]
+        sides = np.roll(corners, -1, axis=1) - corners
+        axes = [np.cross(sides[:, 0], sides[:, 1])]
+        axes += [np.cross(sides[:, k], along) for k in range(3) for along in np.eye(3)]
+        axes += [np.broadcast_to(along, axes[0].shape) for along in np.eye(3)]
+        places = [np.einsum("na,nca->nc", axis, corners) for axis in axes]
+        return [(axis, p.min(axis=1), p.max(axis=1)) for axis, p in zip(axes, places, strict=True)]

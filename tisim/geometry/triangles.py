@@ -13,7 +13,10 @@ from tisim.components.component import parameter
 from tisim.errors import InputError, is_number, must
 from tisim.files import regular_file
 from tisim.geometry.shape import Shape
-from tisim.geometry.triangle_grid import TriangleGrid
+from tisim.geometry.triangle_grid import MOST_LISTED, TriangleGrid
+
+MOST_DISTANCES = 2_000_000
+"""Where places and triangles make more pairs, ``distances`` says of all places that they are far away."""
 
 
 class TriangulatedSurface(Shape):
@@ -48,12 +51,14 @@ class TriangulatedSurface(Shape):
         except ImportError:
             rule = 'there to read a surface (python -m pip install "tisim[mesh]")'
             raise InputError(f"meshio must be {rule}; received none") from None
+        # What is none may have no end.
+        rule, other = "a file that meshio reads", regular_file.irregular(Path(path))
+        must(other is None, where, rule, f"{path!s} ({other})")
         try:
             # For an ASCII file of STL it multiplies what four letters would be as a number.
             with np.errstate(over="ignore"):
                 mesh = meshio.read(path)
         except (OSError, ValueError, meshio.ReadError, SystemExit) as fault:
-            rule = "a file that meshio reads"
             raise InputError(f"{where} must be {rule}; received {path!s} ({fault})") from None
         # Without the others there would be holes in it.
         others = {block.type for block in mesh.cells if block.dim == 2} - {"triangle"}
@@ -81,7 +86,9 @@ class TriangulatedSurface(Shape):
         whole = (self.faces == np.rint(self.faces)) & (self.faces >= 0) & (self.faces < count)
         rule = f"whole numbers below the number of vertices, {count}"
         must(bool(whole.all()), f"{label}.faces", rule, self.faces[~whole][:1].tolist())
-        must(len(self.corners()) > 0, f"{label}.faces", "triangles with an area", "none")
+        number = len(self.corners())
+        must(number > 0, f"{label}.faces", "triangles with an area", "none")
+        must(number <= MOST_LISTED, f"{label}.faces", f"at most {MOST_LISTED} triangles", number)
         return self
 
     def __eq__(self, other: object) -> bool:
@@ -112,6 +119,23 @@ class TriangulatedSurface(Shape):
             "listed": grid.members[:, None],
             "clear": grid.clear[:, None],
         }
+
+    def distances(self, places: np.ndarray) -> np.ndarray:
+        corners = self.corners()
+        least: np.ndarray = np.full(len(places), np.inf)
+        if len(places) * len(corners) > MOST_DISTANCES:
+            return least
+        for a, b, c in corners:
+            sides, normal = (b - a, c - b, a - c), np.cross(b - a, c - a)
+            normal = normal / np.linalg.norm(normal)
+            over = np.ones(len(places), bool)
+            for begin, side in zip((a, b, c), sides, strict=True):
+                out = places - begin
+                over &= out @ np.cross(normal, side) >= 0.0
+                along = np.clip(out @ side / (side @ side), 0.0, 1.0)
+                least = np.minimum(least, np.linalg.norm(out - along[:, None] * side, axis=1))
+            least = np.where(over, np.minimum(least, np.abs((places - a) @ normal)), least)
+        return least
 
     @ti.func
     def nearest(self, m, r):
@@ -177,7 +201,9 @@ class TriangulatedSurface(Shape):
         """Return whether triangle m, which may be in several of the cells from ``low`` on, has not been in
         those before x, y, z."""
         first = [ti.max(ti.cast(self.first[m, axis], ti.i32), low[axis]) for axis in ti.static(range(3))]
-        return x == first[0] and y == first[1] and z == first[2]
+        # A large one is not in all cells of its box, and is looked at in each that has it.
+        large = self.first[m, 0] < 0.0
+        return large or (x == first[0] and y == first[1] and z == first[2])
 
 
 @ti.func

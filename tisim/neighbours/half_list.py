@@ -21,6 +21,7 @@ from tisim.neighbours.neighbour_rows import ALL_PAIRS, NeighbourRows
 from tisim.numerics.ieee import far_away
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
+from tisim.worlds.status import WorldStatus
 
 REACH_PART = 0.125
 """Part of the skin that is kept for laws that come to reach farther, as that of particles that grow does."""
@@ -52,6 +53,7 @@ class HalfList(NeighbourRows):
     """A half list has the pairs of the worlds by which laws may act, each row in order of index.
 
     within_bodies : whether pairs within a rigid body are among them, as a law acts between these.
+    solid : whether a law holds spheres apart that touch, which must not pass through each other unseen.
     spent : part of the skin that movements may use up. pace : how far a particle moves in a step (m), found
     from ``moves`` steps since the list was ``made`` (s).
     """
@@ -69,6 +71,7 @@ class HalfList(NeighbourRows):
         super().__init__(s, domain, sizes.row)
         self.constraints = constraints
         self.within_bodies = any(law.data.within_bodies for law in laws)
+        self.solid = any(law.data.solid for law in laws)
         self.laws, self.sizes = tuple(law for law in laws if law.data.reaches()), sizes
         self.spent = 1.0 - REACH_PART if self.laws else 1.0
         self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
@@ -172,11 +175,16 @@ class HalfList(NeighbourRows):
     def moved(self, w):
         """Note that particles have moved by at most ``displacement`` relative to the frame, along each
         axis."""
-        square = ti.cast(0.0, ti.f64)
+        square, step = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
         self.moves[w] = self.moves[w] + 1
         for k in ti.static(range(3)):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
             square += self.since[w, k] ** 2
+            step += self.s.displacement[w, k] ** 2
+        # Two that meet head on move past each other by twice as much.
+        smallest = ti.cast(self.grid.smallest[w], ti.f64)
+        if ti.static(self.solid) and self.s.count[w] > 1 and step > smallest * smallest:
+            ti.atomic_max(self.s.failed[w], WorldStatus.OUTRUN)
         apart = 2.0 * ti.sqrt(square)
         if ti.static(self.images > 0):
             apart += self.sheared(w, self.s.time[w] + self.s.dt[w] - self.made[w])

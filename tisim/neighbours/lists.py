@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from tisim.backend.taichi import ti
 from tisim.neighbours.half_list import ListSizes
 from tisim.neighbours.near_list import NearList
+from tisim.neighbours.neighbour_rows import NeighbourRows
 from tisim.worlds.state import State
 
 if TYPE_CHECKING:
@@ -42,6 +43,10 @@ class NeighbourLists:
         if ti.static(self.watched):
             gap = self.near.sure(w)
         return gap
+
+    def rows(self) -> tuple[NeighbourRows, ...]:
+        """Return the rows of each list."""
+        return tuple(one if isinstance(one, NeighbourRows) else one.half_list for one in self.lists)
 
     def forget(self) -> None:
         """Have all lists made anew before they are used again."""

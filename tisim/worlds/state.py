@@ -47,18 +47,21 @@ class State(StateMemory):
 
     @ti.func
     def mass_at_wall(self, w, i):
-        """Return the mass (kg) that damps a contact of particle i with a wall; its own, where it is as heavy
-        as one itself: nothing moves by it, and the force on either is that of a particle."""
+        """Return the mass (kg) that damps a contact of particle i with a wall, and 1; where i is as heavy as
+        a wall itself its own mass, as the force on either is that of a particle, and 0: nothing moves by
+        it."""
         mass, own = self.mass_behind(w, i), self.mass[w, i]
-        return ti.select(mass >= HEAVY * own, own, mass)
+        held = mass >= HEAVY * own
+        return ti.select(held, own, mass), ti.cast(ti.select(held, 0.0, 1.0), self.real)
 
     @ti.func
     def masses_behind(self, w, i, j):
-        """Return the masses (kg) that a contact of particles i and j meets; their own, where both are as
-        heavy as walls."""
+        """Return the masses (kg) that a contact of particles i and j meets, and 1; where both are as heavy as
+        walls their own masses, and 0: nothing moves by the contact."""
         m, n, own, other = self.mass_behind(w, i), self.mass_behind(w, j), self.mass[w, i], self.mass[w, j]
         both = (m >= HEAVY * own) & (n >= HEAVY * other)
-        return ti.select(both, own, m), ti.select(both, other, n)
+        free = ti.cast(ti.select(both, 0.0, 1.0), self.real)
+        return ti.select(both, own, m), ti.select(both, other, n), free
 
     @ti.func
     def copy(self, w, source, target):

@@ -30,6 +30,8 @@ class WorldStatus(IntEnum):
     """A step is longer than half of the critical step of the forces on a particle."""
     LIST_OVERFLOW = 11
     """There are more near pairs than their list has room for; it is made longer, and the world goes on."""
+    OUTRUN = 12
+    """Grains move so far in a step that they may pass through each other unseen."""
 
 
 NO_ONE = 2**31 - 1

@@ -209,7 +209,7 @@ def _along(law: ti.template(), path: Array, out: Array):
     """Forces along a path of overlap, slip and relative spin, of R* = 1 m, m* = 1 kg and the normal x."""
     ti.loop_config(serialize=True)
     for _ in range(1):
-        at_wall = ti.Vector([2.5, 2.5])
+        at_wall = ti.Vector([1.0, 3.5, 2.5, 2.5])
         past = ti.Vector.zero(ti.f64, max(1, law.memory))
         n = ti.Vector([1.0, 0.0, 0.0])
         for k in range(path.shape[0]):

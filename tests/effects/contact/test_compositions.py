@@ -8,7 +8,11 @@ from tests.effects.contact.grains import run, twin
 from tests.effects.contact.test_granular_impacts import couple_energies
 from tests.scenes import by_id
 
-pytestmark = pytest.mark.long
+# Grains overlap deeply at the start here, on purpose.
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.filterwarnings("ignore::tisim.errors.StartWarning"),
+]
 
 
 EACH = [name if name == "jkr" else pytest.param(name, marks=pytest.mark.slow) for name in LAWS]

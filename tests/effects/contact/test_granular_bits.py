@@ -20,7 +20,11 @@ from tisim.neighbours.half_list import ListSizes
 from tisim.operators import Operator
 from tisim.worlds.team import Teams
 
-pytestmark = pytest.mark.long
+# Grains overlap deeply at the start here, on purpose.
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.filterwarnings("ignore::tisim.errors.StartWarning"),
+]
 
 GRAINS, STEPS, DT = 200, 200, 2e-4
 CHUNK_SLOTS = 32

@@ -24,6 +24,9 @@ from tisim.packing import EqualSizes
 from tisim.steppers import Verlet
 from tisim.testing.uncompiled import started
 
+# Grains overlap deeply at the start here, on purpose.
+pytestmark = pytest.mark.filterwarnings("ignore::tisim.errors.StartWarning")
+
 
 def material(**changes):
     return Material(**{**USUAL, **changes})
@@ -160,7 +163,7 @@ def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
 def test_walls_say_what_the_laws_of_the_scene_say():
     """Of cohesion where a law has one that grows with the overlap; a bridge holds on to what parts."""
     long, held = (
-        "a step is too long for the springs and dashpots of a contact",
+        "a step is too long for the springs and dashpots of a contact, or for how fast surfaces meet",
         "or no elastic force holds the cohesion there",
     )
     bridge = CapillaryBridge(surface_tension=1.0, volume=1e-3)
@@ -195,13 +198,12 @@ def ends(scenes):
 
 @pytest.mark.long
 def test_what_no_step_can_follow_stops_the_world_and_is_named():
-    """Centres in one place, a modulus beyond numbers, and steps too long for a pair, its damping and a wall;
+    """A modulus beyond numbers, and steps too long for a pair, its damping and a wall;
     the state of before is kept."""
     far = {"dt": 1e-3, "steps": 1000}
     stiff = {"law": {"young": 1e15}, **far}
     couple = [[0, 0, 9], [2.1, 0, 9]]
     made = {
-        "one place": (grains([[0, 0, 5]] * 2, [[0, 0, 0]] * 2, **far), "granular"),
         "no number": (
             grains([[0, 0, 5], [1, 0, 5]], [[0, 0, 0]] * 2, law={"young": 1e300}, **far),
             "granular",

@@ -9,7 +9,11 @@ from tisim.backend.taichi import ti
 from tisim.effects import parameter
 from tisim.operators import Operator
 
-pytestmark = pytest.mark.long
+# Grains overlap deeply at the start here, on purpose.
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.filterwarnings("ignore::tisim.errors.StartWarning"),
+]
 
 GRAINS, BEFORE, AFTER, DT = 60, 100, 100, 2e-4
 PIECE = 0.15

@@ -45,6 +45,11 @@ class Constraint(Effect):
         can."""
         raise NotImplementedError(f"{type(self).__name__} must define held")
 
+    def bodies(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the number of the rigid body of each particle of a start, shape (n,), and -1 where it is of
+        none; as ``joined`` has them in kernels."""
+        return np.full(len(start["mass"]), -1)
+
     def marks(self) -> str:
         """Return what its ``mark`` must be for some particles, as a message says it."""
         return "that of a body"

@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
+SLIDING = 3.5
+"""m* over the reduced mass of the surfaces of two solid spheres that slide, as these turn too."""
 LEAST_OVERLAP = 1e-3
 """Grains at rest under load overlap by some such part of R*: the stiffness is asked for at this overlap at
 least."""

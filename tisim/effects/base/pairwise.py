@@ -15,13 +15,15 @@ class Pairwise(Effect):
     summed over the pair list, otherwise over all pairs. within_bodies : whether a short-ranged one acts
     between the particles of one rigid body as well, as what is a cut-off of a sum over all pairs does.
     truncated : whether ``reach`` is a cut-off of what would go on: far more pairs are within it than touch,
-    and laws of contact are not asked of those.
+    and laws of contact are not asked of those. solid : whether it holds spheres apart that touch: a world in
+    which a step is so long that they may pass through each other is stopped.
     """
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = False
     within_bodies: ClassVar[bool] = False
     truncated: ClassVar[bool] = False
+    solid: ClassVar[bool] = False
 
     def reaches(self) -> bool:
         """Return whether it acts beyond contact at all, given its options."""

@@ -57,6 +57,9 @@ class PrescribedMotion(Constraint):
         held: np.ndarray = start.get("group", np.zeros(len(start["mass"]))) == self.group
         return held
 
+    def bodies(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        return np.where(start.get("group", np.zeros(len(start["mass"]))) == self.group, self.group, -1)
+
     def marks(self) -> str:
         return str(self.group)
 

@@ -54,6 +54,9 @@ class RigidClumps(Constraint):
         fastest = float(np.linalg.norm(start.get("spin", np.zeros((1, 3))), axis=1).max(initial=0.0))
         return 2 / fastest if fastest > 0 else math.inf
 
+    def bodies(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        return start.get("clump", np.full(len(start["mass"]), NO_CLUMP))
+
     @ti.func
     def holds(self, s, w, i):
         return s.clump[w, i] != NO_CLUMP

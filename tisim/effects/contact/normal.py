@@ -79,6 +79,7 @@ class NormalContact(PairForce):
     short_ranged: ClassVar[bool] = True
     # Contacts begin and end.
     kinked: ClassVar[bool] = True
+    solid: ClassVar[bool] = True
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
     fields = ("radius",)

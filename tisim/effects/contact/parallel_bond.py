@@ -11,9 +11,9 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect, PairForce, parameter
-from tisim.effects.base.critical_step import critical_step, smallest_grains
+from tisim.effects.base.critical_step import SLIDING, critical_step, smallest_grains
 from tisim.effects.contact.granular.spring import turned
-from tisim.effects.contact.granular.step_limit import SLIDING, can_follow, can_follow_both, least_mass
+from tisim.effects.contact.granular.step_limit import can_follow, can_follow_both, least_mass
 from tisim.numerics.vectors import piece
 
 
@@ -124,7 +124,7 @@ class ParallelBond(PairForce):
         whole = (tension <= self.tensile_strength(w)) & (shearing <= self.shear_strength(w))
         holds = ((past[0] > 0.0) | begins) & whole
 
-        m, n = s.masses_behind(w, i, j)
+        m, n, free = s.masses_behind(w, i, j)
         inertia, other = 0.4 * m * a * a, 0.4 * n * b * b
         mass, turning = reduced(m, n), reduced(inertia, other)
         # Surfaces that are sheared push and turn both grains.
@@ -136,12 +136,12 @@ class ParallelBond(PairForce):
         force = (pull + along * opening) * normal + shear + across * sliding
         couple = moment + bent * bending + (twist + twisted * twisting) * normal
         # In a longer step what is stretched, sheared, bent or twisted would alternate and grow.
-        follows = can_follow(least_mass(stiff * area, along, dt), 1.0 / mass)
-        follows = follows & can_follow(least_mass(2.0 * soft * second, twisted, dt), 1.0 / turning)
+        follows = can_follow(least_mass(stiff * area, along, dt), free / mass)
+        follows = follows & can_follow(least_mass(2.0 * soft * second, twisted, dt), free / turning)
         shears, bends = least_mass(soft * area, across, dt), least_mass(stiff * second, bent, dt)
         # Of unlike grains what is sheared bends too.
-        coupled = arm / inertia - back / other
-        follows = follows & can_follow_both(shears, bends, sheared, 1.0 / turning, coupled)
+        coupled = free * (arm / inertia - back / other)
+        follows = follows & can_follow_both(shears, bends, free * sheared, free / turning, coupled)
         force = ti.select(follows, force, ti.math.nan)
 
         force, couple = ti.select(holds, force, 0.0), ti.select(holds, couple, 0.0)

@@ -55,6 +55,8 @@ class WallContacts(WallSearch):
                     push, turn = self.touch_surfaces(s, w, i, number + before, number, found, t, dt, commit)
                     force, torque, touching = force + push, torque + turn, touching + number
                     clear = ti.min(clear, beside)
+                    if touching == 0 and self.may_have_passed(s, w, i, beside, t, dt):
+                        force[0] = ti.math.nan
                 if commit:
                     self.note_clearance(s, w, i, ti.select(touching > 0, 0.0, clear), t)
             if commit and touching + before > 0:
@@ -88,6 +90,14 @@ class WallContacts(WallSearch):
             moved = (s.position[w, i] - seen).norm() + self.clear[w, i, 4] * ti.cast(t, s.real)
             near = moved + self.reach(s, w, i) >= self.clear[w, i, 3]
         return near
+
+    @ti.func
+    def may_have_passed(self, s, w, i, beside, t, dt):
+        """Return whether grain i, so far ``beside`` (m) sheets that it does not touch, may have gone through
+        one in this step: by less than its reach it would be seen to touch it."""
+        at = s.position[w, i]
+        path = dt * (s.velocity[w, i] - self.motion.velocity_at(self.kept, w, at, t)).norm()
+        return (path > self.reach(s, w, i)) & (path > beside)
 
     @ti.func
     def note_clearance(self, s, w, i, clear, t):
@@ -161,6 +171,8 @@ class WallContacts(WallSearch):
                 past[c] = ti.select(new > 0, 0.0, self.surface_past[w, i, at + 3 + first + c])
             push, turn, known = self.touch(s, w, i, law, outward, found[q, 3], past, t, dt)
             force, torque = force + push, torque + turn
+            if self.goes_through(s, w, i, outward, found[q, 3], t, dt):
+                force[0] = ti.math.nan
             if commit:
                 for c in ti.static(range(size)):
                     self.surface_past[w, i, at + 3 + first + c] = known[c]
@@ -169,6 +181,14 @@ class WallContacts(WallSearch):
             for axis in ti.static(range(3)):
                 self.surface_past[w, i, at + axis] = direction[axis]
         return force, torque
+
+    @ti.func
+    def goes_through(self, s, w, i, outward, distance, t, dt):
+        """Return whether the centre of grain i would be behind a sheet after another such step, which then
+        would push it out there; it is ``distance`` (m) from it, along ``outward``."""
+        away = self.motion.to_space(self.kept, w, outward, t)
+        sheet = self.motion.velocity_at(self.kept, w, s.position[w, i] - distance * away, t)
+        return dt * (sheet - s.velocity[w, i]).dot(away) > distance
 
     @ti.func
     def slots(self, s, w, i, number, found, t):

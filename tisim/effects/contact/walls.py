@@ -112,6 +112,15 @@ class Walls(WallContacts, UsesMaterials, Force):
         """Return whether there are surfaces other than planes."""
         return self.surface is not None or any(self.kinds_of_surface())
 
+    def overlaps(self, position: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """Return how deep (m) spheres at some places (m, shape (n, 3)) are in the wall at the time 0: what is
+        behind a plane by more than its diameter; shape (n,)."""
+        shapes = [shape for name, _ in self.lists() for shape in getattr(self, name)]
+        shapes += [self.surface] if self.surface else []
+        places = position - np.array(self.motion.shift())
+        deepest: np.ndarray = radius - np.min([shape.distances(places) for shape in shapes], axis=0)
+        return deepest
+
     def keeps(self, what: str) -> tuple[str, ...]:
         kept = tuple(self.motion.quantities)
         names = {"world_quantities": kept, "totals": ("resistance",) if kept else ()}

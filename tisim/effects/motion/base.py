@@ -39,6 +39,10 @@ class Motion(Component):
         not known ahead."""
         return 0.0
 
+    def shift(self) -> Vector:
+        """Return how far (m) the body is at the time 0 from where its shapes say."""
+        return 0.0, 0.0, 0.0
+
     @ti.func
     def to_body(self, kept, w, r, t):
         """Return where a place r (m) in space is among the shapes of the body at time t (s, f64)."""

@@ -21,6 +21,10 @@ class Oscillation(Motion):
     def top_speed(self, extent: float) -> float:
         return 2 * math.pi * self.frequency * math.hypot(*self.amplitude)
 
+    def shift(self) -> Vector:
+        x, y, z = (math.sin(self.phase) * part for part in self.amplitude)
+        return x, y, z
+
     @ti.func
     def angle(self, w, t):
         # In f64, whatever the precision: it grows without bound.

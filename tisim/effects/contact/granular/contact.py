@@ -10,7 +10,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.material_law import MaterialLaw
 from tisim.effects.base import Effect, Field, PairForce
-from tisim.effects.contact.granular.step_limit import TURNING, rolling_inertia
+from tisim.effects.contact.granular.step_limit import TRAVEL, inverse_masses, wall_inverse_masses
 
 
 class GranularContact(MaterialLaw, PairForce):
@@ -54,8 +54,8 @@ class GranularContact(MaterialLaw, PairForce):
         (s), given ``past``.
 
         pair : which materials touch (see tisim/components/material_law.py). normal : unit vector from i to
-        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses : of
-        what rolls, over 1/m* (see ``rolling_inertia``). slip : velocity (m/s) of the surface of the other
+        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses :
+        inverse masses, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of the other
         past that of i. spinning : spin (rad/s) of the other relative to i. Where there is no contact what it
         returns is not used, and may be no number.
         """
@@ -68,19 +68,24 @@ class GranularContact(MaterialLaw, PairForce):
         arm = a - 0.5 * overlap
         normal = (1.0 / distance) * separation
         turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
-        slip = s.relative_velocity(w, i, j, separation) - turn.cross(normal)
-        m, n = s.masses_behind(w, i, j)
+        passing = s.relative_velocity(w, i, j, separation)
+        slip = passing - turn.cross(normal)
+        m, n, free = s.masses_behind(w, i, j)
         # R* and m*, by one division, and by no product of masses, which of small grains is below f32.
         sizes, masses = a + b, m + n
         inverse = 1.0 / (sizes * masses)
         lever, share = b * (masses * inverse), n * (sizes * inverse)
-        radius, mass, inverses = a * lever, m * share, rolling_inertia(lever, share)
+        radius, mass = a * lever, m * share
+        inverses = inverse_masses(lever, share, overlap / radius, free)
         pair, spinning = self.material_pair(s, w, i, j), s.spin[w, j] - s.spin[w, i]
         # Chosen afterwards, not by a branch: several pairs are computed at once.
         force, couple, known = self.contact(
             w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt
         )
         lasts = self.lasts(w, pair, overlap, radius, past)
+        # Else two would be deep in each other, or past each other, before either is felt.
+        outrun = (overlap >= 0.0) & ((free * dt * passing).norm_sqr() > (TRAVEL * ti.min(a, b)) ** 2)
+        force = ti.select(outrun, ti.math.nan, force)
         force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
         # n x F is the same seen from either: both turn round at once.
         moment = normal.cross(force)
@@ -104,12 +109,13 @@ class GranularContact(MaterialLaw, PairForce):
         if ti.static(self.several):
             pair = s.material[w, i] * self.number_of_materials + material
         slip = velocity - s.velocity[w, i] - (arm * spin).cross(normal)
-        mass, spinning = s.mass_at_wall(w, i), turning - spin
-        # What rolls on a wall slides past it as fast.
-        inverses = TURNING * ti.Vector([1.0, 1.0])
+        mass, free = s.mass_at_wall(w, i)
+        spinning, inverses = turning - spin, wall_inverse_masses(overlap / radius, free)
         force, couple, known = self.contact(
             w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt
         )
         lasts = self.lasts(w, pair, overlap, radius, past)
+        outrun = (overlap >= 0.0) & (free * dt * ti.abs(slip.dot(normal)) > TRAVEL * radius)
+        force = ti.select(outrun, ti.math.nan, force)
         force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
         return force, arm * normal.cross(force) + couple, ti.select(lasts, known, 0.0)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -14,6 +14,7 @@ from tisim.components.domain import Domain
 from tisim.components.material_law import MaterialLaw
 from tisim.effects.base import Effect, option
 from tisim.effects.base.critical_step import (
+    SLIDING,
     critical_step,
     elastic_contact,
     impact_stiffness,
@@ -34,7 +35,6 @@ from tisim.effects.contact.granular.parts import (
     TangentialForce,
     TwistingResistance,
 )
-from tisim.effects.contact.granular.step_limit import SLIDING
 from tisim.errors import must
 from tisim.numerics.vectors import piece
 
@@ -61,15 +61,21 @@ class Granular(ContactGuards, GranularContact):
     gives its restitution to 0.004.
 
     In a step beyond S dt^2 + 2 gamma dt = 4 m of any spring and dashpot what they hold would alternate and
-    grow: the force is then not a number, and the world stops. The mass m is m* along the normal; 2/7 m* of
-    surfaces that slide; I*/R*^2 of those that roll, with 1/I* = 1/I_i + 1/I_j; and I* where S is a couple of
-    twisting. What slides and rolls at a wall, or of unlike grains, moves each other, and its limit is that of
-    both together. Mindlin's spring asks for steps shorter by sqrt(14 G*/E*) than Hertz's, 1.70 at nu = 0.3.
-    Parts without friction have no limit. It is that of a pair by itself: in rows and heaps energy grows in
+    grow: the force is then not a number, and the world stops. The mass m is m* along the normal; of surfaces
+    that slide 2/7 m*, and less where they overlap by more than four radii; I*/R*^2 of those that roll, with
+    1/I* = 1/I_i + 1/I_j; and I* where S is a couple of twisting. What slides and rolls at a wall, or of
+    unlike grains, moves each other, and its limit is that of both together. Mindlin's spring asks for steps
+    shorter by sqrt(14 G*/E*) than Hertz's, 1.70 at nu = 0.3. Parts without friction have no limit, and two
+    bodies that are both held have none. It is that of a pair by itself: in rows and heaps energy grows in
     shorter steps, in a row of n grains with undamped springs from 1 / (sqrt(2) cos(pi / (2 n))) of it on,
     0.72 for ten and 0.71 for many. Of rigid clumps the mass is that of the body, as if it were a solid
     sphere: at a lever l about an axis with the moment of inertia I a contact moves it by 1/M + l^2/I, and the
     limit falls by sqrt(1 + M l^2/I), 1.31 at the end of two spheres that touch.
+
+    A world also stops at a step in which two that touch move past each other by more than the smaller radius,
+    a grain comes nearer a wall by more than its own, or grains may pass through each other or through a sheet
+    between two looks. Below these limits an undamped impact may still come out with up to 1 / (1 - S dt^2 / 4
+    m) times its energy, by chance: 1.01 times at a thirtieth of a period.
 
     A spring acts with the surfaces of half a step ago, seen along the normal at the end of the step. One that
     carries a steady force T in a pair that goes round, with a spin about its normal, so does a work of T^2 dt
@@ -78,6 +84,8 @@ class Granular(ContactGuards, GranularContact):
     Source: that of its parts; composed as by A. P. Santos, D. S. Bolintineanu, G. S. Grest, J. B. Lechman, S.
     J. Plimpton, I. Srivastava and L. E. Silbert, Phys. Rev. E 102 (2020) 032903.
     """
+
+    solid: ClassVar[bool] = True
 
     normal: NormalForce = option("elastic force along the line of centres", HertzMaterial())
     damping: Damping | None = option("damping, of the normal and the tangential force", None)
@@ -141,7 +149,8 @@ class Granular(ContactGuards, GranularContact):
 
     def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
         cohesion = ", or no elastic force holds the cohesion there" if self.by_overlap else ""
-        return f"a step is too long for the springs and dashpots of a contact{cohesion}"
+        long = "a step is too long for the springs and dashpots of a contact, or for how fast surfaces meet"
+        return f"{long}{cohesion}"
 
     def members(self) -> dict[str, Component]:
         names = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")

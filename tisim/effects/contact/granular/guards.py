@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from tisim.backend.taichi import ti
 from tisim.effects.contact.granular.step_limit import (
-    SLIDING,
     can_follow,
     can_follow_both,
     least_held,
@@ -37,7 +36,7 @@ class ContactGuards:
         stiffness, damping : S_n (N/m) and gamma_n (N s/m). spring, dashpot, friction : those of the
         tangential force.
         """
-        inverse, rolls, twists = 1.0 / mass, 0.0 * mass, 0.0 * mass
+        inverse, rolls, twists = inverses / mass, 0.0 * mass, 0.0 * mass
         slides = least_held(friction, spring, dashpot, dt)
         if ti.static(self.has("rolling")):
             stiff, drag = (
@@ -53,9 +52,8 @@ class ContactGuards:
             arm = self.twisting.coulomb(w, pair, circle, friction)
             # As a mass, I/R*^2: moments of inertia of the smallest grains are no numbers of f32.
             twists = least_held(arm, turn, loss, dt) / radius / radius
-        light, both = inverses[0] * inverse, inverses[1] * inverse
-        follows = can_follow(least_mass(stiffness, damping, dt), inverse) & can_follow(twists, light)
-        return follows & can_follow_both(slides, rolls, SLIDING * inverse, light, both)
+        follows = can_follow(least_mass(stiffness, damping, dt), inverse[0]) & can_follow(twists, inverse[2])
+        return follows & can_follow_both(slides, rolls, inverse[1], inverse[2], inverse[3])
 
     @ti.func
     def holds_apart(self, w, pair, radius):

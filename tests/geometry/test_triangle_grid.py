@@ -1,0 +1,74 @@
+"""Grids of triangles: every triangle near a place is listed there, and lists are bounded."""
+
+import os
+import time
+
+import numpy as np
+import pytest
+
+from tisim import InputError
+from tisim.geometry import TriangulatedSurface, triangle_grid
+from tisim.geometry.triangle_grid import TriangleGrid
+
+
+def uneven(fine, long):
+    """A sheet of a few long facets, aslant, with a finely meshed bolt on it; (triangles, 3, 3), m."""
+    t = np.linspace(0, 2 * np.pi, fine // 2 + 1)
+    foot = np.column_stack([0.02 * np.cos(t), 0.02 * np.sin(t), 0 * t])
+    top = foot + np.array([0, 0, 0.02])
+    bolt = [np.stack([foot[:-1], foot[1:], top[1:]], 1), np.stack([foot[:-1], top[1:], top[:-1]], 1)]
+    u = np.linspace(0, 1, long // 2 + 1)[:, None]
+    low, high = (np.array(end) + u * [0.4, -0.4, 0.0] for end in ([-2.5, -2.5, 0.0], [2.5, 2.5, 2.5]))
+    sheet = [np.stack([low[:-1], high[:-1], high[1:]], 1), np.stack([low[:-1], high[1:], low[1:]], 1)]
+    return np.concatenate([*bolt, *sheet])
+
+
+def slivers(number, thin=1e-5):
+    """Triangles of a km by 10 um."""
+    y = thin * np.arange(number)
+    return np.stack([np.stack([x + 0 * y, y, z + 0 * y], 1) for x, z in ((0, 0), (1e3, 0), (1e3, thin))], 1)
+
+
+@pytest.mark.parametrize(
+    "corners", [uneven(2000, 40), uneven(4000, 200), slivers(5000)], ids=["sheet", "body", "slivers"]
+)
+def test_a_mesh_of_some_thousand_triangles_takes_seconds_and_few_entries(corners):
+    """There were 1e8 and more."""
+    began = time.perf_counter()
+    grid = TriangleGrid.of(corners)
+    assert time.perf_counter() - began < 60
+    assert len(grid.members) <= triangle_grid.MOST_LISTED
+    assert np.prod(grid.dims) <= triangle_grid.CELLS
+    assert set(grid.members) == set(range(len(corners)))
+
+
+def test_large_triangles_are_listed_in_every_cell_that_they_meet():
+    """Places all over each triangle lie in cells that list it, and none of these is told to be clear."""
+    corners = uneven(200, 20)
+    grid, rng = TriangleGrid.of(corners), np.random.default_rng(0)
+    assert (grid.first[-20:] < 0).all()
+    assert (grid.first[:200] >= 0).all()
+    shares = rng.dirichlet((1, 1, 1), 2000)
+    for k in (0, 100, 200, 205, 219):
+        places = shares @ corners[k]
+        at = np.minimum(((places - grid.low) / grid.width).astype(int), grid.dims - 1)
+        cells = (at[:, 0] * grid.dims[1] + at[:, 1]) * grid.dims[2] + at[:, 2]
+        for cell in np.unique(cells):
+            assert k in grid.members[grid.begin[cell] : grid.begin[cell + 1]]
+            assert grid.clear[cell] == 0
+    # Few of the cells of its box list a large one.
+    box = np.ptp(corners[200], axis=0) / grid.width
+    assert (grid.members == 200).sum() < 0.2 * box.prod()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no fifos")
+@pytest.mark.parametrize("kind", ["fifo", "device"])
+def test_what_is_no_regular_file_is_refused(tmp_path, kind):
+    """One waits for ever, the other has no end."""
+    path = tmp_path / "drum.stl"
+    if kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=rf"surface must be a file that meshio reads; received .*{kind}"):
+        TriangulatedSurface.read(path)

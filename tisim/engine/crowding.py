@@ -1,0 +1,243 @@
+"""Starts whose particles lie in each other: those that cannot be run are refused, others warned of.
+
+A start may have any number of particles at one place, so nothing here takes more memory than a few columns of
+them: the first checks count particles in cells that are so small that all in one overlap.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tisim.backend import runtime
+from tisim.backend.memory import LISTS_PART
+from tisim.effects.base import Constraint, PairEvent, Pairwise
+from tisim.effects.contact.walls import Walls
+from tisim.errors import InputError, StartWarning
+from tisim.interactions.contact_list import CONTACTS_PER_PARTICLE
+from tisim.interactions.contact_memory import PARTNERS
+from tisim.scene.initial_state import Arrays
+from tisim.scene.scene import Scene
+
+PAIR_BYTES = 32
+"""A listed pair takes at least so much memory."""
+DEEP = 0.5
+"""Overlaps are deep from this part of the smaller radius on."""
+SUSPECT = 3
+"""From so many particles in one cell on it is counted how many one of them overlaps."""
+SAMPLE = 64
+"""Where many overlap their pairs are estimated by so many particles."""
+MOST_PAIRS = 2_000_000
+"""Of more pairs that overlap none is looked at by itself."""
+
+
+class Deep(NamedTuple):
+    """The deepest overlap of a start: what lies in what, over the smaller radius, and how many such there
+    are."""
+
+    part: float
+    what: str
+    number: int
+
+
+def check_places(scene: Scene, start: Arrays) -> list[Deep]:
+    """Raise InputError where spheres that the scene holds apart are at one place, or one of them overlaps
+    more than there is room for; else return the deepest overlaps of spheres and in walls."""
+    laws = _holding(scene)
+    if not laws or not len(start["mass"]):
+        return []
+    return [*_overlaps(scene, start, laws), *_in_walls(scene, start)]
+
+
+def warn_of_overlaps(found: Sequence[Sequence[Deep]]) -> None:
+    """Warn, once for all scenes, of spheres that overlap by half of the smaller radius, and of those that lie
+    in walls or behind them; ``found`` in each scene."""
+    deep = [one for of_scene in found for one in of_scene]
+    if deep:
+        worst = max(deep, key=lambda one: one.part)
+        others, scenes = sum(one.number for one in deep) - 1, sum(map(bool, found))
+        text = f"{worst.what}, at the start"
+        text += f"; {others} more overlap by {DEEP:g} of a radius or more" if others else ""
+        text += f", in {scenes} of {len(found)} scenes" if len(found) > 1 else ""
+        warnings.warn(text, StartWarning, stacklevel=3)
+
+
+def _holding(scene: Scene) -> list[Any]:
+    """Return the effects of a scene that hold spheres apart which touch."""
+    solid = [effect for effect in scene.effects if isinstance(effect, Pairwise) and effect.solid]
+    return solid + [effect for effect in scene.effects if isinstance(effect, PairEvent) and effect.hard]
+
+
+def _place(position: np.ndarray) -> str:
+    return "({:.4g}, {:.4g}, {:.4g}) m".format(*position)
+
+
+class _Crowd:
+    """A crowd is the spheres of a start, with the bodies that they are of and the box in which they are."""
+
+    def __init__(self, scene: Scene, start: Arrays) -> None:
+        real = np.float64 if runtime.current().precision == "f64" else np.float32
+        self.position, self.radius = start["position"].astype(real), start["radius"]
+        self.number = len(self.radius)
+        constraints = [effect for effect in scene.effects if isinstance(effect, Constraint)]
+        self.bodies = [constraint.bodies(start) for constraint in constraints]
+        low, high = scene.domain.bounds()
+        self.low, self.side = np.zeros(3), np.zeros(3)
+        if low is not None and high is not None:
+            self.low, self.side = low, np.where(scene.domain.imaged(), high - low, 0.0)
+
+    def nearest(self, apart: np.ndarray) -> np.ndarray:
+        """Return the shortest of the vectors (m) between particles, across joined faces where there are
+        any."""
+        sides = np.where(self.side > 0, self.side, np.inf)
+        return apart - np.rint(apart / sides) * self.side
+
+    def joined(self, i: Any, j: Any) -> np.ndarray:
+        """Return which pairs are of one rigid body, within which they are not held apart."""
+        joined: np.ndarray = np.zeros(np.broadcast(i, j).shape, bool)
+        for body in self.bodies:
+            joined |= (body[i] == body[j]) & (body[i] >= 0)
+        return joined
+
+    def check_coincident(self, law: str) -> None:
+        """Raise InputError where two are at one place."""
+        if not (np.diff(np.sort(self.position[:, 0])) == 0).any():
+            return
+        order = np.lexsort(self.position.T)
+        same = (np.diff(self.position[order], axis=0) == 0).all(axis=1)
+        first, second = order[:-1][same], order[1:][same]
+        apart = ~self.joined(first, second)
+        first, second = first[apart], second[apart]
+        if len(first):
+            i, j = sorted((int(first[0]), int(second[0])))
+            number = len(np.union1d(first, second))
+            rule = f"another place for each particle, as effects.{law} holds them apart"
+            received = f"particles {i} and {j} both at {_place(self.position[i])}"
+            received += f", and {number} particles at places of others" if number > 2 else ""
+            raise InputError(f"particles.position must be {rule}; received {received}")
+
+    def levels(self) -> list[np.ndarray]:
+        """Return the indices of the spheres of each level, with radii up to twice the smallest of it."""
+        smallest = self.radius.min()
+        if self.radius.max() < 2 * smallest:
+            return [np.arange(self.number)]
+        level = np.floor(np.log2(self.radius / smallest)).astype(int)
+        return [np.flatnonzero(level == one) for one in np.unique(level)]
+
+    def check_overlaps(self, laws: Sequence[Any]) -> None:
+        """Raise InputError where a particle overlaps more others than a law remembers of it, or where more
+        pairs overlap than there is room for."""
+        self.pairs = 0
+        remembers = next((law for law in laws if getattr(law, "memory", 0)), None)
+        hard = any(isinstance(law, PairEvent) for law in laws)
+        for members in self.levels():
+            # All in one cell overlap, as it is no wider than two of the smallest from corner to corner.
+            width = 2.0 * self.radius[members].min() / np.sqrt(3.0)
+            with np.errstate(invalid="ignore"):
+                cells = np.floor((self.position[members] - self.low) / width).astype(np.int64)
+            keys = (cells * np.array([73856093, 19349663, 83492791])).sum(axis=1)
+            _, whose, counts = np.unique(keys, return_inverse=True, return_counts=True)
+            if counts.max() < SUSPECT:
+                continue
+            crowded = members[whose == counts.argmax()]
+            lister = int(crowded[0])
+            number, listed = self.overlapped(lister)
+            where = f"particle {lister} at {_place(self.position[lister])}, which overlaps {number} others"
+            if remembers is not None and listed > PARTNERS:
+                rule = f"so far apart that each overlaps at most the {PARTNERS} others"
+                rule += f" that effects.{remembers.label} has room for"
+                raise InputError(f"particles must be {rule}; received {where}")
+            sample = members[:: -(-len(members) // SAMPLE)]
+            each = float(np.mean([self.overlapped(int(i))[0] for i in sample]))
+            self.pairs += int(0.5 * each * len(members))
+            if self.pairs * PAIR_BYTES > LISTS_PART * runtime.memory():
+                rule = "so far apart that lists of those that overlap find room in memory"
+                received = f"about {self.pairs} pairs, and {where}"
+                raise InputError(f"particles must be {rule}; received {received}")
+            # Twice as many, as it is an estimate; of fewer a kernel counts all.
+            if hard and self.pairs > 2 * CONTACTS_PER_PARTICLE * self.number:
+                rule = f"so far apart that at most {CONTACTS_PER_PARTICLE} pairs overlap for each of them"
+                received = f"about {self.pairs} pairs, and {where}"
+                raise InputError(f"particles must be {rule}; received {received}")
+
+    def overlapped(self, i: int) -> tuple[int, int]:
+        """Return how many others particle i overlaps, and how many of these are larger or follow it."""
+        apart = self.nearest(self.position - self.position[i])
+        others = np.arange(self.number)
+        near = (apart**2).sum(axis=1) < (self.radius + self.radius[i]) ** 2
+        near &= (others != i) & ~self.joined(others, i)
+        above = (self.radius > self.radius[i]) | ((self.radius == self.radius[i]) & (others > i))
+        return int(near.sum()), int((near & above).sum())
+
+    def tree(self, members: np.ndarray) -> cKDTree:
+        """Return a tree of some of them, which sees across joined faces."""
+        place = self.position[members] - self.low
+        place = np.where((self.side > 0) & (place >= self.side), 0.0, place)
+        return cKDTree(place, boxsize=self.side if self.side.any() else None)
+
+    def deep_pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the pairs that overlap deeply, shape (pairs, 2), and how deep (m)."""
+        found: list[np.ndarray] = []
+        levels = self.levels()
+        trees = [self.tree(members) for members in levels]
+        for a, (larger, tree) in enumerate(zip(levels, trees, strict=True)):
+            reach = (2 - DEEP) * self.radius[larger].max()
+            found.append(larger[tree.query_pairs(reach, output_type="ndarray")])
+            for smaller, other in zip(levels[:a], trees[:a], strict=True):
+                reaches = self.radius[larger] + (1 - DEEP) * self.radius[smaller].max()
+                near = other.query_ball_point(tree.data, reaches)
+                sizes = [len(one) for one in near]
+                inner = np.concatenate([np.asarray(one, int) for one in near])
+                found.append(np.column_stack([np.repeat(larger, sizes), smaller[inner]]))
+        pairs = np.concatenate(found)
+        i, j = pairs.T
+        apart = self.nearest(self.position[i] - self.position[j])
+        overlap = self.radius[i] + self.radius[j] - np.sqrt((apart**2).sum(axis=1))
+        deep = (overlap >= DEEP * np.minimum(self.radius[i], self.radius[j])) & ~self.joined(i, j)
+        return pairs[deep], overlap[deep]
+
+
+def _overlaps(scene: Scene, start: Arrays, laws: Sequence[Any]) -> list[Deep]:
+    """Return the deepest overlap of two spheres, where any is deep; raise InputError where there are too
+    many."""
+    crowd = _Crowd(scene, start)
+    if crowd.number < 2:
+        return []
+    # Where there cannot be many pairs all are looked at at once: those that are refused are among them.
+    few = crowd.number**2 <= MOST_PAIRS
+    pairs, overlap = crowd.deep_pairs() if few else (None, None)
+    if pairs is None or len(pairs):
+        crowd.check_coincident(laws[0].label)
+        crowd.check_overlaps(laws)
+        if crowd.pairs > MOST_PAIRS:
+            return [Deep(1.0, f"about {crowd.pairs} pairs of particles overlap", 1)]
+    if pairs is None or overlap is None:
+        pairs, overlap = crowd.deep_pairs()
+    if not len(pairs):
+        return []
+    part = overlap / crowd.radius[pairs].min(axis=1)
+    k = int(part.argmax())
+    i, j = sorted(map(int, pairs[k]))
+    what = f"particles {i} and {j} overlap by {overlap[k]:.3g} m, {part[k]:.3g} of the smaller radius"
+    return [Deep(float(part[k]), f"{what}, at {_place(crowd.position[i])}", len(pairs))]
+
+
+def _in_walls(scene: Scene, start: Arrays) -> list[Deep]:
+    """Return the deepest overlap of a sphere with each wall of a scene, where any is deep."""
+    found = []
+    for wall in scene.effects:
+        if isinstance(wall, Walls):
+            overlap = wall.overlaps(start["position"], start["radius"])
+            deep = overlap >= DEEP * start["radius"]
+            if deep.any():
+                part = overlap / start["radius"]
+                k = int(part.argmax())
+                what = f"particle {k} lies {'behind' if part[k] > 1 else 'in'} effects.{wall.label}"
+                what += f" by {overlap[k]:.3g} m, {part[k]:.3g} of its radius"
+                place = _place(start["position"][k])
+                found.append(Deep(float(part[k]), f"{what}, at {place}", int(deep.sum())))
+    return found
