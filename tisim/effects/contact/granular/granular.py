@@ -72,8 +72,8 @@ class Granular(ContactGuards, GranularContact):
     sphere: at a lever l about an axis with the moment of inertia I a contact moves it by 1/M + l^2/I, and the
     limit falls by sqrt(1 + M l^2/I), 1.31 at the end of two spheres that touch.
 
-    A world also stops at a step in which two that touch move past each other by more than the smaller radius,
-    a grain comes nearer a wall by more than its own, or grains may pass through each other or through a sheet
+    A world also stops at a step in which two that touch move past each other by more than the smaller
+    diameter, a grain comes nearer a wall by more than its own, or grains may pass through each other or through a sheet
     between two looks. Below these limits an undamped impact may still come out with up to 1 / (1 - S dt^2 / 4
     m) times its energy, by chance: 1.01 times at a thirtieth of a period.
 

@@ -6,9 +6,9 @@ from tisim.backend.taichi import ti
 
 TURNING = 2.5
 """m R^2 over the moment of inertia of a solid sphere."""
-TRAVEL = 1.0
-"""In a step two that touch may move past each other by this part of the smaller radius, and a grain may come
-nearer a wall by this part of its own. In longer ones a contact may be over, or deeper than a radius, before
+TRAVEL = 2.0
+"""In a step two that touch may move past each other by so many of the smaller radius, and a grain may come
+nearer a wall by so many of its own. In longer ones a contact may be over, or deeper than a radius, before
 it is first seen. Steps of a fiftieth of an impact move surfaces by 0.06 of its largest overlap."""
 
 
