@@ -27,6 +27,10 @@ from tisim.scene.initial_state import Arrays, Start, worst
 from tisim.scene.initial_velocity import Pulse
 
 
+SAMPLE = 4096
+"""A stepper is chosen by this many of the spheres of a larger cloud of equal ones."""
+
+
 class Cloud(Start):
     """A cloud of spheres starts with random velocities.
 
@@ -109,7 +113,7 @@ class Cloud(Start):
 
     @np.errstate(over="ignore", invalid="ignore")
     def arrays(self, domain: Domain, seed: int) -> Arrays:
-        arrays = self.unplaced(seed)
+        arrays = self._unplaced(self.count(), seed)
         arrays = {"position": self.placement.centres(arrays["radius"], domain, seed), **arrays}
         if self.pulse is not None:
             arrays["velocity"] = arrays["velocity"] + self.pulse.velocity(arrays["position"], arrays["mass"])
@@ -118,7 +122,11 @@ class Cloud(Start):
         return arrays
 
     def unplaced(self, seed: int) -> Arrays:
-        n = self.count()
+        # Of equal spheres, which differ in velocity alone, some stand for all.
+        return self._unplaced(self.count() if self.grains else min(self.count(), SAMPLE), seed)
+
+    def _unplaced(self, n: int, seed: int) -> Arrays:
+        """Return the quantities of the first n spheres, but for their places."""
         check_memory(f"a cloud of {n} particles", n)
         draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (n, 3))
         spheres = self._spheres(n, seed)

@@ -31,8 +31,8 @@ class Start(Component):
         raise NotImplementedError(f"{type(self).__name__} must define masses")
 
     def unplaced(self, seed: int) -> Arrays:
-        """Return what is known of the particles without placing them, n of each: velocity (m/s), mass (kg),
-        radius (m) and further quantities."""
+        """Return what is known of the particles, or of enough of them, without placing them: velocity (m/s),
+        mass (kg), radius (m) and further quantities."""
         raise NotImplementedError(f"{type(self).__name__} must define unplaced")
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:

@@ -159,7 +159,8 @@ class Scene(Component):
         materials = Materials(self.materials, self.material_pairs)
         start = self.particles.unplaced(self.seed)
         indices = self.particles.material_indices(materials, self.seed)
-        start = start if indices is None else {**start, "material": indices}
+        if indices is not None:
+            start = {**start, "material": indices[: len(start["mass"])]}
         return [_of(effect, materials) for effect in self.effects], self.domain, start
 
     def structure(self) -> tuple[Any, ...]:
