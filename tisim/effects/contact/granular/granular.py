@@ -73,9 +73,9 @@ class Granular(ContactGuards, GranularContact):
     limit falls by sqrt(1 + M l^2/I), 1.31 at the end of two spheres that touch.
 
     A world also stops at a step in which two that touch move past each other by more than the smaller
-    diameter, a grain comes nearer a wall by more than its own, or grains may pass through each other or through a sheet
-    between two looks. Below these limits an undamped impact may still come out with up to 1 / (1 - S dt^2 / 4
-    m) times its energy, by chance: 1.01 times at a thirtieth of a period.
+    diameter, a grain comes nearer a wall by more than its own, or grains may pass through each other or
+    through a sheet between two looks. Below these limits an undamped impact may still come out with up to 1 /
+    (1 - S dt^2 / 4 m) times its energy, by chance: 1.01 times at a thirtieth of a period.
 
     A spring acts with the surfaces of half a step ago, seen along the normal at the end of the step. One that
     carries a steady force T in a pair that goes round, with a spin about its normal, so does a work of T^2 dt
