@@ -9,7 +9,7 @@ from tisim import Box, Particles, Scene, Simulation
 from tisim.backend import runtime
 from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
 from tisim.operators import Cooling, Fragmentation
-from tisim.steppers import FixedStep, Verlet
+from tisim.steppers import Boris, FixedStep, Verlet
 
 DENSITY = 2000.0
 RADIUS = 1e-3
@@ -60,6 +60,12 @@ def fixed(dt):
     return Verlet(control=FixedStep(dt=dt))
 
 
+def suited(effects, dt):
+    """Steps of one length that suit effects: Verlet's gain energy where velocities gyrate."""
+    gyrates = any(effect.gyrates(effects) for effect in effects)
+    return Boris(control=FixedStep(dt=dt)) if gyrates else fixed(dt)
+
+
 def scene(
     position, velocity, effects=(), radius=RADIUS, density=DENSITY, mass=None, dt=1e-9, steps=1, **more
 ):
@@ -76,7 +82,7 @@ def scene(
             quantities=quantities,
         ),
         effects=effects,
-        stepper=more.pop("stepper", fixed(dt)),
+        stepper=more.pop("stepper", None) or suited(effects, dt),
         duration=more.pop("duration", dt * steps),
         **more,
     )

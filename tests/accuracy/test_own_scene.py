@@ -58,7 +58,7 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
     [
         # Particles alone are together at the end of the run, and nowhere before.
         (Trapezoid(control=ErrorControl(longest=10.0)), 1),
-        (Verlet(control=FixedStep(dt=PERIOD / 4)), 1),
+        (Verlet(control=FixedStep(dt=PERIOD / 8)), 1),
         # Every other observation of 128 is at the start, and the others half a period later.
         (Verlet(control=FixedStep(dt=PERIOD / 400)), 64),
         (Verlet(control=FixedStep(dt=PERIOD / 400)), 128),

@@ -17,6 +17,7 @@ from tests.scenes import scene, simulate
 from tisim import InputError, Scene
 from tisim.effects import Lorentz, MagneticBodyForce
 from tisim.sources import ElectricField, MagneticField
+from tisim.steppers import IterationControl, Trapezoid
 
 
 def waves(source, t):
@@ -70,6 +71,7 @@ def test_fields_oscillate_in_time(rng):
             quantities={"charge": 1e-9 * rng.normal(size=12)},
             dt=0.37,
             steps=k + 1,
+            stepper=Trapezoid(control=IterationControl(first=0.37, longest=0.37)),
         )
         for k in range(WORLDS)
     ]

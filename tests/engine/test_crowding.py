@@ -190,7 +190,7 @@ def test_lists_that_would_not_fit_are_refused_before_they_are_made(monkeypatch):
 
     made = [thrown(100.0 * part) for part in (1.0, 0.0)]
     simulation = compiled(made[0], 2, 64)
-    monkeypatch.setattr(memory, "allowed", lambda: 0)
+    monkeypatch.setattr(memory, "LISTS_PART", 0.0)
     simulation.load(made)
     simulation.run()
     crowded, still = simulation.results()

@@ -158,7 +158,7 @@ SHARED = {
         f"{LAW}/step_limit.py", "slides = 1.0 + TURNING", "slides = 0.5 + TURNING", f"{STEPS}[hooke]",
     ),
     "can_follow_what_rolls": (
-        f"{LAW}/step_limit.py", "return TURNING * ti", "return 2.0 * ti", f"{STEPS}[jkr]",
+        f"{LAW}/step_limit.py", "rolls = TURNING * (", "rolls = 0.8 * TURNING * (", f"{STEPS}[jkr]",
     ),
     "can_follow_what_twists": (
         f"{LAW}/guards.py", "can_follow(twists, ", "can_follow(0.0 * twists, ", f"{STEPS}[hooke]",

@@ -26,8 +26,7 @@ from tisim.packing.tried_places import Packing
 from tisim.scene.initial_state import Arrays, Start, worst
 from tisim.scene.initial_velocity import Pulse
 
-
-SAMPLE = 4096
+SPHERES_ASKED = 4096
 """A stepper is chosen by this many of the spheres of a larger cloud of equal ones."""
 
 
@@ -123,7 +122,7 @@ class Cloud(Start):
 
     def unplaced(self, seed: int) -> Arrays:
         # Of equal spheres, which differ in velocity alone, some stand for all.
-        return self._unplaced(self.count() if self.grains else min(self.count(), SAMPLE), seed)
+        return self._unplaced(self.count() if self.grains else min(self.count(), SPHERES_ASKED), seed)
 
     def _unplaced(self, n: int, seed: int) -> Arrays:
         """Return the quantities of the first n spheres, but for their places."""

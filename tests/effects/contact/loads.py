@@ -7,6 +7,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import Force
 from tisim.engine.assembly import needed_fields
+from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
 from tisim.worlds.fields import CORE, resolve_fields
 
 WORLDS = 8
@@ -70,9 +71,10 @@ def jacobians(scenes, step, capacity=16):
 
 
 def fields_beside_the_core(setup):
-    """Names of what a scene needs and so has allocated, beyond position, velocity, mass, radius and id."""
+    """Names of what the effects of a scene need and so have allocated, beyond position, velocity, mass, radius
+    and id; the guard of explicit steps has fields of its own."""
     fields = resolve_fields(needed_fields(setup.effects, setup.stepper))
-    return {field.name for field in fields} - {field.name for field in CORE}
+    return {field.name for field in fields} - {field.name for field in (*CORE, FORCE_BEFORE, TORQUE_BEFORE)}
 
 
 def pairs(state):
