@@ -8,8 +8,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from tisim.backend import runtime
-from tisim.backend.taichi import check_backend
+from tisim.backend import choice, runtime
 from tisim.cli import cost, describe, effects, inspect, new, run, search
 from tisim.cli.usage import Command, CommandGroup, UsageError
 from tisim.errors import InputError, RunError
@@ -39,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     code = 0
     with handle_signals(raise_interrupt):
         try:
-            check_backend()
+            choice.check()
             code = app(arguments, prog_name="tisim", standalone_mode=False)
             # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
             code = exit_code() if code == 130 else code
