@@ -1,7 +1,7 @@
 """Which package compiles the kernels: Taichi, or its maintained fork Quadrants.
 
-Both give the same bits. TISIM_BACKEND names one of them; where it is not set, tisim takes one whose LLVM knows
-the processor, as the other makes slower code for it.
+Both give the same bits. TISIM_BACKEND names one of them; where it is not set, tisim takes one whose LLVM
+knows the processor, as the other makes slower code for it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ INSTALL = {
     "quadrants": "python -m pip install 'quadrants>=1.3,<1.5'",
 }
 """The command that installs each package."""
-SAID = "tisim.advised"
+ADVISED = "tisim.advised"
 """The name of the file that keeps that the user has been told."""
 
 
@@ -91,5 +91,5 @@ def advise(folder: Path) -> None:
     if line:
         # A file that is there, a folder that cannot be written, a stream that is closed or full.
         with suppress(OSError, ValueError):
-            (folder / SAID).touch(exist_ok=False)
+            (folder / ADVISED).touch(exist_ok=False)
             print(f"tisim: {line}", file=sys.stderr)

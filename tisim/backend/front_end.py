@@ -78,8 +78,8 @@ def _where_there_are_parts(put_names: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _read_once(load: Callable[..., set[str] | None]) -> Callable[..., set[str] | None]:
-    """Return ``load``, which gives the parts of dataclasses that a kernel uses or None where it has to be read
-    for them, so that it gives no part for a kernel of tisim that has no dataclass."""
+    """Return ``load``, which gives the parts of dataclasses that a kernel uses, or None where it has to be
+    read for them; it gives an empty set for a kernel of tisim that takes no dataclass."""
 
     @functools.wraps(load)
     def loaded(kernel: Any, values: tuple[Any, ...], key: Any) -> set[str] | None:
@@ -108,9 +108,7 @@ class ShortTextWrapper(TextWrapper):
 
 
 _LINES = ShortTextWrapper(width=9999, tabsize=4)
-QUICK_TEXTS = SimpleNamespace(
-    fill=lambda line, tabsize, width: _LINES.fill(line), dedent=textwrap.dedent
-)
+QUICK_TEXTS = SimpleNamespace(fill=lambda line, tabsize, width: _LINES.fill(line), dedent=textwrap.dedent)
 """This stands for ``textwrap`` where sources are read, and makes no wrapper for each of their lines."""
 
 

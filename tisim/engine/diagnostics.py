@@ -27,7 +27,7 @@ from tisim.scene.scene import Scene
 from tisim.steppers import FixedStep, Verlet
 
 DEPENDENCIES = ("tisim", "taichi", "quadrants", "numpy", "h5py", "deap", "pydantic", "matplotlib")
-SIDE = 10
+TIMED_SIDE = 10
 """The scenes that are timed have as many particles along each side of a cube."""
 BENCHMARK_SECONDS = 0.5
 """Steps of each scene are timed for so long, wall seconds."""
@@ -46,21 +46,21 @@ class Finding:
 
 def charges() -> Scene:
     """Return a scene of charges on a disturbed lattice, each of which feels all others."""
-    return _lattice(NearField(alpha2=1.0, strength="charge"), spacing=1.0, radius=1e-3)
+    return _lattice(NearField(alpha2=1.0, strength="charge"), radius=1e-3)
 
 
 def grains() -> Scene:
     """Return a scene of grains on a lattice, each of which touches its neighbours."""
-    return _lattice(Granular(damping=RestitutionDamping(), tangential=MindlinForce()), spacing=1.0, radius=0.51)
+    return _lattice(Granular(damping=RestitutionDamping(), tangential=MindlinForce()), radius=0.51)
 
 
-SCENES: dict[str, Callable[[], Scene]] = {"charges": charges, "grains in contact": grains}
+TIMED_SCENES: dict[str, Callable[[], Scene]] = {"charges": charges, "grains in contact": grains}
 
 
-def _lattice(law: object, spacing: float, radius: float) -> Scene:
-    """Return a scene with steps so short that nothing moves."""
+def _lattice(law: object, radius: float) -> Scene:
+    """Return a scene of particles 1 m apart, with steps so short that nothing moves."""
     draw = np.random.Generator(np.random.Philox(1))
-    places = spacing * np.stack(np.meshgrid(*[np.arange(float(SIDE))] * 3, indexing="ij"), -1).reshape(-1, 3)
+    places = np.stack(np.meshgrid(*[np.arange(float(TIMED_SIDE))] * 3, indexing="ij"), -1).reshape(-1, 3)
     position = places + draw.uniform(-0.005, 0.005, places.shape)
     return Scene(
         particles=Particles(
@@ -78,9 +78,9 @@ def _lattice(law: object, spacing: float, radius: float) -> Scene:
 
 
 def step_times() -> dict[str, float]:
-    """Return the time of a step of each of ``SCENES``, s: f64, one core, the running backend."""
+    """Return the time of a step of each of ``TIMED_SCENES``, s: f64, one core, the running backend."""
     runtime.init("cpu", "f64", 1)
-    return {name: _step_time(make()) for name, make in SCENES.items()}
+    return {name: _step_time(make()) for name, make in TIMED_SCENES.items()}
 
 
 def _step_time(scene: Scene) -> float:
@@ -133,9 +133,9 @@ def findings() -> list[Finding]:
         Finding("vulkan", "present" if _vulkan() else "absent", "" if _vulkan() else "no --device vulkan"),
     ]
     times = {name: step_times_of(name) for name in choice.LLVM}
+    report.append(Finding("steps timed", " and ".join(f"{TIMED_SIDE**3} {scene}" for scene in TIMED_SCENES)))
     for name, measured in times.items():
-        texts = [f"{SIDE**3} {scene}: {1e3 * seconds:.3g} ms" for scene, seconds in measured.items()]
-        text = "a step of " + ", of ".join(texts) if texts else _missing(name)
+        text = " and ".join(f"{1e3 * seconds:.3g} ms" for seconds in measured.values()) or _missing(name)
         report.append(Finding(f"{name}, one core, f64", text, "in use" if name == BACKEND else ""))
     report.append(_advice(times))
     report += [Finding("python", f"{platform.python_version()}, {platform.system()} {platform.machine()}")]
@@ -169,7 +169,8 @@ def _advice(times: dict[str, dict[str, float]]) -> Finding:
     advice = "no gain here from changing"
     if faster:
         unset = choice.named() and choice.automatic(choice.installed(), processor()) == other
-        advice = "faster here: " + (f"leave {choice.VARIABLE} out" if unset else f"set {choice.VARIABLE}={other}")
+        how = f"leave {choice.VARIABLE} out" if unset else f"set {choice.VARIABLE}={other}"
+        advice = f"faster here: {how}"
     return Finding("other backend", f"{text} times as fast", advice)
 
 
