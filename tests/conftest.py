@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from tests import scenes
-from tisim.backend import memory, runtime
+from tisim.backend import choice, memory, runtime
+from tisim.backend.taichi import BACKEND
 from tisim.errors import InputError
 from tisim.files import python_file
 
@@ -135,9 +136,9 @@ np.savez(sys.argv[1], **kept)
 """
 
 
-def crowd_elsewhere(folder, **settings):
-    """Results of test_schedules.crowd in another process, with all passes of the compiler and settings of the
-    runtime."""
+def crowd_elsewhere(folder, backend=BACKEND, **settings):
+    """Results of test_schedules.crowd in another process, with all passes of the compiler, a backend and
+    settings of the runtime."""
     file = folder / "results.npz"
     command = [
         sys.executable,
@@ -149,6 +150,7 @@ def crowd_elsewhere(folder, **settings):
         json.dumps(settings),
     ]
     environment = os.environ | {"TI_ADVANCED_OPTIMIZATION": "1", "QD_ADVANCED_OPTIMIZATION": "1"}
+    environment[choice.VARIABLE] = backend
     completed = subprocess.run(
         command, capture_output=True, text=True, timeout=3600, check=False, env=environment
     )
@@ -159,8 +161,9 @@ def crowd_elsewhere(folder, **settings):
 
 @pytest.fixture(scope="session")
 def elsewhere(tmp_path_factory):
-    """Results of test_schedules.crowd in another process, with one thread."""
-    return crowd_elsewhere(tmp_path_factory.mktemp("elsewhere"), threads=1)
+    """Results of test_schedules.crowd in another process, with one thread and the other backend."""
+    other = next((name for name in choice.installed() if name != BACKEND), BACKEND)
+    return crowd_elsewhere(tmp_path_factory.mktemp("elsewhere"), other, threads=1)
 
 
 @pytest.fixture(scope="session")

@@ -61,7 +61,7 @@ def bits(scene: Scene, schedule: str) -> dict[str, str]:
         name: hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
         for name, values in result.state.items()
     }
-    return {"": ended, **arrays}
+    return {"ended": ended, **arrays}
 
 
 def main() -> None:
@@ -75,7 +75,7 @@ def main() -> None:
     found = {}
     for name in arguments.names or extremes.scenes():
         found[name] = bits(scene_of(name), arguments.schedule)
-        print(name, found[name][""][:60], file=sys.stderr, flush=True)
+        print(name, found[name]["ended"][:60], file=sys.stderr, flush=True)
         if memory.needs_restart():
             memory.reclaim()
             memory.renew()
