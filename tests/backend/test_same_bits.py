@@ -15,8 +15,8 @@ from tisim.backend.taichi import BACKEND
 from tisim.engine.simulation import SCHEDULES
 
 FAMILIES = ("effects.granular", "stepper.collocation.0", "stepper.brownian.2")
-"""Contacts with memory, an implicit stepper with forces between all, and noise with hydrodynamics. Impacts are
-compared where ``elsewhere`` is (tests/engine/test_schedules.py)."""
+"""Contacts with memory, an implicit stepper with forces between all, and noise with hydrodynamics. Impacts
+are compared where ``elsewhere`` is (tests/engine/test_schedules.py)."""
 
 
 def bits_of(backend, schedule, folder, names=()):
