@@ -87,6 +87,12 @@ def test_a_wrong_name_and_a_package_that_is_absent_are_refused(monkeypatch):
         choice.check()
     monkeypatch.setenv(choice.VARIABLE, "quadrants")
     choice.check()
+    choice.check("quadrants")
+    with pytest.raises(
+        InputError,
+        match=r"^TISIM_BACKEND must be set before taichi has been imported; received 'quadrants'$",
+    ):
+        choice.check("taichi")
     monkeypatch.setattr(choice, "installed", lambda: ["taichi"])
     with pytest.raises(
         InputError,

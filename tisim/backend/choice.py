@@ -53,9 +53,10 @@ def chosen() -> str:
     return named() if named() in there else automatic(there, processor.processor())
 
 
-def check() -> None:
+def check(taken: str = "") -> None:
     """Raise InputError unless TISIM_BACKEND is not set or names one of the two packages, and it is installed.
 
+    taken : the package that has been imported, where one has; it must be the one that is named.
     The package is imported before anyone asks, so that this is said in a line where the runtime or a command
     starts.
     """
@@ -63,6 +64,7 @@ def check() -> None:
     if named():
         rule = f"installed ({INSTALL[named()]}), or {VARIABLE} left out"
         must(named() in installed(), VARIABLE, rule, named())
+        must(taken in ("", named()), VARIABLE, f"set before {taken} has been imported", named())
 
 
 def lost(there: list[str], cpu: dict[str, str]) -> str:

@@ -42,7 +42,7 @@ class Runtime:
     arithmetic: str = "strict"
 
     def __post_init__(self) -> None:
-        choice.check()
+        choice.check(BACKEND)
         must(self.device in DEVICES, "device", f"one of {', '.join(DEVICES)}", self.device)
         must(self.precision in PRECISIONS, "precision", f"one of {', '.join(PRECISIONS)}", self.precision)
         kinds = ", ".join(ARITHMETICS)
