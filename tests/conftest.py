@@ -54,7 +54,7 @@ def pytest_configure(config):
 
     With Taichi, tests take two thirds of the time, nearly all of which is compiling, without the compiler's
     passes ahead of LLVM. No bit depends on these: the process of ``elsewhere`` has them. Quadrants 1.3.3 and
-    1.4.0 compile as long without theirs, and wrongly: a force may not change a velocity that it is added to.
+    1.4.0 compile as long without theirs, and wrongly: the oscillator of CONTRIBUTING.md does not move.
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
