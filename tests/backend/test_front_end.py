@@ -3,12 +3,21 @@
 import ast
 import importlib
 import inspect
+import sys
 import textwrap
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
 
-from tisim.backend.front_end import ShortTextWrapper, _by_code, _by_place, _in_class_body
+from tisim.backend.front_end import (
+    QUICK_TEXTS,
+    ShortTextWrapper,
+    _by_code,
+    _by_place,
+    _in_class_body,
+    quick_import,
+)
 from tisim.backend.taichi import BACKEND, ti
 
 
@@ -111,6 +120,8 @@ def test_text_of_one_line_is_wrapped_as_by_python():
     ]
     for text in texts:
         assert ShortTextWrapper(width=80).wrap(text) == textwrap.wrap(text, 80)
+        wide = {"tabsize": 4, "width": 9999}
+        assert QUICK_TEXTS.fill(text, **wide) == textwrap.fill(text, **wide)
     called = importlib.import_module(f"{BACKEND}.lang.ast.ast_transformer_utils").TextWrapper
     assert called is ShortTextWrapper
 
@@ -138,3 +149,80 @@ def test_the_text_of_a_place_is_taichis():
     for node in nodes:
         if any("names" in line for line in lines[node.lineno - 1 : node.end_lineno]):
             assert remembered(context(edited), node) == tell.__wrapped__(context(edited), node)
+
+
+def test_while_a_package_is_imported_frames_have_the_line_that_they_have():
+    thorough = inspect.getframeinfo
+
+    def told():
+        class Here:
+            frame = sys._getframe()
+            # The line is the one that runs: asked for in the same line.
+            both = (thorough(frame), inspect.getframeinfo(frame))
+
+        return Here.both
+
+    with quick_import():
+        assert inspect.getframeinfo is not thorough
+        (before, quick), (outside, beyond) = told(), (thorough(FROZEN), inspect.getframeinfo(FROZEN))
+    assert inspect.getframeinfo is thorough
+    for expected, found in ((before, quick), (outside, beyond)):
+        assert (found.function, found.lineno, found.code_context) == (
+            expected.function,
+            expected.lineno,
+            expected.code_context,
+        )
+    assert "both" in quick.code_context[0]
+
+
+FROZEN = eval(compile("__import__('sys')._getframe()", "<nowhere>", "eval"))
+"""A frame without a file."""
+
+
+@dataclass
+class Pair:
+    """What a kernel of Quadrants takes apart."""
+
+    first: ti.i32
+    second: ti.i32
+
+
+@pytest.mark.skipif(BACKEND != "quadrants", reason="Taichi reads each kernel once")
+def test_a_kernel_without_dataclasses_is_read_once(monkeypatch):
+    from quadrants.lang.kernel import Kernel
+
+    from tisim.backend import runtime
+    from tisim.backend.thread import in_taichi_thread
+
+    passes = []
+    read = Kernel.get_tree_and_ctx
+
+    def count(kernel, *values, **settings):
+        passes.append(settings["pass_idx"])
+        return read(kernel, *values, **settings)
+
+    monkeypatch.setattr(Kernel, "get_tree_and_ctx", count)
+
+    def kernels(module):
+        @ti.kernel
+        def double(number: ti.i32) -> ti.i32:
+            return 2 * number
+
+        @ti.kernel
+        def total(pair: Pair, more: ti.i32) -> ti.i32:
+            return pair.first + pair.second + more
+
+        for kernel in (double, total):
+            kernel._primal.func.__module__ = module
+        return double, total
+
+    runtime.current()
+    # Others' kernels are read as ever.
+    for module, times in (("tisim.kernels", [1]), ("mine", [0, 1])):
+        double, total = kernels(module)
+        assert in_taichi_thread(double)(21) == 42
+        assert passes == times
+        passes.clear()
+        assert in_taichi_thread(total)(Pair(1, 2), 3) == 6
+        assert passes == [0, 1]
+        passes.clear()

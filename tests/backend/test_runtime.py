@@ -14,11 +14,12 @@ import tisim
 from tests.scenes import scene
 from tests.throwaway import Trap
 from tisim import InputError, RunError, Scene, Simulation
-from tisim.backend import diagnostics, memory, runtime, surroundings
+from tisim.backend import memory, runtime, surroundings
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.engine import diagnostics
 from tisim.engine.batches import Batches, rounded
 
 

@@ -42,6 +42,8 @@ def test_options_of_the_compilers_are_removed(environment, compiler):
     assert kept.items() <= after.items()
     assert after[f"{compiler}_LOG_LEVEL"] == "warn"
     assert environment(TI_ADVANCED_OPTIMIZATION="0")["TI_ADVANCED_OPTIMIZATION"] == "0"
+    # Quadrants without its passes compiles some kernels to nothing, and says that all is well.
+    assert "QD_ADVANCED_OPTIMIZATION" not in environment(QD_ADVANCED_OPTIMIZATION="0")
 
 
 def test_the_folder_for_caches_is_named_where_home_is_not(environment):

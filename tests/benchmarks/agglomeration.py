@@ -4,7 +4,7 @@
 
 Z04's six best designs (tables 1 and 2), each from worlds / 6 starts, the same ones for both programs. Runs
 alternate, after both have compiled, so that what else the machine does falls on both; the ratio is the median
-over pairs of runs. TISIM_BACKEND=quadrants chooses the other kernel compiler.
+over pairs of runs. TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse

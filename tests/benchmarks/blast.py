@@ -4,7 +4,7 @@
         [--arithmetic strict]
 
 Runs of the two alternate, after both have compiled; the ratio is the median over pairs of runs.
-TISIM_BACKEND=quadrants chooses the other kernel compiler.
+TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse

@@ -4,7 +4,7 @@
         [--arithmetic strict]
 
 Moments in any direction on a disturbed lattice. The time of tisim is that of a whole step, numba's that of
-the sum alone. Tries alternate; the ratio is the median over them. TISIM_BACKEND=quadrants chooses the other
+the sum alone. Tries alternate; the ratio is the median over them. TISIM_BACKEND names the
 kernel compiler.
 """
 

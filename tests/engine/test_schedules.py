@@ -1,4 +1,5 @@
-"""The same scene gives the same bits: on all schedules, one thread or two, alone or in a batch."""
+"""The same scene gives the same bits: on all schedules, one thread or two, alone or in a batch, and whichever
+backend compiles it."""
 
 import numpy as np
 import pytest
@@ -106,7 +107,7 @@ def test_alone_and_in_a_batch_of_240(usual):
 
 
 @pytest.mark.long
-def test_one_thread_and_two(usual, elsewhere):
+def test_one_thread_and_two_and_both_backends(usual, elsewhere):
     for w, result in enumerate(usual):
         for name, values in result.state.items():
             np.testing.assert_array_equal(values, elsewhere[f"{w}/{name}"], err_msg=f"{w} {name}")
@@ -115,7 +116,7 @@ def test_one_thread_and_two(usual, elsewhere):
 
 
 @pytest.mark.long
-def test_noise_with_one_thread_and_two(elsewhere):
+def test_noise_with_one_thread_and_two_and_both_backends(elsewhere):
     """Counter-based noise does not know which thread draws it: each particle a launch of its own here."""
     (result,) = simulate([kicked()], worlds=1, capacity=32, schedule="particle")
     for name, values in result.state.items():

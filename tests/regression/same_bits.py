@@ -5,8 +5,8 @@ python tests/regression/same_bits.py --compare FILE [--check]   with the other: 
 
 A fingerprint is a SHA-256 hash of every frame (names, shapes and bytes of all its arrays), of the end and of
 the counts of the work. With --check, every number that ``tisim check`` finds is compared too (an hour).
-Bits belong to a machine and a backend: write and compare on one. The fitness record has its own tool,
-fitness_record.py.
+Bits belong to a machine, not to a backend: TISIM_BACKEND may be another one in the second command. The
+fitness record has its own tool, fitness_record.py.
 """
 
 from __future__ import annotations

@@ -1,22 +1,48 @@
 """The front end of Taichi and of Quadrants is relieved of work that gives the same each time.
 
 Where a class defines a function for kernels, both look up the line of the class in its file to learn that it
-is one, though the frame of the caller says so. Taichi 1.7.4, which reads a function anew wherever it is
-called, also looks up its source each time, and sets for every expression a text that shows its place, for an
-error that may come. Together that is a third of the time to start a simulation whose kernels lie in the
-cache. Here what is found is remembered, and errors say the same. Quadrants remembers sources by itself. Both
-take each of those texts into words to wrap it; here that is done where it does not fit into a line.
+is one, though the frame of the caller says so. Both look up the source of a function anew wherever it is
+called, and wrap each line of it and each text that shows a place in it, for an error that may come. Taichi
+1.7.4 makes that text anew each time. Quadrants 1.3 and 1.4 read each kernel twice, the first time to learn
+which parts of dataclasses it uses, and copy each function's tree to put names in place of those parts; no
+kernel of tisim has a dataclass. Together that is a third of the time to start a simulation whose kernels lie
+in the cache with Taichi, and two thirds with Quadrants. Here what is found is remembered, what changes
+nothing is left out, and errors say the same.
 """
 
 from __future__ import annotations
 
 import functools
 import importlib
+import inspect
+import linecache
 import sys
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import is_dataclass
 from textwrap import TextWrapper
-from types import CodeType
+from types import CodeType, FrameType, SimpleNamespace
 from typing import Any
+
+
+@contextmanager
+def quick_import() -> Iterator[None]:
+    """Have ``inspect.getframeinfo`` look up the line of a frame alone while ``taichi`` or ``quadrants`` is
+    imported. It searches all modules for the frame's, for each of some 200 functions that they define."""
+    thorough = inspect.getframeinfo
+    inspect.getframeinfo = _line_of_frame  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        inspect.getframeinfo = thorough
+
+
+def _line_of_frame(frame: FrameType, context: int = 1) -> inspect.Traceback:
+    code = frame.f_code
+    line = linecache.getline(code.co_filename, frame.f_lineno, frame.f_globals)
+    place = (code.co_filename, frame.f_lineno, code.co_name)
+    return inspect.Traceback(*place, [line], 0) if line else inspect.Traceback(*place, None, None)
 
 
 def relieve(package: str) -> None:
@@ -26,10 +52,46 @@ def relieve(package: str) -> None:
     texts: Any = importlib.import_module(f"{package}.lang.ast.ast_transformer_utils")
     texts.TextWrapper = ShortTextWrapper
     if package == "taichi":
+        kernels.textwrap = QUICK_TEXTS
         kernels.getsourcelines = _by_code(kernels.getsourcelines)
         kernels.getsourcefile = _by_code(kernels.getsourcefile)
         context = texts.ASTTransformerContext
         context.get_pos_info = _by_place(context.get_pos_info)
+    else:
+        functions: Any = importlib.import_module("quadrants.lang._func_base")
+        functions.textwrap = QUICK_TEXTS
+        functions.get_source_info_and_src = _by_code(functions.get_source_info_and_src)
+        names: Any = importlib.import_module("quadrants.lang._kernel_impl_dataclass")
+        names.unpack_ast_struct_expressions = _where_there_are_parts(names.unpack_ast_struct_expressions)
+        kernel: Any = importlib.import_module("quadrants.lang.kernel").Kernel
+        kernel._try_load_fastcache = _read_once(kernel._try_load_fastcache)
+
+
+def _where_there_are_parts(put_names: Callable[..., Any]) -> Callable[..., Any]:
+    """Return ``put_names``, called only for functions that have parts of dataclasses to put names for."""
+
+    @functools.wraps(put_names)
+    def put(tree: Any, struct_locals: set[str]) -> Any:
+        return put_names(tree, struct_locals) if struct_locals else tree
+
+    return put
+
+
+def _read_once(load: Callable[..., set[str] | None]) -> Callable[..., set[str] | None]:
+    """Return ``load``, which gives the parts of dataclasses that a kernel uses, or None where it has to be
+    read for them; it gives an empty set for a kernel of tisim that takes no dataclass."""
+
+    @functools.wraps(load)
+    def loaded(kernel: Any, values: tuple[Any, ...], key: Any) -> set[str] | None:
+        used = load(kernel, values, key)
+        if used is not None or not kernel.func.__module__.startswith("tisim."):
+            return used
+        if any(map(is_dataclass, (*values, *(argument.annotation for argument in kernel.arg_metas)))):
+            return None
+        kernel.used_py_dataclass_parameters_by_key_enforcing[key] = set()
+        return set()
+
+    return loaded
 
 
 class ShortTextWrapper(TextWrapper):
@@ -43,6 +105,11 @@ class ShortTextWrapper(TextWrapper):
         return [line] if line else []
 
     _odd = frozenset("\t\x0b\x0c\r")
+
+
+_LINES = ShortTextWrapper(width=9999, tabsize=4)
+QUICK_TEXTS = SimpleNamespace(fill=lambda line, tabsize, width: _LINES.fill(line), dedent=textwrap.dedent)
+"""This stands for ``textwrap`` where sources are read, and makes no wrapper for each of their lines."""
 
 
 def _in_class_body(level_of_class_stackframe: int) -> bool:

@@ -12,8 +12,8 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
-from tisim.backend import kernel_cache, loops, surroundings
-from tisim.backend.taichi import BACKEND, check_backend, ti
+from tisim.backend import choice, kernel_cache, loops, surroundings
+from tisim.backend.taichi import BACKEND, ti
 from tisim.backend.thread import forked, in_taichi_thread, require_own_process
 from tisim.errors import InputError, RunError, is_whole, must
 
@@ -43,7 +43,7 @@ class Runtime:
     arithmetic: str = "strict"
 
     def __post_init__(self) -> None:
-        check_backend()
+        choice.check(BACKEND)
         must(self.device in DEVICES, "device", f"one of {', '.join(DEVICES)}", self.device)
         must(self.precision in PRECISIONS, "precision", f"one of {', '.join(PRECISIONS)}", self.precision)
         kinds = ", ".join(ARITHMETICS)
@@ -168,6 +168,8 @@ def _start(requested: Runtime) -> None:
     if requested.device == "vulkan":
         rule = "one whose driver ends loops where it should (Mesa's software device: from version 25 on)"
         must(loops.end_where_they_should(), "device", rule, requested.device)
+    if requested.device == "cpu":
+        choice.advise(kernel_cache.lock().parent)
     _current = requested
 
 

@@ -28,10 +28,16 @@ OPTION_PREFIXES = ("TI_", "QD_", "TAICHI_", "QUADRANTS_", "_QD_", "ENABLE_TAICHI
 """Variables of these names are options of the compilers. They are removed from the environment of the
 process, as tisim has options of its own for what they set."""
 COMPILERS = ("TI", "QD")
-KEPT = {"OFFLINE_CACHE_FILE_PATH": None, "OFFLINE_CACHE": ("0", "1"), "ADVANCED_OPTIMIZATION": ("0", "1")}
-"""Options that stay, behind the prefix of a compiler, with the values that it takes (None for any): where
-compiled kernels are kept, whether they are, and whether the compiler takes longer for code that may be
-quicker. No result depends on them."""
+KEPT = {
+    "TI_OFFLINE_CACHE_FILE_PATH": None,
+    "QD_OFFLINE_CACHE_FILE_PATH": None,
+    "TI_OFFLINE_CACHE": ("0", "1"),
+    "QD_OFFLINE_CACHE": ("0", "1"),
+    "TI_ADVANCED_OPTIMIZATION": ("0", "1"),
+}
+"""Options that stay, with the values that they take (None for any): where compiled kernels are kept, whether
+they are, and whether Taichi takes longer for code that may be quicker. No result depends on them. Without its
+passes Quadrants, up to 1.4, compiles some kernels to code that does nothing."""
 SET = {"SKIP_VERSION_CHECK": "ON", "LOG_LEVEL": "warn"}
 """Options that are set: no call over the network for the newest version, and no announcements."""
 
@@ -48,9 +54,8 @@ def prepare() -> None:
 def _replace_options() -> None:
     """Remove the compilers' options from the environment but those that stay, and set those of tisim."""
     for name in [name for name in os.environ if name.startswith(OPTION_PREFIXES)]:
-        option = name.partition("_")[2]
-        allowed = KEPT.get(option, ())
-        if not (name.startswith(("TI_", "QD_")) and (allowed is None or os.environ[name] in allowed)):
+        allowed = KEPT.get(name, ())
+        if allowed is not None and os.environ[name] not in allowed:
             del os.environ[name]
     for compiler in COMPILERS:
         os.environ.update({f"{compiler}_{option}": value for option, value in SET.items()})

@@ -1,39 +1,25 @@
-"""The only import of Taichi, or of its maintained fork Quadrants when TISIM_BACKEND=quadrants.
+"""The only import of Taichi, or of its maintained fork Quadrants (``choice.py`` says which).
 
 Everything else writes ``from tisim.backend.taichi import ti``. Only what both packages offer is used.
 """
 
 from __future__ import annotations
 
-import importlib.util
-import os
 import warnings
 
-from tisim.backend import front_end, surroundings
-from tisim.errors import must
+from tisim.backend import choice, front_end, surroundings
 
-BACKEND = os.environ.get("TISIM_BACKEND", "taichi")
+BACKEND = choice.chosen()
 """This package compiles the kernels: ``"taichi"`` or ``"quadrants"``."""
 
-
-def check_backend() -> None:
-    """Raise InputError unless TISIM_BACKEND names one of the two packages, and it is installed.
-
-    The import goes on with Taichi, so that this is said in a line where the runtime or a command starts.
-    """
-    must(BACKEND in ("taichi", "quadrants"), "TISIM_BACKEND", "taichi or quadrants", BACKEND)
-    rule = "installed (python -m pip install 'tisim[quadrants]') or left out"
-    must(importlib.util.find_spec(BACKEND) is not None, "TISIM_BACKEND", rule, BACKEND)
-
-
 surroundings.prepare()
-if BACKEND == "quadrants" and importlib.util.find_spec("quadrants") is not None:
-    import quadrants as ti
-else:
-    with warnings.catch_warnings():
-        # Taichi 1.7.4 imports with deprecations of newer Pythons; they are not ours to mend.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        warnings.simplefilter("ignore", SyntaxWarning)
+with front_end.quick_import(), warnings.catch_warnings():
+    # Taichi 1.7.4 imports with deprecations of newer Pythons; they are not ours to mend.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    warnings.simplefilter("ignore", SyntaxWarning)
+    if BACKEND == "quadrants":
+        import quadrants as ti
+    else:
         import taichi as ti
 front_end.relieve(ti.__name__)
 
@@ -54,4 +40,4 @@ def is_device_function(value: object) -> bool:
     return bool(getattr(value, f"_is_{ti.__name__}_function", False))
 
 
-__all__ = ["BACKEND", "DEVICE_FUNCTION", "check_backend", "is_device_function", "ti"]
+__all__ = ["BACKEND", "DEVICE_FUNCTION", "is_device_function", "ti"]

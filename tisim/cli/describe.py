@@ -84,7 +84,7 @@ def check(
 
 def doctor() -> None:
     """Say what this machine is to tisim, and what the other backend would give."""
-    from tisim.backend.diagnostics import findings
+    from tisim.engine.diagnostics import findings
 
     table = plain_table()
     with err().status("measuring"):

@@ -9,8 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from tisim.backend import runtime
-from tisim.backend.taichi import check_backend
+from tisim.backend import choice, runtime
 from tisim.cli import cost, describe, effects, inspect, new, run, search
 from tisim.cli.usage import Command, CommandGroup, UsageError
 from tisim.errors import InputError, RunError
@@ -59,7 +58,7 @@ def _exit_code(words: list[str]) -> int:
     warnings.showwarning = _print_warning
     with handle_signals(raise_interrupt):
         try:
-            check_backend()
+            choice.check()
             code = app(words, prog_name="tisim", standalone_mode=False)
             # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
             return exit_code() if code == 130 else code or 0

@@ -71,8 +71,8 @@ def jacobians(scenes, step, capacity=16):
 
 
 def fields_beside_the_core(setup):
-    """Names of what the effects of a scene need and so have allocated, beyond position, velocity, mass, radius
-    and id; the guard of explicit steps has fields of its own."""
+    """Names of what the effects of a scene need and so have allocated, beyond position, velocity, mass,
+    radius and id; the guard of explicit steps has fields of its own."""
     fields = resolve_fields(needed_fields(setup.effects, setup.stepper))
     return {field.name for field in fields} - {field.name for field in (*CORE, FORCE_BEFORE, TORQUE_BEFORE)}
 
