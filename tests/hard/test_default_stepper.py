@@ -258,6 +258,20 @@ class TestTheChoice:
                 duration=1.0,
             )
 
+    def test_a_law_of_a_user_counts_as_smooth_where_it_says_so(self):
+        class Silent(laws.Tether):
+            pass
+
+        class Smooth(laws.Tether):
+            kinked = False
+
+        base = tethered()
+        steppers = [
+            tisim.Scene(particles=base.particles, effects=(law(stiffness=(1, 1, 1)),), duration=1.0).stepper
+            for law in (laws.Tether, Smooth, Silent)
+        ]
+        assert [type(stepper) for stepper in steppers] == [Collocation, Collocation, Trapezoid]
+
     def test_a_law_that_tells_no_critical_step_is_refused_beside_grains(self):
         class Unknown(laws.Tether):
             def critical_step(self, start, speed, effects):

@@ -182,7 +182,7 @@ def _error_controlled(
     accuracy: float,
 ) -> StepperChoice:
     pairwise = [effect for effect in effects if isinstance(effect, PairForce)]
-    kinked = [effect.label for effect in effects if effect.kinked]
+    kinked = [effect.label for effect in effects if _may_have_kinks(effect)]
     if pairwise and any(domain.imaged()):
         kinked.append(domain.label)
     limits = {
@@ -201,6 +201,14 @@ def _error_controlled(
     acceleration = "anderson" if pairwise else "none"
     reason = f"forces have kinks, of {kinked[0]}: implicit steps with an error of {error:.3g} at the end"
     return StepperChoice(Trapezoid(control=bound, acceleration=acceleration), reason, critical)
+
+
+def _may_have_kinks(effect: Effect) -> bool:
+    """Return whether an effect has kinks on the way, or may have: a law of a user that does not say."""
+    classes = [base for base in type(effect).__mro__ if issubclass(base, Effect)]
+    own = [vars(base) for base in classes if not base.__module__.startswith("tisim.")]
+    told = not own or any("kinked" in names for names in own)
+    return effect.kinked or not effect.smooth or not told
 
 
 def _stride(effects: Sequence[Effect], start: Mapping[str, np.ndarray]) -> float:

@@ -51,7 +51,10 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
     ``beside`` takes these over from one that it is tried with. Nobody asks what an effect is called.
 12. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may ever
     live at once, given the start.
-13. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
+13. For scenes that name no stepper, ``critical_step`` tells the longest step of a leapfrog, ``kinked`` that
+    forces have kinks or jumps on the way, ``leapfrog`` that only explicit steppers keep their order with it,
+    and ``reached_speed`` how fast it makes particles (see tisim/steppers/choice.py).
+14. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
     say with ``s.invalidate_lists(w)`` that they have moved or resized one. Indices move only between steps.
     Nothing may depend on the order of parallel work: no float atomics.
 
