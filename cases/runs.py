@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tisim import Result
+from tisim import Result, RunError
 from tisim.analysis import largest_overlap, periodic_sides
 
 OTHER_STARTS = 1_000_000
@@ -15,7 +15,8 @@ def sound(results: Sequence[Result]) -> list[Result]:
     """Return results of worlds that are at their end or on the way to it; RunError where one has failed: the
     state of its last good step would be taken for that of the others."""
     for result in results:
-        result.check()
+        if not result.status.ok and result.status.reason != "running":
+            raise RunError(f"{result.scene.name}: {result.status.reason}")
     return list(results)
 
 

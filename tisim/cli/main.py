@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 def _exit_code(words: list[str]) -> int:
     """Run a command; return its exit code, and print why where it is not 0."""
-    warnings.showwarning = _print_warning
+    warnings.formatwarning = _one_line
     with handle_signals(raise_interrupt):
         try:
             choice.check()
@@ -82,9 +82,10 @@ def _exit_code(words: list[str]) -> int:
             return exit_code()
 
 
-def _print_warning(message: Warning | str, category: type[Warning], *_where: Any, **_more: Any) -> None:
-    """Print a warning on one line."""
-    say(f"warning: {message}")
+def _one_line(message: Warning | str, *_where: Any, **_more: Any) -> str:
+    """Return the text of a warning, on one line and without its place in the code."""
+    text = " ".join(str(message).split())
+    return f"warning: {text if text.isprintable() else repr(text)[1:-1]}\n"
 
 
 def _print_version(wanted: bool) -> None:

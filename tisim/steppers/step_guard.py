@@ -42,18 +42,25 @@ def guard_fields(effects: Sequence[Effect]) -> tuple[Field, ...]:
 
 @ti.func
 def check_step(s, w, i, force, torque, turns: ti.template()):  # type: ignore[valid-type]
-    """Stop the world where dt is beyond the critical step of particle i, which has moved by dt v and, where
-    it ``turns``, by dt spin since the last forces; ``force`` (N) and ``torque`` (N m) are the new ones."""
+    """Stop the world where dt is beyond half of the critical step of particle i, which has moved by dt v and,
+    where it ``turns``, by dt spin since the last forces; ``force`` (N) and ``torque`` (N m) are the new
+    ones.
+
+    What the new force does in a step is let pass, too: a field that is switched on, or grows in time, changes
+    the force on a particle at rest.
+    """
     dt, radius = ti.cast(s.dt[w], s.real), s.radius[w, i]
-    moved = dt * s.velocity[w, i].norm()
-    bent = dt * dt / s.mass[w, i] * (force - s.force_before[w, i]).norm()
-    excess = bent / (STEP_LIMIT * (moved + HARDLY * radius))
+    per_force = dt * dt / s.mass[w, i]
+    moved = dt * s.velocity[w, i].norm() + HARDLY * radius
+    bent = per_force * (force - s.force_before[w, i]).norm()
+    fails, excess = bent > STEP_LIMIT * (moved + per_force * force.norm()), bent / moved
     if ti.static(turns):
-        turned = dt * s.spin[w, i].norm()
         # Of grains of nanometres m R^2 is below f32.
-        couple = (torque - s.torque_before[w, i]).norm() / radius
-        twisted = dt * dt / (0.4 * s.mass[w, i] * radius) * couple
-        excess = ti.max(excess, twisted / (STEP_LIMIT * (turned + HARDLY)))
-    if excess > 1.0:
+        per_torque = per_force / 0.4 / radius
+        turned = dt * s.spin[w, i].norm() + HARDLY
+        twisted = per_torque * ((torque - s.torque_before[w, i]).norm() / radius)
+        fails = fails or twisted > STEP_LIMIT * (turned + per_torque * (torque.norm() / radius))
+        excess = ti.max(excess, twisted / turned)
+    if fails:
         s.fail_by_force(w, WorldStatus.STEP_TOO_LONG, i)
-        ti.atomic_max(s.step_excess[w], ti.cast(STEP_LIMIT * excess, ti.f64))
+        ti.atomic_max(s.step_excess[w], ti.cast(excess, ti.f64))
