@@ -172,12 +172,12 @@ SHARED = {
         f"{PARTS}cohesion_pulls_while_surfaces_touch",
     ),
     "bonds_of_unlike_grains": (
-        f"{CONTACT}/parallel_bond.py", "coupled = arm / inertia - back / other", "coupled = 0.0 * arm",
+        f"{CONTACT}/parallel_bond.py", "coupled = free * (arm / inertia - back / other)", "coupled = 0.0 * arm",
         f"{BONDS}what_no_step_can_follow_of_unlike_grains_stops_the_world",
     ),
     "can_follow_at_walls": (
-        f"{LAW}/contact.py", "inverses = TURNING * ti.Vector([1.0, 1.0])",
-        "inverses = TURNING * ti.Vector([1.0, 0.0])", f"{STEPS}[jkr]",
+        f"{LAW}/step_limit.py", "TURNING * arm * arm, TURNING, TURNING * arm]",
+        "TURNING * arm * arm, TURNING, 0.0 * arm]", f"{STEPS}[jkr]",
     ),
     "cohesion_limit": (
         f"{LAW}/cohesion_limit.py", "a * b / (a + b)", "0.9 * a * b / (a + b)",

@@ -18,6 +18,8 @@ from tisim.backend.thread import forked, in_taichi_thread, require_own_process
 from tisim.errors import InputError, RunError, is_whole, must
 
 DEVICES = ("cpu", "cuda", "vulkan")
+LEAST_ADDRESS_SPACE = 10**9
+"""No kernel compiler starts in an address space of so few bytes."""
 PRECISIONS = ("f64", "f32")
 ARITHMETICS = ("strict", "fast")
 THREADS = 1024
@@ -132,6 +134,9 @@ def _start(requested: Runtime) -> None:
     global _current, _generation
     if not _generation:
         atexit.register(_stop)
+    if surroundings.address_space() < LEAST_ADDRESS_SPACE:
+        # Where threads get no stacks, Quadrants waits for them without end.
+        raise _too_little_memory()
     # Whether it starts or not, what ran before has stopped.
     _current, _generation = None, _generation + 1
     try:
@@ -158,10 +163,7 @@ def _start(requested: Runtime) -> None:
             _compile_first()
     except RuntimeError as failure:
         if "memory" in str(failure):
-            raise RunError(
-                f"memory must be enough to start {BACKEND}; received no more than {memory() / 1e9:.3g} GB "
-                "(ulimit -v, or a limit of the container or batch system)"
-            ) from failure
+            raise _too_little_memory() from failure
         raise InputError(
             f"device must be present on this machine; received {requested.device!r} ({failure})"
         ) from failure
@@ -171,6 +173,13 @@ def _start(requested: Runtime) -> None:
     if requested.device == "cpu":
         choice.advise(kernel_cache.lock().parent)
     _current = requested
+
+
+def _too_little_memory() -> RunError:
+    return RunError(
+        f"memory must be enough to start {BACKEND}; received no more than {memory() / 1e9:.3g} GB "
+        "(ulimit -v, or a limit of the container or batch system)"
+    )
 
 
 @ti.kernel

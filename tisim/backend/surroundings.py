@@ -111,12 +111,17 @@ NO_LIMIT = 2**62
 """Control groups of version 1 say a number of bytes above this where there is no limit."""
 
 
+def address_space() -> int:
+    """Return the limit of the address space of this process (ulimit -v), bytes; ``sys.maxsize`` where there
+    is none."""
+    most = -1 if resource is None else resource.getrlimit(resource.RLIMIT_AS)[0]
+    return most if most >= 0 else sys.maxsize
+
+
 def memory_limit() -> int:
     """Return the memory that this process may have, bytes, whatever the machine has: the limit of its address
     space (ulimit -v) or of its control group; ``sys.maxsize`` where there is none."""
-    limits = [sys.maxsize]
-    if resource is not None and (most := resource.getrlimit(resource.RLIMIT_AS)[0]) >= 0:
-        limits.append(most)
+    limits = [address_space()]
     try:
         groups = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
     except OSError:
