@@ -172,7 +172,7 @@ SHARED = {
         f"{PARTS}cohesion_pulls_while_surfaces_touch",
     ),
     "bonds_of_unlike_grains": (
-        f"{CONTACT}/parallel_bond.py", "coupled = free * (arm / inertia - back / other)", "coupled = 0.0 * arm",
+        f"{CONTACT}/parallel_bond.py", "free * (arm / inertia - back / other)", "0.0 * arm",
         f"{BONDS}what_no_step_can_follow_of_unlike_grains_stops_the_world",
     ),
     "can_follow_at_walls": (
