@@ -14,7 +14,8 @@ import pytest
 import tisim
 from tests.hard.default_scenes import FAMILIES
 from tisim import effects as laws
-from tisim import sources
+from tisim import operators, sources
+from tisim.geometry import Plane
 from tisim.steppers import (
     ApproachTime,
     Boris,
@@ -258,30 +259,96 @@ class TestTheChoice:
                 duration=1.0,
             )
 
+    def test_a_stream_of_grains_meets_a_wall_at_its_own_speed(self):
+        def step(speed):
+            return tisim.Scene(
+                particles=tisim.Particles(
+                    position=[(0, 0, 1), (1, 0, 1)],
+                    velocity=[(0, 0, -speed)] * 2,
+                    radius=1e-3,
+                    density=2000.0,
+                ),
+                materials={"a": tisim.Material(young=1e7, poisson=0.3)},
+                effects=(laws.Granular(), laws.Walls(planes=[Plane()])),
+                duration=1.0,
+            ).stepper.control.dt
+
+        # The time of an impact of Hertz's law goes as v^-1/5.
+        assert step(10.0) == pytest.approx(step(0.1) * 100**-0.2, rel=0.02)
+
+    def test_a_blast_is_known_before_it_is_placed(self):
+        cloud = {"number": 50, "radius": 1e-3, "density": 2000.0}
+        steps = [
+            tisim.Scene(
+                particles=tisim.Cloud(**cloud, pulse=tisim.Blast(energy=energy)),
+                effects=(laws.Impact(hardness=1e6),),
+                domain=tisim.Box(low=(0, 0, 0), high=(1, 1, 1)),
+                duration=1.0,
+            ).stepper.control.shortest
+            for energy in (1.0, 100.0)
+        ]
+        assert steps[0] == pytest.approx(10 * steps[1], rel=0.02)
+
+    def test_bodies_that_only_fall_are_stepped(self):
+        clump = tisim.Clump(centres=[(0, 0, 0), (1e-3, 0, 0)], radii=[1e-3] * 2, density=2000.0)
+        scene = tisim.Scene(
+            particles=tisim.Particles.of_clumps(clump, position=[(0, 0, 0)]),
+            effects=(laws.RigidClumps(), laws.Gravity(acceleration=(0, 0, -10.0))),
+            duration=1.0,
+        )
+        fallen = tisim.run(scene).check().state["position"][:, 2]
+        assert fallen == pytest.approx([-5.0, -5.0], rel=1e-9)
+
+    def test_a_charge_that_is_missing_is_asked_for(self):
+        scene = tisim.Scene(
+            particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=1e-3, mass=1e-6),
+            effects=(laws.Lorentz(), sources.MagneticField(constant=(0, 0, 1.0))),
+            duration=1.0,
+        )
+        with pytest.raises(tisim.InputError, match="charge"):
+            tisim.run(scene)
+
+    def test_particles_that_come_later_are_refused(self):
+        insertion = operators.InsertionByFlux(
+            number=10, flux=1.0, low=(0.0,) * 3, high=(0.1,) * 3,
+            grains=[tisim.GrainClass(sizes=tisim.packing.EqualSizes(radius=1e-3), density=2000.0)],
+        )  # fmt: skip
+        with pytest.raises(
+            tisim.InputError, match="scene.stepper must be given, as .* puts in particles later"
+        ):
+            tisim.Scene(
+                particles=tisim.Particles.none(),
+                materials={"a": tisim.Material(young=1e7, poisson=0.3)},
+                effects=(laws.Granular(), insertion),
+                duration=1.0,
+            )
+
     def test_a_law_of_a_user_counts_as_smooth_where_it_says_so(self):
-        class Silent(laws.Tether):
+        class SaysNothing(laws.Tether):
             pass
 
-        class Smooth(laws.Tether):
+        class SaysSmooth(laws.Tether):
             kinked = False
 
         base = tethered()
         steppers = [
             tisim.Scene(particles=base.particles, effects=(law(stiffness=(1, 1, 1)),), duration=1.0).stepper
-            for law in (laws.Tether, Smooth, Silent)
+            for law in (laws.Tether, SaysSmooth, SaysNothing)
         ]
         assert [type(stepper) for stepper in steppers] == [Collocation, Collocation, Trapezoid]
 
     def test_a_law_that_tells_no_critical_step_is_refused_beside_grains(self):
-        class Unknown(laws.Tether):
+        class WithoutCriticalStep(laws.Tether):
             def critical_step(self, start, speed, effects):
                 return None
 
-        with pytest.raises(tisim.InputError, match=r"effects.unknown does not tell the critical time step"):
+        with pytest.raises(
+            tisim.InputError, match=r"no critical time step is known for effects.without_critical_step"
+        ):
             tisim.Scene(
                 particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, mass=1e-6),
                 materials={"a": tisim.Material(young=1e6, poisson=0.3)},
-                effects=(laws.Granular(), Unknown(stiffness=(1, 1, 1))),
+                effects=(laws.Granular(), WithoutCriticalStep(stiffness=(1, 1, 1))),
                 duration=1.0,
             )
 

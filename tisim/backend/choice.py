@@ -90,7 +90,7 @@ def advise(folder: Path) -> None:
     A Python warning would stop those who make errors of warnings, though nothing is wrong with their results.
     """
     line = "" if named() else lost(installed(), processor.processor())
-    if line:
+    if line and sys.stderr:
         # A file that is there, a folder that cannot be written, a stream that is closed or full.
         with suppress(OSError, ValueError):
             (folder / ADVISED).touch(exist_ok=False)

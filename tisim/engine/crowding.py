@@ -176,7 +176,10 @@ class _Crowd:
     def tree(self, members: np.ndarray) -> cKDTree:
         """Return a tree of some of them, which sees across joined faces."""
         place = self.position[members] - self.low
-        place = np.where((self.side > 0) & (place >= self.side), 0.0, place)
+        # A remainder may round up to the whole side.
+        inside = np.mod(place, np.where(self.side > 0, self.side, 1.0))
+        inside = np.where(inside >= self.side, 0.0, inside)
+        place = np.where(self.side > 0, inside, place)
         return cKDTree(place, boxsize=self.side if self.side.any() else None)
 
     def deep_pairs(self) -> tuple[np.ndarray, np.ndarray]:

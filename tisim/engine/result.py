@@ -89,6 +89,6 @@ class Result:
         own = object.__getattribute__(self, "__dict__")
         if own.get("_unread") and own["status"].failed:
             own["_unread"] = False
-            told = "read result.status, or call result.check(), to be told otherwise"
+            told = "read result.status first, or call result.check(), which raises"
             text = f"the run of {own['scene'].name!r} failed, and {what} ({told}): {own['status'].reason}"
             warnings.warn(text, RunWarning, stacklevel=3)

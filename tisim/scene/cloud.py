@@ -122,7 +122,13 @@ class Cloud(Start):
 
     def unplaced(self, seed: int) -> Arrays:
         # Of equal spheres, which differ in velocity alone, some stand for all.
-        return self._unplaced(self.count() if self.grains else min(self.count(), SPHERES_ASKED), seed)
+        known = self._unplaced(self.count() if self.grains else min(self.count(), SPHERES_ASKED), seed)
+        if self.pulse is not None and len(known["mass"]):
+            # In whatever direction: two of them may be thrown apart.
+            added = self.pulse.top_speed(self.masses(seed))
+            known["velocity"][0, 0] += added
+            known["velocity"][-1, 0] -= added
+        return known
 
     def _unplaced(self, n: int, seed: int) -> Arrays:
         """Return the quantities of the first n spheres, but for their places."""

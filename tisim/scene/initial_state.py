@@ -32,8 +32,8 @@ class Start(Component):
 
     def unplaced(self, seed: int) -> Arrays:
         """Return what is known of the particles, or of enough of them, without placing them: velocity (m/s),
-        mass (kg), radius (m) and further quantities."""
-        raise NotImplementedError(f"{type(self).__name__} must define unplaced")
+        mass (kg), radius (m) and further quantities; by default they are placed in open space."""
+        return self.arrays(Open(), seed)
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:
         """Return position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""

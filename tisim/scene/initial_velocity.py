@@ -19,6 +19,11 @@ class Pulse(Component):
         """Return what is added to velocities, m/s, (n, 3), given positions, m, and masses, kg, (n,)."""
         raise NotImplementedError(f"{type(self).__name__} must define velocity")
 
+    def top_speed(self, mass: np.ndarray) -> float:
+        """Return the largest speed (m/s) that it adds to particles of some masses (kg), wherever they are; 0
+        where it is not known."""
+        return 0.0
+
 
 class Blast(Pulse):
     """A blast gives all particles the same speed away from their centre of mass.
@@ -35,6 +40,9 @@ class Blast(Pulse):
     energy: float = parameter(
         "J", "energy W: the kinetic energy of particles that were at rest", examples=[1.0], gt=0
     )
+
+    def top_speed(self, mass: np.ndarray) -> float:
+        return float(np.sqrt(2 * self.energy / mass.sum()))
 
     def velocity(self, position: np.ndarray, mass: np.ndarray) -> np.ndarray:
         arm = position - np.average(position, axis=0, weights=mass)

@@ -25,6 +25,7 @@ from tisim.components.accuracy_parameter import three_digits
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.errors import must
+from tisim.operators.base import Operator
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
 from tisim.steppers.boris import Boris
@@ -38,8 +39,8 @@ from tisim.steppers.verlet import Verlet
 ACCURACY = 1e-2
 """This accuracy is aimed at unless another is asked for: results are good to a hundredth."""
 SMOOTH_SAFETY, KINKED_SAFETY = 100.0, 3.0
-"""The error of a run was up to some such factor above the one that is asked of collocation, and of the
-trapezoidal rule, in the scenes of docs/steppers.md: they are asked for so much less."""
+"""In the scenes of docs/steppers.md the error of a run exceeded the tolerance by up to about these factors,
+for collocation and for the trapezoidal rule; the tolerance is set lower by them."""
 LONGEST_MEETING = 1e3
 """Steps between collisions are at most this many times the shortest, as in Z04."""
 RESOLUTION = 1e-6
@@ -48,8 +49,8 @@ RESOLUTION = 1e-6
 
 @dataclass(frozen=True)
 class StepperChoice:
-    """A choice is a stepper, and the reason for it. critical : the critical time step (s) by the label of the
-    effect that it is of, the shortest first; of the effects that have one."""
+    """A choice is a stepper, and the reason for it. critical : critical time steps (s) by the label of the
+    effect, the shortest first; only effects that have one."""
 
     stepper: Stepper
     reason: str
@@ -71,6 +72,8 @@ def choose(
     for effect in effects:
         rule = f"given, as the length of a step is part of the law of effects.{effect.label}"
         must(not effect.step_dependent, "scene.stepper", rule, "none")
+        rule = f"given, as effects.{effect.label} puts in particles later, whose sizes are not known here"
+        must(not len(effect.largest_newcomers()["radius"]), "scene.stepper", rule, "none")
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
     steps = {effect.label: effect.critical_step(start, speed, effects) for effect in effects}
@@ -106,8 +109,11 @@ def meeting_speed(
     """Return the speed (m/s) at which particles are expected to meet each other, or a wall."""
     velocity, (low, high) = start["velocity"], domain.bounds()
     extent = math.inf if low is None or high is None else float(np.linalg.norm(high - low))
-    own = velocity - velocity.mean(axis=0) if len(velocity) > 1 else velocity
-    speed = 2 * float(np.linalg.norm(own, axis=1).max(initial=0.0)) if len(velocity) else 0.0
+    if not len(velocity):
+        return sum(effect.reached_speed(duration, extent) for effect in effects)
+    # Past each other, and past what stands still or is held.
+    own = float(np.linalg.norm(velocity - velocity.mean(axis=0), axis=1).max())
+    speed = max(2 * own, float(np.linalg.norm(velocity, axis=1).max()))
     return speed + sum(effect.reached_speed(duration, extent) for effect in effects)
 
 
@@ -134,6 +140,10 @@ def _meetings(
     accuracy: float,
 ) -> StepperChoice:
     _check_told(steps, "collisions")
+    for effect in effects:
+        rule = f"given, as none steps collisions and effects.{effect.label} together"
+        suits = ApproachTime.kind() not in effect.incompatible_controls and not effect.gyrates(effects)
+        must(suits, "scene.stepper", rule, "none")
     control, events = ApproachTime(), any(isinstance(effect, PairEvent) for effect in effects)
     smallest = float(start["radius"].min(initial=math.inf))
     shortest, longest = control.shortest, control.longest
@@ -141,6 +151,9 @@ def _meetings(
         # Those that meet within the shortest step are moved into each other by this part of a radius.
         shortest = accuracy * smallest / speed
         longest = LONGEST_MEETING * shortest
+    if any(isinstance(effect, Operator) for effect in effects):
+        # What cools or reacts between collisions does so step by step.
+        longest = min(longest, ApproachTime().longest)
     longest = min(longest, leapfrog_step(effects, critical, accuracy)[0])
     control = ApproachTime(shortest=_length(min(shortest, longest)), longest=_length(longest))
     what = "particles collide" if events else "no force acts"
@@ -157,9 +170,12 @@ def _leapfrog(
     accuracy: float,
 ) -> StepperChoice:
     _check_told(steps, f"effects.{why}")
-    must(bool(critical), "scene.stepper", f"given, as no effect beside {why} tells a critical step", "none")
+    touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
+    rule = f"given, as no critical time step is known for {why}"
+    must(bool(critical) or not touching, "scene.stepper", rule, "none")
     longest, label = leapfrog_step(effects, critical, accuracy)
-    dt = min(_length(longest), duration)
+    # Without a motion that has a critical step the whole is divided.
+    dt = _length(min(longest, accuracy * duration))
     gyrates = any(effect.gyrates(effects) for effect in effects)
     others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
     if gyrates and others:
@@ -167,9 +183,11 @@ def _leapfrog(
         must(False, "scene.stepper", rule, "none")
     stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
     reason = (
-        f"a leapfrog, for {why}: steps of {dt / critical[label]:.3g} of the critical time step, "
-        f"{critical[label]:.3g} s, of {label}"
+        f"a leapfrog, for {why}: steps of {accuracy:g} of the duration, as no critical time step is known"
     )
+    if critical:
+        part = f"{dt / critical[label]:.3g} of the critical time step, {critical[label]:.3g} s, of {label}"
+        reason = f"a leapfrog, for {why}: steps of {part}"
     return StepperChoice(stepper, reason, critical)
 
 
@@ -185,9 +203,11 @@ def _error_controlled(
     kinked = [effect.label for effect in effects if _may_have_kinks(effect)]
     if pairwise and any(domain.imaged()):
         kinked.append(domain.label)
+    # Operators act, and look, once a step.
+    sampled = any(isinstance(effect, Operator) for effect in effects)
     limits = {
         "first": _length(min(1e-6, 1e-4 * duration)),
-        "longest": _length(0.1 * duration),
+        "longest": _length(0.1 * duration * (accuracy if sampled else 1.0)),
         "shortest": max(SHORTEST_STEP, min(1e-12, 1e-10 * duration)),
         "stride": _stride(effects, start),
         "resolution": RESOLUTION,
@@ -223,7 +243,7 @@ def _stride(effects: Sequence[Effect], start: Mapping[str, np.ndarray]) -> float
 def _check_told(steps: Mapping[str, float | None], what: str) -> None:
     """Raise InputError where an effect does not tell its critical step, which one with ``what`` goes by."""
     for label, step in steps.items():
-        rule = f"given, as effects.{label} does not tell the critical time step that {what} would go by"
+        rule = f"given, as no critical time step is known for effects.{label}, which {what} would need"
         must(step is not None, "scene.stepper", rule, "none")
 
 

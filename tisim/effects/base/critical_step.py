@@ -15,14 +15,13 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
+from tisim.effects.base.effect import LONGEST_PART
+
 SLIDING = 3.5
 """m* over the reduced mass of the surfaces of two solid spheres that slide, as these turn too."""
 LEAST_OVERLAP = 1e-3
 """Grains at rest under load overlap by some such part of R*: the stiffness is asked for at this overlap at
 least."""
-LONGEST_PART = 0.35
-"""Steps are not chosen longer than this part of the critical one: in rows of grains energy grows in steps of
-0.7 of it."""
 OVERLAPS = np.geomspace(1e-9, 1.0, 512)
 """Forces are asked for at these overlaps, over R*."""
 
@@ -55,6 +54,9 @@ def impact_stiffness(
     """
     overlap = radius * OVERLAPS
     force = push(overlap)
+    if not np.isfinite(force).all():
+        # The law does not say it.
+        return math.inf
     steps, means = np.diff(overlap, prepend=0.0), 0.5 * (force + np.append(0.0, force[:-1]))
     work = np.cumsum(steps * means)
     stopped = np.flatnonzero(work >= 0.5 * mass * speed * speed)

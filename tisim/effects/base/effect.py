@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from tisim.components.domain import Domain
 
 
+LONGEST_PART = 0.35
+"""Steps are not chosen longer than this part of the critical one: in rows of grains energy grows in steps of
+0.7 of it."""
+
+
 class Effect(LawHints, Component):
     """An effect is anything physical that a scene can call for: the contract of all of them.
 
@@ -92,7 +97,7 @@ class Effect(LawHints, Component):
     def part_of_critical_step(self, accuracy: float) -> float:
         """Return how long a leapfrog's steps may be, over the critical step, to be as accurate (relative): by
         default so that the energy of what swings is off by half of that at most, (omega dt)^2 / 8."""
-        return math.sqrt(accuracy)
+        return min(math.sqrt(accuracy), LONGEST_PART)
 
     def gyrates(self, effects: Sequence[Effect]) -> bool:
         """Return whether it turns velocities, as a magnetic field does those of charges, given all effects of

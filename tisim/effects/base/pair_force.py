@@ -15,7 +15,7 @@ from tisim.effects.base.pairwise import Pairwise
 def keeps_apart(effects: Sequence[Effect]) -> bool:
     """Return whether a scene has a law of contact with a memory, which is far stiffer than what draws
     particles together."""
-    return any(isinstance(one, PairForce) and one.short_ranged and one.leapfrog for one in effects)
+    return any(isinstance(one, PairForce) and one.solid and one.leapfrog for one in effects)
 
 
 class PairForce(Pairwise):

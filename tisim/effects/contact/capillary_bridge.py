@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, parameter
+from tisim.effects.base import Effect, keeps_apart, parameter
 from tisim.effects.contact.granular.contact import GranularContact
 
 
@@ -32,8 +32,8 @@ class CapillaryBridge(GranularContact):
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
-        # Its slope is far below that of a contact, beside which it acts.
-        return math.inf
+        # Its slope is far below that of a contact.
+        return math.inf if keeps_apart(effects) else None
 
     depends_on_velocity: ClassVar[bool] = False
 

@@ -22,9 +22,6 @@ from tisim.numerics import elementary
 from tisim.sources.base import Source, sources
 from tisim.worlds.bound import Peers
 
-LAG = 0.1
-"""Verlet takes the drag of half a step ago, which is an error of dt g / (2 m): the critical step is shorter
-by this factor, so that drag is as accurate as oscillations are."""
 LEAST_SPEED = 1e-30
 """This speed, in m/s, stands for zero where a direction is needed that then has no effect."""
 
@@ -55,7 +52,11 @@ class Drag(Force):
         past = speed + float(np.linalg.norm(start["velocity"], axis=1).max(initial=0.0))
         g = self.resistance_of(start["radius"], past + sum(filter(None, bounds)))
         fastest = float((g / start["mass"]).max(initial=0.0))
-        return LAG * 2 / fastest if fastest > 0 else math.inf
+        return 2 / fastest if fastest > 0 else math.inf
+
+    def part_of_critical_step(self, accuracy: float) -> float:
+        # Verlet takes the drag of half a step ago, which is an error of dt g / (2 m).
+        return min(accuracy, super().part_of_critical_step(accuracy))
 
     @ti.func
     def resistance(self, s, w, i, speed):

@@ -37,7 +37,8 @@ class Lorentz(Force):
         bounds = [one.strongest() for one in fields if one.quantity == "magnetic_flux_density"]
         if None in bounds:
             return None
-        specific = float(np.abs(start["charge"] / start["mass"]).max(initial=0.0))
+        charge = start.get("charge", np.zeros_like(start["mass"]))
+        specific = float(np.abs(charge / start["mass"]).max(initial=0.0))
         rate = specific * sum(filter(None, bounds))
         return 2 / rate if rate > 0 else math.inf
 
