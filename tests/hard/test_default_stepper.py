@@ -314,7 +314,7 @@ class TestTheChoice:
             grains=[tisim.GrainClass(sizes=tisim.packing.EqualSizes(radius=1e-3), density=2000.0)],
         )  # fmt: skip
         with pytest.raises(
-            tisim.InputError, match="scene.stepper must be given, as .* puts in particles later"
+            tisim.InputError, match=r"scene.stepper must be given, as .* puts in particles later"
         ):
             tisim.Scene(
                 particles=tisim.Particles.none(),

@@ -2,6 +2,7 @@ from .base import Stepper as Stepper
 from .boris import Boris as Boris
 from .brownian.brownian import Brownian as Brownian
 from .brownian.drift_limit import DriftLimit as DriftLimit
+from .choice import StepperChoice as StepperChoice
 from .context import Step as Step
 from .context import StepContext as StepContext
 from .implicit.collocation import Collocation as Collocation
