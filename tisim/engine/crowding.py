@@ -32,7 +32,7 @@ SUSPECT = 3
 SAMPLE = 64
 """Where many overlap their pairs are estimated by so many particles."""
 MOST_PAIRS = 2_000_000
-"""Of more pairs that overlap none is looked at by itself."""
+"""Above this number, overlapping pairs are counted but not examined one by one."""
 
 
 class Deep(NamedTuple):
