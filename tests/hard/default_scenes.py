@@ -397,6 +397,31 @@ def bonded_pair(draw):
 
 
 @family
+def bond_along_itself(draw):
+    """A free bonded pair swings along its bond as a spring: the energy, with that of the bond, stays."""
+    radius, rho, mass, young = grains_of(draw)
+    speed = decades(draw, 1e-6, 1e-4) * np.sqrt(young / rho)
+    r, v = [[-radius, 0, 0], [radius, 0, 0]], speed * draw.uniform(-1, 1, (2, 3))
+    v[1, 1:] = v[0, 1:]
+    stiffness = young / (2 * radius) * np.pi * radius**2
+    period = 2 * np.pi * np.sqrt(0.5 * mass / stiffness)
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass),
+        effects=(
+            laws.ParallelBond(gap=1e-6 * radius, young=young, tensile_strength=1e30, shear_strength=1e30),
+        ),
+        duration=draw.uniform(1, 30) * period,
+    )
+
+    def energy(state):
+        stretch = state["position"][1, 0] - state["position"][0, 0] - 2 * radius
+        along = (state["velocity"][:, 0] - state["velocity"][:, 0].mean()) ** 2
+        return 0.5 * mass * along.sum() + 0.5 * stiffness * stretch**2
+
+    return scene, lambda result: float(abs(energy(result.state) / energy(result.start) - 1))
+
+
+@family
 def zohdi_contact(draw):
     """Two soft spheres of Z16 hit each other: the energy stays."""
     radius, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
@@ -435,7 +460,8 @@ def impact(draw):
 def free_clump(draw):
     """A rigid body of unlike spheres turns freely: energy and angular momentum stay."""
     size, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
-    centres = size * draw.uniform(-1, 1, (4, 3))
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    centres = size * (0.6 * corners + 0.3 * draw.uniform(-1, 1, (4, 3)))
     clump = tisim.Clump(centres=centres, radii=size * draw.uniform(0.3, 0.6, 4), density=rho)
     rate = decades(draw, 1e-2, 1e3)
     spin = rate * draw.normal(size=3)
@@ -443,7 +469,7 @@ def free_clump(draw):
     scene = tisim.Scene(
         particles=bodies,
         effects=(laws.RigidClumps(),),
-        duration=draw.uniform(0.5, 4) / rate,
+        duration=decades(draw, 0.5, 300) / rate,
     )
 
     def error(result):

@@ -29,20 +29,20 @@ OLDEST = 12
 
 
 def processor() -> dict[str, str]:
-    """Return the entries of the first processor in /proc/cpuinfo; its name alone where there is no such
-    file."""
-    info = Path("/proc/cpuinfo")
+    """Return the entries of the first processor in /proc/cpuinfo; its name alone where that file cannot be
+    read."""
     entries: dict[str, str] = {}
-    if not info.is_file():
-        return {"model name": platform.processor() or platform.machine()}
-    # Not the whole file: the kernel asks each of some hundred cores for its part.
-    with info.open() as lines:
-        for line in lines:
-            if not line.strip():
-                break
-            key, _, value = line.partition(":")
-            entries[key.strip()] = value.strip()
-    return entries
+    try:
+        # Not the whole file: the kernel asks each of some hundred cores for its part.
+        with Path("/proc/cpuinfo").open() as lines:
+            for line in lines:
+                if not line.strip():
+                    break
+                key, _, value = line.partition(":")
+                entries[key.strip()] = value.strip()
+    except OSError:
+        entries = {}
+    return entries or {"model name": platform.processor() or platform.machine()}
 
 
 def first_llvm(cpu: dict[str, str]) -> tuple[str, int | None]:

@@ -72,6 +72,17 @@ class Result:
         self.__dict__["_unread"] = True
         return self
 
+    def __repr__(self) -> str:
+        # Who prints it sees how it ended.
+        n, status = len(self.start.get("mass", ())), self.status.reason
+        return f"Result({self.scene.name!r}: {n} particles, {self.time:.6g} s, {status})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The copy warns in its place.
+        own = dict(self.__dict__)
+        self.__dict__["_unread"] = False
+        return own
+
     def __getattribute__(self, name: str) -> Any:
         if name == "status":
             object.__getattribute__(self, "__dict__")["_unread"] = False

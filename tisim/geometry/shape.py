@@ -22,8 +22,9 @@ class Shape(Component):
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         """Return the distance (m) of each of some places (m, shape (n, 3)) from its surface, positive where
-        particles are, shape (n,)."""
-        raise NotImplementedError(f"{type(self).__name__} must define distances")
+        particles are, shape (n,); by default infinite, so that a start is not checked for overlaps with a
+        shape that does not tell it."""
+        return np.full(len(places), np.inf)
 
     @ti.func
     def distance(self, w, k, r):

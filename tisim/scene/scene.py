@@ -134,6 +134,7 @@ class Scene(Component):
                 self.stepper.control.kind(),
             )
         self.stepper.suits(self.effects, self.domain)
+        self.stepper.resolves(self.effects, lambda: self._unplaced()[2])
         self.stepper.fewest(self.effects, self.duration)
 
     def _check_materials(self) -> None:

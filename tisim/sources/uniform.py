@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -34,6 +34,10 @@ class Uniform(Source):
     def kinked(self) -> bool:  # type: ignore[override]
         """Return whether the field is switched on in the course of a run."""
         return self.begin > 0
+
+    def structure(self) -> tuple[Any, ...]:
+        # Steppers may be compiled otherwise for forces with kinks.
+        return (*super().structure(), self.kinked)
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]

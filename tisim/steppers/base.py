@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
+
+import numpy as np
 
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import StepperHints
@@ -78,6 +80,11 @@ class Stepper(StepperHints, Component):
                 must(not isinstance(effect, PairEvent), name, f"a force, and not sudden, {where}", name)
                 rule = f"one that acts on all layers alike (homogeneous), as gravity does, {where}"
                 must(effect.homogeneous, name, rule, effect.kind())
+
+    def resolves(self, effects: Sequence[Effect], start: Callable[[], Mapping[str, np.ndarray]]) -> None:
+        """Raise InputError when steps are known beforehand to be too long for a motion that an effect causes;
+        by default that is found in the run. start : gives the quantities of the particles at the start, SI,
+        without their places."""
 
     def countable(self, effects: Sequence[Effect]) -> float:
         """Return the number of steps that the stepper can count in a scene of these effects."""

@@ -4,11 +4,10 @@ The rule, in this order:
 
 1. Particles that only drift, and hard particles that collide, step from one meeting of surfaces to the next
    (``approach_time``).
-2. Effects that remember, turn with their particles or move them, and laws of contact, are stepped by a
+2. Effects that remember, turn with their particles or move them, and solid contacts, are stepped by a
    leapfrog (``verlet``, or ``boris`` with a Lorentz force) in steps of one length: a part of the critical
    time step, 2/omega of the stiffest motion that an effect of the scene tells (``Effect.critical_step``).
-3. All other forces are stepped with the error that is asked for: by collocation of order 8 where they are
-   smooth, and by the trapezoidal rule where they have kinks or jumps.
+3. All other forces are stepped by collocation, with the error that is asked for.
 
 What cannot be chosen so is refused, with the effect at fault.
 """
@@ -23,7 +22,7 @@ import numpy as np
 
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.domain import Domain
-from tisim.effects.base import Effect, Force, PairEvent, PairForce
+from tisim.effects.base import Effect, Force, PairEvent, PairForce, kinks
 from tisim.errors import must
 from tisim.operators.base import Operator
 from tisim.sources.base import Source
@@ -31,16 +30,18 @@ from tisim.steppers.base import Stepper
 from tisim.steppers.boris import Boris
 from tisim.steppers.implicit.collocation import Collocation
 from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
 from tisim.steppers.step_control import SHORTEST_STEP, ApproachTime, FixedStep
 from tisim.steppers.verlet import Verlet
 
 ACCURACY = 1e-2
 """This accuracy is aimed at unless another is asked for: results are good to a hundredth."""
-SMOOTH_SAFETY, KINKED_SAFETY = 100.0, 3.0
-"""In the scenes of docs/steppers.md the error of a run exceeded the tolerance by up to about these factors,
-for collocation and for the trapezoidal rule; the tolerance is set lower by them."""
+ALONE, TOGETHER, KINKED, MEETING = 20.0, 75.0, 3.0, 15.0
+"""The error that collocation is asked for is the accuracy over these: where forces are smooth, of particles
+that move alone, and of such as act on each other, which multiplies errors on the way, in eccentric orbits by
+40; where forces have kinks, of particles alone, and of such as meet (tests/hard/test_default_stepper.py,
+tests/steppers/test_kinked_forces.py)."""
+FINE = 1e-3
+"""From this accuracy on five stages of collocation are cheapest."""
 LONGEST_MEETING = 1e3
 """Steps between collisions are at most this many times the shortest, as in Z04."""
 RESOLUTION = 1e-6
@@ -81,7 +82,7 @@ def choose(
     needed = [effect for effect in effects if effect.leapfrog]
     if not (forces or needed) or any(isinstance(effect, PairEvent) for effect in effects):
         return _meetings(effects, start, speed, critical, steps, accuracy)
-    contacts = [one for one in forces if one.kinked and isinstance(one, PairForce) and one.short_ranged]
+    contacts = [one for one in forces if one.kinked and isinstance(one, PairForce) and one.solid]
     told = None not in steps.values() and bool(critical)
     if needed or domain.shears() or (contacts and told):
         why = (needed or contacts or [domain])[0].label
@@ -174,8 +175,10 @@ def _leapfrog(
     rule = f"given, as no critical time step is known for {why}"
     must(bool(critical) or not touching, "scene.stepper", rule, "none")
     longest, label = leapfrog_step(effects, critical, accuracy)
-    # Without a motion that has a critical step the whole is divided.
-    dt = _length(min(longest, accuracy * duration))
+    # Without a motion that has a critical step the whole is divided, and where something acts once a step or
+    # begins on the way.
+    divided = not critical or any(isinstance(effect, Operator | Source) for effect in effects)
+    dt = _length(min(longest, (accuracy if divided else 0.1) * duration))
     gyrates = any(effect.gyrates(effects) for effect in effects)
     others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
     if gyrates and others:
@@ -199,10 +202,7 @@ def _error_controlled(
     duration: float,
     accuracy: float,
 ) -> StepperChoice:
-    pairwise = [effect for effect in effects if isinstance(effect, PairForce)]
-    kinked = [effect.label for effect in effects if _may_have_kinks(effect)]
-    if pairwise and any(domain.imaged()):
-        kinked.append(domain.label)
+    pairwise, kinked = any(isinstance(effect, PairForce) for effect in effects), kinks(effects, domain)
     # Operators act, and look, once a step.
     sampled = any(isinstance(effect, Operator) for effect in effects)
     limits = {
@@ -212,23 +212,25 @@ def _error_controlled(
         "stride": _stride(effects, start),
         "resolution": RESOLUTION,
     }
-    if not kinked:
-        control = StageControl(error=accuracy / SMOOTH_SAFETY, per="run", norm="each", **limits)
-        reason = f"forces are smooth: steps of order 8 with an error of {control.error:.3g} at the end"
-        return StepperChoice(Collocation(control=control), reason, critical)
-    error = accuracy / KINKED_SAFETY
-    bound = ErrorControl(error=error, tolerance=1e-2 * error, per="run", **limits)
-    acceleration = "anderson" if pairwise else "none"
-    reason = f"forces have kinks, of {kinked[0]}: implicit steps with an error of {error:.3g} at the end"
-    return StepperChoice(Trapezoid(control=bound, acceleration=acceleration), reason, critical)
+    smooth = TOGETHER if pairwise else ALONE
+    error = accuracy / ((MEETING if pairwise else KINKED) if kinked else smooth)
+    control = StageControl(error=error, per="run", norm="each", **limits)
+    stages = 3 if kinked else _stages(effects, accuracy)
+    stepper = Collocation(control=control, stages=stages)
+    what = f"forces have kinks, of {kinked[0]}" if kinked else "forces are smooth"
+    reason = f"{what}: steps of order {stepper.order} with an error of {error:.3g} at the end"
+    return StepperChoice(stepper, reason, critical)
 
 
-def _may_have_kinks(effect: Effect) -> bool:
-    """Return whether an effect has kinks on the way, or may have: a law of a user that does not say."""
-    classes = [base for base in type(effect).__mro__ if issubclass(base, Effect)]
-    own = [vars(base) for base in classes if not base.__module__.startswith("tisim.")]
-    told = not own or any("kinked" in names for names in own)
-    return effect.kinked or not effect.smooth or not told
+def _stages(effects: Sequence[Effect], accuracy: float) -> int:
+    """Return the number of stages that reach an accuracy with the fewest sums of smooth forces.
+
+    Where velocities gyrate, steps take more sweeps, each of which gains one order of dt and not two; fewer
+    steps of a higher order are cheaper then.
+    """
+    if accuracy <= FINE:
+        return 5
+    return 4 if any(effect.gyrates(effects) for effect in effects) else 3
 
 
 def _stride(effects: Sequence[Effect], start: Mapping[str, np.ndarray]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tisim.effects.base import Constraint, Force
+from tisim.effects.base import Constraint, Effect, Force, kinks
 from tisim.operators.base import Operator
 
 if TYPE_CHECKING:
@@ -71,6 +71,11 @@ class StepContext:
     def turning(self) -> bool:
         """Return whether there are torques."""
         return self.force_sum.turning
+
+    @property
+    def smooth(self) -> bool:
+        """Return whether forces have no kinks or jumps on the way."""
+        return not kinks([effect.data for effect in self.effects.of(Effect)], self.domain.data)
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ from tisim.effects.base.effect import Effect
 from tisim.effects.base.force import Force
 from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
-from tisim.effects.base.pair_force import PairForce, keeps_apart
+from tisim.effects.base.pair_force import PairForce, keeps_apart, kinks
 from tisim.effects.base.pairwise import Pairwise
 from tisim.worlds.fields import Field
 
@@ -95,6 +95,7 @@ __all__ = [
     "SelfConsistentQuantity",
     "Vector",
     "keeps_apart",
+    "kinks",
     "option",
     "parameter",
 ]

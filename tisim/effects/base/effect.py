@@ -99,6 +99,13 @@ class Effect(LawHints, Component):
         default so that the energy of what swings is off by half of that at most, (omega dt)^2 / 8."""
         return min(math.sqrt(accuracy), LONGEST_PART)
 
+    def has_kinks(self) -> bool:
+        """Return whether it has kinks or jumps on the way, or may have: a law of a user that does not say."""
+        classes = [base for base in type(self).__mro__ if issubclass(base, Effect)]
+        own = [vars(base) for base in classes if not base.__module__.startswith("tisim.")]
+        told = not own or any("kinked" in names for names in own)
+        return self.kinked or not self.smooth or not told
+
     def gyrates(self, effects: Sequence[Effect]) -> bool:
         """Return whether it turns velocities, as a magnetic field does those of charges, given all effects of
         the scene: Verlet's steps then gain energy however short they are."""

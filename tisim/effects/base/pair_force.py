@@ -8,8 +8,18 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import is_device_function, ti
+from tisim.components.domain import Domain
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pairwise import Pairwise
+
+
+def kinks(effects: Sequence[Effect], domain: Domain) -> list[str]:
+    """Return the labels of the parts of a scene whose forces have kinks or jumps on the way, or may have."""
+    kinked = [effect.label for effect in effects if effect.has_kinks()]
+    if any(domain.imaged()) and any(isinstance(effect, PairForce) for effect in effects):
+        # Where the nearest image becomes another.
+        kinked.append(domain.label)
+    return kinked
 
 
 def keeps_apart(effects: Sequence[Effect]) -> bool:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
+
+import numpy as np
 
 from tisim.components.component import option, parameter
 from tisim.components.domain import Domain
@@ -29,6 +32,9 @@ from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.intervals import INTERVAL_FLAGS, INTERVAL_QUANTITIES, BeginIntervals
 from tisim.worlds.fields import Field
 
+LONGEST_RELAXATION = 0.2
+"""Steps are at most this part of the time in which a spring draws a particle back."""
+
 
 class Brownian(Stepper):
     """Brownian dynamics moves particles without inertia: by the flow, by forces and by thermal noise.
@@ -39,6 +45,10 @@ class Brownian(Stepper):
     of the step and R normal noise. ``velocity`` is that of drift in the last step, u + sum_j D_ij F_j / kT.
     Its mean is exact to first order in dt, and so is every statistic (weak order 1). The fluid has no inertia
     either; it is infinite, and at rest but for u.
+
+    In a trap of stiffness k the variance of the place is kT/k / (1 - a/2), with a = dt k / (6 pi eta R); it
+    grows without bound from a = 2 on. Steps with a above 0.2, where it is a ninth too large, are refused for
+    forces on single particles that tell their stiffness (``critical_step``), as ``tether`` does.
 
     Noise is made by Cholesky's decomposition ("exact"), or by the truncated expansion, in N^2 operations
     ("fast"). A world in which the diffusion tensor is not positive definite fails, with time and particle:
@@ -83,6 +93,25 @@ class Brownian(Stepper):
             must(not (effect.depends_on_velocity or isinstance(effect, PairEvent)), name, rule, name)
         fits = self.hydrodynamics == "none" or not any(domain.imaged())
         must(fits, "brownian.hydrodynamics", "none in a periodic box", self.hydrodynamics)
+
+    def resolves(self, effects: Sequence[Effect], start: Callable[[], Mapping[str, np.ndarray]]) -> None:
+        forces = [effect for effect in effects if isinstance(effect, Force) and not effect.kinked]
+        quantities = start() if forces else {"mass": np.zeros(0)}
+        if not len(quantities["mass"]):
+            return
+        lightest, smallest = float(quantities["mass"].min()), float(quantities["radius"].min())
+        friction = 6 * math.pi * self.viscosity * smallest
+        for effect in forces:
+            critical = effect.critical_step(quantities, 0.0, effects)
+            if critical is not None and math.isfinite(critical):
+                # Of the spring constant k = m omega^2.
+                relaxation = friction / (lightest * (2 / critical) ** 2)
+                rule = (
+                    f"at most {LONGEST_RELAXATION:g} of the relaxation time of effects.{effect.label}, "
+                    f"6 pi eta R / k = {relaxation:.3g} s"
+                )
+                fits = self.control.longest <= LONGEST_RELAXATION * relaxation * (1 + 1e-9)
+                must(fits, "brownian.control.longest", rule, self.control.longest)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
         separate = all(single(effect) or _one_by_one(effect) for effect in effects)

@@ -107,6 +107,7 @@ class TakeStages(PerBlock):
     def __init__(self, context: StepContext, sums, stages) -> None:
         super().__init__(sums)
         self.control, self.stages = context.control, stages
+        self.leading = context.control.leading(context.smooth)
         self.eps = float(np.finfo(np.float64 if self.s.real == ti.f64 else np.float32).eps)
 
     @ti.func
@@ -162,7 +163,7 @@ class TakeStages(PerBlock):
             total += ti.cast(self.stages.estimate[j], self.s.real) * here
             largest = ti.max(largest, here.norm())
         error = total.norm()
-        if ti.static(self.control.at_end):
+        if ti.static(self.leading):
             factor, power = ti.static(self.stages.leading)
             error = largest * elementary.pow(factor * error / ti.select(largest > 0.0, largest, 1.0), power)
         return error

@@ -19,7 +19,7 @@ class JudgeStages(Phase):
 
     def __init__(self, context: StepContext, sums, stages) -> None:
         self.s, self.control, self.sums, self.stages = context.s, context.control, sums, stages
-        self.order = context.control.order(stages.number)
+        self.order = context.control.order(stages.number, context.smooth)
 
     @ti.func
     def run(self, w, _k):

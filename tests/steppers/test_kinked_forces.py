@@ -1,0 +1,94 @@
+"""What an error asked for at the end of a run is worth where forces have kinks or jumps.
+
+    python -m pytest -n 0 -m slow -s tests/steppers/test_kinked_forces.py
+
+prints, for each kind of scene in kinked.py, the median and the largest error at the end over that asked for.
+"""
+
+import numpy as np
+import pytest
+
+import tisim
+from tests.steppers.kinked import KINDS, RADIUS, error
+from tisim import effects as laws
+from tisim import sources
+from tisim.steppers import Collocation, ErrorControl, StageControl, Trapezoid
+
+ASKED = (1e-3, 1e-5, 1e-7)
+PAIRS = ("mie_at_its_cutoff", "powers_with_a_cutoff")
+STRIDE = {name: 0.025 for name in PAIRS}
+"""m. Half a radius: in longer steps particles may pass what acts at short range unseen."""
+LARGEST = dict.fromkeys(KINDS, 15.0) | dict.fromkeys(PAIRS, 100.0)
+
+
+def ratios(name, make, number):
+    """Return errors at the end over that asked for, shape (asked, scenes). make : of (error, stride, s)."""
+    drawn = [KINDS[name](np.random.Generator(np.random.Philox(key=[k, 1]))) for k in range(number)]
+    found = []
+    for asked in ASKED:
+        results = tisim.run(
+            [
+                tisim.Scene(
+                    particles=scene.particles, effects=scene.effects, duration=scene.duration,
+                    stepper=make(asked, STRIDE.get(name, 0.0), scene.duration),
+                )
+                for scene, _ in drawn
+            ]
+        )  # fmt: skip
+        found.append([error(s, end, r) / asked for (s, end), r in zip(drawn, results, strict=True)])
+    return np.array(found)
+
+
+def collocation(stages, per="run"):
+    """Return how collocation of a number of stages is made for an error."""
+    return lambda asked, stride, duration: Collocation(
+        stages=stages, control=StageControl(error=asked, per=per, stride=stride)
+    )
+
+
+def trapezoid(asked, stride, duration):
+    """Return the trapezoidal rule for an error; its steps are bounded, as a jump may hide within one."""
+    return Trapezoid(
+        control=ErrorControl(
+            error=asked, tolerance=1e-2 * asked, per="run", longest=duration / 50, stride=stride
+        )
+    )
+
+
+@pytest.mark.parametrize("name", ["constriction", "flow_that_begins"])
+def test_collocation_meets_the_error_asked_for_past_kinks(name):
+    assert ratios(name, collocation(5), 12).max() < LARGEST[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("stepper", ["collocation 3", "collocation 5", "trapezoid"])
+def test_40_scenes_of_each_kind(name, stepper, capsys):
+    found = ratios(name, trapezoid if stepper == "trapezoid" else collocation(int(stepper[-1])), 40)
+    with capsys.disabled():
+        cells = (f"{np.median(one):7.2g} {one.max():7.2g}" for one in found)
+        print(f"\n{name:32s} {stepper:14s}", *cells, sep=" | ")
+    assert found.max() < LARGEST[name]
+
+
+def test_fields_that_begin_and_fields_that_do_not_may_run_in_one_batch():
+    """Each with the estimate of error that suits it: the same bits as alone."""
+    scenes = [
+        tisim.Scene(
+            particles=tisim.Particles(
+                position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=RADIUS, mass=1.0,
+                quantities={"charge": [1.0]},
+            ),
+            effects=(
+                laws.Lorentz(), sources.ElectricField(amplitude=(1, 0, 0), omega=(50, 0, 0), begin=begin)
+            ),
+            stepper=Collocation(control=StageControl(error=1e-7, per="run")),
+            duration=0.2,
+        )
+        for begin in (0.0, 0.1)
+    ]  # fmt: skip
+    together = tisim.run(scenes)
+    for scene, result in zip(scenes, together, strict=True):
+        (alone,) = tisim.run([scene])
+        assert np.array_equal(alone.state["position"], result.state["position"])
+        assert alone.work == result.work
