@@ -141,7 +141,7 @@ CONTROLLED = {
         ({"kind": "stage_control", "per": "run"}, {}, (Lorentz, MagneticField, Tether)),
     ),
     "brownian": (
-        ({"kind": "drift_limit", "longest": DT}, {}, (Tether,)),
+        ({"kind": "drift_limit", "longest": DT / 20}, {}, (Tether,)),
         ({"kind": "drift_limit", "longest": DT}, {}, (Mie,)),
         ({"kind": "drift_limit", "longest": DT}, {"hydrodynamics": "rotne-prager"}, (Mie,)),
         ({"kind": "drift_limit", "longest": DT}, {"hydrodynamics": "oseen", "noise": "fast"}, (NearField,)),

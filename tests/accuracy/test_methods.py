@@ -160,7 +160,7 @@ def test_settings_of_what_is_tried_are_rounded():
 def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_what_it_chooses():
     """Temperature and viscosity are not of its choice."""
     fluid = Brownian(
-        temperature=298.0, viscosity=1e-3, control=DriftLimit(longest=1e-3), hydrodynamics="rotne-prager",
+        temperature=298.0, viscosity=1e3, control=DriftLimit(longest=1e-3), hydrodynamics="rotne-prager",
         noise="fast",
     )  # fmt: skip
     names = list(methods_of(oscillator().model_copy(update={"stepper": fluid})))

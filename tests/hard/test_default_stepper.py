@@ -29,7 +29,7 @@ from tisim.steppers import (
     Trapezoid,
     Verlet,
 )
-from tisim.steppers.choice import ACCURACY
+from tisim.steppers.choice import ACCURACY, ALONE, KINKED
 
 QUICK = ("tether", "lorentz", "permanent_magnet", "damped_grains", "impact", "driven_charge")
 """These families stand for the rules in the quick tests."""
@@ -352,7 +352,9 @@ class TestTheChoice:
             tisim.Scene(particles=base.particles, effects=(law(stiffness=(1, 1, 1)),), duration=1.0).stepper
             for law in (laws.Tether, SaysSmooth, SaysNothing)
         ]
-        assert [type(stepper) for stepper in steppers] == [Collocation, Collocation, Trapezoid]
+        assert [stepper.control.error for stepper in steppers] == [
+            ACCURACY / safety for safety in (ALONE, ALONE, KINKED)
+        ]
 
     def test_a_law_that_tells_no_critical_step_is_refused_beside_grains(self):
         class WithoutCriticalStep(laws.Tether):
