@@ -98,7 +98,9 @@ def plain(line: str) -> str:
     parts = re.split(r"``(.*?)``", line)
     names = (f":ref:`{name}`" if name in NAMES else f"``{name}``" for name in parts[1::2])
     texts = (re.sub(r"([\\*|`_])", r"\\\1", text) for text in parts[::2])
-    return "".join(part for pair in zip_longest(texts, names, fillvalue="") for part in pair)
+    text = "".join(part for pair in zip_longest(texts, names, fillvalue="") for part in pair)
+    # An initial, such as that of an author, would begin a list.
+    return re.sub(r"^(\s*)([A-Za-z][.)] )", r"\1\\\2", text)
 
 
 def as_rst(_app: Any, _what: str, _name: str, value: Any, _options: Any, lines: list[str]) -> None:

@@ -71,6 +71,21 @@ def test_public_names_are_all_there(pages):
     assert "autoclass:: tisim.effects.Impact\n" not in pages["api"]
 
 
+def test_no_page_has_a_name_that_sphinx_gives_its_own_pages():
+    assert not {page.stem for page in DOCS.glob("*.md")} & {"search", "genindex", "modindex", "py-modindex"}
+
+
+def test_no_line_of_a_page_is_a_comment():
+    for page in DOCS.rglob("*.md"):
+        assert not re.search(r"^\s*% ", page.read_text(encoding="utf-8"), re.M), page
+
+
+@pytest.mark.parametrize("line", ["C. D. Willett, Langmuir", "e. of that", "M) of three"])
+def test_initials_at_the_beginning_of_a_line_begin_no_list(maker, line):
+    assert maker.plain(line) == f"\\{line}"
+    assert maker.plain(f"  {line}") == f"  \\{line}"
+
+
 def test_docstrings_are_plain_text(maker):
     law = "A force |F| on i_ by ``impact``, ``j`` and *.\n\n    F = |a_b|\n\n"
     text = f"{law}name : one,\n    and more. third : 3,\n3.\nlow, high : two.\nMore."
