@@ -1,6 +1,6 @@
 """Looks into rendered pages for what their sources say.
 
-    python docs/check_pages.py FOLDER    of ``sphinx-build docs FOLDER``; ends with 1 and a line for each fault
+    python docs/check_pages.py FOLDER    of ``sphinx-build docs FOLDER``; exit code 1 and a line for each fault
 
 Found are guides that another page has overwritten, lines that were taken for comments, and lists that nobody
 wrote: initials of authors at the beginning of a line.
@@ -30,7 +30,7 @@ def faults(folder: Path) -> list[str]:
     for page in sorted(folder.rglob("*.html")):
         if re.search(r'<ol class="(upper|lower)', page.read_text(encoding="utf-8")):
             found.append(
-                f"{page.relative_to(folder)}: a list by letters, which may be the initials of a name"
+                f"{page.relative_to(folder)}: a list by letters, or the initials of a name"
             )
     return found
 
