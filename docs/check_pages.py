@@ -1,6 +1,6 @@
 """Looks into rendered pages for what their sources say.
 
-    python docs/check_pages.py FOLDER    of ``sphinx-build docs FOLDER``; exit code 1 and a line for each fault
+    python docs/check_pages.py FOLDER    of ``sphinx-build docs FOLDER``; exit code 1 and a line for a fault
 
 Found are guides that another page has overwritten, lines that were taken for comments, and lists that nobody
 wrote: initials of authors at the beginning of a line.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tisim.engine.observer import Observer
+from tisim.engine.observer import Observer, next_due
 from tisim.errors import is_number, must
 from tisim.worlds.status import WorldStatus
 
@@ -52,7 +52,7 @@ class MeasureSeries(Observer):
         return len(self._rows)
 
     def _due(self, rows: list[dict[str, float]]) -> float:
-        """Return the time (s) of the next entry, early by what rounding of times makes of it."""
+        """Return the time (s) of the next entry."""
         if not rows:
             return 0.0
-        return float((np.floor(rows[-1]["time"] / self.interval + 1e-9) + 1 - 1e-9) * self.interval)
+        return next_due(rows[-1]["time"], self.interval)

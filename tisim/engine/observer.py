@@ -16,6 +16,17 @@ if TYPE_CHECKING:
     from tisim.engine.simulation import Simulation
 
 
+EARLY_FRACTION = 1e-9
+"""What is due may come early by this fraction of an interval, so that rounding of times costs no step."""
+
+
+def next_due(time: float, interval: float) -> float:
+    """Return the first time (s) after this one, s, at which what comes at equal intervals (s) is due."""
+    due = (np.floor(time / interval + EARLY_FRACTION) + 1 - EARLY_FRACTION) * interval
+    # At intervals that numbers of this size do not resolve it is due at once.
+    return float(due) if time < due < np.inf else float(np.nextafter(time, np.inf))
+
+
 class Observer:
     """This is the contract of an observer.
 

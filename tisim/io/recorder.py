@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
-from tisim.engine.observer import Observer
+from tisim.engine.observer import Observer, next_due
 from tisim.io.reader import Frame
 from tisim.worlds.status import WorldStatus
 
 if TYPE_CHECKING:
     from tisim.engine.simulation import Simulation
     from tisim.io.trajectory import Trajectory
-
-EARLY_FRACTION = 1e-9
-"""A frame may come early by this fraction of an interval, so that rounding of times costs no step."""
 
 
 class Recorder(Observer):
@@ -32,15 +29,10 @@ class Recorder(Observer):
         # A run that goes on may owe the frame of the time where it goes on: the disk was full.
         self.due = np.array(
             [
-                0.0 if last < 0 else self._next_due(last, interval)
+                0.0 if last < 0 else next_due(last, interval)
                 for last, interval in zip(self.last, self.interval, strict=True)
             ]
         )
-
-    @staticmethod
-    def _next_due(time: float, interval: float) -> float:
-        """Return the first time after this one at which a frame is due, s."""
-        return float((np.floor(time / interval + EARLY_FRACTION) + 1 - EARLY_FRACTION) * interval)
 
     def pause(self, simulation: Simulation) -> np.ndarray:
         return self.due
@@ -53,7 +45,7 @@ class Recorder(Observer):
             time = float(good["time"][w])
             if time < self.due[w] and running[w]:
                 continue
-            self.due[w] = self._next_due(time, interval)
+            self.due[w] = next_due(time, interval)
             if time > self.last[w]:
                 new.append(w)
         for w, measures in zip(new, simulation.measures(new), strict=True):
