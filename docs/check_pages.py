@@ -29,9 +29,7 @@ def faults(folder: Path) -> list[str]:
             found.append(f"{name}: the page is without {', '.join(lost[:9])}")
     for page in sorted(folder.rglob("*.html")):
         if re.search(r'<ol class="(upper|lower)', page.read_text(encoding="utf-8")):
-            found.append(
-                f"{page.relative_to(folder)}: a list by letters, or the initials of a name"
-            )
+            found.append(f"{page.relative_to(folder)}: a list by letters, or the initials of a name")
     return found
 
 

@@ -206,6 +206,11 @@ def current() -> Runtime:
     return _current or init()
 
 
+def precision() -> str:
+    """Return the precision that runs, or by default will; unlike ``current`` it starts nothing."""
+    return _current.precision if _current else Runtime.precision
+
+
 def generation() -> int:
     """Return the number of starts: compiled objects of an earlier generation must not be touched."""
     return _generation

@@ -13,8 +13,10 @@ from tisim.steppers.common import (
     BeginStep,
     apply_displacement,
     apply_operators,
+    displaced,
     drift,
     report_displacement,
+    rounding_fields,
 )
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
@@ -50,7 +52,7 @@ class Boris(Stepper):
         return (cls(control=FixedStep(dt=dt)),) if linear else ()
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
-        return (FORCE, *guard_fields(effects))
+        return (FORCE, *guard_fields(effects), *rounding_fields())
 
     def step(self, context: StepContext) -> Step:
         report = report_displacement(context)
@@ -86,7 +88,8 @@ class BorisDrift(PerParticle):
         moved = 0.5 * ti.cast(s.dt[w], s.real) * s.velocity[w, i]
         r, end = s.position[w, i], s.time_before[w] + self.part * s.dt[w]
         beside = ti.cast(moved, ti.f64) - 0.5 * s.dt[w] * drift(s, self.domain, w, r)
-        apply_displacement(s, self.domain, w, i, r + moved, beside, ti.cast(0.0, ti.f64), end)
+        place = displaced(s, w, i, r, moved)
+        apply_displacement(s, self.domain, w, i, place, beside, ti.cast(0.0, ti.f64), end)
 
 
 class BorisRotation(PerParticle):

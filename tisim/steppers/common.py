@@ -1,10 +1,34 @@
 """Phases that several steppers have in common."""
 
+from tisim.backend import runtime
 from tisim.backend.taichi import ti
-from tisim.numerics.ieee import compensated_sum, finite
+from tisim.numerics.ieee import compensated_sum, finite, rounded_vector
 from tisim.steppers.context import StepContext
+from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
+
+
+POSITION_ROUNDING = Field("position_rounding", "m", 3, "keep", scratch=True)
+"""This field is what rounding has taken from a particle's displacements so far; in single precision only."""
+
+
+def rounding_fields() -> tuple[Field, ...]:
+    """Return the field of what rounding takes from displacements, in the precision that needs it."""
+    return (POSITION_ROUNDING,) if runtime.precision() == "f32" else ()
+
+
+@ti.func
+def displaced(s, w, i, r, path):
+    """Return the place (m) to which a path (m) leads from r. In single precision the sum is compensated (W.
+    Kahan 1965): slow particles would otherwise lose a part of each step, always the same way."""
+    place = r + path
+    if ti.static(POSITION_ROUNDING in s.fields):
+        whole = path + s.position_rounding[w, i]
+        # What is left is far below 1 m.
+        place = rounded_vector(r + whole, s.position_rounding[w, i][0])
+        s.position_rounding[w, i] = whole - rounded_vector(place - r, s.position_rounding[w, i][0])
+    return place
 
 
 @ti.func

@@ -12,6 +12,8 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, parameter
 from tisim.errors import must
 
+HALF_DIGIT = 2.0**-24
+"""Numbers are rounded by at most this part of them in single precision."""
 TOUCH = 1.0 + 1e-6
 """Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
 SHORTEST_STEP = 1e-30
@@ -88,7 +90,14 @@ class FixedStep(Controller):
 
     @ti.func
     def next(self, s, w, horizon):
-        return ti.cast(self.dt(w), ti.f64)
+        dt = ti.cast(self.dt(w), ti.f64)
+        if ti.static(s.real == ti.f32):
+            # It is known to half a last digit: where that is the difference, whole steps lead to the end.
+            remaining = s.end[w] - s.time[w]
+            steps = ti.round(remaining / dt)
+            if steps >= 1.0 and ti.abs(remaining - steps * dt) <= HALF_DIGIT * remaining:
+                dt = remaining / steps
+        return dt
 
 
 class ApproachTime(Controller):

@@ -13,7 +13,14 @@ from tisim.components.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent
 from tisim.errors import must
 from tisim.steppers.base import Stepper
-from tisim.steppers.common import BeginStep, advance_clock, apply_displacement, drift
+from tisim.steppers.common import (
+    BeginStep,
+    advance_clock,
+    apply_displacement,
+    displaced,
+    drift,
+    rounding_fields,
+)
 from tisim.steppers.constraints import advance_bodies, kick_bodies, put_held, steer_held
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE
@@ -56,7 +63,7 @@ class Verlet(Stepper):
             must(not effect.gyrates(effects), "stepper", rule, self.kind())
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
-        return guard_fields(effects)
+        return (*guard_fields(effects), *rounding_fields())
 
     def step(self, context: StepContext) -> Step:
         kick = (*kick_bodies(context), Kick(context)) if context.forced else ()
@@ -99,7 +106,7 @@ class Move(PerParticle):
                     s.torque_before[w, i] = s.torque[w, i]
             if ti.static(self.forced):
                 half_kick(s, w, i, self.turning)
-            s.position[w, i] = before + dt * s.velocity[w, i]
+            s.position[w, i] = displaced(s, w, i, before, dt * s.velocity[w, i])
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, end, dt)
         after, grown = s.position[w, i], ti.cast(s.radius[w, i] - size, ti.f64)

@@ -1,0 +1,99 @@
+"""Single precision: displacements below the last digits of positions add up, and steps are counted right."""
+
+import numpy as np
+import pytest
+
+import tisim
+from tisim import effects as laws
+from tisim.steppers import Boris, FixedStep, Verlet
+
+SPEED, DT, STEPS = 1e-3, 1e-5, 200_000
+STEPPERS = {
+    "verlet": lambda dt: Verlet(control=FixedStep(dt=dt)),
+    "boris": lambda dt: Boris(control=FixedStep(dt=dt)),
+}
+
+
+def flights():
+    """Return, for each stepper, where a slow particle gets, and the steps that it takes. At 0.1 m a step moves
+    it by 1.3 last digits, at 1 m by a sixth of one."""
+    ends = {}
+    for name, stepper in STEPPERS.items():
+        scene = tisim.Scene(
+            particles=tisim.Particles(
+                position=[(0.1, 1.0, -0.1)], velocity=[(SPEED, SPEED, -SPEED)], radius=1e-3, density=2500.0
+            ),
+            effects=(laws.Gravity(acceleration=(0, 0, 0)),),
+            stepper=stepper(DT),
+            duration=STEPS * DT,
+        )
+        (result,) = tisim.run([scene])
+        ends[name] = result.state["position"][0].tolist(), result.work["steps"]
+    return ends
+
+
+def counts():
+    """Return how many steps are taken where a number is asked for, by Verlet."""
+    scenes = [
+        tisim.Scene(
+            particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=1e-3, density=1.0),
+            stepper=Verlet(control=FixedStep(dt=dt)),
+            duration=number * dt,
+        )
+        for number in (1, 7, 2000, 100_001)
+        for dt in (1e-5, 3e-7, 0.1)
+    ]
+    return [result.work["steps"] for result in tisim.run(scenes)]
+
+
+def fast_flights():
+    """Return the same in fast arithmetic, which may regroup sums."""
+    tisim.init(precision="f32", arithmetic="fast")
+    return flights()
+
+
+@pytest.mark.parametrize("function", ["flights", pytest.param("fast_flights", marks=pytest.mark.slow)])
+def test_a_slow_particle_gets_as_far_as_it_flies(single, function):
+    ends = single("steppers.test_single_precision", function)
+    for place, steps in ends.values():
+        assert steps == STEPS
+        exact = np.array([0.1, 1.0, -0.1]) + SPEED * DT * STEPS * np.array([1, 1, -1])
+        assert np.abs(np.array(place) - exact).max() < 2e-7
+
+
+def test_as_many_steps_are_taken_as_were_asked_for(single):
+    assert single("steppers.test_single_precision", "counts") == [
+        n for n in (1, 7, 2000, 100_001) for _ in "abc"
+    ]
+
+
+def restarts():
+    """Return whether a run that is taken up from its checkpoint ends with the same bits."""
+    import tempfile
+    from pathlib import Path
+
+    from tisim.io.checkpoint import restore, save
+
+    scene = tisim.Scene(
+        particles=tisim.Particles(
+            position=[(0.1, 0, 0.5)], velocity=[(1e-3, 0, 0)], radius=1e-3, density=1.0
+        ),
+        effects=(laws.Gravity(acceleration=(0, 0, -1e-3)),),
+        stepper=Verlet(control=FixedStep(dt=1e-5)),
+        duration=0.02,
+    )
+    simulation = tisim.Simulation(scene)
+    simulation.load(scene)
+    simulation.run(steps=900)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "c.h5"
+        save(simulation, path)
+        simulation.run()
+        straight = simulation.results()[0].state["position"].tolist()
+        restore(simulation, path)
+        simulation.run()
+    return straight == simulation.results()[0].state["position"].tolist()
+
+
+def test_a_checkpoint_has_what_rounding_has_taken(single):
+    assert single("steppers.test_single_precision", "restarts")
