@@ -15,7 +15,7 @@ STEPPERS = {
 
 
 def flights():
-    """Return, for each stepper, where a slow particle gets, and the steps that it takes. At 0.1 m a step moves
+    """Return, for each stepper, where a slow particle gets, and its steps. At 0.1 m one step moves
     it by 1.3 last digits, at 1 m by a sixth of one."""
     ends = {}
     for name, stepper in STEPPERS.items():
