@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tisim.errors import must
+from tisim.errors import is_number, must
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,11 @@ class Gene:
 
     def __post_init__(self) -> None:
         must(bool(self.name.strip()), "gene name", "a non-empty string", self.name)
+        for which in ("low", "high"):
+            value = getattr(self, which)
+            must(is_number(value), f"{which} of gene {self.name}", "a number", value)
+            # In 8 bits a range of 200 is below 0.
+            object.__setattr__(self, which, float(value))
         finite = math.isfinite(self.low) and math.isfinite(self.high)
         must(
             finite and self.low < self.high,

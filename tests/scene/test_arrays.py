@@ -53,7 +53,7 @@ def test_text_of_what_has_arrays_in_it():
 def kinds():
     """Lists, tuples, whole numbers and arrays of several types."""
     return Particles(
-        position=[[0, 1, 2], [3.5, 4, -0.0]], velocity=np.arange(6).reshape(2, 3), radius=[1, True],
+        position=[[0, 1, 2], [3.5, 4, -0.0]], velocity=np.arange(6).reshape(2, 3), radius=[1, 1.0],
         density=2000,
         quantities={
             "temperature": np.float32([300.1, 200.7]), "fixed": np.array([0, 0]), "charge": [1, 2.0],

@@ -7,9 +7,10 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, GetPydanticSchema
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from tisim.components.component import Vector
+from tisim.components.plain_numbers import broken_rule
 
 
 def frozen(values: Any, kind: type | None = None) -> np.ndarray:
@@ -33,21 +34,29 @@ def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
     """Return an array of as many rows as are given, from such an array or from what makes the list."""
 
     def validated(value: Any, as_list: Callable[[Any], Any]) -> np.ndarray:
+        if rule := broken_rule(value):
+            raise PydanticCustomError("numbers", rule)
         if isinstance(value, np.ndarray):
             if value.dtype.kind in "iuf" and value.shape[1:] == columns and value.ndim and len(value):
                 array = frozen(value, float)
                 if np.isfinite(array).all():
                     return array
+        elif isinstance(value, list | tuple):
+            # Of numbers of NumPy, flags and complex numbers among them.
+            whole = np.asarray(value, object)
+            if any(broken_rule(one) for one in whole.flat):
+                raise PydanticCustomError("numbers", "numbers")
+        if isinstance(value, np.ndarray | np.generic):
             # What is wrong with it, or how it can be read, is found out as of a list.
             value = value.tolist()
         array = np.array(as_list((value,) if isinstance(value, float | int) else value), float)
         return frozen(array.reshape(-1, *columns))
 
-    def plain(array: np.ndarray, info: Any) -> Any:
+    def serialized(array: np.ndarray, info: Any) -> Any:
         return array.tolist() if info.mode_is_json() else array
 
     def schema(source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
-        to_list = core_schema.plain_serializer_function_ser_schema(plain, info_arg=True)
+        to_list = core_schema.plain_serializer_function_ser_schema(serialized, info_arg=True)
         return core_schema.no_info_wrap_validator_function(validated, handler(listed), serialization=to_list)
 
     return GetPydanticSchema(schema)

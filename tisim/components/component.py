@@ -20,6 +20,7 @@ from pydantic_core import PydanticCustomError
 from tisim.backend.taichi import DEVICE_FUNCTION, is_device_function
 from tisim.components.cost_hints import AccuracyHints
 from tisim.components.invalid import explain_invalid, unit_of
+from tisim.components.plain_numbers import is_numeric, plain
 from tisim.components.ranges import WHOLE, check_magnitude
 from tisim.errors import InputError, must, some_of
 from tisim.files import python_file
@@ -52,6 +53,20 @@ class Checked(BaseModel):
             super().__init__(**data)
         except ValidationError as invalid:
             raise InputError(explain_invalid(invalid, self.called(data), type(self).model_fields)) from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _plain_numbers(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        label, numeric = cls.called(data), cls.numeric()
+        return {k: plain(f"{label}.{k}", v) if k in numeric else v for k, v in data.items()}
+
+    @classmethod
+    @functools.cache
+    def numeric(cls) -> frozenset[str]:
+        """Return the names of the settings that are numbers, or lists of them."""
+        return frozenset(name for name, info in cls.model_fields.items() if is_numeric(info.annotation))
 
     @classmethod
     def called(cls, data: Mapping[str, Any]) -> str:

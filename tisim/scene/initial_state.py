@@ -12,6 +12,7 @@ from tisim.components.arrays import Numbers, RowsOrNone, equal, frozen
 from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.materials import Materials
+from tisim.components.plain_numbers import broken_rule, plain
 from tisim.components.ranges import MOST, limits
 from tisim.errors import InputError, abbreviated, must
 from tisim.packing.clump import Clump, clump_columns, sphere_columns
@@ -19,6 +20,10 @@ from tisim.packing.tried_places import Packing
 
 Arrays = dict[str, np.ndarray]
 """These are particle quantities by field name: shape (n,) or (n, 3), SI."""
+
+
+FLAGS = ("fixed",)
+"""Quantities that are true or false may be given as such."""
 
 
 class Start(Component):
@@ -139,12 +144,17 @@ class Particles(Start):
                 value.flags.writeable = False
 
     def _column(self, name: str, value: Any, n: int) -> np.ndarray:
+        where = f"particles.{name}"
+        if name in FLAGS:
+            value = np.asarray(value, float) if np.asarray(value).dtype.kind == "b" else value
+        rule = broken_rule(value)
+        must(not rule, where, rule, value)
         try:
-            column = np.asarray(value)
+            column = np.asarray(value if isinstance(value, np.ndarray) else plain(where, value))
         except (ValueError, RecursionError):
             raise InputError(f"particles.{name} must be numbers; received {abbreviated(value)}") from None
         # Neither text nor whole numbers of more than 64 bits.
-        must(column.dtype.kind in "biuf", f"particles.{name}", "numbers", value)
+        must(column.dtype.kind in "iuf", where, "numbers", value)
         column = column.astype(float)
         if column.ndim == 0 or column.shape == (1,):
             column = np.full(n, float(column.reshape(-1)[0]))
@@ -155,6 +165,8 @@ class Particles(Start):
     @field_validator("quantities")
     @classmethod
     def _frozen(cls, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        for name, value in values.items():
+            must(not np.ma.is_masked(value), f"particles.{name}", "without masked entries", value)
         return {k: frozen(v) if isinstance(v, np.ndarray) else v for k, v in values.items()}
 
     @field_serializer("quantities", when_used="json")

@@ -8,7 +8,6 @@ from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
 
-
 POSITION_ROUNDING = Field("position_rounding", "m", 3, "keep", scratch=True)
 """This field is what rounding has taken from a particle's displacements so far; in single precision only."""
 
