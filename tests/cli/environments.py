@@ -238,7 +238,7 @@ LIMITS = (
        "FILE_PATH=$PWD/k; (ulimit -f 4; $RUN); [ $? = 1 ] && $RUN", {"says": ""})
       for backend, prefix in (("taichi", "TI"), ("quadrants", "QD"))),
     ("killed before the first checkpoint, then again", "$RUN --frames 2 --set duration=1e6 & "
-     "while [ ! -e out/trajectory.h5 ]; do sleep 0.1; done; kill -9 $!; wait $!; "
+     "while [ ! -e out/trajectory.h5 ] && kill -0 $!; do sleep 0.1; done; kill -9 $!; wait $!; "
      "TISIM_CHECKPOINT_SECONDS=0 $RUN --frames 2 --set duration=1e6 & "
      "while [ ! -e out/checkpoint.h5 ] && kill -0 $!; do sleep 0.1; done; kill $!; wait $!",
      {"code": 143, "result": False, "says": "To go on, give the same command again"}),
