@@ -1,11 +1,15 @@
 """Checkpoints: to the same bits, whole or refused."""
 
+import io
+
+import h5py
 import numpy as np
 import pytest
 
 from tests.scenes import Agglomeration, Cooling, Heating, Impact
 from tisim import Box, Cloud, InputError, RunError, Scene, Simulation
-from tisim.io.checkpoint import restore, save
+from tisim.files import checksum
+from tisim.io.checkpoint import restore, save, snapshot
 
 
 def flow(seed=3, number=100, heat_capacity=500.0):
@@ -108,3 +112,61 @@ def test_full_disk_keeps_the_checkpoint_before(simulation, checkpoint_file, monk
         save(simulation, checkpoint_file)
     assert checkpoint_file.read_bytes() == before
     assert [path.name for path in checkpoint_file.parent.iterdir()] == ["c.h5"]
+
+
+def forged(path, name, change):
+    """Change a column of a checkpoint, and give the file the checksum of that."""
+    image = io.BytesIO(checksum.read_image(path, "checkpoint", "a file"))
+    with h5py.File(image, "r+") as file:
+        values, attributes = np.asarray(file[name]), dict(file[name].attrs)
+        del file[name]
+        file[name] = change(values)
+        file[name].attrs.update(attributes)
+    path.write_bytes(checksum.with_checksum(image.getvalue()))
+
+
+FORGED = {
+    "count, far beyond": ("count", lambda a: np.full_like(a, 2**31 - 1), "between 0 and 100"),
+    "count, just beyond": ("count", lambda a: np.full_like(a, 101), "between 0 and 100"),
+    "count, negative": ("count", lambda a: np.full_like(a, -1), "between 0 and 100"),
+    "status": ("status", lambda a: np.full_like(a, 77), "a known status"),
+    "failed": ("failed", lambda a: np.full_like(a, 2**20), "a known status"),
+    "time": ("time", lambda a: np.full_like(a, -1e30), "between 0 and"),
+    "time, not finite": ("time", lambda a: np.full_like(a, np.nan), "between 0 and"),
+    "time's rounding": ("time_carry", lambda a: np.full_like(a, 1e-3), "between"),
+    "end": ("end", lambda a: 2 * a, r"\[0.0004\]"),
+    "seed": ("seed", lambda a: a + 1, r"\[3\]"),
+    "steps": ("steps", lambda a: -a, "between 0 and"),
+    "a mass": ("mass", lambda a: -a, "within the range of f64"),
+    "a radius": ("radius", lambda a: -a, "within the range of f64"),
+    "a place": ("position", lambda a: np.full_like(a, np.inf), "within the range of f64"),
+    "a temperature": ("temperature", lambda a: -a, "at least 0 K"),
+    "single precision": ("velocity", lambda a: a.astype(np.float32), "float64 numbers of shape"),
+    "whole numbers": ("position", lambda a: np.zeros(a.shape, np.int64), "float64 numbers of shape"),
+}
+
+
+@pytest.mark.parametrize("case", FORGED)
+def test_columns_out_of_range_are_refused(simulation, checkpoint_file, case):
+    name, change, rule = FORGED[case]
+    forged(checkpoint_file, name, change)
+    simulation.load([flow()])
+    with pytest.raises(InputError, match=rf"checkpoint('s |\.){name} must be (of )?{rule}"):
+        restore(simulation, checkpoint_file)
+    assert simulation.results()[0].work["steps"] == 0
+    if name == "count":
+        with pytest.raises(InputError, match="checkpoint's count must be between 0 and 100"):
+            snapshot(checkpoint_file)
+
+
+def test_columns_of_other_shapes_are_refused(simulation, checkpoint_file):
+    whole = checkpoint_file.read_bytes()
+    simulation.load([flow()])
+    for name in simulation.s.saved():
+        checkpoint_file.write_bytes(whole)
+        forged(checkpoint_file, name, lambda a: np.zeros([n + 5 for n in a.shape], a.dtype))
+        with pytest.raises(InputError, match=f"checkpoint's {name} must be .* numbers of shape"):
+            restore(simulation, checkpoint_file)
+        if name in ("count", "time", "steps", *(field.name for field in simulation.s.reported)):
+            with pytest.raises(InputError, match="checkpoint must be of particles in rows of one length"):
+                snapshot(checkpoint_file)

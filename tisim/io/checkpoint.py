@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from tisim.backend import runtime
@@ -22,6 +24,7 @@ from tisim.engine.observer import Observer
 from tisim.engine.simulation import Simulation
 from tisim.errors import must
 from tisim.files import checksum
+from tisim.io.checkpoint_columns import check_columns
 from tisim.scene.initial_state import Arrays
 
 CHECKPOINT_FORMAT = "tisim checkpoint 5"
@@ -78,8 +81,16 @@ def snapshot(path: str | Path) -> Snapshot:
     """
     with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         group, worlds = file.get(BEFORE_STEP, file), len(json.loads(file.attrs["scenes"]))
-        arrays = {name: np.asarray(group[name]) for name in file if "unit" in file[name].attrs}
-        counts, times, steps = (np.asarray(group[name])[:worlds] for name in ("count", "time", "steps"))
+        arrays = _read(group, [name for name in file if "unit" in file[name].attrs])
+        books = _read(group, ("count", "time", "steps"))
+        shape = arrays["mass"].shape if "mass" in arrays else ()
+        whole = len(shape) == 2 and shape[0] >= worlds
+        whole = whole and all(values.shape[:2] == shape for values in arrays.values())
+        whole = whole and all(values.shape == shape[:1] for values in books.values())
+        must(whole, "checkpoint", "of particles in rows of one length", shape)
+        counts, times, steps = (books[name][:worlds] for name in ("count", "time", "steps"))
+        fits = bool(((counts >= 0) & (counts <= shape[1])).all())
+        must(fits, "checkpoint's count", f"between 0 and {shape[1]}", counts.tolist())
         # Sorted in memory: what is shown is in the order of ids.
         by_id = bool(file.attrs.get("sorted", False))
         orders = [np.argsort(arrays["id"][w, :n]) if by_id else np.arange(n) for w, n in enumerate(counts)]
@@ -98,14 +109,24 @@ def restore(simulation: Simulation, path: str | Path) -> None:
         for name, value in _identity(simulation).items():
             _require_equal(name, value, file.attrs[name])
         wall_s, edits = float(file.attrs["wall_s"]), json.loads(file.attrs["edits"])
-        columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
+        names, own, used = simulation.s.saved(), simulation.s.image(), len(simulation.scenes)
+        columns = _read(file, names)
         group = file.get(BEFORE_STEP, file)
-        before = {name: np.asarray(group[name]) for name in columns}
+        before = _read(group, names)
+        for saved in (columns, before):
+            check_columns(saved, own, simulation.s.fields, used)
     simulation.put(columns)
     simulation.wall_s = wall_s
     simulation.edits = edits
     simulation.monitor = Monitor(simulation, before)
     simulation.monitor.check_worlds()
+
+
+def _read(group: h5py.Group, names: Iterable[str]) -> Arrays:
+    """Return data sets of a checkpoint by name."""
+    for name in names:
+        must(isinstance(group.get(name), h5py.Dataset), "checkpoint", f"one that holds {name}", "one without")
+    return {name: np.asarray(group[name]) for name in names}
 
 
 class PeriodicCheckpoint(Observer):

@@ -1,0 +1,80 @@
+"""What a checkpoint holds is asked for shape and range before kernels see it.
+
+A checksum tells damage, not a file of another program: a count beyond the memory has kernels read what is
+not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tisim.engine.loading import check_field
+from tisim.errors import must
+from tisim.worlds.columns import WORLD_COUNTERS
+from tisim.worlds.fields import Field
+from tisim.worlds.status import WorldStatus
+
+ROUNDING = 1e-9
+"""What time has been rounded by is far below this part of it."""
+Columns = Mapping[str, np.ndarray]
+
+
+def check_columns(columns: Columns, own: Columns, fields: Sequence[Field], worlds: int) -> None:
+    """Raise InputError unless columns of a checkpoint may take the place of a simulation's own.
+
+    own : those of the simulation, loaded with the same scenes, by name; the first ``worlds`` of each are in
+    use. fields : of its particles.
+    """
+    for name, there in own.items():
+        column = columns[name]
+        rule = f"{there.dtype} numbers of shape {there.shape}"
+        must(
+            column.shape == there.shape and column.dtype == there.dtype,
+            f"checkpoint's {name}",
+            rule,
+            f"{column.dtype}, {column.shape}",
+        )
+    capacity = own["mass"].shape[1]
+    _within(columns, "count", 0, capacity)
+    for name in ("status", "failed"):
+        known = np.isin(columns[name], [int(one) for one in WorldStatus])
+        must(bool(known.all()), f"checkpoint's {name}", "a known status", columns[name][~known].tolist()[:1])
+    _check_times(columns, own, worlds)
+    for name in WORLD_COUNTERS:
+        _within(columns, name, 0, np.inf)
+    for w in range(worlds):
+        _check_particles(columns, fields, w, capacity)
+
+
+def _check_times(columns: Columns, own: Columns, worlds: int) -> None:
+    end = own["end"][:worlds]
+    for name in ("end", "seed"):
+        same = np.array_equal(columns[name][:worlds], own[name][:worlds])
+        must(same, f"checkpoint's {name}", f"{own[name][:worlds].tolist()}", columns[name][:worlds].tolist())
+    _within(columns, "time", 0.0, float(end.max(initial=0.0)) * (1 + ROUNDING))
+    most = ROUNDING * float(end.max(initial=0.0))
+    _within(columns, "time_carry", -most, most)
+
+
+def _check_particles(columns: Columns, fields: Sequence[Field], w: int, capacity: int) -> None:
+    """Check what the particles of a world carry, those apart that are only of use to a stepper."""
+    n = int(columns["count"][w])
+    there = columns["mass"][w, :n] != 0
+    for field in fields:
+        values = columns[field.name][w, :n][there]
+        if not field.scratch:
+            check_field(field, values, len(values), "checkpoint")
+        if field.lookup or (field.name.startswith("clump_") and field.integer):
+            # They say where in memory something is.
+            _within({field.name: values}, field.name, -capacity, capacity)
+
+
+def _within(columns: Columns, name: str, low: float, high: float) -> None:
+    values: Any = columns[name]
+    fine = (values >= low) & (values <= high)
+    must(
+        bool(fine.all()), f"checkpoint's {name}", f"between {low:g} and {high:g}", values[~fine].tolist()[:1]
+    )
