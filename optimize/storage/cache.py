@@ -10,7 +10,9 @@ A kill between replacing FILE and emptying the journal leaves evaluations in bot
 
 from __future__ import annotations
 
+import os
 import warnings
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,10 +25,12 @@ from tisim.errors import must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.framing import Scan
 from tisim.files.ownership import ensure_writable
-from tisim.files.regular_file import file_status, is_folder
+from tisim.files.regular_file import file_status, is_folder, open_descriptor
 
 FOLD_BYTES = 8 << 20
 """Length of a journal, bytes, above which replaying it costs more than rewriting the HDF5 file."""
+TAIL = 4096
+"""At the end of a file, within so many bytes, is its checksum."""
 
 
 class Cache:
@@ -44,6 +48,7 @@ class Cache:
         self._records: dict[str, Record] = {}
         self._pending: dict[str, Hdf5Table] = {}
         self._version: tuple[int, ...] | None = None
+        self._content: tuple[int, ...] | None = None
         self._end = self._frames = 0
         if file_status(self.path) is not None:
             # A file that is no cache's is refused before a lock file is left beside it.
@@ -85,7 +90,7 @@ class Cache:
             if record.key not in self._records:
                 self._end = self._journal.append(self._end, record.payload())
                 self._frames += 1
-                Mark(self._version, self._end, self._frames).write(lock)
+                Mark(self._content, self._end, self._frames).write(lock)
                 self._records[record.key] = record
                 if self._end > FOLD_BYTES:
                     self._fold()
@@ -152,12 +157,14 @@ class Cache:
         old = None if file_status(self.path) is None else self.path
         replace_file(self.path, hdf5_store.build_image(old, self.records(), self._pending, damaged))
         self._journal.clear()
-        self._pending, self._version, self._end, self._frames = {}, file_version(self.path), 0, 0
+        self._pending, self._end, self._frames = {}, 0, 0
+        self._version, self._content = file_version(self.path), file_content(self.path)
 
     def _refresh(self) -> None:
         version = file_version(self.path)
         if version != self._version or self._journal.size() < self._end:
-            self._records, self._end, self._frames, self._version = {}, 0, 0, version
+            self._records, self._end, self._frames = {}, 0, 0
+            self._version, self._content = version, file_content(self.path)
             if version is not None:
                 with hdf5_store.open_evaluations(self.path) as file:
                     self._take(*hdf5_store.read_rows(file))
@@ -166,7 +173,7 @@ class Cache:
         self._take(*journal_records(scanned))
         self._end, self._frames = scanned.end, self._frames + len(scanned.payloads)
         mark = Mark.read(self._lock) if first else None
-        if mark is not None and (loss := mark.loss(version, scanned)):
+        if mark is not None and (loss := mark.loss(self._content, scanned)):
             warnings.warn(
                 f"{self.path}: {loss}; what is lost will be run again", RuntimeWarning, stacklevel=4
             )
@@ -190,6 +197,17 @@ def file_version(path: Path) -> tuple[int, ...] | None:
     """Return numbers that tell one state of the HDF5 file from another; None where there is no file."""
     status = file_status(path)
     return None if status is None else (status.st_ino, status.st_mtime_ns, status.st_size)
+
+
+def file_content(path: Path) -> tuple[int, ...] | None:
+    """Return numbers that tell the content of the HDF5 file from others, also in a copy: those of its last
+    bytes, in which its checksum is; None where there is no file."""
+    status = file_status(path)
+    if status is None:
+        return None
+    with os.fdopen(open_descriptor(path, os.O_RDONLY), "rb") as file:
+        file.seek(max(0, status.st_size - TAIL))
+        return zlib.crc32(file.read()), status.st_size
 
 
 def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:

@@ -20,7 +20,7 @@ from tisim.files.regular_file import content, file_status, open_descriptor
 class Mark:
     """A mark says how far a journal had been written.
 
-    base : numbers of the version of the file that it belongs to; None where there is no such file.
+    base : numbers of the content of the file that it belongs to; None where there is no such file.
     end : length, bytes. frames : their number within this length.
     """
 

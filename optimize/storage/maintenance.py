@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from optimize.storage import hdf5_store, salvage
-from optimize.storage.cache import Cache, existing_files, file_version, journal_records
+from optimize.storage.cache import Cache, existing_files, file_content, journal_records
 from optimize.storage.journal import Journal, Mark
 from optimize.storage.record import Record
 from tisim.files.atomic import locked
@@ -45,15 +45,15 @@ def verify(path: str | Path) -> VerifyReport:
     with locked(lock, exclusive=False):
         rows: list[Record] = []
         damaged: list[str] = []
-        version = file_version(path)
-        if version is not None:
+        content = file_content(path)
+        if content is not None:
             with hdf5_store.open_evaluations(path) as file:
                 rows, damaged = hdf5_store.read_rows(file)
                 names = hdf5_store.damaged_tables(file)
                 damaged += [f"table {name}: its checksum does not fit" for name in names]
         scanned, mark = Journal(journal).read(), Mark.read(lock)
     frames, not_records = journal_records(scanned)
-    loss = None if mark is None else mark.loss(version, scanned)
+    loss = None if mark is None else mark.loss(content, scanned)
     damaged += [*not_records, *([loss] if loss else [])]
     by_key: dict[str, Record] = {}
     for record in (*rows, *frames):

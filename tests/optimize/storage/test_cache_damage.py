@@ -1,5 +1,6 @@
 import os
 import re
+import shutil
 
 import h5py
 import pytest
@@ -225,6 +226,23 @@ def test_a_journal_that_was_cut_says_how_much_was_lost(path, folded):
     cache.put(fake_record(9))
     assert verify(path).ok, "what was lost has been told"
     assert len(Cache(path)) == folded + 3
+
+
+@pytest.mark.parametrize("folded", [0, 2])
+def test_a_journal_that_was_cut_in_a_copied_folder_says_so_too(path, folded):
+    with Cache(path) as cache:
+        for number in range(folded):
+            cache.put(fake_record(number))
+        cache.fold()
+        for number in range(folded, folded + 3):
+            cache.put(fake_record(number))
+        copied = path.parent.with_name(f"copied-{folded}")
+        shutil.copytree(path.parent, copied)
+    journal = journal_of(copied / path.name)
+    journal.write_bytes(journal.read_bytes()[:-1])
+    assert "1 evaluation(s) cut off" in verify(copied / path.name).damaged[0]
+    with pytest.warns(RuntimeWarning, match=r"1 evaluation\(s\) cut off"):
+        assert len(Cache(copied / path.name)) == folded + 2
 
 
 @pytest.mark.parametrize("mark", [b"", b"the user's own", frame(b"{}"), frame(b"[1,2,3]"), frame(b"[[1],2]")])
