@@ -27,6 +27,9 @@ class BoxSurface(Surface):
     def face_count(self) -> int:
         return 6
 
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.low), np.array(self.high)
+
     def distances(self, places: np.ndarray) -> np.ndarray:
         low, high = np.array(self.low), np.array(self.high)
         beyond = np.maximum(low - places, places - high)

@@ -12,7 +12,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, parameter
 from tisim.components.directed import Directed
-from tisim.geometry.shape import Shape
+from tisim.geometry.shape import SEAM, Shape
 
 
 class Plane(Directed, Shape):
@@ -36,6 +36,12 @@ class Plane(Directed, Shape):
 
     def values(self) -> list[float]:
         return [*super().values(), math.fsum(map(mul, self.point, self.unit_vector()))]
+
+    def ends_at(self, low: np.ndarray, high: np.ndarray, reach: float) -> np.ndarray:
+        # One that leans along an axis meets the faces there at different places.
+        normal = np.array(self.normal)
+        leans: np.ndarray = np.abs(normal) > SEAM * np.linalg.norm(normal)
+        return leans
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         away: np.ndarray = (places - np.array(self.point)) @ np.array(self.unit_vector())

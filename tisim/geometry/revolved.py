@@ -42,6 +42,15 @@ class RevolvedSurface(Surface):
         axis = np.array(direction) / math.hypot(*direction)
         return [*super().values(), *origin, *axis.tolist(), *across(axis)[0].tolist(), *sizes]
 
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        origin, direction, length, low, high = self.generator()
+        axis = np.array(direction) / math.hypot(*direction)
+        # So far a circle about the axis reaches along each coordinate, over its radius.
+        wide = np.sqrt(np.maximum(0.0, 1.0 - axis**2))
+        ends = np.array([np.array(origin), np.array(origin) + length * axis])
+        sides = np.array([low, high])[:, None] * wide
+        return (ends - sides).min(axis=0), (ends + sides).max(axis=0)
+
     def distances(self, places: np.ndarray) -> np.ndarray:
         origin, direction, length, low, high = self.generator()
         axis = np.array(direction) / math.hypot(*direction)

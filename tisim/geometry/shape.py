@@ -9,6 +9,9 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.component import Component
 
+SEAM = 1e-6
+"""What ends within this part of a box's side of a face ends at the face."""
+
 
 class Shape(Component):
     """A shape tells how far a place is from its surface. Most are rows of lists, as those of walls."""
@@ -25,6 +28,20 @@ class Shape(Component):
         particles are, shape (n,); by default infinite, so that a start is not checked for overlaps with a
         shape that does not tell it."""
         return np.full(len(places), np.inf)
+
+    def extent(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the lowest and the highest coordinates (m, shape (3,)) that it reaches; None for one without
+        end, and for one that does not tell."""
+        return None
+
+    def ends_at(self, low: np.ndarray, high: np.ndarray, reach: float) -> np.ndarray:
+        """Return along which axes it ends, or bends, within reach (m) of two faces, at low and high (m, shape
+        (3,)), shape (3,): an image of it at the other face would then be felt."""
+        if (extent := self.extent()) is None:
+            return np.zeros(3, bool)
+        slack = SEAM * (high - low)
+        near: np.ndarray = (extent[0] - reach < low) | (extent[1] + reach > high)
+        return near & ~((extent[0] <= low + slack) & (extent[1] >= high - slack))
 
     @ti.func
     def distance(self, w, k, r):

@@ -27,6 +27,9 @@ class SphericalSurface(Surface):
     centre: Vector = parameter("m", "centre c", (0.0, 0.0, 0.0))
     radius: float = parameter("m", "radius R", examples=[0.1], gt=0)
 
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.centre) - self.radius, np.array(self.centre) + self.radius
+
     def distances(self, places: np.ndarray) -> np.ndarray:
         away: np.ndarray = np.linalg.norm(places - np.array(self.centre), axis=1) - self.radius
         return np.abs(away)

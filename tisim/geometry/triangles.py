@@ -12,7 +12,7 @@ from tisim.components.arrays import Rows, equal
 from tisim.components.component import parameter
 from tisim.errors import InputError, is_number, must
 from tisim.files import regular_file
-from tisim.geometry.shape import Shape
+from tisim.geometry.shape import SEAM, Shape
 from tisim.geometry.triangle_grid import MOST_LISTED, TriangleGrid
 
 MOST_DISTANCES = 2_000_000
@@ -119,6 +119,18 @@ class TriangulatedSurface(Shape):
             "listed": grid.members[:, None],
             "clear": grid.clear[:, None],
         }
+
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        places = self.corners().reshape(-1, 3)
+        return places.min(axis=0), places.max(axis=0)
+
+    def ends_at(self, low: np.ndarray, high: np.ndarray, reach: float) -> np.ndarray:
+        corners = self.corners()
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        slopes = np.abs(normals) > SEAM * np.linalg.norm(normals, axis=1)[:, None]
+        near = (corners.min(axis=1) - reach < low) | (corners.max(axis=1) + reach > high)
+        bends: np.ndarray = (near & slopes).any(axis=0)
+        return bends | super().ends_at(low, high, reach)
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         corners = self.corners()

@@ -163,7 +163,7 @@ class Effect(LawHints, Component):
         asked whether it can hold all pairs of them."""
         return {"radius": np.zeros(0), "material": np.zeros(0, int)}
 
-    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
+    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
         """Raise InputError unless it can act on the particles of a start, by field name, among the effects of
         the scene; by default it can."""
 

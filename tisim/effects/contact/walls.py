@@ -25,6 +25,7 @@ from tisim.geometry.cone import ConicalSurface
 from tisim.geometry.cylinder import CylindricalSurface
 from tisim.geometry.disc import Disc
 from tisim.geometry.plane import Plane
+from tisim.geometry.shape import Shape
 from tisim.geometry.sphere import SphericalSurface
 from tisim.geometry.surface import Surface
 from tisim.geometry.triangles import TriangulatedSurface
@@ -42,7 +43,8 @@ class Walls(WallContacts, UsesMaterials, Force):
     A wall is a grain of infinite radius and mass. Planes bound the space in which grains are: each is felt by
     itself. Other surfaces have two sides, and rims; where they meet, at an edge or a seam, a grain feels the
     nearer one, and at a concave edge both. What a contact remembers lies with the grain, and goes along with
-    it from one triangle to the next.
+    it from one triangle to the next. None is felt through the periodic faces of a box: a surface at one must
+    go on to the opposite one, as a floor does, or is refused.
 
     Bodies that move by themselves, or whose forces are told by themselves, are walls of their own names. The
     result tells the force (N) and the torque (N m) of the grains on the body, about the origin or the centre
@@ -81,10 +83,34 @@ class Walls(WallContacts, UsesMaterials, Force):
     def check_materials(self, materials: Materials) -> None:
         self.material_index(materials)
 
-    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
+    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
         for law in effects:
             if isinstance(law, GranularContact):
                 law.suits_wall(start, effects, self.material_index(self._materials), self.label)
+        later = [effect.largest_newcomers()["radius"] for effect in effects]
+        radii = np.concatenate([start["radius"], *later])
+        self._check_faces(domain, float(radii.max(initial=0.0)))
+
+    def _check_faces(self, domain: Domain, reach: float) -> None:
+        """Raise InputError where a surface is within reach (m) of a joined face, through which it is not
+        felt, unless it goes on from face to face."""
+        (low, high), shift = domain.bounds(), np.array(self.motion.shift())
+        if low is None or high is None:
+            return
+        for name, shape in self._named_shapes():
+            ends = shape.ends_at(low - shift, high - shift, reach) & np.array(domain.joined())
+            for axis in np.flatnonzero(ends):
+                rule = (
+                    f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
+                    f"{'xyz'[axis]}, or go on flat from one to the other: it is not felt through them"
+                )
+                must(False, f"{self.label}.{name}", rule, "one that ends or bends there")
+
+    def _named_shapes(self) -> Iterator[tuple[str, Shape]]:
+        for name, _ in self.lists():
+            yield from ((name, shape) for shape in getattr(self, name))
+        if self.surface:
+            yield "surface", self.surface
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
@@ -115,8 +141,7 @@ class Walls(WallContacts, UsesMaterials, Force):
     def overlaps(self, position: np.ndarray, radius: np.ndarray) -> np.ndarray:
         """Return how deep (m) spheres at some places (m, shape (n, 3)) are in the wall at the time 0: what is
         behind a plane by more than its diameter; shape (n,)."""
-        shapes = [shape for name, _ in self.lists() for shape in getattr(self, name)]
-        shapes += [self.surface] if self.surface else []
+        shapes = [shape for _, shape in self._named_shapes()]
         places = position - np.array(self.motion.shift())
         deepest: np.ndarray = radius - np.min([shape.distances(places) for shape in shapes], axis=0)
         return deepest

@@ -118,7 +118,7 @@ class Granular(ContactGuards, GranularContact):
                 tried.append(law)
         return tuple(tried)
 
-    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
+    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
         if self.by_overlap:
             check_grains(self, self._materials, with_newcomers(start, effects))
 

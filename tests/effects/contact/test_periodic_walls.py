@@ -1,0 +1,146 @@
+"""Walls at periodic faces of a box: felt where they go on from face to face, refused where they would have to
+be felt through one."""
+
+import numpy as np
+import pytest
+
+import tisim
+from tisim.effects import Granular, Walls
+from tisim.geometry import (
+    BoxSurface,
+    ConicalSurface,
+    CylindricalSurface,
+    Disc,
+    Plane,
+    SphericalSurface,
+    TriangulatedSurface,
+)
+from tisim.steppers import FixedStep, Verlet
+
+SIDE, RADIUS, OVERLAP = 0.1, 5e-3, 1e-4
+BOX = tisim.Box(low=(0, 0, 0), high=(SIDE,) * 3, periodic=(True, True, False))
+
+
+def quad(*corners):
+    """Return a flat surface of two triangles."""
+    return TriangulatedSurface(vertices=corners, faces=[(0, 1, 2), (0, 2, 3)])
+
+
+FLOOR = quad((0, 0, 0.02), (SIDE, 0, 0.02), (SIDE, SIDE, 0.02), (0, SIDE, 0.02))
+STAIR = TriangulatedSurface(
+    vertices=[
+        *((x, y, z) for x, z in ((0, 0.01), (0, 0.03), (SIDE, 0.03), (SIDE, 0.01)) for y in (0, SIDE)),
+    ],
+    faces=[(0, 1, 3), (0, 3, 2), (2, 3, 5), (2, 5, 4)],
+)
+REFUSED = {
+    "a sphere across a face": {"spheres": [SphericalSurface(centre=(0.001, 0.05, 0.05), radius=0.01)]},
+    "a sphere within reach": {"spheres": [SphericalSurface(centre=(0.0149, 0.05, 0.05), radius=0.01)]},
+    "a wall of triangles": {
+        "surface": quad((0.002, 0, 0), (0.002, SIDE, 0), (0.002, SIDE, SIDE), (0.002, 0, SIDE))
+    },
+    "a floor that ends before the face": {
+        "surface": quad((0, 0, 0.02), (0.098, 0, 0.02), (0.098, SIDE, 0.02), (0, SIDE, 0.02))
+    },
+    "a stair with its riser in the face": {"surface": STAIR},
+    "a plane that leans": {"planes": [Plane(point=(0, 0, 0), normal=(0.1, 0, 1))]},
+    "a plane across": {"planes": [Plane(point=(0, 0, 0), normal=(0, 1, 0))]},
+    "a post": {
+        "cylinders": [CylindricalSurface(start=(0.002, 0.05, 0), end=(0.002, 0.05, SIDE), radius=0.01)]
+    },
+    "a cone": {
+        "cones": [
+            ConicalSurface(
+                start=(0.05, 0.09, 0.02), end=(0.05, 0.09, 0.08), start_radius=0.001, end_radius=0.02
+            )
+        ]
+    },
+    "a disc": {"discs": [Disc(centre=(0.05, 0.003, 0.05), normal=(1, 0, 0), radius=0.01)]},
+    "a box": {"boxes": [BoxSurface(low=(0.09, 0.04, 0.04), high=(0.098, 0.06, 0.06))]},
+}  # fmt: skip
+FELT = {
+    "a floor of triangles": {"surface": FLOOR},
+    "a plane": {"planes": [Plane(point=(0, 0, 0.02))]},
+    "a sphere farther than a radius": {
+        "spheres": [SphericalSurface(centre=(0.0151, 0.05, 0.05), radius=0.01)],
+        "planes": [Plane(point=(0, 0, 0.02))],
+    },
+    "a cylinder from face to face": {
+        "cylinders": [CylindricalSurface(start=(0, 0.05, 0.06), end=(SIDE, 0.05, 0.06), radius=0.04)]
+    },
+    "a box wider than the other": {"boxes": [BoxSurface(low=(0, 0, 0.02), high=(SIDE, SIDE, 0.09))]},
+}
+
+
+def scene(**walls):
+    """Return a grain that lies in a floor at 0.02 m by OVERLAP, in the middle."""
+    return tisim.Scene(
+        particles=tisim.Particles(
+            position=[(0.05, 0.05, 0.02 + RADIUS - OVERLAP)], velocity=[(0, 0, 0)], radius=RADIUS,
+            density=2500.0,
+        ),
+        materials={"glass": tisim.Material(young=1e7, poisson=0.25)},
+        effects=(Granular(), Walls(**walls)),
+        domain=BOX,
+        stepper=Verlet(control=FixedStep(dt=1e-6)),
+        duration=1e-6,
+    )  # fmt: skip
+
+
+def start(made):
+    """Look at the start of a scene as a run does, without compiling it."""
+    for effect in made.acting():
+        effect.suits_start(made.start(), made.acting(), made.domain)
+
+
+def test_a_run_looks():
+    with pytest.raises(tisim.InputError, match="it is not felt through them"):
+        tisim.run(scene(**REFUSED["a post"]))
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_would_have_to_be_felt_through_a_face_is_refused(name):
+    with pytest.raises(
+        tisim.InputError, match=r"^walls\.\w+ must be farther than the largest radius, 0.005 m"
+    ):
+        tisim.run(scene(**REFUSED[name]))
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_without_periodic_faces_it_is_taken(name):
+    open_box = tisim.Box(low=(0, 0, 0), high=(SIDE,) * 3, periodic=(False, False, False))
+    changed = scene(**REFUSED[name]).model_copy(update={"domain": open_box})
+    start(changed)
+
+
+@pytest.mark.parametrize(
+    "name", ["a plane", *(pytest.param(name, marks=pytest.mark.slow) for name in FELT if name != "a plane")]
+)
+def test_what_goes_on_from_face_to_face_is_felt(name):
+    (result,) = tisim.run([scene(**FELT[name])])
+    force = 4 / 3 * 1e7 / (2 * (1 - 0.25**2)) * np.sqrt(RADIUS) * OVERLAP**1.5
+    assert result.measures["walls_force_z"] == pytest.approx(-force, rel=1e-3)
+
+
+SHAPES = [
+    one
+    for walls in REFUSED.values()
+    for shapes in walls.values()
+    for one in (shapes if isinstance(shapes, list) else [shapes])
+    if not isinstance(one, Plane)
+]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.kind())
+def test_a_shape_reaches_as_far_as_it_says(shape):
+    """No farther, and so far: its distance from places on its extent is nowhere negative, and 0 somewhere."""
+    low, high = shape.extent()
+    draw = np.random.default_rng(1)
+    for axis in range(3):
+        for face in (low, high):
+            places = draw.uniform(low - 1e-9, high + 1e-9, (4000, 3))
+            places[:, axis] = face[axis]
+            beyond = places.copy()
+            beyond[:, axis] += 1e-3 if face is high else -1e-3
+            assert np.abs(shape.distances(beyond)).min() > 1e-3 * (1 - 1e-9)
+            assert np.abs(shape.distances(places)).min() < 2e-3
