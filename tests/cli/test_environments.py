@@ -26,7 +26,7 @@ TIMEOUT = 900.0
 FAULTS = re.compile(
     r"Traceback|terminate called|Aborted|core dumped|Segmentation fault|Exception ignored|Assertion"
 )
-PROGRESS = re.compile(r"^\s*$|[━╸-]{5,}|^compiling|^.* steps ahead")
+PROGRESS = re.compile(r"^\s*$|[━╸-]{5,}|^compiling|^.* steps to go")
 """Lines of standard error that are of the bar of progress."""
 QUICK = [environment for environment in ENVIRONMENTS if environment.quick]
 

@@ -180,7 +180,7 @@ def test_rows_of_a_study(tmp_path):
         (
             "search.h5",
             hdf5_store.build_image(None, [], {}),
-            "read by `tisim cache` and by `tisim plot` of its folder",
+            "listed by `tisim cache`",
         ),
         (".", None, r"folder must be one with a whole run or study \(what an interrupted run has left"),
     ],

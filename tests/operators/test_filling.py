@@ -9,6 +9,7 @@ from tests.scenes import by_id, compiled, fixed, scene
 from tisim import GrainClass, InputError, Material, MeasureSeries, Particles, Recording, Scene, Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity, PairForce, parameter
+from tisim.engine.explained_parts import explained
 from tisim.geometry import Plane
 from tisim.io import run_folder
 from tisim.io.export import export
@@ -456,3 +457,9 @@ def test_wrong_insertions_are_refused(make, message):
     with pytest.raises(InputError, match=message) as error_info:
         make()
     check_message(str(error_info.value))
+
+
+@pytest.mark.parametrize(("by", "unit"), [("mass", "kg/s"), ("number", "1/s")])
+def test_a_flux_is_explained_in_its_own_unit(by, unit):
+    rows = explained(poured({}).model_copy(update={"by": by})).parameters
+    assert next(row for row in rows if row[0] == "flux")[1:3] == ("1", unit)

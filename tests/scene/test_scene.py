@@ -1,5 +1,8 @@
 """Scenes as plain data: TOML and back, changes by dotted key, and a digest of all that decides a result."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -253,3 +256,15 @@ def test_a_scene_is_a_value():
     assert particles.position.tolist() == [[0, 0, 0], [0, 0, 0]]
     with pytest.raises(Exception, match="frozen"):
         cloud().duration = 2.0
+
+
+def test_a_missing_effect_is_named_as_it_is_listed():
+    """Also where no other has been imported yet: in a process of its own."""
+    code = (
+        "import tisim; from tisim.effects import Walls; from tisim.geometry import Plane\n"
+        "particles = tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, density=1.0)\n"
+        "try: tisim.Scene(particles=particles, effects=(Walls(planes=[Plane()]),), duration=1.0)\n"
+        "except tisim.InputError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "must be used together with effects.capillary_bridge or effects.granular" in done.stdout

@@ -95,7 +95,7 @@ def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -
         task = bar.add_task(name, total=1.0)
 
         def report(simulation: Simulation) -> None:
-            description = f"{name}, {simulation.remaining_steps():.3g} steps ahead"
+            description = f"{name}, {simulation.remaining_steps():.3g} steps to go"
             bar.update(task, completed=simulation.fraction(), description=description)
             ctrl_c.check()
 

@@ -61,7 +61,7 @@ def _read_hdf5(path: Path) -> Any:
 
     with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", READABLE)), "r") as file:
         kind = str(file.attrs.get("format", "none"))
-    rule = f"{READABLE}; a search is read by `tisim cache` and by `tisim plot` of its folder"
+    rule = f"{READABLE}; what is in a search is listed by `tisim cache`"
     must(kind != SEARCH_FORMAT, "file to read", rule, f"{path}, of a search")
     readers: dict[str, Callable[[Path], Any]] = {
         RESULT: run_folder.read_result,

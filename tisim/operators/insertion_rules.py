@@ -27,6 +27,9 @@ class InsertionByFlux(Insertion):
         "what the flux is of: the mass of the grains, or their number", "mass"
     )
 
+    def unit(self, name: str) -> str:
+        return "1/s" if name == "flux" and self.by == "number" else super().unit(name)
+
     @ti.func
     def acts(self, s, w):
         return ti.cast(self.is_wanted(s, w), ti.i32)

@@ -20,7 +20,7 @@ from tisim.components.sheared_box import ShearedBox
 from tisim.effects.base import Effect
 from tisim.errors import InputError, abbreviated, must
 from tisim.files import python_file
-from tisim.scene import plain_data
+from tisim.scene import plain_data, plugins
 from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
@@ -269,4 +269,6 @@ def _names(kind: type[Component]) -> list[str]:
     """Return the name of an effect in files, or the names of those that are made after a contract."""
     if not kind.__dict__.get("contract"):
         return [f"effects.{kind.kind()}"]
+    # Those that are imported when they are first asked for.
+    plugins.load_parts()
     return [f"effects.{name}" for name in sorted(kind.known())] or [kind.kind()]
