@@ -68,7 +68,8 @@ def progress_bar(before: str, after: str = "", console: Console | None = None) -
     """Return a bar with the time taken and left, between two texts with fields of its task."""
     return bars.Progress(
         bars.TextColumn(before, markup=False), Compiling(), bars.BarColumn(), bars.TaskProgressColumn(),
-        bars.TextColumn("elapsed"), bars.TimeElapsedColumn(), bars.TextColumn("left"), bars.TimeRemainingColumn(),
+        bars.TextColumn("elapsed"), bars.TimeElapsedColumn(),
+        bars.TextColumn("left"), bars.TimeRemainingColumn(),
         bars.TextColumn(after, markup=False), console=console or err(),
     )  # fmt: skip
 

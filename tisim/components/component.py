@@ -103,7 +103,7 @@ class Component(AccuracyHints, Checked):
                 must(value is None or abs(value) < WHOLE, where, f"less than {WHOLE}", value)
         return self
 
-    def unit(self, name: str) -> str:
+    def unit_as_set(self, name: str) -> str:
         """Return the unit of a setting as it is set; by default the one that it is declared with."""
         return unit_of(type(self).model_fields[name])
 

@@ -70,7 +70,7 @@ def _values(spec: Component, within: str = "") -> Iterator[Row]:
             if not 0 < len(value) <= ROWS_SHOWN:
                 yield f"{within}{name}", f"{len(value)} in all", "", text_of(info)
         elif within or not isinstance(value, Component):
-            yield f"{within}{name}", reference.shown(value), spec.unit(name), text_of(info)
+            yield f"{within}{name}", reference.shown(value), spec.unit_as_set(name), text_of(info)
             if isinstance(value, Component):
                 yield from _values(value, f"{within}{name}.")
 

@@ -27,8 +27,8 @@ class InsertionByFlux(Insertion):
         "what the flux is of: the mass of the grains, or their number", "mass"
     )
 
-    def unit(self, name: str) -> str:
-        return "1/s" if name == "flux" and self.by == "number" else super().unit(name)
+    def unit_as_set(self, name: str) -> str:
+        return "1/s" if name == "flux" and self.by == "number" else super().unit_as_set(name)
 
     @ti.func
     def acts(self, s, w):
