@@ -173,3 +173,22 @@ def test_neither_making_nor_digesting_takes_lists_of_all(rng):
     tracemalloc.stop()
     assert making < 6 * where.nbytes
     assert digesting - before < 15e6
+
+
+def test_lists_of_arrays_are_plain_data():
+    """A list of vectors, as NumPy makes them: a scene can be changed, written and told from others."""
+    moment = np.array([0.0, 1.0, 2.0])
+    quantities = {"moment": [moment, 2 * moment], "charge": [np.float64(1), np.int8(2)]}
+    listed = {"moment": [[0.0, 1.0, 2.0], [0.0, 2.0, 4.0]], "charge": [1.0, 2]}
+    made, plain = (
+        Scene(
+            particles=Particles(
+                position=np.eye(3)[:2], velocity=np.eye(3)[:2], radius=1, density=1, quantities=q
+            ),
+            duration=1.0,
+        )
+        for q in (quantities, listed)
+    )  # fmt: skip
+    assert made.replace({"duration": 2.0}).particles == made.particles
+    assert made.to_toml() == plain.to_toml()
+    assert made.digest() == plain.digest()

@@ -167,7 +167,7 @@ class Particles(Start):
     def _frozen(cls, values: Mapping[str, Any]) -> Mapping[str, Any]:
         for name, value in values.items():
             must(not np.ma.is_masked(value), f"particles.{name}", "without masked entries", value)
-        return {k: frozen(v) if isinstance(v, np.ndarray) else v for k, v in values.items()}
+        return {k: frozen(v) if isinstance(v, np.ndarray) else _lists(v) for k, v in values.items()}
 
     @field_serializer("quantities", when_used="json")
     def _plain(self, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -249,6 +249,13 @@ def _beside(clumps: Arrays, mass: np.ndarray, spheres: Arrays) -> Arrays:
     clumps = {**clumps, **({"group": np.zeros(len(clumps["mass"]))} if "group" in given else {})}
     must(given.keys() == clumps.keys(), "spheres beside clumps", f"given {sorted(clumps)}", sorted(given))
     return {name: np.concatenate([values, given[name]]) for name, values in clumps.items()}
+
+
+def _lists(value: Any) -> Any:
+    """Return a list with what is of NumPy in it as lists and numbers of Python; all else as it is."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return type(value)(map(_lists, value)) if type(value) in (list, tuple) else value
 
 
 def _of_each(name: str, value: Any, n: int) -> np.ndarray:
