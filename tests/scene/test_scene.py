@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import flow, scene
-from tisim import Box, Cloud, InputError, Particles, Scene
+from tisim import Box, Cloud, InputError, Material, Particles, Scene
 from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Softening
 from tisim.operators import Cooling, Operator
 from tisim.steppers import ApproachTime, FixedStep, Verlet
@@ -268,3 +268,12 @@ def test_a_missing_effect_is_named_as_it_is_listed():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "must be used together with effects.capillary_bridge or effects.granular" in done.stdout
+
+
+def test_a_scene_and_a_material_are_printed_in_a_line():
+    assert (
+        repr(cloud())
+        == str(cloud())
+        == ("Scene('a cloud': 7 particles, Impact, Friction, Heating, Cooling, Verlet, 0.5 s)")
+    )
+    assert repr(Material(young=1e7, poisson=0.25)) == "Material(young=10000000.0, poisson=0.25)"

@@ -84,6 +84,11 @@ class Study:
         self.truths: tuple[Truth, ...] = ()
         self.complete = False
 
+    def __repr__(self) -> str:
+        names = ", ".join(quantity.name for quantity in self.quantities)
+        state = "complete" if self.complete else "not complete"
+        return f"Study({self.scene.name!r}: {names}; {len(self.rows)} rows, {state})"
+
     @property
     def numbers(self) -> list[tuple[str, str]]:
         """Precisions and arithmetics to try: each by itself."""

@@ -83,6 +83,9 @@ class Material(ContactProperties):
     state, unless the scene gives them for the pair (``MaterialPair``).
     """
 
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        return ((name, value) for name, value in super().__repr_args__() if value is not None)
+
     young: float | None = parameter(
         "Pa", "Young's modulus E; of two materials, 1/E* = (1 - nu_i^2)/E_i + (1 - nu_j^2)/E_j", None, gt=0
     )

@@ -49,6 +49,11 @@ class Simulation(CompiledWorlds):
         self.edits: list[list[str]] = []
         self.wall_s = 0.0
 
+    def __repr__(self) -> str:
+        names = ", ".join(repr(scene.name) for scene in self.scenes[:3]) + ", ..." * (len(self.scenes) > 3)
+        room = f"{self.worlds} worlds of up to {self.s.capacity} particles"
+        return f"Simulation({room}, loaded: {names or 'none'})"
+
     def load(self, scenes: Scene | Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
         """Put one scene in each of the first worlds, or one in the first; the others stay empty. Nothing is
         compiled.

@@ -145,6 +145,14 @@ class Scene(Component):
             if isinstance(part, UsesMaterials):
                 part.check_materials(materials)
 
+    def __repr__(self) -> str:
+        effects = ", ".join(type(effect).__name__ for effect in self.effects) or "no effects"
+        n, stepper = len(self.particles.masses(self.seed)), type(self.stepper).__name__
+        return f"Scene({self.name!r}: {n} particles, {effects}, {stepper}, {self.duration:.6g} s)"
+
+    def __str__(self) -> str:
+        return repr(self)
+
     def choice(self) -> StepperChoice:
         """Return the stepper that is chosen for the effects, the start and the accuracy, with the reason;
         InputError where none can be chosen."""
