@@ -10,13 +10,17 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.arrays import Rows, equal
 from tisim.components.component import parameter
-from tisim.errors import InputError, is_number, must
+from tisim.errors import is_number, must
 from tisim.files import regular_file
+from tisim.geometry.mesh_files import MeshFile
 from tisim.geometry.shape import SEAM, Shape
 from tisim.geometry.triangle_grid import MOST_LISTED, TriangleGrid
 
 MOST_DISTANCES = 2_000_000
 """Where places and triangles make more pairs, ``distances`` says of all places that they are far away."""
+
+PAIRS_AT_ONCE = 100_000
+"""``distances`` works on so many pairs of a place and a triangle at a time: some 10 MB."""
 
 
 class TriangulatedSurface(Shape):
@@ -39,34 +43,16 @@ class TriangulatedSurface(Shape):
 
     @classmethod
     def read(cls, path: str | Path, scale: float = 1.0, where: str = "surface") -> Self:
-        """Return the surface in a file of a format that meshio reads, such as STL, PLY or OBJ; ``scale`` is
-        the length of its unit in m.
+        """Return the surface in a file: STL, OBJ, or another format if meshio is there to read it, such as
+        PLY; ``scale`` is the length of its unit in m. Polygons are cut into triangles.
 
-        InputError, which calls the surface ``where``, is raised for a file that cannot be read or has faces
-        other than triangles, and for a scale that is not above 0.
+        InputError, which calls the surface ``where``, is raised for a file that is damaged or cut short, for
+        faces other than polygons, and for a scale that is not above 0.
         """
         must(is_number(scale) and scale > 0, f"{where}.scale", "a number of m above 0", scale)
-        try:
-            import meshio
-        except ImportError:
-            rule = 'there to read a surface (python -m pip install "tisim[mesh]")'
-            raise InputError(f"meshio must be {rule}; received none") from None
-        # What is none may have no end.
-        rule, other = "a file that meshio reads", regular_file.irregular(Path(path))
-        must(other is None, where, rule, f"{path!s} ({other})")
-        try:
-            # For an ASCII file of STL it multiplies what four letters would be as a number.
-            with np.errstate(over="ignore"):
-                mesh = meshio.read(path)
-        except (OSError, ValueError, meshio.ReadError, SystemExit) as fault:
-            raise InputError(f"{where} must be {rule}; received {path!s} ({fault})") from None
-        # Without the others there would be holes in it.
-        others = {block.type for block in mesh.cells if block.dim == 2} - {"triangle"}
-        rule = "of triangles alone (triangulate it with a program for meshes)"
-        must(not others, where, rule, f"{', '.join(sorted(others))} in {path!s}")
-        must("triangle" in mesh.cells_dict, where, "of triangles", str(path))
-        vertices, index = np.unique(mesh.points.astype(float), axis=0, return_inverse=True)
-        return cls(vertices=scale * vertices, faces=index.reshape(-1)[mesh.cells_dict["triangle"]])
+        places, faces = MeshFile(Path(path), where).read()
+        vertices, index = np.unique(places, axis=0, return_inverse=True)
+        return cls(vertices=scale * vertices, faces=index.reshape(-1)[faces])
 
     @classmethod
     def from_files(cls, values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:
@@ -137,16 +123,10 @@ class TriangulatedSurface(Shape):
         least: np.ndarray = np.full(len(places), np.inf)
         if len(places) * len(corners) > MOST_DISTANCES:
             return least
-        for a, b, c in corners:
-            sides, normal = (b - a, c - b, a - c), np.cross(b - a, c - a)
-            normal = normal / np.linalg.norm(normal)
-            over = np.ones(len(places), bool)
-            for begin, side in zip((a, b, c), sides, strict=True):
-                out = places - begin
-                over &= out @ np.cross(normal, side) >= 0.0
-                along = np.clip(out @ side / (side @ side), 0.0, 1.0)
-                least = np.minimum(least, np.linalg.norm(out - along[:, None] * side, axis=1))
-            least = np.where(over, np.minimum(least, np.abs((places - a) @ normal)), least)
+        # In blocks: a loop over triangles, or over places, takes a minute where there are 10^5 of them.
+        block = max(1, PAIRS_AT_ONCE // max(1, len(places)))
+        for first in range(0, len(corners), block):
+            least = np.minimum(least, _distances(corners[first : first + block], places))
         return least
 
     @ti.func
@@ -216,6 +196,24 @@ class TriangulatedSurface(Shape):
         # A large one is not in all cells of its box, and is looked at in each that has it.
         large = self.first[m, 0] < 0.0
         return large or (x == first[0] and y == first[1] and z == first[2])
+
+
+def _distances(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the distance (m) of each place (m, shape (n, 3)) from the nearest of some triangles."""
+    sides = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    least = np.full((len(corners), len(places)), np.inf)
+    over = np.ones(least.shape, bool)
+    for begin, side in zip(np.moveaxis(corners, 1, 0), np.moveaxis(sides, 1, 0), strict=True):
+        out = places - begin[:, None]
+        over &= np.einsum("mni,mi->mn", out, np.cross(normals, side)) >= 0.0
+        along = np.einsum("mni,mi->mn", out, side) / (side**2).sum(axis=1)[:, None]
+        foot = np.clip(along, 0.0, 1.0)[..., None] * side[:, None]
+        least = np.minimum(least, np.linalg.norm(out - foot, axis=2))
+    above = np.abs(np.einsum("mni,mi->mn", places - corners[:, :1], normals))
+    nearest: np.ndarray = np.where(over, np.minimum(least, above), least).min(axis=0)
+    return nearest
 
 
 @ti.func
