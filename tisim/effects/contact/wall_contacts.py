@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from tisim.backend.taichi import ti
+from tisim.effects.contact.wall_ring import WallRing
 from tisim.effects.contact.wall_search import CONTACTS, WallSearch
 
 STILL_THE_SAME = 0.9
@@ -11,7 +12,7 @@ CAUTION = 1e-6
 """Clearances are taken to be shorter by this part of the lengths that they are made of, as those round."""
 
 
-class WallContacts(WallSearch):
+class WallContacts(WallRing, WallSearch):
     """Wall contacts are what a bound wall does to the grains that touch it.
 
     laws : each contact law with where its values begin among those of a contact, and their number; stride :
@@ -170,7 +171,7 @@ class WallContacts(WallSearch):
             for c in ti.static(range(size)):
                 past[c] = ti.select(new > 0, 0.0, self.surface_past[w, i, at + 3 + first + c])
             push, turn, known = self.touch(s, w, i, law, outward, found[q, 3], past, t, dt)
-            force, torque = force + push, torque + turn
+            force, torque = force + found[q, 4] * push, torque + found[q, 4] * turn
             if self.goes_through(s, w, i, outward, found[q, 3], t, dt):
                 force[0] = ti.math.nan
             if commit:

@@ -11,10 +11,9 @@ force follows from the least distance wherever a grain moves over an edge, and n
 from typing import TYPE_CHECKING, Any
 
 from tisim.backend.taichi import ti
-from tisim.worlds.status import WorldStatus
 
 CONTACTS = 6
-"""A grain touches one wall in at most so many places, as many as a box has faces."""
+"""A grain remembers so many contacts with one wall, as many as a box has faces; of more it makes bundles."""
 ALIKE = 0.966
 """Two contacts of a grain with one wall whose directions have a larger cosine, so below 15 degrees, are
 one."""
@@ -37,18 +36,39 @@ def explained(out, distance, found, number):
     return hit
 
 
+class Faces:
+    """These are the faces of a wall: lists of surfaces, of which there are any, and triangles, if there is a
+    mesh."""
+
+    def __init__(self, surfaces: tuple[Any, ...], mesh: Any, has_mesh: bool) -> None:
+        self.surfaces, self.mesh, self.has_mesh = surfaces, mesh, has_mesh
+
+    @ti.func
+    def all(self, w, r, reach, best, search: ti.template(), found, number):  # type: ignore[valid-type]
+        """Return what ``search.consider`` makes of all faces, and of the triangles within ``reach`` (m) of r,
+        one after another, from ``best`` on."""
+        for each in ti.static(self.surfaces):
+            for k in range(each.size(w)):
+                for c in range(ti.cast(each.faces(w, k), ti.i32)):
+                    best = search.consider(r, each.nearest(w, k, c, r), best, found, number)
+        if ti.static(self.has_mesh):
+            best = self.mesh.search(r, reach, best, search, found, number)
+        return best
+
+
 class WallSearch:
     """A wall search finds where a grain touches a wall: it is what a bound wall does with its shapes.
 
-    flat : the list of its planes. surfaces : the lists of surfaces of which there are any. mesh : its
-    triangles, where ``has_mesh``.
+    flat : the list of its planes. faces : those of its surfaces. mesh : its triangles, where ``has_mesh``.
     """
 
     if TYPE_CHECKING:
         flat: Any
-        surfaces: Any
+        faces: Any
         mesh: Any
         has_mesh: Any
+        bundles: Any
+        in_doubt: Any
 
     @ti.func
     def consider(self, r, place, best, found, number):
@@ -66,20 +86,14 @@ class WallSearch:
         """Return distance (m) and place of the nearest contact beside those found, of triangles within
         ``reach`` (m), where that is above 0; the distance is ``limit`` where there is none within it."""
         best = ti.Vector([limit, r[0], r[1], r[2]])
-        for each in ti.static(self.surfaces):
-            for k in range(each.size(w)):
-                for c in range(ti.cast(each.faces(w, k), ti.i32)):
-                    best = self.consider(r, each.nearest(w, k, c, r), best, found, number)
-        if ti.static(self.has_mesh):
-            best = self.mesh.search(r, reach, best, self, found, number)
-        return best
+        return self.faces.all(w, r, reach, best, self, found, number)
 
     @ti.func
     def contacts(self, s, w, i, r, touching):
         """Return the contacts of grain i, which is at r (m) beside the shapes, with surfaces: how many, and
-        their directions and distances, of ``touching`` (m) at most; and how far it is from surfaces at least,
-        where there is none."""
-        found, number, searching = ti.Matrix.zero(s.real, CONTACTS, 4), 0, 1
+        their directions, their distances, of ``touching`` (m) at most, and by how much their forces are
+        multiplied; and how far it is from surfaces at least, where there is none."""
+        found, number, searching = ti.Matrix.zero(s.real, CONTACTS, 5), 0, 1
         clear = ti.cast(ti.math.inf, s.real)
         limit, reach = clear, REACH * touching
         if ti.static(self.has_mesh):
@@ -92,13 +106,14 @@ class WallSearch:
             if best[0] >= touching:
                 searching = 0
             elif number == CONTACTS:
-                s.fail(w, WorldStatus.CONTACT_OVERFLOW, i)
-                searching = 0
+                number, searching = CONTACTS + 1, 0
             else:
                 for axis in ti.static(range(3)):
                     found[number, axis] = (r[axis] - best[1 + axis]) / best[0]
-                found[number, 3] = best[0]
+                found[number, 3], found[number, 4] = best[0], 1.0
                 number, limit = number + 1, touching
+        if number > CONTACTS or self.in_doubt(w, r, touching, reach, found, number):
+            number, found = self.bundles(s, w, r, touching, reach)
         return number, found, clear
 
     @ti.func

@@ -16,7 +16,8 @@ from tisim.components.materials import Materials
 from tisim.effects.base import Effect, Field, Force, option
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.wall_contacts import WallContacts
-from tisim.effects.contact.wall_search import CONTACTS
+from tisim.effects.contact.wall_ring import Bundling, Doubting
+from tisim.effects.contact.wall_search import CONTACTS, Faces
 from tisim.effects.motion.base import Fixed, Motion, MotionState
 from tisim.effects.motion.resultant import resultant, resultant_units
 from tisim.errors import must
@@ -167,13 +168,17 @@ class Walls(WallContacts, UsesMaterials, Force):
             laws.append((law, begin, law.data.memory))
             begin += law.data.memory
         bound = peers.bound(self)
+        surfaces = tuple(getattr(bound, name) for name in self.kinds_of_surface())
+        faces = Faces(surfaces, bound.surface, self.surface is not None)
         return {
             "laws": tuple(laws),
             "stride": begin,
             "wall_material": self.material_index(self._materials),
             "flat": bound.planes,
             "has_planes": bool(self.planes),
-            "surfaces": tuple(getattr(bound, name) for name in self.kinds_of_surface()),
+            "faces": faces,
+            "bundling": Bundling(faces),
+            "doubting": Doubting(),
             "has_mesh": self.surface is not None,
             "mesh": bound.surface,
         }

@@ -1,0 +1,88 @@
+"""A ball that blocks a round outlet of a mesh lies there, whatever the number of facets."""
+
+import numpy as np
+import pytest
+
+import tisim
+from tests.effects.contact.grains import HERTZ_MINDLIN
+from tests.scenes import scene, simulate
+from tisim import Material, geometry
+from tisim.effects import Gravity, Walls
+
+RADIUS, YOUNG, POISSON, GRAVITY = 5e-3, 1e7, 0.25, 9.80665
+MASS = 2500 * 4 / 3 * np.pi * RADIUS**3
+E_STAR = YOUNG / (2 * (1 - POISSON**2))
+
+
+def outlet(number, radius, slope):
+    """A funnel of plane facets, each of two triangles; the radius of the outlet and its height in radii."""
+    angle = 2 * np.pi * np.arange(number) / number
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    top = (radius + 1.5) * ring + [0, 0, slope]
+    k = np.arange(number)
+    after = (k + 1) % number
+    faces = np.stack([k, after, number + k, after, number + after, number + k], 1).reshape(-1, 3)
+    return geometry.TriangulatedSurface(vertices=RADIUS * np.concatenate([radius * ring, top]), faces=faces)
+
+
+def lodged(number, radius=0.8, slope=1.2, friction=0.0, aside=(2e-7, 3e-7), sunk=0.0, steps=12_000, **more):
+    """A ball let go in the outlet, at first somewhat off its axis."""
+    rim = radius * np.cos(np.pi / number)
+    height = np.sqrt(1 - rim**2) * RADIUS
+    law = {"young": YOUNG, "poisson": POISSON, "restitution": 0.3, "friction": friction}
+    acting = (HERTZ_MINDLIN, Walls(surface=outlet(number, radius, slope)), Gravity())
+    given = {"radius": RADIUS, "mass": MASS, "dt": 1e-5, "materials": {"glass": Material(**law)}, **more}
+    place = (*aside, height + RADIUS * (2e-3 if not sunk else -sunk))
+    return scene([place], [(0.0, 0.0, 0.0)], acting, steps=steps, **given)
+
+
+RINGS = [(6, 0.0), (7, 0.5), (8, 0.0), (8, 0.5), (16, 0.0), (16, 0.5), (32, 0.0), (64, 0.0), (64, 0.5)]
+
+
+@pytest.mark.parametrize(("number", "friction"), RINGS)
+def test_a_ball_rests_in_a_ring_of_any_number_of_facets(number, friction):
+    """Its weight is on the wall, nothing pushes it aside, and it comes to rest; a world of more than six
+    contacts was ended."""
+    result = tisim.run(lodged(number, friction=friction))
+    assert result.status.ok, result.status.reason
+    force = np.array([result.measures[f"walls_force_{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(force / (MASS * GRAVITY), [0, 0, -1], atol=1e-6)
+    assert np.linalg.norm(result.state["velocity"]) < 1e-9
+    assert np.linalg.norm(result.state["position"][0, :2]) < 1e-3 * RADIUS
+    if not friction:
+        assert np.linalg.norm(result.state["position"][0, :2]) < 1e-9 * RADIUS
+
+
+@pytest.mark.parametrize("number", [6, 7, 8, 12])
+def test_contacts_apart_push_each_by_its_own(number):
+    """The force is the sum of those of Hertz, also where there are more contacts than a ball remembers."""
+    sunk, aside = 1e-4, np.array([2e-7, -1e-7])
+    result = tisim.run(lodged(number, sunk=sunk, aside=tuple(aside), steps=1, dt=1e-12))
+    place = np.array([*aside, (np.sqrt(1 - (0.8 * np.cos(np.pi / number)) ** 2) - sunk) * RADIUS])
+    middle = 2 * np.pi * (np.arange(number) + 0.5) / number
+    rim = 0.8 * np.cos(np.pi / number) * RADIUS
+    edge = np.column_stack([rim * np.cos(middle), rim * np.sin(middle), 0 * middle])
+    along = np.column_stack([-np.sin(middle), np.cos(middle), 0 * middle])
+    nearest = edge + ((place - edge) * along).sum(axis=1)[:, None] * along
+    out = place - nearest
+    distance = np.linalg.norm(out, axis=1)
+    force = 4 / 3 * E_STAR * np.sqrt(RADIUS) * (RADIUS - distance) ** 1.5
+    expected = (force[:, None] * out / distance[:, None]).sum(axis=0)
+    found = -np.array([result.measures[f"walls_force_{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.linalg.norm(expected))
+
+
+def test_a_ring_of_more_facets_is_not_stiffer():
+    """From some number on the force does not grow with that of facets."""
+    scenes = [lodged(number, sunk=1e-4, aside=(0.0, 0.0), steps=1, dt=1e-12) for number in (16, 32, 64, 128)]
+    forces = [tisim.run(made).measures["walls_force_z"] for made in scenes]
+    assert max(forces) / min(forces) == pytest.approx(1, abs=0.2)
+
+
+def test_a_ball_in_a_ring_is_the_same_alone_and_among_others():
+    scenes = [lodged(16, friction=0.3, aside=(k * 1e-6, 2e-7), steps=300) for k in range(4)]
+    together = simulate(scenes, worlds=4, capacity=2)
+    for made, among in zip(scenes, together, strict=True):
+        alone = tisim.run(made)
+        for name in ("position", "velocity", "spin"):
+            assert alone.state[name].tobytes() == among.state[name].tobytes()
