@@ -32,6 +32,7 @@ from .engine.result import Status as Status
 from .engine.run import run as run
 from .engine.simulation import Simulation as Simulation
 from .errors import InputError as InputError
+from .errors import MeshWarning as MeshWarning
 from .errors import RunError as RunError
 from .errors import RunWarning as RunWarning
 from .errors import StartWarning as StartWarning

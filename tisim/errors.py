@@ -30,6 +30,10 @@ class StartWarning(UserWarning):
     """Grains of a start lie deep in each other, or behind a wall. The scene runs all the same."""
 
 
+class MeshWarning(UserWarning):
+    """A mesh has faces that are there twice, or have no area. The scene runs all the same."""
+
+
 class _Short(reprlib.Repr):
     """This repr bounds the length and the depth of what it returns, however large the value is."""
 

@@ -223,6 +223,10 @@ class Component(AccuracyHints, Checked):
         (rows, columns)."""
         return {}
 
+    def remarks(self) -> dict[str, str]:
+        """Return, by name, what ``tisim explain`` says of it besides its parameters; by default nothing."""
+        return {}
+
     contract: ClassVar[bool] = False
     """A class sets this if it is no part of a scene itself, only what parts are made after."""
     requires: ClassVar[tuple[type[Component], ...]] = ()

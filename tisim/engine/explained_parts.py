@@ -49,7 +49,9 @@ def explained(spec: Component, name: str = "") -> Part:
         if isinstance(value := getattr(spec, field), Component)
     )
     shown = f"{label}: {spec.kind()}" if name else label
-    return replace(explained_kind(type(spec)), name=shown, parameters=tuple(_values(spec)), parts=made_of)
+    remarks = ((name, value, "", "") for name, value in spec.remarks().items())
+    rows = (*_values(spec), *remarks)
+    return replace(explained_kind(type(spec)), name=shown, parameters=rows, parts=made_of)
 
 
 def explained_kind(kind: type[Component]) -> Part:

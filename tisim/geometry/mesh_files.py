@@ -45,8 +45,8 @@ OBJ_IGNORED = frozenset(
     )
 )
 """Statements of OBJ that do not change the surface: textures, normals, groups, materials, lines, points."""
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-INDEX = re.compile(r"([-+]?\d{1,18})(/[-+]?\d+|//[-+]?\d+|/[-+]?\d+/[-+]?\d+)?", re.ASCII)
+NUMBER_WORD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+CORNER_WORD = re.compile(r"([-+]?\d{1,18})(/[-+]?\d+|//[-+]?\d+|/[-+]?\d+/[-+]?\d+)?", re.ASCII)
 
 
 BY_MESHIO = """
@@ -62,7 +62,7 @@ with redirect_stdout(sys.stderr), numpy.errstate(all="ignore"):
     numpy.savez(archive, points=mesh.points, **blocks)
 sys.stdout.buffer.write(archive.getvalue())
 """
-LEAST_TIME, LEAST_SPEED = 20.0, 1e5
+READING_TIME, READING_RATE = 20.0, 1e5
 """meshio has so long to read a file, s, and besides at this rate, byte/s."""
 
 
@@ -112,7 +112,7 @@ class MeshFile:
 
     def _coordinates(self, words: list[str], line: int, rule: str) -> list[float]:
         for word in words:
-            if not NUMBER.fullmatch(word) or not math.isfinite(float(word)):
+            if not NUMBER_WORD.fullmatch(word) or not math.isfinite(float(word)):
                 self.refuse(rule, repr(word), line)
         return [float(word) for word in words]
 
@@ -177,7 +177,7 @@ class MeshFile:
         """Add the corners of the facet that these words begin with."""
         for word, rule, line in zip(words, FACET, lines, strict=False):
             if rule == "number":
-                if not NUMBER.fullmatch(word):
+                if not NUMBER_WORD.fullmatch(word):
                     self.refuse("an STL file with three numbers after each 'vertex'", repr(word), line)
                 corners.append(float(word))
             elif rule and word.lower() != rule:
@@ -224,7 +224,7 @@ class MeshFile:
 
     def _polygon(self, words: list[str], known: int, statement: str, line: int) -> list[int]:
         """Return the vertices of a polygon, from 0; ``known`` : how many vertices stand before it."""
-        found = [INDEX.fullmatch(word) for word in words]
+        found = [CORNER_WORD.fullmatch(word) for word in words]
         forms = {(word.count("/"), "//" in word) for word in words}
         if len(words) > MOST_CORNERS:
             self.refuse(f"a mesh of polygons with at most {MOST_CORNERS} corners", len(words), line)
@@ -263,7 +263,7 @@ class MeshFile:
     def _arrays(self) -> bytes:
         """Return what meshio reads, as an archive of NumPy."""
         # By a process of its own: of a file that is cut short, some readers wait for the rest for ever.
-        limit = LEAST_TIME + self.path.stat().st_size / LEAST_SPEED
+        limit = READING_TIME + self.path.stat().st_size / READING_RATE
         surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = (sys.executable, "-P", "-c", BY_MESHIO, str(self.path))
         try:

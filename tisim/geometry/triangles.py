@@ -1,6 +1,7 @@
 """A surface made of triangles, such as that of an STL file."""
 
 import hashlib
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -10,8 +11,9 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.arrays import Rows, equal
 from tisim.components.component import parameter
-from tisim.errors import is_number, must
+from tisim.errors import MeshWarning, is_number, must, printable
 from tisim.files import regular_file
+from tisim.geometry.mesh_check import MeshCheck
 from tisim.geometry.mesh_files import MeshFile
 from tisim.geometry.shape import SEAM, Shape
 from tisim.geometry.triangle_grid import MOST_LISTED, TriangleGrid
@@ -47,12 +49,16 @@ class TriangulatedSurface(Shape):
         PLY; ``scale`` is the length of its unit in m. Polygons are cut into triangles.
 
         InputError, which calls the surface ``where``, is raised for a file that is damaged or cut short, for
-        faces other than polygons, and for a scale that is not above 0.
+        faces other than polygons, and for a scale that is not above 0. Of faces that are there twice or have
+        no area a MeshWarning tells.
         """
         must(is_number(scale) and scale > 0, f"{where}.scale", "a number of m above 0", scale)
         places, faces = MeshFile(Path(path), where).read()
         vertices, index = np.unique(places, axis=0, return_inverse=True)
-        return cls(vertices=scale * vertices, faces=index.reshape(-1)[faces])
+        surface = cls(vertices=scale * vertices, faces=index.reshape(-1)[faces])
+        if suspect := MeshCheck.of(surface.vertices, surface.faces).suspect():
+            warnings.warn(f"{where}: {suspect} ({printable(str(path))})", MeshWarning, stacklevel=2)
+        return surface
 
     @classmethod
     def from_files(cls, values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:
@@ -93,6 +99,9 @@ class TriangulatedSurface(Shape):
 
     def structure(self) -> tuple[Any, ...]:
         return type(self), hashlib.sha256(self.corners().tobytes()).hexdigest()
+
+    def remarks(self) -> dict[str, str]:
+        return {"mesh": str(MeshCheck.of(self.vertices, self.faces))}
 
     def lookups(self) -> dict[str, np.ndarray]:
         corners = self.corners()
