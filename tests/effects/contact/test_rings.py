@@ -86,3 +86,13 @@ def test_a_ball_in_a_ring_is_the_same_alone_and_among_others():
         alone = tisim.run(made)
         for name in ("position", "velocity", "spin"):
             assert alone.state[name].tobytes() == among.state[name].tobytes()
+
+
+@pytest.mark.parametrize("radius", [0.3, 0.45, 0.8])
+def test_nothing_pushes_a_ball_in_the_middle_aside(radius):
+    """Nor far aside near it: of 64 facets it would be chance which ones count."""
+    given = {"radius": radius, "slope": 0.05, "sunk": 1e-4, "steps": 1, "dt": 1e-12}
+    for x in (0.0, 1e-12, -1e-12):
+        result = tisim.run(lodged(64, aside=(x, 0.0), **given))
+        force = np.array([result.measures[f"walls_force_{axis}"] for axis in "xyz"])
+        assert np.linalg.norm(force[:2]) < 1e-5 * abs(force[2])
