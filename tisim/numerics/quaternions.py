@@ -29,6 +29,16 @@ def turned(v, turn):
 
 
 @ti.func
+def brought(v, before, after):
+    """Return a vector that is fixed in a body whose orientation was one quaternion and is another: turned by
+    ``after`` times ``before`` to the minus one, of length 1 or nearly so; in f64, as ``turned``."""
+    q, r = product(ti.cast(after, ti.f64), conjugate(ti.cast(before, ti.f64))), ti.cast(v, ti.f64)
+    u = ti.Vector([q[1], q[2], q[3]])
+    twice = 2.0 / q.norm_sqr() * u.cross(r)
+    return r + q[0] * twice + u.cross(twice)
+
+
+@ti.func
 def conjugate(q):
     """Return the quaternion of the rotation back."""
     return ti.Vector([q[0], -q[1], -q[2], -q[3]])

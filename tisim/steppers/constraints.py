@@ -13,13 +13,14 @@ Constraints = tuple[Bound[Constraint], ...]
 
 
 @ti.func
-def put_held(s, domain: ti.template(), constraints: ti.template(), w, i, t):  # type: ignore[valid-type]
-    """Put a particle that a constraint holds where that says, at time t (s); return whether one does."""
+def put_held(s, domain: ti.template(), constraints: ti.template(), w, i, t, dt):  # type: ignore[valid-type]
+    """Put a particle that a constraint holds where that says, at the end t (s) of a step of dt (s), with the
+    velocity midway in it; return whether one does."""
     held = 0
     for constraint in ti.static(constraints):
         if constraint.holds(s, w, i):
             s.position[w, i] = domain.wrap(w, constraint.position(s, w, i, t), t)
-            s.velocity[w, i], s.spin[w, i] = constraint.velocity(s, w, i, t)
+            s.velocity[w, i], s.spin[w, i] = constraint.velocity_midway(s, w, i, t, dt)
             held = 1
     return held
 
@@ -73,7 +74,8 @@ class PutHeld(OfConstraints):
 
     @ti.func
     def run(self, w, i):
-        put_held(self.s, self.s.domain, self.constraints, w, i, self.s.time[w])
+        t = self.s.time[w]
+        put_held(self.s, self.s.domain, self.constraints, w, i, t, ti.cast(0.0, self.s.real))
 
 
 class AdvanceBodies(OfConstraints):

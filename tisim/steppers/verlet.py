@@ -98,7 +98,7 @@ class Move(PerParticle):
         s = self.s
         dt = ti.cast(s.dt[w], s.real)
         before, size, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
-        held = put_held(s, self.domain, self.constraints, w, i, end)
+        held = put_held(s, self.domain, self.constraints, w, i, end, dt)
         if held == 0:
             if ti.static(self.guarded):
                 s.force_before[w, i] = s.force[w, i]
@@ -114,6 +114,9 @@ class Move(PerParticle):
         if ti.static(len(self.constraints) > 0):
             # What is held may have been put through a face already.
             path = ti.select(held > 0, self.domain.nearest(w, before, after, end), path)
+            if ti.static(not self.forced):
+                # No kick follows, after which they would.
+                steer_held(s, self.constraints, w, i, end)
         moved = ti.cast(path, ti.f64) - drift(s, self.domain, w, before) * s.dt[w]
         apply_displacement(s, self.domain, w, i, after, moved, grown, end)
 

@@ -11,6 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pair_event import PairEvent
+from tisim.numerics.quaternions import turned
 from tisim.worlds.fields import Field
 
 BODY_MASS = Field("body_mass", "kg", 1, "keep", default="mass", minimum=0.0)
@@ -22,10 +23,10 @@ class Constraint(Effect):
 
     Held particles act on others, and forces on them are summed as on any; what becomes of these forces is up
     to the constraint. No particle is held by two. A stepper that ``follows_constraints`` asks, in each step,
-    each as a loop over particles: ``locate``; ``advance``; then ``position`` and ``velocity`` at the end of
-    the step, in place of kick and drift; after forces are summed, ``kick``; then ``velocity`` again. Before
-    the first step, and after a world has been written to, ``begin``, ``locate``, ``position`` and
-    ``velocity``.
+    each as a loop over particles: ``locate``; ``advance``; then ``position`` at the end of the step, in place
+    of kick and drift, and ``velocity_midway``, as forces see free particles move too; after forces are
+    summed, ``kick``; then ``velocity``. Before the first step, and after a world has been written to,
+    ``begin``, ``locate``, ``position`` and ``velocity``.
 
     mark : the field by which it knows what it holds. free : whether bodies that it holds move by the forces
     on them, and so come to rest as particles do.
@@ -111,6 +112,19 @@ class Constraint(Effect):
     def velocity(self, s, w, i, t):
         """Return velocity (m/s) and spin (rad/s) of particle i, which it holds, at time t (s, f64)."""
         return s.velocity[w, i], s.spin[w, i]
+
+    @ti.func
+    def velocity_midway(self, s, w, i, t, dt):
+        """Return velocity (m/s) and spin (rad/s) of particle i, which it holds, midway in a step of dt (s)
+        that ends at time t (s, f64), of which ``advance`` has been asked: those at the place midway between
+        where it was and where it is."""
+        return self.velocity(s, w, i, t)
+
+    @ti.func
+    def carried(self, s, w, i, vector, t, dt):
+        """Return a vector that is fixed in the body of particle i, which it holds, at the end t (s, f64) of a
+        step of dt (s), given what it was at the beginning; in f64. It is asked after ``velocity_midway``."""
+        return turned(vector, dt * s.spin[w, i])
 
     @ti.func
     def kick(self, s, w, i, dt):

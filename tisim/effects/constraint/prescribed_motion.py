@@ -112,3 +112,10 @@ class PrescribedMotion(Constraint):
     def velocity(self, s, w, i, t):
         place = self.position(s, w, i, t)
         return self.motion.velocity_at(self.kept, w, place, t), self.motion.angular_velocity(w)
+
+    @ti.func
+    def velocity_midway(self, s, w, i, t, dt):
+        step = ti.cast(dt, ti.f64)
+        place = 0.5 * (self.position(s, w, i, t - step) + self.position(s, w, i, t))
+        velocity = self.motion.velocity_at(self.kept, w, place, t - 0.5 * step)
+        return velocity, self.motion.angular_velocity(w)

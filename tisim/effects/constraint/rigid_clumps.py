@@ -11,9 +11,9 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import Constraint, Effect, Field
-from tisim.effects.constraint.clump_fields import BODY, MEMBERSHIP, NO_CLUMP, check_clumps
+from tisim.effects.constraint.clump_fields import BEFORE, BODY, MEMBERSHIP, NO_CLUMP, check_clumps
 from tisim.effects.constraint.rigid_rotation import angular_velocity, free_rotation
-from tisim.numerics.quaternions import rotated
+from tisim.numerics.quaternions import brought, rotated
 
 INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
 """The slot of a number has where in memory the member of that number is; it says nothing of the particle in
@@ -29,14 +29,14 @@ class RigidClumps(Constraint):
     act on each, but short-ranged ones, other than of dipoles, not between those of one clump. In granular
     contacts the mass is that of the body. The centre of mass is stepped by velocity Verlet. The rotation is
     stepped by five turns about principal axes between half kicks of the angular momentum, which is symplectic
-    and of second order. Sums are in the order of the members.
+    and of second order; permanent moments turn with the body. Sums are in the order of the members.
 
     ``tisim.analysis.clump_bodies`` tells of a Result where the bodies are and how they move.
 
     Source: A. Dullweber, B. Leimkuhler, R. McLachlan, J. Chem. Phys. 107 (1997) 5840.
     """
 
-    fields: ClassVar = (*Constraint.fields, *MEMBERSHIP, *BODY, INDEX)
+    fields: ClassVar = (*Constraint.fields, *MEMBERSHIP, *BODY, BEFORE, INDEX)
     mark: ClassVar = "clump"
     free: ClassVar = True
 
@@ -101,9 +101,10 @@ class RigidClumps(Constraint):
             place = s.clump_position[w, i] + dt * s.clump_velocity[w, i]
             s.clump_position[w, i] = s.domain.wrap(w, place, s.time[w])
             momentum, moments = s.clump_angular_momentum[w, i], s.clump_inertia[w, i]
-            turned = free_rotation(self.orientation(s, w, i), momentum, moments, dt)
+            before = self.orientation(s, w, i)
+            after = free_rotation(before, momentum, moments, dt)
             for k in ti.static(range(4)):
-                s.clump_orientation[w, i, k] = turned[k]
+                s.clump_orientation_before[w, i, k], s.clump_orientation[w, i, k] = before[k], after[k]
 
     @ti.func
     def kick(self, s, w, i, dt):
@@ -137,3 +138,22 @@ class RigidClumps(Constraint):
         q = self.orientation(s, w, leader)
         spin = angular_velocity(q, s.clump_angular_momentum[w, leader], s.clump_inertia[w, leader])
         return s.clump_velocity[w, leader] + spin.cross(rotated(q, s.clump_offset[w, i])), spin
+
+    @ti.func
+    def carried(self, s, w, i, vector, t, dt):
+        leader = s.clump_index[w, s.clump_first[w, i]]
+        before = ti.Vector([s.clump_orientation_before[w, leader, k] for k in ti.static(range(4))])
+        return brought(vector, before, self.orientation(s, w, leader))
+
+    @ti.func
+    def velocity_midway(self, s, w, i, t, dt):
+        leader, half = s.clump_index[w, s.clump_first[w, i]], 0.5 * dt
+        q, momentum = self.orientation(s, w, leader), s.clump_angular_momentum[w, leader]
+        moments, arm = s.clump_inertia[w, leader], rotated(q, s.clump_offset[w, i])
+        spin = angular_velocity(q, momentum, moments)
+        # It turned freely, dw/dt = -I^-1 (w x L), and the arm midway between both is what is left of that at
+        # the end without turn x it.
+        spin += half * angular_velocity(q, spin.cross(momentum), moments)
+        turn = half * spin
+        arm = (arm - turn.cross(arm) + turn.dot(arm) * turn) / (1.0 + turn.norm_sqr())
+        return s.clump_velocity[w, leader] + spin.cross(arm), spin

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, PairForce, parameter
+from tisim.effects.base import Constraint, Effect, PairForce, parameter
 from tisim.effects.magnetic.moment import MOMENT, Moment
 from tisim.errors import must
 from tisim.numerics.quaternions import turned
 from tisim.numerics.random_streams import MOMENTS
 from tisim.operators.base import Operator
 from tisim.sources.base import Source
+from tisim.worlds.bound import Peers
 
 
 class PermanentMoment(Operator):
@@ -30,7 +31,8 @@ class PermanentMoment(Operator):
     gives them.
 
     Each step turns the moment about w by |w| dt, so that its magnitude stays. With ``verlet`` that is the
-    drift of a leapfrog: of second order, symplectic, and without an error where there is no torque. Other
+    drift of a leapfrog: of second order, symplectic, and without an error where there is no torque. In a
+    rigid body it turns with that, of a clump by its quaternion. Other
     steppers hold moments where they were until the end of a step, which makes them of first order in dt.
 
     Source: L21 Eqs (4.6) to (4.9), section 4.2.1.4.
@@ -81,6 +83,13 @@ class PermanentMoment(Operator):
         # 0.27 (omega dt)^2 of m B (tests/hard/test_default_stepper.py).
         return super().part_of_critical_step(accuracy / 2)
 
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"constraints": peers.of(Constraint)}
+
     @ti.func
     def particle(self, s, w, i, t, dt):
-        s.moment[w, i] = ti.cast(turned(s.moment[w, i], dt * s.spin[w, i]), s.real)
+        moment = turned(s.moment[w, i], dt * s.spin[w, i])
+        for constraint in ti.static(self.constraints):
+            if constraint.holds(s, w, i):
+                moment = constraint.carried(s, w, i, s.moment[w, i], t, dt)
+        s.moment[w, i] = ti.cast(moment, s.real)
