@@ -5,15 +5,17 @@
 
 512 grains of two sizes that overlap, move and spin, without walls and in a cell. The law is that of
 ``hertz/material`` with ``mindlin_rescale/force`` and ``coeff_restitution``; the damping aside is that of the
-normal times xgammat = sqrt(S_t / S_n) = sqrt(2 (1 - nu) / (2 - nu)). LAMMPS of July 2025 differs twice:
+normal times xgammat = sqrt(S_t / S_n) = sqrt(2 (1 - nu) / (2 - nu)). LAMMPS of July 2025 differs thrice:
 
+- It turns springs with the normal alone ("projected"); here they turn about it too, and are drawn by the
+  surfaces as they are midway in a step.
 - It has the spin move a surface that is R from the centre, but lets forces turn grains at R - delta / 2
   (at walls, R). So the power of a force is not that by which energy falls. Here both are at R - delta / 2.
 - It drops the tangential force in the step in which a contact begins, if the damping alone is beyond
   Coulomb's limit. Here it is the limit.
 
-Both are an option of the NumPy twin, which with it agrees with LAMMPS, and without it with the package, to
-rounding; where neither point matters, so does the package with LAMMPS.
+All are an option of the NumPy twin, which with it agrees with LAMMPS, and without it with the package, to
+rounding; where none matters, so does the package with LAMMPS.
 """
 
 from __future__ import annotations
@@ -249,7 +251,7 @@ def main() -> None:
             for name, a, b in (
                 ("package - LAMMPS", here, there),
                 ("package - NumPy", here, twin),
-                ("NumPy with LAMMPS's two points - LAMMPS", as_theirs, there),
+                ("NumPy with LAMMPS's points - LAMMPS", as_theirs, there),
             ):
                 row = " | ".join(f"{value:.1e}" for value in apart(a, b).values())
                 print(f"| {name}{', walls' if walls else ''} | {steps} | {row} |")

@@ -35,7 +35,7 @@ PARTS_OF_LAWS = {
         f"{PARTS}a_linear_spring_is_remembered_and_slides",
     ),
     "mindlin_force": (
-        f"{LAW}/mindlin.py", "elastic = turned(elastic, normal) + spring * dt * sliding",
+        f"{LAW}/mindlin.py", "elastic += spring * dt * sliding",
         "elastic = spring * dt * sliding",
         "tests/effects/contact/test_walls.py::test_a_grain_between_two_walls_hangs_by_mindlins_springs",
     ),

@@ -184,12 +184,8 @@ def total(name, made, state, law, liquid):
 def test_what_spins_in_a_lasting_contact_never_gains_energy(name):
     """On a floor, and a pair that adheres or that a liquid holds: it rolls, slides and twists until it is
     still or goes round as a top does, and energy with what all springs hold never rises from one look to the
-    next, but for what steps give.
-
-    A spring acts with the surfaces of half a step ago. One that carries a steady force T, such as that by
-    which a pair with a spin about its normal goes round, so does a work of T^2 dt / (2 m_t) in a second, with
-    m_t = 2/7 m* the inertia of the surfaces; a constant torque trembles about rest by a step's worth of spin.
-    At the start dashpots alone are beyond Coulomb's limit, which draws springs against them at once.
+    next; but a constant torque trembles about rest by a step's worth of spin. At the start dashpots alone are
+    beyond Coulomb's limit, which draws springs against them at once.
     """
     law = {**ELASTIC[name], **lossy(name)[0]}
     liquid = {"surface_tension": 5.0, "volume": 1e-3} if name == "mindlin" else None
@@ -209,22 +205,19 @@ def test_what_spins_in_a_lasting_contact_never_gains_energy(name):
     for one, states in zip(made, looks(made, number), strict=True):
         pair = len(states[0]["position"]) > 1
         found = [total(name, one, state, law, liquid if pair else None) for state in states]
-        energies, forces = np.array(found).T
+        energies, _ = np.array(found).T
         first, last = kinetic(states[0]).sum(), kinetic(states[-1]).sum()
-        lag = np.maximum(forces[1:], forces[:-1]) ** 2 * dt / (4 / 7 * (0.5 if pair else 1.0))
         most = 4 * np.pi * law.get("surface_energy", 0.0) + G
         tremble = (law["rolling_friction"] * most * dt) ** 2 if name == "dmt" else 0.0
-        given = 1.02 * lag * dt * steps / number + tremble
-        assert (np.diff(energies) < given + (1e-9 + 1e4 * roundoff()) * first).all()
+        assert (np.diff(energies) < tremble + (1e-9 + 1e4 * roundoff()) * first).all()
         assert last < 0.9 * first
 
 
-def test_a_steady_spring_in_a_pair_that_goes_round_gains_by_the_step():
-    """T^2 dt / (2 m_t) in a second, m_t = 2/7 m*: of first order in dt. A pair that a liquid holds turns like
-    a top, as one rigid body with a spin about its normal; damping has left the force of its spring alone.
-
-    The spring draws with velocities of half a step ago along the normal of now. Seen along that, surfaces
-    that the force keeps at rest half a step ago, and half a step on, slide by T dt / (2 m_t) in between.
+def test_a_steady_spring_in_a_pair_that_goes_round_gains_nothing():
+    """A pair that a liquid holds turns like a top, as one rigid body with a spin about its normal, by a
+    steady force T of its spring. Drawn along the normal at the end of a step, by velocities of half a step
+    ago, the spring would do a work of T^2 dt / (2 m_t) in a second, m_t = 2/7 m*; drawn along that midway, it
+    does none, and what damping takes is the same in all steps.
     """
     liquid = {"surface_tension": 5.0, "volume": 1e-3}
     law = {**ELASTIC["mindlin"], "restitution": 0.1, "friction": 1e3}
@@ -245,7 +238,10 @@ def test_a_steady_spring_in_a_pair_that_goes_round_gains_by_the_step():
     (before, _), (after, force) = (np.transpose(look) for look in found)
     gain, expected = after - before, force**2 * dts / (2 * 2 / 7 * 0.5)
     assert (expected > 2e-5 * before).all()
-    np.testing.assert_allclose(gain, expected, rtol=5e-3, atol=1e3 * roundoff() * before.max())
+    rounding = 1e3 * roundoff() * before.max()
+    assert (gain < rounding).all()
+    assert (-gain < 0.02 * expected + rounding).all()
+    np.testing.assert_allclose(gain, gain[-1], rtol=1e-3, atol=rounding)
 
 
 SETTLES = {"jkr": {"viscous_time": 1e-2}, "dmt": {"damping": 100.0}}

@@ -215,7 +215,9 @@ def _along(law: ti.template(), path: Array, out: Array):
         for k in range(path.shape[0]):
             slip = ti.Vector([path[k, 1], path[k, 2], path[k, 3]])
             spin = ti.Vector([path[k, 4], path[k, 5], path[k, 6]])
-            force, couple, known = law.contact(0, 0, n, path[k, 0], 1.0, 1.0, at_wall, slip, spin, past, DT)
+            force, couple, known = law.contact(
+                0, 0, n, path[k, 0], 1.0, 1.0, at_wall, slip, spin, 0.0 * n, 0.0, past, DT
+            )
             out[k, 6] = ti.cast(law.lasts(0, 0, path[k, 0], 1.0, past), ti.f64)
             past = ti.select(out[k, 6] > 0.0, known, 0.0)
             for c in ti.static(range(3)):

@@ -22,6 +22,8 @@ class TwinLaw:
     "radius" does as LAMMPS: spins move surfaces at R, where walls act too; a contact that begins has no
     tangential or rolling force if its damping alone is beyond the limit; a couple of twisting that is beyond
     its limit acts against the twist of now; and JKR ends where its pull is largest.
+    frame : "turning" has springs turn with the normal and about it, by the mean of both spins, and be drawn
+    by the surfaces midway in a step; "projected" puts them into the plane of now, as LAMMPS does.
     """
 
     materials: tuple[dict[str, float], ...]
@@ -34,6 +36,7 @@ class TwinLaw:
     cohesion: str | None = None
     options: dict[str, float] = field(default_factory=dict)
     levers: str = "contact"
+    frame: str = "turning"
 
     def of(self, name, which):
         """A property of each of some pairs of materials, (n, 2)."""
@@ -98,9 +101,21 @@ class TwinLaw:
             return self.of("cohesion_energy_density", which) * 2 * np.pi * radius * overlap
         return 4 * np.pi * self.of("surface_energy", which) * radius if self.cohesion == "dmt" else 0 * radius
 
-    def contact(self, which, normal, overlap, radius, mass, slip, spinning, past, dt):
+    @property
+    def turns(self):
+        """Whether springs turn about the normal too."""
+        springs = {"mindlin_force", "mindlin_displacement", "linear_spring"}
+        held = self.tangential in springs or self.twisting or self.rolling in ("rolling_sds", "rolling_epsd")
+        return bool(held) and self.frame == "turning" and self.levers == "contact"
+
+    def contact(self, which, normal, overlap, radius, mass, slip, spinning, way, past, dt):
         """Force and couple on each of some contacts, and what they remember then; ``which`` materials touch,
-        (n, 2)."""
+        (n, 2), and ``way`` they turned in the step: tilt of the normal and half of the turn about it."""
+        tilt, turn = way
+        if self.turns:
+            carry, past = carrying(normal, tilt, turn), past.copy()
+            for part in (slice(1, 4), slice(5, 8)):
+                past[:, part] = (carry @ past[:, part, None])[..., 0]
         known = np.zeros_like(past)
         known[:, ATTACHED] = 1
         circle, stiffness, elastic, parting, self.stored = self.press(which, overlap, radius)
@@ -120,7 +135,16 @@ class TwinLaw:
             if self.tangential in ("mindlin_displacement", "linear_spring"):
                 form = "displacement"
             grip, known[:, SLIP], self.slides = spring_and_slider(
-                past[:, SLIP], normal, across, spring, drag, friction * limit, dt, form, self.levers
+                past[:, SLIP],
+                normal,
+                across,
+                spring,
+                drag,
+                friction * limit,
+                dt,
+                form,
+                self.levers,
+                self.turns,
             )
             force = force + grip
             if self.tangential == "viscous_friction":
@@ -131,6 +155,9 @@ class TwinLaw:
             self.stored = self.stored + np.where(spring > 0, own, 0)
         if self.rolling:
             rolling = radius[:, None] * np.cross(spinning, normal)
+            if self.turns:
+                rolling = radius[:, None] * np.cross(spinning, normal + tilt)
+                rolling = seen_midway(rolling, normal, tilt, turn)
             roll, known[:, ROLL] = self.rolled(
                 which, normal, stiffness, mass, limit, rolling, past[:, ROLL], dt
             )
@@ -143,7 +170,7 @@ class TwinLaw:
                 drag,
                 friction,
                 limit,
-                (spinning * normal).sum(axis=1),
+                (spinning * (normal + tilt)).sum(axis=1),
                 past[:, TWIST],
                 dt,
             )
@@ -177,7 +204,9 @@ class TwinLaw:
         else:
             spring, form = 2.25 * self.of("rolling_friction", which) ** 2 * stiffness, "force"
             drag = 2 * self.options.get("rolling_damping_ratio", 0.3) * np.sqrt(spring * mass)
-        return spring_and_slider(past, normal, rolling, spring, drag, most, dt, form, self.levers)[:2]
+        return spring_and_slider(
+            past, normal, rolling, spring, drag, most, dt, form, self.levers, self.turns
+        )[:2]
 
     def twisted(self, which, circle, spring, drag, friction, limit, twisting, past, dt):
         """The couple of twisting, and what is remembered."""
@@ -198,7 +227,26 @@ class TwinLaw:
         return held, np.column_stack([elastic, stiffness])
 
 
-def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, levers="contact"):
+def cross(n):
+    """The matrices of n x, (k, 3, 3)."""
+    return np.cross(np.eye(3), n[:, None])
+
+
+def carrying(normal, tilt, turn):
+    """Matrices by which springs turn in a step: from the plane before to that of now, along the normal midway
+    (R. Cayley's for the turn about it)."""
+    flat = np.eye(3) - np.einsum("na,nb->nab", normal + tilt, normal)
+    k = turn[:, None, None] * cross(normal)
+    return np.linalg.solve(np.eye(3) - k, (np.eye(3) + k) @ flat)
+
+
+def seen_midway(slip, normal, tilt, turn):
+    """What is across the normal midway in the step, which half of the step then turns on."""
+    opening = (slip * normal).sum(axis=1)[:, None]
+    return slip - opening * tilt + turn[:, None] * np.cross(normal, slip)
+
+
+def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, levers="contact", carried=False):
     """Force of a spring, a dashpot and a slider; what they remember: force or displacement, and stiffness."""
     held, was = past[:, :3], past[:, 3]
     if form == "force":
@@ -206,7 +254,8 @@ def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, leve
         held = held * np.where(eased, spring / np.where(was > 0, was, 1), 1)[:, None]
     flat = held - (held * normal).sum(axis=1, keepdims=True) * normal
     size, left = np.linalg.norm(held, axis=1), np.linalg.norm(flat, axis=1)
-    held = flat * np.where(left > 0, size / np.where(left > 0, left, 1), 0)[:, None]
+    if not carried:
+        held = flat * np.where(left > 0, size / np.where(left > 0, left, 1), 0)[:, None]
     held = held + (dt * velocity if form == "displacement" else (spring * dt)[:, None] * velocity)
     elastic = held if form == "force" else spring[:, None] * held
     damped = drag[:, None] * velocity
@@ -241,7 +290,7 @@ def law_of(scene, levers="contact"):
         for name in ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
     }
     materials = tuple(material.model_dump(exclude_none=True) for material in scene.materials.values())
-    return TwinLaw(materials, given, **kinds, options=options, levers=levers)
+    return TwinLaw(materials, given, **kinds, options=options, levers=levers, frame=law.frame)
 
 
 def hertz_mindlin(young, poisson, restitution, friction, levers="contact"):
@@ -319,9 +368,19 @@ class Grains:
         else:
             turn = np.cross(a[:, None] * self.w[i] + b[:, None] * self.w[j], n)
         slip, spinning = passing[i, j] - turn, self.w[j] - self.w[i]
+        tilt, half = 0 * n, 0 * delta
+        if self.law.turns:
+            far, along = distance[i, j], (passing[i, j] * n).sum(axis=1)
+            back = dt / 2 / far
+            tilt = ((1 + back * along) * back)[:, None] * (along[:, None] * n - passing[i, j])
+            half = dt / 4 * ((self.w[i] + self.w[j]) * n).sum(axis=1)
+            # As if both were arms of what lay between the centres midway.
+            lain = gap[i, j] - dt / 2 * passing[i, j]
+            arms = (arm * self.w[i] + other * self.w[j]) / far[:, None]
+            slip = seen_midway(passing[i, j] - np.cross(arms, lain), n, tilt, half)
         mass = self.mass[i] * self.mass[j] / (self.mass[i] + self.mass[j])
         force, couple, known = self._contact(
-            which, n, delta, reduced, mass, slip, spinning, self.past[i, j], dt
+            which, n, delta, reduced, mass, slip, spinning, (tilt, half), self.past[i, j], dt
         )
         self.past[:] = 0
         self.past[i, j] = known
@@ -340,11 +399,17 @@ class Grains:
         if self.law.levers == "radius":
             arm = self.radius[i][:, None]
         rate, centre = self.turning
-        surface = np.cross(rate, self.x[i] + arm * n - centre)
-        slip, spinning = surface - self.v[i] - np.cross(arm * self.w[i], n), rate - self.w[i]
+        tilt = -dt / 2 * np.cross(rate, n) * self.law.turns
+        # The wall too is where it was midway in the step.
+        surface = np.cross(rate, self.x[i] + arm * (n + tilt) - dt / 2 * self.v[i] - centre)
+        slip, spinning = surface - self.v[i] - np.cross(arm * self.w[i], n + tilt), rate - self.w[i]
+        half = dt / 4 * ((self.w[i] + rate) * n).sum(axis=1)
+        if self.law.turns:
+            slip = seen_midway(slip, n, tilt, half)
         force, couple, known = self._contact(
-            which[i], n, overlap[i], self.radius[i], self.mass[i], slip, spinning, self.held[i, k], dt
-        )
+            which[i], n, overlap[i], self.radius[i], self.mass[i], slip, spinning, (tilt, half),
+            self.held[i, k], dt,
+        )  # fmt: skip
         self.held[:, k] = 0
         self.held[i, k] = known
         self.force[i] += force

@@ -30,12 +30,14 @@ def _along(law: ti.template(), normal: ti.types.ndarray(), path: ti.types.ndarra
     ti.loop_config(serialize=True)
     for _ in range(1):
         at_wall = ti.Vector([1.0, 3.5, 2.5, 2.5])
-        past = ti.Vector.zero(ti.f64, 4)
+        past, before = ti.Vector.zero(ti.f64, 4), ti.Vector([normal[0, 0], normal[0, 1], normal[0, 2]])
         for k in range(path.shape[0]):
             n = ti.Vector([normal[k, 0], normal[k, 1], normal[k, 2]])
+            along = n.dot(before)
+            tilt, before = (before - along * n) / (1.0 + along), n
             slip = ti.Vector([path[k, 1], path[k, 2], path[k, 3]])
             force, _couple, known = law.contact(
-                0, 0, n, path[k, 0], 1.0, 1.0, at_wall, slip, 0.0 * slip, past, DT
+                0, 0, n, path[k, 0], 1.0, 1.0, at_wall, slip, 0.0 * slip, tilt, 0.0, past, DT
             )
             past = known
             for c in ti.static(range(3)):

@@ -63,7 +63,7 @@ class CapillaryBridge(GranularContact):
         return (overlap >= 0.0) | ((past[0] > 0.0) & (overlap >= -self.rupture(w)))
 
     @ti.func
-    def contact(self, w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt):
+    def contact(self, w, pair, normal, overlap, radius, mass, inverses, slip, spinning, tilt, turn, past, dt):
         mean = 2.0 * radius
         gap = ti.max(-overlap, 0.0) * ti.sqrt(mean / self.volume(w))
         pull = self.line(w) * mean / (1.0 + gap * (1.05 + 2.5 * gap))

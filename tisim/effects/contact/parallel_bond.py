@@ -12,17 +12,17 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect, PairForce, parameter
 from tisim.effects.base.critical_step import SLIDING, critical_step, smallest_grains
-from tisim.effects.contact.granular.spring import turned
+from tisim.effects.contact.granular.spring import carried, tilted
 from tisim.effects.contact.granular.step_limit import can_follow, can_follow_both, least_mass
 from tisim.numerics.vectors import piece
 
 
 @ti.func
-def carried(remembered, normal, angle):
-    """Return a vector across the line of centres as it turns with the pair, and by an angle (rad) about its
-    normal."""
-    known = turned(remembered, normal)
-    return (known + angle * normal.cross(known)) / ti.sqrt(1.0 + angle * angle)
+def swung(rate, normal, tilt, turn):
+    """Return a rate across the line of centres midway in a step as the bond carries it to the end: by half of
+    its turn (see ``carried``), which is by arctan(turn) about the normal."""
+    known = rate - rate.dot(normal) * (normal + tilt)
+    return (known + turn * normal.cross(known)) / ti.sqrt(1.0 + turn * turn)
 
 
 @ti.func
@@ -100,22 +100,28 @@ class ParallelBond(PairForce):
         normal = (1.0 / distance) * separation
         arm = 0.5 * (a - b + distance)
         back = distance - arm
+        passing = s.relative_velocity(w, i, j, separation)
+        # Velocities are those midway in the step, where the centres were apart by this.
+        half = separation - 0.5 * dt * passing
+        apart = half.norm()
+        middle = half / apart
+        halfway, start = tilted(middle, normal), tilted((half - 0.5 * dt * passing).normalized(), normal)
         begins = (t <= 0.0) & (distance <= a + b + self.gap(w))
         rest = ti.select(past[0] > 0.0, past[0], distance)
 
-        turn = arm * s.spin[w, i] + back * s.spin[w, j]
-        passing = s.relative_velocity(w, i, j, separation) - turn.cross(normal)
-        opening, rolling = passing.dot(normal), s.spin[w, j] - s.spin[w, i]
-        sliding, twisting = passing - opening * normal, rolling.dot(normal)
-        bending = rolling - twisting * normal
+        lever, turn = 0.5 * (a - b + apart), 0.25 * dt * (s.spin[w, i] + s.spin[w, j]).dot(middle)
+        surfaces = passing - (lever * s.spin[w, i] + (apart - lever) * s.spin[w, j]).cross(middle)
+        opening, rolling = surfaces.dot(middle), s.spin[w, j] - s.spin[w, i]
+        twisting = rolling.dot(middle)
+        sliding = swung(surfaces - opening * middle, normal, halfway, turn)
+        bending = swung(rolling - twisting * middle, normal, halfway, turn)
 
         r = self.radius_ratio(w) * ti.min(a, b)
         area, second = ti.math.pi * r * r, 0.25 * ti.math.pi * r * r * r * r
         stiff = self.young(w) / (a + b)
         soft = stiff / self.stiffness_ratio(w)
-        spin = 0.5 * dt * (s.spin[w, i] + s.spin[w, j]).dot(normal)
-        shear = carried(piece(past, 1, 3), normal, spin) + soft * area * dt * sliding
-        moment = carried(piece(past, 4, 3), normal, spin) + stiff * second * dt * bending
+        shear = carried(piece(past, 1, 3), normal, start, turn) + soft * area * dt * sliding
+        moment = carried(piece(past, 4, 3), normal, start, turn) + stiff * second * dt * bending
         twist = past[7] + 2.0 * soft * second * dt * twisting
         pull = stiff * area * (distance - rest)
 
@@ -145,11 +151,11 @@ class ParallelBond(PairForce):
         force = ti.select(follows, force, ti.math.nan)
 
         force, couple = ti.select(holds, force, 0.0), ti.select(holds, couple, 0.0)
-        lever = normal.cross(force)
+        moved = normal.cross(force)
         known = ti.Vector([rest, shear[0], shear[1], shear[2], moment[0], moment[1], moment[2], twist])
         return (
             force,
-            arm * lever + couple,
-            back * lever - couple,
+            arm * moved + couple,
+            back * moved - couple,
             ti.select(holds, known, 0.0),
         )

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from tisim.backend.taichi import ti
+from tisim.effects.contact.granular.spring import tilted
 from tisim.effects.contact.wall_ring import WallRing
 from tisim.effects.contact.wall_search import CONTACTS, WallSearch
 
@@ -112,15 +113,27 @@ class WallContacts(WallRing, WallSearch):
         self.clear[w, i, 4] = speed
 
     @ti.func
-    def touch(self, s, w, i, law: ti.template(), outward, distance, past, t, dt):  # type: ignore[valid-type]
+    def touch(self, s, w, i, law: ti.template(), outward, before, distance, past, t, dt):  # type: ignore[valid-type]
         """Return force (N), torque (N m) and what is remembered of a contact at a ``distance`` (m) from the
-        centre, which lies from there along ``outward``, a direction of the body."""
+        centre, which lies from there along ``outward``, a direction of the body; a step ago it lay along
+        ``before``, a direction in space."""
         normal = -self.motion.to_space(self.kept, w, outward, t)
-        overlap = s.radius[w, i] - distance
-        place = s.position[w, i] + (s.radius[w, i] - 0.5 * overlap) * normal
-        velocity = self.motion.velocity_at(self.kept, w, place, t)
-        turning = self.motion.angular_velocity(w)
-        return law.at_wall(s, w, i, normal, overlap, velocity, turning, self.wall_material, past, dt)
+        overlap, turning = s.radius[w, i] - distance, self.motion.angular_velocity(w)
+        arm, tilt = s.radius[w, i] - 0.5 * overlap, tilted(-before, normal)
+        velocity = 0.0 * normal
+        if ti.static(self.motion.moves):
+            # As that of a grain, midway in the step.
+            place = s.position[w, i] - 0.5 * dt * s.velocity[w, i] + arm * (normal + tilt)
+            velocity = self.motion.velocity_at(self.kept, w, place, t - 0.5 * ti.cast(dt, ti.f64))
+        return law.at_wall(s, w, i, normal, tilt, overlap, velocity, turning, self.wall_material, past, dt)
+
+    @ti.func
+    def moved_back(self, w, direction, dt):
+        """Return a direction in space that turns with the body, a step of dt (s) ago."""
+        before = direction
+        if ti.static(self.motion.moves):
+            before -= dt * self.motion.angular_velocity(w).cross(direction)
+        return before
 
     @ti.func
     def touch_plane(self, s, w, i, k, r, t, dt, commit):
@@ -135,7 +148,9 @@ class WallContacts(WallRing, WallSearch):
             known = 0.0 * past
             if distance <= self.reach(s, w, i):
                 outward = self.flat.direction(w, k)
-                push, turn, known = self.touch(s, w, i, law, outward, distance, past, t, dt)
+                now = self.motion.to_space(self.kept, w, outward, t)
+                before = self.moved_back(w, now, dt)
+                push, turn, known = self.touch(s, w, i, law, outward, before, distance, past, t, dt)
                 force, torque = force + push, torque + turn
             if commit:
                 for c in ti.static(range(size)):
@@ -166,11 +181,14 @@ class WallContacts(WallRing, WallSearch):
         what it remembers, unless it is new."""
         force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
         outward, at = ti.Vector([found[q, 0], found[q, 1], found[q, 2]]), slot * (3 + self.stride)
+        before = self.motion.to_space(self.kept, w, outward, t)
+        if new == 0:
+            before = ti.Vector([self.surface_past[w, i, at + axis] for axis in ti.static(range(3))])
         for law, first, size in ti.static(self.laws):
             past = ti.Vector.zero(s.real, max(1, size))
             for c in ti.static(range(size)):
                 past[c] = ti.select(new > 0, 0.0, self.surface_past[w, i, at + 3 + first + c])
-            push, turn, known = self.touch(s, w, i, law, outward, found[q, 3], past, t, dt)
+            push, turn, known = self.touch(s, w, i, law, outward, before, found[q, 3], past, t, dt)
             force, torque = force + found[q, 4] * push, torque + found[q, 4] * turn
             if self.goes_through(s, w, i, outward, found[q, 3], t, dt):
                 force[0] = ti.math.nan

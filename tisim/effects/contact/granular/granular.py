@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -35,6 +35,7 @@ from tisim.effects.contact.granular.parts import (
     TangentialForce,
     TwistingResistance,
 )
+from tisim.effects.contact.granular.spring import carried, midway, projected
 from tisim.errors import must
 from tisim.numerics.vectors import piece
 
@@ -77,11 +78,14 @@ class Granular(ContactGuards, GranularContact):
     through a sheet between two looks. Below these limits an undamped impact may still come out with up to 1 /
     (1 - S dt^2 / 4 m) times its energy, by chance: 1.01 times at a thirtieth of a period.
 
-    A spring acts with the surfaces of half a step ago, seen along the normal at the end of the step. One that
-    carries a steady force T in a pair that goes round, with a spin about its normal, so does a work of T^2 dt
-    / (2 m_t) in a second, m_t = 2/7 m*: an error of first order in dt.
+    Springs turn with the two that touch: with the normal, and about it by the mean of both spins, at a wall
+    that of grain and wall. Two that turn as one, about whichever axis, so keep the force that they had. They
+    are drawn by the surfaces as these are midway in a step, to second order in dt. With ``frame`` =
+    "projected" they turn with the normal alone and are drawn along that at the end of a step, as in LAMMPS:
+    a force then stays in space while both turn about the normal, and what sticks to a turntable creeps.
 
-    Source: that of its parts; composed as by A. P. Santos, D. S. Bolintineanu, G. S. Grest, J. B. Lechman, S.
+    Source: that of its parts; M. R. Kuhn, K. Suzuki and A. Daouadji, Int. J. Numer. Methods Eng. 121 (2020)
+    560, for how springs turn; composed as by A. P. Santos, D. S. Bolintineanu, G. S. Grest, J. B. Lechman, S.
     J. Plimpton, I. Srivastava and L. E. Silbert, Phys. Rev. E 102 (2020) 032903.
     """
 
@@ -93,6 +97,10 @@ class Granular(ContactGuards, GranularContact):
     rolling: RollingResistance | None = option("resistance to rolling", None)
     twisting: TwistingResistance | None = option("resistance to twisting about the line of centres", None)
     cohesion: Cohesion | None = option("cohesion of surfaces that touch", None)
+    frame: Literal["turning", "projected"] = option(
+        "how springs turn with a contact: with its normal and about it, or with its normal as in LAMMPS",
+        "turning",
+    )
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
@@ -170,6 +178,15 @@ class Granular(ContactGuards, GranularContact):
         return slots
 
     @property
+    def turns_springs(self) -> bool:  # type: ignore[override]
+        return self.frame == "turning" and any(getattr(part, "memory", 0) for part in self.springs())
+
+    def springs(self) -> list[Component]:
+        """Return the parts that hold back a motion."""
+        names = ("tangential", "rolling", "twisting")
+        return [part for name, part in self.members().items() if name in names]
+
+    @property
     def memory(self) -> int:  # type: ignore[override]
         return sum(size for _, size in self.slots().values())
 
@@ -207,7 +224,7 @@ class Granular(ContactGuards, GranularContact):
         return touches
 
     @ti.func
-    def contact(self, w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt):
+    def contact(self, w, pair, normal, overlap, radius, mass, inverses, slip, spinning, tilt, turn, past, dt):
         known, couple, opening = 0.0 * past, 0.0 * normal, slip.dot(normal)
         deep = overlap
         if ti.static(not self.normal.beyond_contact):
@@ -240,32 +257,47 @@ class Granular(ContactGuards, GranularContact):
 
         if ti.static(self.has("tangential")):
             begin, size = ti.static(self.slots()["tangential"])
+            held = self.turned(remembered(past, begin, size), normal, tilt, turn, self.tangential.vector)
             sliding = slip - opening * normal
-            grip, kept = self.tangential.force(
-                w, pair, normal, stiffness, damping, limit, sliding, remembered(past, begin, size), dt
-            )
+            grip, kept = self.tangential.force(w, pair, normal, stiffness, damping, limit, sliding, held, dt)
             force += grip
             for k in ti.static(range(size)):
                 known[begin + k] = kept[k]
         if ti.static(self.has("rolling")):
             first, length = ti.static(self.slots()["rolling"])
+            bent = self.turned(remembered(past, first, length), normal, tilt, turn, self.rolling.vector)
             rolling = radius * spinning.cross(normal)
-            roll, left = self.rolling.force(
-                w, pair, normal, stiffness, mass, limit, rolling, remembered(past, first, length), dt
-            )
+            if ti.static(self.turns_springs):
+                rolling = midway(radius * spinning.cross(normal + tilt), normal, tilt, turn)
+            roll, left = self.rolling.force(w, pair, normal, stiffness, mass, limit, rolling, bent, dt)
             couple += radius * normal.cross(roll)
             for k in ti.static(range(length)):
                 known[first + k] = left[k]
         if ti.static(self.has("twisting")):
             start, extent = ti.static(self.slots()["twisting"])
-            twist, turned = self.twisting.couple(
-                w, pair, circle, spring, dashpot, friction, limit, spinning.dot(normal),
+            twist, wound = self.twisting.couple(
+                w, pair, circle, spring, dashpot, friction, limit, spinning.dot(normal + tilt),
                 remembered(past, start, extent), dt,
             )  # fmt: skip
             couple += twist * normal
             for k in ti.static(range(extent)):
-                known[start + k] = turned[k]
+                known[start + k] = wound[k]
         return force, couple, known
+
+    @ti.func
+    def turned(self, past, normal, tilt, turn, vector: ti.template()):  # type: ignore[valid-type]
+        """Return what a part remembers as it turns with the contact: the first three values where they are a
+        vector."""
+        known = past
+        if ti.static(vector):
+            held = piece(past, 0, 3)
+            if ti.static(self.turns_springs):
+                held = carried(held, normal, tilt, turn)
+            else:
+                held = projected(held, normal)
+            for axis in ti.static(range(3)):
+                known[axis] = held[axis]
+        return known
 
     @ti.func
     def adhesion(self, w, pair, radius, overlap):

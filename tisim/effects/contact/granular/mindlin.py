@@ -9,7 +9,7 @@ from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular.parts import TangentialForce
-from tisim.effects.contact.granular.spring import eased, slipping, turned
+from tisim.effects.contact.granular.spring import eased, slipping
 
 
 class TangentialSpring(TangentialForce):
@@ -58,6 +58,7 @@ class MindlinForce(TangentialSpring):
     """
 
     memory: ClassVar[int] = 4
+    vector: ClassVar[bool] = True
     uses: ClassVar = ("young", "poisson", "friction")
 
     def ratio(self, pair: Touching) -> float:
@@ -67,7 +68,7 @@ class MindlinForce(TangentialSpring):
     def force(self, w, pair, normal, stiffness, damping, limit, sliding, past, dt):
         spring = self.spring(w, pair, stiffness)
         elastic = eased(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
-        elastic = turned(elastic, normal) + spring * dt * sliding
+        elastic += spring * dt * sliding
         drag = self.dashpot(w, pair, damping) * sliding
         grip, known = slipping(elastic, drag, self.coulomb(w, pair) * limit)
         return grip, ti.Vector([known[0], known[1], known[2], spring])
@@ -78,11 +79,12 @@ class DisplacementSpring(TangentialSpring):
 
     contract: ClassVar[bool] = True
     memory: ClassVar[int] = 3
+    vector: ClassVar[bool] = True
 
     @ti.func
     def force(self, w, pair, normal, stiffness, damping, limit, sliding, past, dt):
         spring = self.spring(w, pair, stiffness)
-        drawn = turned(ti.Vector([past[0], past[1], past[2]]), normal) + dt * sliding
+        drawn = ti.Vector([past[0], past[1], past[2]]) + dt * sliding
         drag = self.dashpot(w, pair, damping) * sliding
         grip, known = slipping(spring * drawn, drag, self.coulomb(w, pair) * limit)
         # Where the spring is none, as at no overlap, nothing is drawn.

@@ -3,8 +3,10 @@
 In all of them ``pair`` says which materials touch (see tisim/components/material_law.py), ``radius`` is R*
 and ``mass`` m*; 1/R* = 1/R_i + 1/R_j and 1/m* = 1/m_i + 1/m_j. ``limit`` is the normal force (N) that
 Coulomb's limit is taken of. A part that remembers something says how many values, in ``memory``; they are 0
-when a contact begins. Parts that hold back a motion say by which ``spring``, ``dashpot`` and ``coulomb`` they
-do: where no step can follow these, and there is friction, the world stops (see step_limit.py).
+when a contact begins. Where the first three are a vector across the normal, ``vector``, they have turned with
+the contact when the part is given them (see spring.py). Parts that hold back a motion say by which
+``spring``, ``dashpot`` and ``coulomb`` they do: where no step can follow these, and there is friction, the
+world stops (see step_limit.py).
 """
 
 from __future__ import annotations
@@ -95,6 +97,7 @@ class TangentialForce(ContactPart):
 
     contract: ClassVar[bool] = True
     memory: ClassVar[int] = 0
+    vector: ClassVar[bool] = False
 
     def ratio(self, pair: Touching) -> float:
         """Return the tangential stiffness over the normal one; 0 where there is no spring."""
@@ -131,6 +134,7 @@ class RollingResistance(ContactPart):
 
     contract: ClassVar[bool] = True
     memory: ClassVar[int] = 0
+    vector: ClassVar[bool] = False
 
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):

@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular.parts import RollingResistance
-from tisim.effects.contact.granular.spring import eased, slipping, turned
+from tisim.effects.contact.granular.spring import eased, slipping
 
 
 class RollingCDT(RollingResistance):
@@ -54,6 +54,7 @@ class RollingEPSD(RollingResistance):
     """
 
     memory: ClassVar[int] = 4
+    vector: ClassVar[bool] = True
     uses: ClassVar = ("rolling_friction",)
 
     damping_ratio: float = parameter("", "damping over the critical one, eta", 0.3, ge=0)
@@ -78,7 +79,7 @@ class RollingEPSD(RollingResistance):
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
         spring = self.spring(w, pair, stiffness)
         elastic = eased(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
-        elastic = turned(elastic, normal) + spring * dt * rolling
+        elastic += spring * dt * rolling
         drag = self.dashpot(w, pair, stiffness, mass) * rolling
         grip, known = slipping(elastic, drag, self.coulomb(w, pair) * limit)
         return grip, ti.Vector([known[0], known[1], known[2], spring])
@@ -97,6 +98,7 @@ class RollingSDS(RollingResistance):
     """
 
     memory: ClassVar[int] = 3
+    vector: ClassVar[bool] = True
     uses: ClassVar = ("rolling_friction", "rolling_stiffness", "rolling_damping")
 
     def mix(self, pair: Touching) -> dict[str, float]:
@@ -121,7 +123,7 @@ class RollingSDS(RollingResistance):
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
         spring = self.spring(w, pair, stiffness)
-        drawn = turned(ti.Vector([past[0], past[1], past[2]]), normal) + dt * rolling
+        drawn = ti.Vector([past[0], past[1], past[2]]) + dt * rolling
         drag = self.dashpot(w, pair, stiffness, mass) * rolling
         grip, known = slipping(spring * drawn, drag, self.coulomb(w, pair) * limit)
         return grip, known / spring

@@ -1,0 +1,266 @@
+"""Springs of contacts turn with the bodies that touch: closed forms of held grains, bodies that stick."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation as Turn
+
+from tests.scenes import by_id, compiled, scene
+from tisim import Clump, Material, Particles, Scene
+from tisim.effects import (
+    Granular,
+    Gravity,
+    HertzMaterial,
+    LinearSpring,
+    MindlinDisplacement,
+    MindlinForce,
+    PrescribedMotion,
+    RestitutionDamping,
+    RigidClumps,
+    RollingEPSD,
+    RollingSDS,
+    Rotation,
+    Translation,
+    Walls,
+)
+from tisim.geometry import CylindricalSurface, Disc, Plane
+from tisim.steppers import FixedStep, Verlet
+
+pytestmark = pytest.mark.slow
+
+R, YOUNG, POISSON, PRESSED = 1e-3, 1e7, 0.25, 2e-5
+"""m, Pa, -, m."""
+APART = 3e-8
+"""m; of the axes of two that turn as one."""
+RATE = 2 * np.pi
+"""rad/s."""
+E_STAR = YOUNG / 2 / (1 - POISSON**2)
+RATIO = 2 * (1 - POISSON) / (2 - POISSON)
+"""Mindlin's tangential stiffness over Hertz's."""
+SPRINGS = {"mindlin_force": (MindlinForce(), RATIO), "mindlin_displacement": (MindlinDisplacement(), RATIO),
+           "linear_spring": (LinearSpring(stiffness_ratio=0.5), 0.5)}  # fmt: skip
+ROLLING = {
+    "rolling_sds": (RollingSDS(), 50.0),
+    "rolling_epsd": (RollingEPSD(damping_ratio=0.0), 2.25 * 0.3**2 * 2 * E_STAR * np.sqrt(R / 2 * PRESSED)),
+}
+"""N/m."""
+SURFACE = {"young": YOUNG, "poisson": POISSON, "friction": 1e3, "restitution": 1.0, "rolling_friction": 0.3,
+           "rolling_stiffness": 50.0, "rolling_damping": 0.0}  # fmt: skip
+LOOKS = (0.1, 0.25, 0.6, 1.0, 2.0)
+"""Turns."""
+
+
+def stiffness(radius):
+    """Hertz's, at R* (m)."""
+    return 2 * E_STAR * np.sqrt(radius * PRESSED)
+
+
+def held(law, groups, place, walls=(), dt=5e-4):
+    """Grains that are held, each by a motion of its own."""
+    motions = [PrescribedMotion(name=f"g{k}", group=k + 1, motion=one) for k, one in enumerate(groups)]
+    return scene(
+        place, np.zeros((len(place), 3)), (law, *motions, *walls), radius=R, mass=1.0, dt=dt, duration=3.0,
+        materials={"grain": Material(**SURFACE)},
+        quantities={"group": np.arange(1.0, len(place) + 1)},
+    )  # fmt: skip
+
+
+def seen(made, times):
+    """States of a scene at some times."""
+    simulation = compiled(made, 1, 8)
+    simulation.load([made])
+    for time in times:
+        simulation.run(until=time)
+        (result,) = simulation.results()
+        assert result.status.ok or result.status.reason == "running", result.status.reason
+        yield by_id(result)
+
+
+def across(state, n):
+    """The tangential force on the first grain, whose contact faces n, N."""
+    force = state["force"][0]
+    return force - (force @ n) * n
+
+
+AXES = {"normal": (0.0, 0.0, 1.0), "across": (0.6, 0.8, 0.0), "askew": (2 / 3, -1 / 3, 2 / 3)}
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("name", SPRINGS)
+def test_a_pair_that_turns_as_one_has_the_force_of_its_displacement(name, axis):
+    """About axes that are c apart: S_t (c - R c) across the normal, with the rotation R of the bodies, which
+    is none after whole turns, whichever way the normal goes round."""
+    law, ratio = SPRINGS[name]
+    way, c = np.array(AXES[axis]), APART * np.array([1.0, 0.5, -0.7])
+    place = np.array([[0, 0, 0], [0, 0, 2 * R - PRESSED]])
+    motions = [Rotation(rate=tuple(RATE * way), centre=tuple(at)) for at in (0 * c, c)]
+    made = held(Granular(normal=HertzMaterial(), tangential=law), motions, place)
+    most = ratio * stiffness(R / 2) * APART
+    for turns, state in zip(LOOKS, seen(made, LOOKS), strict=True):
+        gap = np.diff(state["position"], axis=0)[0]
+        n = gap / np.linalg.norm(gap)
+        moved = c - Turn.from_rotvec(RATE * turns * way).apply(c)
+        expected = ratio * stiffness(R / 2) * (moved - (moved @ n) * n)
+        np.testing.assert_allclose(across(state, n), expected, rtol=0, atol=5e-3 * most)
+
+
+def test_projected_springs_do_not_turn_about_the_normal():
+    """As in LAMMPS: 2 pi S_t c after one turn, 4 pi after two."""
+    place, c = np.array([[0, 0, 0], [0, 0, 2 * R - PRESSED]]), np.array([APART, 0, 0])
+    motions = [Rotation(rate=(0, 0, RATE), centre=tuple(at)) for at in (0 * c, c)]
+    law = Granular(normal=HertzMaterial(), tangential=MindlinForce(), frame="projected")
+    for turns, state in zip((1.0, 2.0), seen(held(law, motions, place), (1.0, 2.0)), strict=True):
+        most = RATIO * stiffness(R / 2) * APART
+        np.testing.assert_allclose(
+            state["force"][0] / most, [0, -2 * np.pi * turns, state["force"][0, 2] / most], atol=1e-2
+        )
+
+
+@pytest.mark.parametrize("wall", ["plane", "disc"])
+@pytest.mark.parametrize("name", SPRINGS)
+def test_a_grain_that_turns_with_a_wall_has_the_force_of_its_displacement(name, wall):
+    """About its normal, on a table that turns about an axis beside the grain's."""
+    law, ratio = SPRINGS[name]
+    c = APART * np.array([1.0, 0.5, 0.0])
+    shapes = {"planes": [Plane()]} if wall == "plane" else {"discs": [Disc(radius=1.0)]}
+    table = Walls(motion=Rotation(rate=(0, 0, RATE), centre=tuple(c)), **shapes)
+    motions = [Rotation(rate=(0, 0, RATE))]
+    made = held(
+        Granular(normal=HertzMaterial(), tangential=law), motions, np.array([[0, 0, R - PRESSED]]), [table]
+    )
+    spring = ratio * stiffness(R)
+    for turns, state in zip(LOOKS, seen(made, LOOKS), strict=True):
+        moved = c - Turn.from_rotvec([0, 0, RATE * turns]).apply(c)
+        expected = spring * moved
+        np.testing.assert_allclose(
+            across(state, np.array([0, 0, -1.0])), expected, rtol=0, atol=1e-3 * spring * APART
+        )
+
+
+def test_a_grain_that_turns_with_a_drum_has_no_force():
+    """Round the axis of a drum, with it: its normal goes round, and not a force comes of that."""
+    drum = Walls(cylinders=[CylindricalSurface(start=(0, 0, -0.1), end=(0, 0, 0.1), radius=5 * R)],
+                 motion=Rotation(rate=(0, 0, RATE)))  # fmt: skip
+    place = np.array([[4 * R + PRESSED, 0, 0]])
+    law = Granular(normal=HertzMaterial(), tangential=MindlinForce())
+    made = held(law, [Rotation(rate=(0, 0, RATE))], place, [drum])
+    for state in seen(made, LOOKS):
+        n = state["position"][0] / np.linalg.norm(state["position"][0])
+        assert np.linalg.norm(across(state, n)) < 1e-9 * abs(state["force"][0] @ n)
+
+
+@pytest.mark.parametrize("where", ["pair", "wall"])
+@pytest.mark.parametrize("name", ROLLING)
+def test_a_rolling_spring_turns_with_both_bodies(name, where):
+    """Of two that spin about axes that are askew by d: dM/dt = R*^2 k dw + W x M, W their mean spin about the
+    normal, which is none after whole turns."""
+    law, k = ROLLING[name]
+    radius, d = (R / 2, 1e-4) if where == "pair" else (R, 1e-4)
+    if name == "rolling_epsd" and where == "wall":
+        k *= np.sqrt(2)
+    other = Rotation(rate=(RATE * d, 0, RATE), centre=(0, 0, 2 * R - PRESSED))
+    place, walls = np.array([[0, 0, 0], [0, 0, 2 * R - PRESSED]]), []
+    motions, sign = [Rotation(rate=(0, 0, RATE)), other], 1
+    if where == "wall":
+        # Seen by the grain the table is the other.
+        walls = [Walls(planes=[Plane()], motion=Rotation(rate=(0, 0, RATE)))]
+        place, motions, sign = np.array([[0, 0, R - PRESSED]]), [other.model_copy(
+            update={"centre": (0, 0, R - PRESSED)})], -1  # fmt: skip
+    made = held(Granular(normal=HertzMaterial(), rolling=law), motions, place, walls)
+    most = radius**2 * k * d
+    for turns, state in zip(LOOKS, seen(made, LOOKS), strict=True):
+        angle = RATE * turns
+        expected = sign * most * np.array([np.sin(angle), 1 - np.cos(angle), 0])
+        np.testing.assert_allclose(state["torque"][0], expected, rtol=0, atol=2e-3 * most)
+
+
+@pytest.mark.parametrize("where", ["pair", "wall"])
+def test_the_mean_of_both_spins_turns_a_spring(where):
+    """A grain spins about the normal while a wall does not, and slides past at v: dT/dt = S_t v + w/2 n x T,
+    which comes back after two turns of the grain. Where another grain slides past the normal leans, and the
+    surfaces of the one that spins go aside by w/2 v t: its force is S_t v t, straight on."""
+    v = 1e-8
+    place, walls, radius = np.array([[0, 0, R - PRESSED]]), [Walls(planes=[Plane()])], R
+    spinning = Rotation(rate=(0, 0, RATE), centre=(0, 0, R - PRESSED))
+    motions = [spinning]
+    if where == "pair":
+        place, walls, radius = np.array([[0, 0, 0], [0, 0, 2 * R - PRESSED]]), [], R / 2
+        motions = [Rotation(rate=(0, 0, RATE)), Translation(velocity=(v, 0, 0))]
+    else:
+        walls = [Walls(planes=[Plane()], motion=Translation(velocity=(v, 0, 0)))]
+    made = held(Granular(normal=HertzMaterial(), tangential=MindlinForce()), motions, place, walls)
+    spring = RATIO * stiffness(radius)
+    for turns, state in zip(LOOKS, seen(made, LOOKS), strict=True):
+        angle = RATE / 2 * turns
+        expected = spring * 2 * v / RATE * np.array([np.sin(angle), 1 - np.cos(angle), 0])
+        if where == "pair":
+            n = np.diff(state["position"], axis=0)[0]
+            expected = spring * v * turns * np.array([1, 0, 0])
+            state["force"][0] = across(state, n / np.linalg.norm(n))
+        force = state["force"][0] * [1, 1, 0]
+        np.testing.assert_allclose(force, expected, rtol=0, atol=2e-3 * spring * v / RATE)
+
+
+def tripod(steps, rate, out, turns):
+    """A tripod that stands on a table which turns, and sticks to it; where it is on the table after each
+    turn, m."""
+    radius, young, gravity = 5e-3, 1e6, 9.81
+    angles = np.array([0, 1, 2]) * 2 * np.pi / 3
+    feet = 1.02 * radius * 2 / np.sqrt(3) * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    mass = 2500.0 * 4 / 3 * np.pi * radius**3
+    sunk = (mass * gravity / (4 / 3 * young / 2 / (1 - 0.3**2) * np.sqrt(radius))) ** (2 / 3)
+    body = Clump(centres=feet, radii=[radius] * 3, density=2500.0)
+    made = Scene(
+        particles=Particles.of_clumps(body, position=[(out, 0, radius - sunk)], velocity=[(0, rate * out, 0)],
+                                      angular_velocity=[(0, 0, rate)]),
+        materials={"rock": Material(young=young, poisson=0.3, friction=1.0, restitution=0.3)},
+        effects=(
+            RigidClumps(),
+            Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce()),
+            Walls(planes=[Plane()], motion=Rotation(rate=(0, 0, rate))),
+            Gravity(acceleration=(0, 0, -gravity)),
+        ),
+        stepper=Verlet(control=FixedStep(dt=steps)),
+        duration=1e3,
+    )  # fmt: skip
+    places = []
+    for k, state in enumerate(seen(made, 2 * np.pi / rate * np.arange(1, turns + 1))):
+        time = 2 * np.pi / rate * (k + 1)
+        places.append(Turn.from_rotvec([0, 0, -rate * time]).apply(state["clump_position"][0]))
+    return np.array(places)
+
+
+def test_a_body_that_sticks_to_a_turntable_stays_where_it_is():
+    """At 0.31 of Coulomb's limit, a tripod that cannot roll: to 1e-4 of 2 pi T / S_t = 61 um a turn, by which
+    it would creep if the springs did not turn with it; and in steps of any size."""
+    for dt in (2e-5, 1e-5):
+        moved = np.diff(tripod(dt, 2 * np.pi / 0.6, 0.028, 4)[1:], axis=0)
+        assert np.abs(moved[:, :2]).max() < 6e-9
+
+
+def test_what_carries_a_spring_keeps_its_length_and_goes_back():
+    """NumPy's integral of dT/dt = W x T along a path of the normal with a spin about it, and its reverse."""
+    from tests.effects.contact.granular_twin import carrying
+
+    def normal(t):
+        n = np.array([np.cos(3 * t) * np.sin(1 + t), np.sin(3 * t) * np.sin(1 + t), np.cos(1 + t)])
+        return n / np.linalg.norm(n)
+
+    def rate(t, vector):
+        n, h = normal(t), 1e-6
+        slope = (normal(t + h) - normal(t - h)) / (2 * h)
+        return np.cross(np.cross(n, slope) + 5.0 * n, vector)
+
+    start = np.cross(normal(0), [0.3, -0.2, 0.9])
+    exact = solve_ivp(rate, (0, 1), start, rtol=1e-10, atol=1e-12).y[:, -1]
+    errors = []
+    for steps in (100, 200):
+        known, dt = start, 1 / steps
+        for k in range(steps):
+            a, n = normal(k * dt), normal((k + 1) * dt)
+            tilt = (a - (a @ n) * n) / (1 + a @ n)
+            known = (carrying(n[None], tilt[None], np.array([2.5 * dt])) @ known)[0]
+        errors.append(np.linalg.norm(known - exact))
+        assert np.linalg.norm(known) == pytest.approx(np.linalg.norm(start), rel=1e-12)
+    assert errors[0] < 1e-2
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
