@@ -5,12 +5,17 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation as Turn
 
+from tests.effects.contact.grains import heap, twin
+from tests.effects.contact.granular_twin import carrying
+from tests.effects.contact.loads import close
 from tests.scenes import by_id, compiled, scene
 from tisim import Clump, Material, Particles, Scene
 from tisim.effects import (
+    CapillaryBridge,
     Granular,
     Gravity,
     HertzMaterial,
+    Hooke,
     LinearSpring,
     MindlinDisplacement,
     MindlinForce,
@@ -21,6 +26,7 @@ from tisim.effects import (
     RollingSDS,
     Rotation,
     Translation,
+    TwistingSDS,
     Walls,
 )
 from tisim.geometry import CylindricalSurface, Disc, Plane
@@ -240,7 +246,6 @@ def test_a_body_that_sticks_to_a_turntable_stays_where_it_is():
 
 def test_what_carries_a_spring_keeps_its_length_and_goes_back():
     """NumPy's integral of dT/dt = W x T along a path of the normal with a spin about it, and its reverse."""
-    from tests.effects.contact.granular_twin import carrying
 
     def normal(t):
         n = np.array([np.cos(3 * t) * np.sin(1 + t), np.sin(3 * t) * np.sin(1 + t), np.cos(1 + t)])
@@ -264,3 +269,60 @@ def test_what_carries_a_spring_keeps_its_length_and_goes_back():
         assert np.linalg.norm(known) == pytest.approx(np.linalg.norm(start), rel=1e-12)
     assert errors[0] < 1e-2
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
+
+
+def test_projected_springs_are_those_of_the_twin(rng):
+    """Grains that stick, slide and spin in a cell."""
+    made = heap(rng)
+    law, *others = made.effects
+    made = made.model_copy(update={"effects": (law.model_copy(update={"frame": "projected"}), *others)})
+    known = twin(made)
+    known.run(200, 2e-4)
+    assert min(known.sliding, known.sticking) > 500
+    simulation = compiled(made, 1, 64)
+    simulation.load([made])
+    simulation.run(steps=200)
+    state = by_id(simulation.results()[0])
+    for name, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
+        close(state[name], values, 1e-11)
+
+
+def test_an_elastic_pair_keeps_its_energy():
+    """Two that a liquid holds, without loss, swing in all their springs and turn like a top: for 1e5 steps
+    the energy of motion, springs and liquid stays within a bound that goes with dt^2."""
+    stiff, shear, rolls, twists, tension, dts = 1e4, 0.4, 2e3, 500.0, 50.0, (4e-4, 2e-4, 1e-4)
+    pull, spin = 2 * np.pi * tension, np.array([4.0, 0, 1.0])
+    place = np.array([[-1, 0, 0], [1, 0, 0]]) * (1 - pull / stiff / 2)
+    swing = 0.02 * np.array([[0, 1, 0.3], [0, -1, 0.2]])
+    surface = Material(stiffness=stiff, friction=1e3, rolling_friction=1e3, rolling_stiffness=rolls,
+                       rolling_damping=0.0, twisting_friction=1e3, twisting_stiffness=twists,
+                       twisting_damping=0.0)  # fmt: skip
+    law = Granular(normal=Hooke(), tangential=LinearSpring(stiffness_ratio=shear), rolling=RollingSDS(),
+                   twisting=TwistingSDS())  # fmt: skip
+    wet = CapillaryBridge(surface_tension=tension, contact_angle=0.0, volume=1e-3)
+
+    def energy(state):
+        overlap = 2 - np.linalg.norm(np.diff(state["position"], axis=0))
+        moving = (state["velocity"] ** 2).sum() + 0.4 * (state["spin"] ** 2).sum()
+        known = (state["granular_past"].reshape(-1, law.memory) ** 2).sum(axis=0)
+        drawn, rolled, twisted = known[:3].sum(), known[3:6].sum(), known[6]
+        held = shear * stiff * drawn + rolls * rolled + twists * twisted + stiff * overlap**2
+        return (moving + held) / 2 - pull * overlap
+
+    made = [
+        scene(place, np.cross(spin, place) + swing, (law, wet), radius=1.0, mass=1.0, dt=dt, duration=40.0,
+              materials={"grain": surface}, quantities={"spin": spin + swing[::-1]})
+        for dt in dts
+    ]  # fmt: skip
+    simulation = compiled(made[0], 4, 8)
+    simulation.load(made)
+    energies = []
+    for until in range(41):
+        simulation.run(until=float(until))
+        results = simulation.results()
+        assert all(one.status.ok or one.status.reason == "running" for one in results)
+        energies.append([energy(by_id(one)) for one in results])
+    swings = (swing**2).sum() * 0.7
+    off = np.abs(np.array(energies) - energies[0]).max(axis=0) / swings
+    assert off[0] < 0.05
+    assert off[0] / off[2] == pytest.approx(16, rel=0.3)
