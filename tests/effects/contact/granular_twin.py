@@ -241,9 +241,10 @@ def carrying(normal, tilt, turn):
 
 
 def seen_midway(slip, normal, tilt, turn):
-    """What is across the normal midway in the step, which half of the step then turns on."""
-    opening = (slip * normal).sum(axis=1)[:, None]
-    return slip - opening * tilt + turn[:, None] * np.cross(normal, slip)
+    """What is across the normal midway in the step, which half of the step then turns on; across that of
+    now."""
+    along = (slip * normal).sum(axis=1)[:, None]
+    return slip - along * (normal + tilt) + turn[:, None] * np.cross(normal, slip)
 
 
 def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, levers="contact", carried=False):
@@ -377,7 +378,7 @@ class Grains:
             # As if both were arms of what lay between the centres midway.
             lain = gap[i, j] - dt / 2 * passing[i, j]
             arms = (arm * self.w[i] + other * self.w[j]) / far[:, None]
-            slip = seen_midway(passing[i, j] - np.cross(arms, lain), n, tilt, half)
+            slip = seen_midway(passing[i, j] - np.cross(arms, lain), n, tilt, half) + along[:, None] * n
         mass = self.mass[i] * self.mass[j] / (self.mass[i] + self.mass[j])
         force, couple, known = self._contact(
             which, n, delta, reduced, mass, slip, spinning, (tilt, half), self.past[i, j], dt
@@ -405,7 +406,8 @@ class Grains:
         slip, spinning = surface - self.v[i] - np.cross(arm * self.w[i], n + tilt), rate - self.w[i]
         half = dt / 4 * ((self.w[i] + rate) * n).sum(axis=1)
         if self.law.turns:
-            slip = seen_midway(slip, n, tilt, half)
+            along = ((surface - self.v[i]) * n).sum(axis=1)[:, None]
+            slip = seen_midway(slip, n, tilt, half) + along * n
         force, couple, known = self._contact(
             which[i], n, overlap[i], self.radius[i], self.mass[i], slip, spinning, (tilt, half),
             self.held[i, k], dt,

@@ -80,7 +80,7 @@ class GranularContact(MaterialLaw, PairForce):
             opening, back = passing.dot(normal), 0.5 * dt * nearness
             tilt = (back + back * back * opening) * (opening * normal - passing)
             turn = 0.25 * dt * (s.spin[w, i] + s.spin[w, j]).dot(normal)
-            slip = midway(slip + back * spins.cross(passing), normal, tilt, turn)
+            slip = midway(slip + back * spins.cross(passing), opening, normal, tilt, turn)
         m, n, free = s.masses_behind(w, i, j)
         # R* and m*, by one division, and by no product of masses, which of small grains is below f32.
         sizes, masses = a + b, m + n
@@ -120,12 +120,12 @@ class GranularContact(MaterialLaw, PairForce):
         pair, spin = 0, s.spin[w, i]
         if ti.static(self.several):
             pair = s.material[w, i] * self.number_of_materials + material
+        passing = velocity - s.velocity[w, i]
+        slip = passing - (arm * spin).cross(normal)
         leant, turn = 0.0 * normal, 0.0 * arm
         if ti.static(self.turns_springs):
             leant, turn = tilt, 0.25 * dt * (spin + turning).dot(normal)
-        slip = velocity - s.velocity[w, i] - (arm * spin).cross(normal + leant)
-        if ti.static(self.turns_springs):
-            slip = midway(slip, normal, leant, turn)
+            slip = midway(slip - (arm * spin).cross(tilt), passing.dot(normal), normal, tilt, turn)
         mass, free = s.mass_at_wall(w, i)
         spinning, inverses = turning - spin, wall_inverse_masses(overlap / radius, free)
         force, couple, known = self.contact(

@@ -268,7 +268,7 @@ class Granular(ContactGuards, GranularContact):
             bent = self.turned(remembered(past, first, length), normal, tilt, turn, self.rolling.vector)
             rolling = radius * spinning.cross(normal)
             if ti.static(self.turns_springs):
-                rolling = midway(radius * spinning.cross(normal + tilt), normal, tilt, turn)
+                rolling = midway(radius * spinning.cross(normal + tilt), 0.0, normal, tilt, turn)
             roll, left = self.rolling.force(w, pair, normal, stiffness, mass, limit, rolling, bent, dt)
             couple += radius * normal.cross(roll)
             for k in ti.static(range(length)):

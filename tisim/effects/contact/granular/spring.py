@@ -51,14 +51,15 @@ def carried(remembered, normal, tilt, turn):
 
 
 @ti.func
-def midway(slip, normal, tilt, turn):
+def midway(slip, opening, normal, tilt, turn):
     """Return a velocity (m/s) of surfaces past each other midway in a step as the contact has turned it since
     then, to second order in the step.
 
     What it is across the normal of then it is across that of now, where it has turned by half of the step's
-    turn. tilt, turn : see ``carried``.
+    turn. opening : what it is to be along the normal. tilt, turn : see ``carried``.
     """
-    return slip - slip.dot(normal) * tilt + turn * normal.cross(slip)
+    along = slip.dot(normal)
+    return slip + (opening - along) * normal - along * tilt + turn * normal.cross(slip)
 
 
 @ti.func
