@@ -17,7 +17,7 @@ from tisim.worlds.columns import WORLD_COUNTERS
 from tisim.worlds.fields import Field
 from tisim.worlds.status import WorldStatus
 
-ROUNDING = 1e-9
+ROUNDED_PART = 1e-9
 """What time has been rounded by is far below this part of it."""
 Columns = Mapping[str, np.ndarray]
 
@@ -54,8 +54,8 @@ def _check_times(columns: Columns, own: Columns, worlds: int) -> None:
     for name in ("end", "seed"):
         same = np.array_equal(columns[name][:worlds], own[name][:worlds])
         must(same, f"checkpoint's {name}", f"{own[name][:worlds].tolist()}", columns[name][:worlds].tolist())
-    _within(columns, "time", 0.0, float(end.max(initial=0.0)) * (1 + ROUNDING))
-    most = ROUNDING * float(end.max(initial=0.0))
+    _within(columns, "time", 0.0, float(end.max(initial=0.0)) * (1 + ROUNDED_PART))
+    most = ROUNDED_PART * float(end.max(initial=0.0))
     _within(columns, "time_carry", -most, most)
 
 

@@ -382,3 +382,23 @@ def test_particles_that_are_no_clumps_are_refused():
 def test_a_scene_file_holds_clumps():
     made = clumps(PEAR, [(0, 0, 0), (0.01, 0, 0)], (StokesDrag(viscosity=1e-3),))
     assert Scene.from_dict(made.to_dict()).digest() == made.digest()
+
+
+@pytest.mark.parametrize(("side", "fits"), [(0.0759, False), (0.0761, True)])
+def test_a_rod_whose_ends_another_may_touch_at_once_in_an_image_is_refused(side, fits):
+    """66 mm long, with spheres of 10 mm."""
+    rod = Clump(centres=[(8e-3 * k, 0, 0) for k in range(8)], radii=[5e-3] * 8, density=2500.0)
+    box = Box(low=(0, 0, 0), high=(side,) * 3)
+    made = Scene(
+        particles=Particles.of_clumps(rod, position=[(0.03, 0.03, 0.03)], box=box),
+        materials={"glass": Material(young=1e7, poisson=0.25)},
+        effects=(RigidClumps(), Granular()),
+        domain=box,
+        duration=1e-5,
+    )
+    start, effects = made.start(), made.acting()
+    if fits:
+        effects[0].suits_start(start, effects, box)
+    else:
+        with pytest.raises(InputError, match=r"box must be at least 0.076 m wide where it is periodic"):
+            effects[0].suits_start(start, effects, box)

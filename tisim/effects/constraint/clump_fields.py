@@ -41,6 +41,17 @@ APART = 1e-4
 and quaternions are of length 1 to within it; single precision rounds by less."""
 
 
+def longest_clump(start: Mapping[str, np.ndarray]) -> float:
+    """Return the largest length (m) of a clump of a start, from surface to surface of two of its spheres."""
+    held = np.flatnonzero(start["clump"] != NO_CLUMP)
+    longest = 0.0
+    for members in np.split(held, np.flatnonzero(np.diff(start["clump"][held])) + 1):
+        places, radii = start["clump_offset"][members], start["radius"][members]
+        apart = np.linalg.norm(places[:, None] - places[None], axis=2) + radii[:, None] + radii[None]
+        longest = max(longest, float(apart.max(initial=0.0)))
+    return longest
+
+
 def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
     """Raise InputError unless the particles of a start are whole clumps, which are where their bodies say,
     and others."""

@@ -10,9 +10,17 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.effects.base import Constraint, Effect, Field
-from tisim.effects.constraint.clump_fields import BEFORE, BODY, MEMBERSHIP, NO_CLUMP, check_clumps
+from tisim.effects.base import Constraint, Effect, Field, PairForce
+from tisim.effects.constraint.clump_fields import (
+    BEFORE,
+    BODY,
+    MEMBERSHIP,
+    NO_CLUMP,
+    check_clumps,
+    longest_clump,
+)
 from tisim.effects.constraint.rigid_rotation import angular_velocity, free_rotation
+from tisim.errors import must
 from tisim.numerics.quaternions import brought, rotated
 
 INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
@@ -46,6 +54,16 @@ class RigidClumps(Constraint):
         check_clumps(start, domain)
         held: np.ndarray = start["clump"] != NO_CLUMP
         return held
+
+    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
+        (low, high), imaged = domain.bounds(), np.array(domain.imaged())
+        touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
+        if low is None or high is None or not imaged.any() or not touching:
+            return
+        # Another one may touch both of its ends, one of them in an image.
+        taken = longest_clump(start) + 2 * float(start["radius"].max(initial=0.0))
+        rule = f"at least {taken:g} m wide where it is periodic, what its longest clump and a particle take"
+        must(not (imaged & (high - low < taken)).any(), domain.label, rule, (high - low).tolist())
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
