@@ -34,7 +34,7 @@ BODY = (
 """The first member of a clump has these of the body: the centre of mass, its velocity, the orientation as a
 unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments, the
 volume of the union of its members."""
-BEFORE = Field("clump_orientation_before", "", 1, "keep", slots=4, scratch=True)
+BODY_BEFORE = Field("clump_orientation_before", "", 1, "keep", slots=4, scratch=True)
 """The orientation at the beginning of a step."""
 APART = 1e-4
 """Members are where and as fast as their bodies say to within this part of a radius and of the largest speed,

@@ -12,8 +12,8 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import Constraint, Effect, Field, PairForce
 from tisim.effects.constraint.clump_fields import (
-    BEFORE,
     BODY,
+    BODY_BEFORE,
     MEMBERSHIP,
     NO_CLUMP,
     check_clumps,
@@ -44,7 +44,7 @@ class RigidClumps(Constraint):
     Source: A. Dullweber, B. Leimkuhler, R. McLachlan, J. Chem. Phys. 107 (1997) 5840.
     """
 
-    fields: ClassVar = (*Constraint.fields, *MEMBERSHIP, *BODY, BEFORE, INDEX)
+    fields: ClassVar = (*Constraint.fields, *MEMBERSHIP, *BODY, BODY_BEFORE, INDEX)
     mark: ClassVar = "clump"
     free: ClassVar = True
 
