@@ -14,6 +14,8 @@ from tisim.backend import choice, runtime
 from tisim.backend.taichi import BACKEND
 from tisim.engine.simulation import SCHEDULES
 
+pytestmark = pytest.mark.long
+
 FAMILIES = ("effects.granular", "stepper.collocation.0", "stepper.brownian.2")
 """Contacts with memory, an implicit stepper with forces between all, and noise with hydrodynamics. Impacts
 are compared where ``elsewhere`` is (tests/engine/test_schedules.py)."""

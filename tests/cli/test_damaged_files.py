@@ -80,7 +80,7 @@ def is_refusal(answer, must, what):
     code, out, err = answer
     assert code == 2 if must else code in (0, 2), (what, answer)
     if code:
-        lines = [line for line in err.strip().splitlines() if "% 0:00" not in line]
+        lines = [line for line in err.strip().splitlines() if "% elapsed 0:00" not in line]
         assert len(lines) == 1, (what, err)
         assert "must be" in lines[0], (what, err)
         assert out == "", what

@@ -31,6 +31,8 @@ from tisim.steppers import (
 )
 from tisim.steppers.choice import ACCURACY, ALONE, KINKED
 
+pytestmark = pytest.mark.long
+
 QUICK = ("tether", "lorentz", "permanent_magnet", "damped_grains", "impact", "driven_charge")
 """These families stand for the rules in the quick tests."""
 

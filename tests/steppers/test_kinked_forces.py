@@ -14,6 +14,8 @@ from tisim import effects as laws
 from tisim import sources
 from tisim.steppers import Collocation, ErrorControl, StageControl, Trapezoid
 
+pytestmark = pytest.mark.long
+
 ASKED = (1e-3, 1e-5, 1e-7)
 PAIRS = ("mie_at_its_cutoff", "powers_with_a_cutoff")
 STRIDE = {name: 0.025 for name in PAIRS}

@@ -7,6 +7,8 @@ import tisim
 from tisim import effects as laws
 from tisim.steppers import Boris, FixedStep, Verlet
 
+pytestmark = pytest.mark.long
+
 SPEED, DT, STEPS = 1e-3, 1e-5, 200_000
 STEPPERS = {
     "verlet": lambda dt: Verlet(control=FixedStep(dt=dt)),

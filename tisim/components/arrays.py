@@ -10,7 +10,7 @@ from pydantic import Field, GetPydanticSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from tisim.components.component import Vector
-from tisim.components.plain_numbers import broken_rule
+from tisim.components.plain_numbers import broken_rule, holds_no_number
 
 
 def frozen(values: Any, kind: type | None = None) -> np.ndarray:
@@ -41,11 +41,8 @@ def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
                 array = frozen(value, float)
                 if np.isfinite(array).all():
                     return array
-        elif isinstance(value, list | tuple):
-            # Of numbers of NumPy, flags and complex numbers among them.
-            whole = np.asarray(value, object)
-            if any(broken_rule(one) for one in whole.flat):
-                raise PydanticCustomError("numbers", "numbers")
+        elif holds_no_number(value):
+            raise PydanticCustomError("numbers", "numbers")
         if isinstance(value, np.ndarray | np.generic):
             # What is wrong with it, or how it can be read, is found out as of a list.
             value = value.tolist()

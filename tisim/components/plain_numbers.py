@@ -13,6 +13,9 @@ import numpy as np
 
 from tisim.errors import must
 
+DEEPEST = 3
+"""No list of numbers has lists in it deeper than this."""
+
 
 def is_numeric(annotation: Any) -> bool:
     """Return whether a setting of this type is a number, or has fixed or any numbers of them, or may be left
@@ -29,7 +32,7 @@ def _leaves(annotation: Any) -> set[Any]:
     return {annotation}
 
 
-def plain(where: str, value: Any) -> Any:
+def plain(where: str, value: Any, depth: int = DEEPEST) -> Any:
     """Return a number, a list or an array of numbers with what is of NumPy as numbers and lists of Python;
     raise InputError, naming ``where``, for flags, complex numbers and what is masked. All else is as it
     was."""
@@ -37,9 +40,16 @@ def plain(where: str, value: Any) -> Any:
     must(not rule, where, rule, value)
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if isinstance(value, list | tuple):
-        return [plain(f"{where}.{k}", one) for k, one in enumerate(value)]
+    if isinstance(value, list | tuple) and depth > 0:
+        return [plain(f"{where}.{k}", one, depth - 1) for k, one in enumerate(value)]
     return value
+
+
+def holds_no_number(value: Any, depth: int = DEEPEST) -> bool:
+    """Return whether a list has a flag, a complex number or what is masked in it."""
+    if isinstance(value, list | tuple) and depth > 0:
+        return any(holds_no_number(one, depth - 1) for one in value)
+    return bool(broken_rule(value))
 
 
 def broken_rule(value: Any) -> str:

@@ -12,7 +12,7 @@ from tisim.components.arrays import Numbers, RowsOrNone, equal, frozen
 from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.materials import Materials
-from tisim.components.plain_numbers import broken_rule, plain
+from tisim.components.plain_numbers import DEEPEST, broken_rule, plain
 from tisim.components.ranges import MOST, limits
 from tisim.errors import InputError, abbreviated, must
 from tisim.packing.clump import Clump, clump_columns, sphere_columns
@@ -251,11 +251,13 @@ def _beside(clumps: Arrays, mass: np.ndarray, spheres: Arrays) -> Arrays:
     return {name: np.concatenate([values, given[name]]) for name, values in clumps.items()}
 
 
-def _lists(value: Any) -> Any:
+def _lists(value: Any, depth: int = DEEPEST) -> Any:
     """Return a list with what is of NumPy in it as lists and numbers of Python; all else as it is."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    return type(value)(map(_lists, value)) if type(value) in (list, tuple) else value
+    if type(value) not in (list, tuple) or depth == 0:
+        return value
+    return type(value)(_lists(one, depth - 1) for one in value)
 
 
 def _of_each(name: str, value: Any, n: int) -> np.ndarray:
