@@ -2,8 +2,8 @@
 
     python docs/check_pages.py FOLDER    of ``sphinx-build docs FOLDER``; exit code 1 and a line for a fault
 
-Found are guides that another page has overwritten, lines that were taken for comments, and lists that nobody
-wrote: initials of authors at the beginning of a line.
+It finds three faults: a guide that another page has overwritten; a line that was taken for a comment; and a
+list made of the initials of an author at the beginning of a line.
 """
 
 import html

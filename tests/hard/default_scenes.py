@@ -369,29 +369,32 @@ def grain_on_floor(draw):
     return scene, lambda result: float(abs(energy(result.state) / energy(result.start) - 1))
 
 
+def bonded(draw, velocities):
+    """Return a scene of a free bonded pair, its stiffness along the bond (N/m) and its velocities (m/s, shape
+    (2, 3)), which ``velocities`` makes of random numbers between -1 and 1."""
+    radius, rho, mass, young = grains_of(draw)
+    speed = decades(draw, 1e-6, 1e-4) * np.sqrt(young / rho)
+    r, v = [[-radius, 0, 0], [radius, 0, 0]], velocities(speed * draw.uniform(-1, 1, (2, 3)))
+    stiffness = young / (2 * radius) * np.pi * radius**2
+    period = 2 * np.pi * np.sqrt(0.5 * mass / stiffness)
+    law = laws.ParallelBond(gap=1e-6 * radius, young=young, tensile_strength=1e30, shear_strength=1e30)
+    scene = tisim.Scene(
+        particles=particles(r, v, radius, mass), effects=(law,), duration=draw.uniform(1, 30) * period
+    )
+    return scene, stiffness, v
+
+
 @family
 def bonded_pair(draw):
     """A free bonded pair swings along and across its bond: its energy, at rest in the bond, stays bounded."""
-    radius, rho, mass, young = grains_of(draw)
-    speed = decades(draw, 1e-6, 1e-4) * np.sqrt(young / rho)
-    r = [[-radius, 0, 0], [radius, 0, 0]]
-    v = speed * draw.uniform(-1, 1, (2, 3))
-    stiffness = young / (2 * radius) * np.pi * radius**2
-    period = 2 * np.pi * np.sqrt(0.5 * mass / stiffness)
-    scene = tisim.Scene(
-        particles=particles(r, v, radius, mass),
-        effects=(
-            laws.ParallelBond(gap=1e-6 * radius, young=young, tensile_strength=1e30, shear_strength=1e30),
-        ),
-        duration=draw.uniform(1, 30) * period,
-    )
+    scene, _, v = bonded(draw, lambda drawn: drawn)
 
     def error(result):
         # No more than the energy of the start, and the centre of mass where it must be.
         more = kinetic(result.state) / kinetic(result.start) - 1
         centre = result.state["position"].mean(axis=0) - v.mean(axis=0) * result.time
-        off = np.linalg.norm(centre) / max(np.linalg.norm(v.mean(axis=0)) * result.time, 1e-3 * radius)
-        return float(max(more, off))
+        path = np.linalg.norm(v.mean(axis=0)) * result.time
+        return float(max(more, np.linalg.norm(centre) / max(path, 1e-3 * result.start["radius"][0])))
 
     return scene, error
 
@@ -399,24 +402,16 @@ def bonded_pair(draw):
 @family
 def bond_along_itself(draw):
     """A free bonded pair swings along its bond as a spring: the energy, with that of the bond, stays."""
-    radius, rho, mass, young = grains_of(draw)
-    speed = decades(draw, 1e-6, 1e-4) * np.sqrt(young / rho)
-    r, v = [[-radius, 0, 0], [radius, 0, 0]], speed * draw.uniform(-1, 1, (2, 3))
-    v[1, 1:] = v[0, 1:]
-    stiffness = young / (2 * radius) * np.pi * radius**2
-    period = 2 * np.pi * np.sqrt(0.5 * mass / stiffness)
-    scene = tisim.Scene(
-        particles=particles(r, v, radius, mass),
-        effects=(
-            laws.ParallelBond(gap=1e-6 * radius, young=young, tensile_strength=1e30, shear_strength=1e30),
-        ),
-        duration=draw.uniform(1, 30) * period,
-    )
+
+    def along(drawn):
+        return np.column_stack([drawn[:, 0], drawn[[0, 0], 1:]])
+
+    scene, stiffness, _ = bonded(draw, along)
 
     def energy(state):
-        stretch = state["position"][1, 0] - state["position"][0, 0] - 2 * radius
+        stretch = state["position"][1, 0] - state["position"][0, 0] - state["radius"].sum()
         along = (state["velocity"][:, 0] - state["velocity"][:, 0].mean()) ** 2
-        return 0.5 * mass * along.sum() + 0.5 * stiffness * stretch**2
+        return 0.5 * state["mass"][0] * along.sum() + 0.5 * stiffness * stretch**2
 
     return scene, lambda result: float(abs(energy(result.state) / energy(result.start) - 1))
 

@@ -108,35 +108,33 @@ def field_that_begins(draw):
     return scene, (0.2 * v + np.array([0.5 * a * late**2, along, 0]))[None]
 
 
-@kind
-def schiller_naumann_past_its_jump(draw):
-    rho, mu, v = 1.2, 1.8e-5, np.array([draw.uniform(2, 6), 0, 0])
+def slowed(law, speed, duration, jump, above, below):
+    """Return a sphere in air that slows down past the Reynolds number at which its drag coefficient jumps,
+    from ``above`` to ``below``, functions of that number; and its end."""
+    rho, mu, v = 1.2, 1.8e-5, np.array([speed, 0, 0])
     per_speed = 2 * RADIUS * rho / mu
 
     def acceleration(t, r, u, sides):
-        speed = np.linalg.norm(u)
-        reynolds = per_speed * speed
-        drag = 0.44 if sides[0] > 0 else 24 / reynolds * (1 + 0.15 * reynolds**0.687)
-        return -0.5 * rho * drag * np.pi * RADIUS**2 * speed * u / MASS
+        size = np.linalg.norm(u)
+        drag = (above if sides[0] > 0 else below)(per_speed * size)
+        return -0.5 * rho * drag * np.pi * RADIUS**2 * size * u / MASS
 
-    passes = [lambda t, r, u: per_speed * np.linalg.norm(u) - 1000]
-    scene = alone(v, (laws.SchillerNaumannDrag(density=rho, viscosity=mu),), 4.0)
-    return scene, exact(acceleration, np.zeros(3), v, 4.0, passes)[None]
+    passes = [lambda t, r, u: per_speed * np.linalg.norm(u) - jump]
+    scene = alone(v, (law(density=rho, viscosity=mu),), duration)
+    return scene, exact(acceleration, np.zeros(3), v, duration, passes)[None]
+
+
+@kind
+def schiller_naumann_past_its_jump(draw):
+    def below(re):
+        return 24 / re * (1 + 0.15 * re**0.687)
+
+    return slowed(laws.SchillerNaumannDrag, draw.uniform(2, 6), 4.0, 1000, lambda re: 0.44, below)
 
 
 @kind
 def chow_past_its_jump(draw):
-    rho, mu, v = 1.2, 1.8e-5, np.array([draw.uniform(0.7, 2), 0, 0])
-    per_speed = 2 * RADIUS * rho / mu
-
-    def acceleration(t, r, u, sides):
-        speed = np.linalg.norm(u)
-        drag = 0.5 if sides[0] > 0 else 24 / (per_speed * speed) ** 0.646
-        return -0.5 * rho * drag * np.pi * RADIUS**2 * speed * u / MASS
-
-    passes = [lambda t, r, u: per_speed * np.linalg.norm(u) - 400]
-    scene = alone(v, (laws.ChowDrag(density=rho, viscosity=mu),), 10.0)
-    return scene, exact(acceleration, np.zeros(3), v, 10.0, passes)[None]
+    return slowed(laws.ChowDrag, draw.uniform(0.7, 2), 10.0, 400, lambda re: 0.5, lambda re: 24 / re**0.646)
 
 
 @kind

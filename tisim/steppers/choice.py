@@ -218,7 +218,7 @@ def _error_controlled(
     stages = 3 if kinked else _stages(effects, accuracy)
     stepper = Collocation(control=control, stages=stages)
     what = f"forces have kinks, of {kinked[0]}" if kinked else "forces are smooth"
-    reason = f"{what}: steps of order {stepper.order} with an error of {error:.3g} at the end"
+    reason = f"{what}: collocation with {stages} stages and an error of {error:.3g} at the end"
     return StepperChoice(stepper, reason, critical)
 
 

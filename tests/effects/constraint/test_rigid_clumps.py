@@ -22,6 +22,7 @@ from tisim.effects import (
     Tether,
     Walls,
 )
+from tisim.effects.constraint.clump_fields import longest_clump
 from tisim.geometry import Plane
 from tisim.operators import InsertionByFlux
 from tisim.packing import EqualSizes
@@ -402,3 +403,14 @@ def test_a_rod_whose_ends_another_may_touch_at_once_in_an_image_is_refused(side,
     else:
         with pytest.raises(InputError, match=r"box must be at least 0.076 m wide where it is periodic"):
             effects[0].suits_start(start, effects, box)
+
+
+def test_the_longest_clump_is_found_whatever_the_order_of_its_members():
+    box = Box(low=(-1, -1, -1), high=(1, 1, 1))
+    start = Particles.of_clumps(DUMBBELL, position=[(0, 0, 0), (9 * R, 0, 0)]).arrays(box, 0)
+    order = [0, 2, 1, 3]
+    assert longest_clump({name: values[order] for name, values in start.items()}) == pytest.approx(4 * R)
+
+
+def test_clumps_may_all_be_put_in_later_in_a_periodic_box():
+    RigidClumps().suits_start({"mass": np.zeros(0)}, (Granular(),), Box(low=(0, 0, 0), high=(1, 1, 1)))

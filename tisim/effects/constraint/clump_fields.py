@@ -44,6 +44,7 @@ and quaternions are of length 1 to within it; single precision rounds by less.""
 def longest_clump(start: Mapping[str, np.ndarray]) -> float:
     """Return the largest length (m) of a clump of a start, from surface to surface of two of its spheres."""
     held = np.flatnonzero(start["clump"] != NO_CLUMP)
+    held = held[np.argsort(start["clump"][held], kind="stable")]
     longest = 0.0
     for members in np.split(held, np.flatnonzero(np.diff(start["clump"][held])) + 1):
         places, radii = start["clump_offset"][members], start["radius"][members]

@@ -58,7 +58,7 @@ class RigidClumps(Constraint):
     def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
         (low, high), imaged = domain.bounds(), np.array(domain.imaged())
         touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
-        if low is None or high is None or not imaged.any() or not touching:
+        if low is None or high is None or not imaged.any() or not touching or not len(start["mass"]):
             return
         # Another one may touch both of its ends, one of them in an image.
         taken = longest_clump(start) + 2 * float(start["radius"].max(initial=0.0))

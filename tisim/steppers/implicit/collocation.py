@@ -43,8 +43,9 @@ class Collocation(Stepper):
     linear in velocity is solved exactly with each stage. Spin is stepped as velocity is. What the first sweep
     starts from is made anew when there have been impacts.
 
-    It pays where forces are smooth and more than three digits are wanted; for forces with kinks, such as
-    contacts, its order is lost.
+    It pays where forces are smooth, the more so the more digits are wanted. Kinks and jumps of forces cost it
+    its order: three stages are best there, and its control goes by a bound of the error (``StageControl``).
+    For contacts a leapfrog is cheaper.
 
     Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.5. Sweeps that
     start from the polynomial of the last step: E. Everhart, Celest. Mech. 10 (1974) 35-55, and H. Rein, D. S.

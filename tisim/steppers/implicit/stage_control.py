@@ -32,8 +32,9 @@ class StageControl(ImplicitControl):
     then, too. The resolution is there as for a particle that starts from rest the ratio of error and
     displacement has no limit.
 
-    With ``per="run"`` the error at the end was 0.03 to 30 times that asked for in 13 scenes, less under drag
-    and beside kinks (docs/steppers.md); a chaotic motion multiplies it without bound.
+    With ``per="run"`` the error at the end was 0.03 to 30 times that asked for in 13 scenes, less under drag.
+    With kinks it was up to 9 times that for particles by themselves, and up to 70 for pairs at a cut-off
+    (docs/steppers.md). A chaotic motion multiplies it without bound.
 
     With ``norm="each"`` a particle's error is compared with its own motion, so that slow ones, and small
     orbits, are as accurate as large ones: the world has the norm of order 8 of these ratios, which is at
