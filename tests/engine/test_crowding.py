@@ -73,6 +73,19 @@ def test_what_holds_nothing_apart_may_be_at_one_place():
     assert "particles 0 and 1" in refused(start([[0, 0, 0]] * 2, plate, quantities={"group": [1.0, 0.0]}))
 
 
+def test_a_skin_that_takes_in_thousands_is_refused(rng):
+    """Lists of 2e8 pairs kept a run from its first step; a few particles may all be listed."""
+    places = rng.uniform(0, 0.1, (20_000, 3))
+    with pytest.raises(
+        InputError, match=r"scene.skin must be so small .*; received 1000 m, within which each "
+    ):
+        check_places(*alone(start(places, radius=1e-5, skin=1e3)))
+    check_places(*alone(start(places, radius=1e-5, skin=0.01)))
+    check_places(*alone(start(places[:1000], radius=1e-5, skin=1e3)))
+    # Nothing is listed.
+    check_places(*alone(scene(places, 0 * places, (Gravity(),), 1e-5, skin=1e3)))
+
+
 def alone(one):
     """A scene and its start."""
     return one, one.start()

@@ -33,6 +33,9 @@ SAMPLE = 64
 """Where many overlap their pairs are estimated by so many particles."""
 MOST_PAIRS = 2_000_000
 """Above this number, overlapping pairs are counted but not examined one by one."""
+MOST_LISTED = 1000
+"""A skin by which a particle lists more others than this, in lists of more than MOST_PAIRS, is refused: going
+through such lists takes longer than any list lasts."""
 
 
 class Deep(NamedTuple):
@@ -46,11 +49,27 @@ class Deep(NamedTuple):
 
 def check_places(scene: Scene, start: Arrays) -> list[Deep]:
     """Raise InputError where spheres that the scene holds apart are at one place, or one of them overlaps
-    more than there is room for; else return the deepest overlaps of spheres and in walls."""
+    more than there is room for, or where the skin of the scene takes in too many; else return the deepest
+    overlaps of spheres and in walls."""
+    check_skin(scene, start)
     laws = _holding(scene)
     if not laws or not len(start["mass"]):
         return []
     return [*_overlaps(scene, start, laws), *_in_walls(scene, start)]
+
+
+def check_skin(scene: Scene, start: Arrays) -> None:
+    """Raise InputError where lists of pairs with the skin of the scene would be of no use."""
+    lists = any(isinstance(effect, Pairwise) and effect.short_ranged for effect in scene.effects)
+    if scene.skin is None or not lists or not len(start["mass"]):
+        return
+    crowd = _Crowd(scene, start)
+    sample = range(0, crowd.number, -(-crowd.number // SAMPLE))
+    each = float(np.mean([crowd.overlapped(i, scene.skin)[0] for i in sample]))
+    if each > MOST_LISTED and 0.5 * each * crowd.number > MOST_PAIRS:
+        rule = f"so small that a particle has at most {MOST_LISTED} others within it"
+        received = f"{scene.skin:g} m, within which each has about {each:.0f} of {crowd.number} particles"
+        raise InputError(f"scene.skin must be {rule}; received {received}")
 
 
 def warn_of_overlaps(found: Sequence[Sequence[Deep]]) -> None:
@@ -164,11 +183,12 @@ class _Crowd:
                 received = f"about {self.pairs} pairs, and {where}"
                 raise InputError(f"particles must be {rule}; received {received}")
 
-    def overlapped(self, i: int) -> tuple[int, int]:
-        """Return how many others particle i overlaps, and how many of these are larger or follow it."""
+    def overlapped(self, i: int, skin: float = 0.0) -> tuple[int, int]:
+        """Return how many others particle i overlaps, or has within a skin (m) around it, and how many of
+        these are larger or follow it."""
         apart = self.nearest(self.position - self.position[i])
         others = np.arange(self.number)
-        near = (apart**2).sum(axis=1) < (self.radius + self.radius[i]) ** 2
+        near = (apart**2).sum(axis=1) < (self.radius + self.radius[i] + skin) ** 2
         near &= (others != i) & ~self.joined(others, i)
         above = (self.radius > self.radius[i]) | ((self.radius == self.radius[i]) & (others > i))
         return int(near.sum()), int((near & above).sum())

@@ -37,7 +37,7 @@ class Verlet(Stepper):
 
     It is of second order in dt for forces that depend on position only. A scene without forces drifts in
     straight lines, and has no kick at all. Operators and pair events follow the drift. A step of more than
-    half of the critical one, 2/omega of the stiffest motion, stops the world.
+    0.45 of the critical one, 2/omega of the stiffest motion, stops the world.
 
     Source: L. Verlet, Phys. Rev. 159 (1967) 98; W. C. Swope et al., J. Chem. Phys. 76 (1982) 637.
     """

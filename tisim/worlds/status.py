@@ -27,7 +27,7 @@ class WorldStatus(IntEnum):
     NOT_POSITIVE_DEFINITE = 9
     """A diffusion matrix is not positive definite."""
     STEP_TOO_LONG = 10
-    """A step is longer than half of the critical step of the forces on a particle."""
+    """A step is too long beside the critical step of the forces on a particle."""
     LIST_OVERFLOW = 11
     """There are more near pairs than their list has room for; it is made longer, and the world goes on."""
     OUTRUN = 12
