@@ -23,7 +23,7 @@ from optimize.settings import IDENTITY_FORMAT, search_name
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
 from tisim import InputError
-from tisim.errors import must
+from tisim.errors import abbreviated, must
 from tisim.files import lock, ownership
 from tisim.files.atomic import locked
 from tisim.files.regular_file import file_status
@@ -59,7 +59,7 @@ def resume_or_clear(
     """
     journal, lock_file = f"{file}.journal", f"{file}.lock"
     resumable = any(file_status(folder / name) is not None for name in (file, journal))
-    results = f"what a {command} has found" if resumable else ""
+    results = f"results of a {command}" if resumable else ""
     resume = resumes(folder, command, resumable, results, fresh, overwrite)
     ownership.check(folder, (file, journal, lock_file, *result_files, lock.LOCK), overwrite)
     if resumable and not resume:
@@ -93,11 +93,22 @@ def refuse(folder: Path, command: str, stored: Mapping[str, Any], requested: Map
     old = _leaves(stored)
     new = _leaves(json.loads(canonical(requested)))
     names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-    differences = ", ".join(f"{name} = {old.get(name)} and not {new.get(name)}" for name in names)
-    raise InputError(
-        f"output folder must be without another {command} (or give --out or --overwrite); "
-        f"received {str(folder)!r}, where one has {differences}"
+    # Of a problem file only a hash is kept.
+    differences = "; ".join(
+        "the problem file has changed"
+        if name == "problem_code"
+        else f"{name} is {_shown(old, name)} there and {_shown(new, name)} here"
+        for name in names
     )
+    raise InputError(
+        f"output folder must be free of another {command}; received {str(folder)!r}, which holds one that "
+        f"differs ({differences}). Use another --out, or --overwrite to replace it"
+    )
+
+
+def _shown(leaves: Mapping[str, Any], name: str) -> str:
+    """Return the value of a setting as a message gives it."""
+    return abbreviated(leaves[name]) if name in leaves else "not given"
 
 
 def _leaves(settings: Mapping[str, Any], above: str = "") -> dict[str, Any]:

@@ -1,6 +1,8 @@
 """Files of measurements to which a case is calibrated: those that are refused, and those that make another
 problem."""
 
+import os
+
 import pytest
 
 from cases.case import every
@@ -30,6 +32,11 @@ def check_refused(read, text, message, folder):
     check_message(str(error_info.value))
     with pytest.raises(InputError, match="must be a CSV file that can be read"):
         read(folder / "absent.csv")
+    if hasattr(os, "mkfifo"):
+        # Reading one that nobody writes to would wait for ever.
+        os.mkfifo(folder / "fifo.csv")
+        with pytest.raises(InputError, match="must be a CSV file that can be read; received a fifo"):
+            read(folder / "fifo.csv")
 
 
 def check_another_problem(name, text, calibration, design, folder):

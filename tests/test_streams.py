@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from tisim import console, streams
-from tisim.streams import SafeStream
+from tisim.streams import SafeStream, say
 
 
 class Failing(io.StringIO):
@@ -75,7 +75,7 @@ def test_consoles_and_bars_bear_any_stream(monkeypatch, stream):
 
 
 def test_names_that_would_control_the_terminal_are_printed_as_escapes(capsys):
-    """In text, in tables and in the words of a bar."""
+    """In text, in tables, in the words of a bar and in messages."""
     name = "\x1b[31mRED\x1b[0m\x1b]0;title\x07"
     shown = r"\x1b[31mRED\x1b[0m\x1b]0;title\x07"
     console.out().print(f"scene: {name}\nsecond line")
@@ -84,9 +84,10 @@ def test_names_that_would_control_the_terminal_are_printed_as_escapes(capsys):
     console.out().print(table)
     with console.progress_bar("{task.description}") as bar:
         bar.add_task(name, total=1.0)
+    say(f"line 2 must be a number; received {name}")
     out, err = capsys.readouterr()
     assert out.count(shown) == 2
-    assert r"\x1b[31mRED" in err
+    assert err.count(r"\x1b[31mRED") == 2
     assert "\x1b" not in out + err
     assert out.splitlines()[1] == "second line"
 

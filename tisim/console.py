@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tisim.compiling import is_compiling
-from tisim.streams import safe, say
+from tisim.streams import escaped, safe, say
 
 FILE_WIDTH = 110
 """Width of tables that do not go to a terminal, characters; rich would assume 80."""
@@ -28,18 +28,11 @@ class PrintableConsole(Console):
     """This console prints characters that control a terminal as escapes, such as \\x1b, but for its own."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        return super().render_str(_escaped(text), **options)
+        return super().render_str(escaped(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         for segment in super().render(renderable, options):
-            yield segment if segment.is_control else Segment(_escaped(segment.text), segment.style)
-
-
-def _escaped(text: str) -> str:
-    """Return text with an escape for each character that is not printable, but ends of lines."""
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+            yield segment if segment.is_control else Segment(escaped(segment.text), segment.style)
 
 
 def _console(stream: Any) -> Console:

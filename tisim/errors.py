@@ -34,6 +34,10 @@ class MeshWarning(UserWarning):
     """A mesh has faces that are there twice, or have no area. The scene runs all the same."""
 
 
+class Words(str):
+    """What was received, in words: a message gives it without the quotes that a string gets."""
+
+
 class _Short(reprlib.Repr):
     """This repr bounds the length and the depth of what it returns, however large the value is."""
 
@@ -53,7 +57,7 @@ _short = _Short()
 
 def abbreviated(value: Any) -> str:
     """Return a value as a message repeats it: on one line, with at most LONGEST characters."""
-    return printable(_short.repr(value))
+    return printable(value if isinstance(value, Words) else _short.repr(value))
 
 
 def printable(text: str) -> str:

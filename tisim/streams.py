@@ -81,10 +81,17 @@ def safe(stream: Any) -> SafeStream:
     return stream if isinstance(stream, SafeStream) else SafeStream(stream)
 
 
+def escaped(text: str) -> str:
+    """Return text with an escape for each character that is not printable, except ends of lines."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+
+
 def say(line: str) -> None:
-    """Print a line on standard error, where there is one."""
+    """Print a line on standard error, if there is one; control characters are printed as escapes."""
     error = safe(sys.stderr)
-    error.write(f"{line}\n")
+    error.write(f"{escaped(line)}\n")
     error.flush()
 
 

@@ -22,7 +22,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tisim.errors import InputError, did_you_mean, must
+from tisim.errors import InputError, Words, did_you_mean, must
+from tisim.files import regular_file
 
 QUANTITY_UNITS = {
     "angle_of_repose": "degrees", "discharge_rate": "kg/s", "rebound_ratio": "", "sliding_angle": "degrees",
@@ -55,6 +56,8 @@ Measured = Mapping[str, Measurement]
 def table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[str]]]:
     """Return the heading of a CSV file, one of some of three cells, and its lines; InputError where it is no
     such file."""
+    other = regular_file.irregular(path)
+    must(other is None, str(path), "a CSV file that can be read", Words(other or ""))
     try:
         rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -96,5 +99,5 @@ def measurements(
                 f"{name} of {path} must be a value and an uncertainty; received {','.join(numbers)}"
             ) from None
         measured[name] = Measurement(value, uncertainty)
-    must(bool(measured), f"quantities of {path}", "one or more", "none")
+    must(bool(measured), f"quantities of {path}", "one or more", Words("none"))
     return measured

@@ -58,7 +58,7 @@ class Display:
         pairs = zip(self.problem.objectives, where.best, strict=True)
         if self.problem.several:
             best = "".join(f"  {o.name} {value:.4g} {o.unit}".rstrip() for o, value in pairs)
-            return f"front of {where.designs}  best{best}"
+            return f"front of {where.designs}  ideal point{best}"
         objective, fitness = next(pairs)
         derived = "".join(f"  {name} {of(fitness):.4g}" for name, of in self.problem.derived.items())
         return f"best {objective.name} {fitness:.4g} {objective.unit}".rstrip() + derived

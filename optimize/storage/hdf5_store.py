@@ -22,7 +22,7 @@ import numpy as np
 
 from optimize.storage.record import Record, canonical
 from tisim import InputError
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.files import regular_file
 from tisim.files.checksum import verified, with_checksum
 from tisim.files.superblock import SIGNATURE
@@ -138,7 +138,7 @@ def read_table(file: h5py.File, name: str) -> Hdf5Table:
         name not in damaged_tables(file),
         f"table {name}",
         "whole ('tisim cache --compact' drops it)",
-        "damage",
+        Words("damage"),
     )
     return _read_table(file[name])
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 
 from optimize.storage import hdf5_store
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.checksum import verified
 from tisim.files.regular_file import content, file_status
@@ -55,7 +55,7 @@ def _rebuild(old: bytes) -> bytes:
     """Return a cache file of what is whole in a damaged one; any error when nothing can be read."""
     with h5py.File(io.BytesIO(old), "r") as file:
         by_cache = file.attrs.get("format") == hdf5_store.EVALUATIONS_FORMAT
-        must(by_cache, "file", "written by a cache", "another")
+        must(by_cache, "file", "written by a cache", Words("another"))
         records, _ = hdf5_store.read_rows(file)
         try:
             damaged = hdf5_store.damaged_tables(file)

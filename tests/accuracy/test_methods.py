@@ -423,6 +423,9 @@ def test_what_timings_do_not_tell_apart_is_decided_by_work():
         assert decades(rows)[1e-5] == rows
     apart = [row("a", (0.020, 0.021, 0.022), 1e-5, sums=20.0), spread[1]]
     assert [r.method for r in tied(apart, 1e-4)] == ["b"]
+    # What the table shows to be slower and less accurate is not recommended, whatever its work.
+    beaten = [row("a", (1.05e-3, 1.05e-3), 9.7e-7, sums=20.0), row("b", (6.6e-4, 6.6e-4), 4e-10, sums=90.0)]
+    assert [r.method for r in tied(beaten, 1e-4)] == ["b", "a"]
     # Starts are work too.
     more = replace(spread[0], starts=8)
     assert [r.method for r in tied([more, spread[1]], 1e-4)] == ["b", "a"]

@@ -66,7 +66,7 @@ def test_errors_fall_and_work_rises_with_what_is_asked_for(measured, method):
 
 
 def test_work_is_that_of_the_steppers(measured):
-    """One sum of forces a step for Verlet, one for each iteration for the implicit one."""
+    """One force evaluation a step for Verlet, one for each iteration for the implicit one."""
     for row in measured.line("Verlet, FixedStep: dt"):
         dt = float(row.setting.removeprefix("dt="))
         assert row.steps == np.ceil(DURATION / dt - 1e-9)

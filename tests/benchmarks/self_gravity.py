@@ -98,7 +98,7 @@ def exact(place: np.ndarray, probes: np.ndarray) -> np.ndarray:
 
 
 def errors(numbers: list[int]) -> None:
-    print("start           particles  theta  rms       largest   sum of forces")
+    print("start           particles  theta  rms       largest   force evaluation")
     for n in numbers:
         for name, start in STARTS.items():
             begin = start(np.random.default_rng(1), n)

@@ -191,7 +191,7 @@ def draw(results: list[Point], path: Path) -> None:
             axis.loglog([size(p) for p in line], [p.error for p in line], ms=3, color=COLOURS[k], **style)
         axes[0].lines[-1].set_label(method)
     axes[0].set(xlabel="wall time (s)", ylabel="error of positions", title="343 particles, 0.005 s")
-    axes[1].set(xlabel="sums of forces", title="the same against work")
+    axes[1].set(xlabel="force evaluations", title="the same against work")
     figure.legend(loc="outside lower center", fontsize=8, ncols=4, frameon=False)
     for axis in axes:
         plain(axis)
@@ -218,7 +218,7 @@ def main() -> None:
         began = time.perf_counter()
         for _ in range(20):
             near(start)
-        print(f"one sum of forces by {name}: {(time.perf_counter() - began) / 20 * 1e6:.0f} us")
+        print(f"one force evaluation by {name}: {(time.perf_counter() - began) / 20 * 1e6:.0f} us")
     results = points(start)
     for _ in range(options.repeats + 1):
         for point in results:
@@ -231,7 +231,7 @@ def main() -> None:
         spread = max(point.seconds) - min(point.seconds)
         print(
             f"{point.method:24s} {point.setting:14s} error {point.error:.1e}  {point.median() * 1e3:8.2f} ms "
-            f"(spread {spread * 1e3:.2f})  {point.work:6d} sums of forces"
+            f"(spread {spread * 1e3:.2f})  {point.work:6d} force evaluations"
         )
     for decade in DECADES:
         ours, theirs = fastest(results, True, 10.0**-decade), fastest(results, False, 10.0**-decade)

@@ -258,7 +258,7 @@ def test_wrong_input(tisim, toml, tmp_path):
         (["run", toml, "--frames", 0], "frames must be a whole number, at least 1; received 0"),
         (
             ["run", toml, "--frames", 2, "--every", 1],
-            "recording must be given frames or every; received 'both'",
+            "recording must be given frames or every; received both",
         ),
         (["plot", "none.h5"], "file must be a trajectory.h5 or result.h5 of a run; received 'none.h5'"),
         (["movie", toml], "file must be a trajectory.h5 or result.h5 of a run; received 'flow.toml'"),

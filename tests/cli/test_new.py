@@ -78,14 +78,14 @@ WRONG = [
     ),
     (["effect", "x", "--kind", "trio"], "--kind must be one of pair, external; received 'trio'"),
     (["source", "x", "--kind", "pair"], "--kind must be given for an effect only; received 'pair'"),
-    (["effect", "SoftLaw"], "name must be a name of Python in lower case; received 'SoftLaw'"),
-    (["effect", "class"], "name must be a name of Python in lower case; received 'class'"),
+    (["effect", "SoftLaw"], "name must be a lower-case Python identifier; received 'SoftLaw'"),
+    (["effect", "class"], "name must be a lower-case Python identifier; received 'class'"),
     (["case", "json"], "name must be one that no other module has; received 'json'"),
     (["effect", "gravity"], "name must be one that no other part of scenes has; received 'gravity'"),
     (["stepper", "verlet"], "name must be one that no other part of scenes has; received 'verlet'"),
-    (["operator", "settled"], "file to write must be one that is not there yet; received 'settled.toml'"),
-    (["effect", "there"], "file to write must be one that is not there yet; received 'there.py'"),
-    (["effect", "tested"], "file to write must be one that is not there yet; received 'test_tested.py'"),
+    (["operator", "settled"], "settled.toml must be a new file; it already exists"),
+    (["effect", "there"], "there.py must be a new file; it already exists"),
+    (["effect", "tested"], "test_tested.py must be a new file; it already exists"),
 ]
 
 

@@ -30,7 +30,7 @@ def test_a_run_is_stopped_gone_on_with_and_drawn(tisim, pulled, press_ctrl_c, mo
     own_file("own_laws.py", LAW + "\n")
     code, _, err = tisim(*command)
     how = "(to begin anew, give --out or --fresh)"
-    assert (code, err) == (2, f"checkpoint must be of the same scenes; received 'one of others' {how}\n")
+    assert (code, err) == (2, f"checkpoint must be of the same scenes; received one of others {how}\n")
     own_file("own_laws.py", LAW)
     code, _, err = tisim(*command)
     assert code == 0, err

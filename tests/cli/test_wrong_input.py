@@ -88,7 +88,7 @@ def test_scene_files_that_are_none(tisim, impacts, tmp_path):
         content[: len(content) // 2] + "[": "scene file must be TOML",
         content.replace("duration", "durration"): "must be",
         content.replace("[effects.impact]", "[effects.warp]"): "effects.warp.kind must be one of",
-        "": "scene.particles must be given; received 'nothing'",
+        "": "scene.particles must be given; received nothing",
     }.items():
         (tmp_path / impacts).write_text(text)
         code, _, err = tisim("run", impacts)

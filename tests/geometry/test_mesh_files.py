@@ -251,6 +251,17 @@ def test_what_is_no_regular_file_is_refused(tmp_path, kind, suffix):
         TriangulatedSurface.read(path)
 
 
+@pytest.mark.parametrize("suffix", ["stl", "obj"])
+def test_a_link_to_a_file_of_another_kind_is_not_quoted(tmp_path, suffix):
+    """The scene may be someone else's, and the file private."""
+    (tmp_path / "passwords").write_text("root:secret\n")
+    link = tmp_path / f"drum.{suffix}"
+    link.symlink_to("passwords")
+    with pytest.raises(InputError, match=r"received a link to a file of another kind \(") as fault:
+        TriangulatedSurface.read(link)
+    assert "secret" not in str(fault.value)
+
+
 def test_a_file_too_large_is_refused_unread(tmp_path):
     for suffix in ("stl", "obj", "ply"):
         path = tmp_path / f"sparse.{suffix}"

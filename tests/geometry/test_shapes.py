@@ -298,7 +298,7 @@ WRONG = {
     ),
     HIGH: lambda: geometry.BoxSurface(high=(1, 1, 0)),
     INDEX: lambda: geometry.TriangulatedSurface(vertices=np.eye(3), faces=[[0, 1, 3]]),
-    "triangulated_surface.faces must be triangles with an area; received 'none'": lambda: (
+    "triangulated_surface.faces must be triangles with an area; received none": lambda: (
         geometry.TriangulatedSurface(vertices=np.eye(3), faces=[[0, 1, 1]])
     ),
 }

@@ -323,8 +323,8 @@ def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda path: Recording(path), "recording must be given frames or every; received 'neither'"),
-        (lambda path: Recording(path, 1, 1.0), "recording must be given frames or every; received 'both'"),
+        (lambda path: Recording(path), "recording must be given frames or every; received neither"),
+        (lambda path: Recording(path, 1, 1.0), "recording must be given frames or every; received both"),
         (lambda path: Recording(path, frames=0), "frames must be a whole number, at least 1; received 0"),
         (lambda path: Recording(path, frames=2.5), "frames must be a whole number, at least 1; received 2.5"),
         (lambda path: Recording(path, every="1 s"), "every must be above 0 s, and finite; received '1 s'"),

@@ -303,7 +303,7 @@ WRONG = {
         lambda: InsertionByFlux(flux=1.0, number=1, grains=GRAINS[:1], low=(0, 0, 0), high=(1, 1, 0.1)),
         "insertion_by_flux.high must be at least 0.1",
     ),
-    "a cloud": (lambda: Cloud(number=3, grains=GRAINS), "cloud.grains must be spheres; received 'clumps'"),
+    "a cloud": (lambda: Cloud(number=3, grains=GRAINS), "cloud.grains must be spheres; received clumps"),
     "loose spheres": (
         lambda: Scene(particles=Particles.none(), effects=(SCENES["pour"].effects[3],), duration=1.0),
         r"effects.pour must be used together with effects.rigid_clumps",

@@ -419,7 +419,7 @@ WRONG = {
     ),
     "nothing ever": (
         lambda: Scene(particles=Particles.none(), effects=(Gravity(),), duration=1.0),
-        "particles must be at least one, or put in by an effect such as insertion_by_flux; received 'none'",
+        "particles must be at least one, or put in by an effect such as insertion_by_flux; received none",
     ),
     "rest without weight": (
         lambda: Scene(

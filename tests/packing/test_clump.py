@@ -42,7 +42,7 @@ def test_mass_and_inertia_may_be_given():
 PAIR = {"centres": [(-1, 0, 0), (1, 0, 0)], "radii": [0.5]}
 FLAT = [(1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.5)]
 REFUSED = {
-    "no density": ({}, "clump must be given density, or mass and inertia; received 'none'"),
+    "no density": ({}, "clump must be given density, or mass and inertia; received none"),
     "both": ({"density": 1.0, "mass": 1.0}, "clump must be given density, or mass and inertia"),
     "radii": ({"density": 1.0, "radii": [1, 1, 1]}, r"clump.radii must be one value or 2 of them"),
     "buried": ({"density": 1.0, "radii": [3.0, 0.5]}, "clump must be of spheres none of which lies within"),

@@ -126,14 +126,14 @@ def test_lattice_by_spacing_about_a_centre():
 
 
 WRONG = {
-    "no number": (lambda: Cloud(radius=1.0, density=1.0), "cloud.number must be given; received 'nothing'"),
+    "no number": (lambda: Cloud(radius=1.0, density=1.0), "cloud.number must be given; received nothing"),
     "another number than sites": (
         lambda: Cloud(**VIBRATION, number=344),
         "cloud.number must be 343, as the placement has sites, or left out; received 344",
     ),
     "spacing and size": (
         lambda: Lattice(shape=(2, 2, 2), spacing=1.0, size=(1, 1, 1)),
-        "lattice must be given spacing or size; received 'both'",
+        "lattice must be given spacing or size; received both",
     ),
     "neither": (lambda: Lattice(shape=(2, 2, 2)), "lattice must be given spacing or size"),
     "no sites": (lambda: Lattice(shape=(0, 2, 2), spacing=1.0), "lattice.shape must be at least 1"),

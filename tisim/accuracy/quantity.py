@@ -9,7 +9,7 @@ import numpy as np
 
 from tisim.effects.base import PairEvent
 from tisim.engine.result import Result
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.numerics.statistics import half_width
 from tisim.operators.base import Operator
 from tisim.scene.scene import Scene
@@ -109,7 +109,7 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     random themselves it is the mean square displacement.
     """
     if scene.stepper.random:
-        must(not any(scene.domain.joined()), "quantities", "given for random paths in a box", "none")
+        must(not any(scene.domain.joined()), "quantities", "given for random paths in a box", Words("none"))
         return (Quantity("mean square displacement", mean_square, random=True),)
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
         # Across joined faces a place jumps, and so does a velocity where these move past each other.
@@ -122,5 +122,5 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     starts = [scene.start(scene.seed + k) for k in (0, 1)]
     differ = any(not np.array_equal(starts[0][name], starts[1][name]) for name in ("position", "velocity"))
     rule = "given for a scene with impacts or operators whose start is not random"
-    must(differ, "quantities", rule, "none")
+    must(differ, "quantities", rule, Words("none"))
     return (Quantity("mean kinetic energy", kinetic_energy, random=True),)

@@ -19,7 +19,7 @@ from tisim.accuracy.quantity import Quantity, QuantityEstimate, estimate
 from tisim.accuracy.scene_parts import finest
 from tisim.accuracy.sweep import USUAL_NUMBERS, SettingSweep
 from tisim.engine.result import Result
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.scene.scene import Scene
 
 LARGEST_REFERENCE_ERROR = 0.1
@@ -76,7 +76,7 @@ def attempts(methods: Sequence[SettingSweep], level: float) -> list[ReferenceRun
     level : that of the finest settings of the methods. InputError when none of them converges.
     """
     able = [m for m in methods if m.converges and all(s.numbers == USUAL_NUMBERS for s in m.settings)]
-    must(bool(able), "stepper", "one with an accuracy parameter that its error vanishes with", "none")
+    must(bool(able), "stepper", "one with an accuracy parameter that its error vanishes with", Words("none"))
     best = max(able, key=lambda method: method.base.stepper.order)
     others = [
         m for m in able if type(m.base.stepper) is not type(best.base.stepper) and m.base.stepper.order > 1

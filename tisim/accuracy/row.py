@@ -1,7 +1,8 @@
 """A measured setting, and the choice among them.
 
 Timings that overlap are not told apart: among settings that take the least time as far as can be seen, the
-one with the fewest sums of forces is chosen, which no machine changes.
+one with the fewest force evaluations is chosen, which no machine changes, unless the table shows another to
+be both faster and more accurate.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ class Row:
     python : stepper, and laws and materials that were exchanged, as Python. options : those of ``tisim run``
     that make the setting, as a shell takes them. starts : the number of random starts that all that follows
     is of.
-    seconds : wall seconds of each repeat. steps, sums, rejections : steps, sums of forces and rejected steps
-    of a particle, the mean over particles and starts.
+    seconds : wall seconds of each repeat. steps, sums, rejections : steps, force evaluations and rejected
+    steps of a particle, the mean over particles and starts.
     errors : for each quantity the error, and how far that may be off; both relative.
     failed : why there is no result, or nothing; of a run that was stopped as it took too long ``seconds`` is
     the limit. same : whether it is a cheaper law that makes no difference here to the law it stands for.
@@ -100,15 +101,20 @@ class Row:
 
 def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
     """Return the rows that take least time, as far as timings tell, among those whose error of a quantity is
-    at most this; the one to choose, which takes the least work, is the first."""
+    at most this. The one to choose is the first: it takes the least work of those that no other row beats in
+    both time and error."""
     good = [row for row in rows if row.at_most(quantity) <= error and not row.same]
     if not good:
         return []
     _, latest = min((row.interval for row in good), key=lambda interval: interval[1])
-    return sorted(
-        (row for row in good if row.interval[0] <= latest),
-        key=lambda row: (row.sums * row.starts, row.median),
-    )
+    fast = [row for row in good if row.interval[0] <= latest]
+
+    def beaten(row: Row) -> bool:
+        return any(
+            other.median < row.median and other.at_most(quantity) < row.at_most(quantity) for other in fast
+        )
+
+    return sorted(fast, key=lambda row: (beaten(row), row.sums * row.starts, row.median))
 
 
 def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:

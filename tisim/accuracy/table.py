@@ -17,7 +17,7 @@ from tisim.console import TERMINAL_WIDTH
 
 HEADINGS = (
     "time: the median of the wall seconds; spread: the longest less the shortest of them",
-    "steps, forces, rejected: the steps, sums of forces and rejected steps of a particle",
+    "steps, forces, rejected: the steps, force evaluations and rejected steps of a particle",
     "best for: the error that no other setting meets in less time",
 )
 """What the heads of the table stand for."""

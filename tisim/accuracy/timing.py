@@ -36,14 +36,14 @@ class Timed:
 
     @property
     def work(self) -> tuple[float, float, float]:
-        """The number of steps, of sums of forces and of rejected steps, per particle and start."""
+        """The number of steps, of force evaluations and of rejected steps, per particle and start."""
         steps, sums, rejections = 0.0, 0.0, 0.0
         for result in self.results:
             n, stepper = len(result.start["mass"]), result.scene.stepper
             independent, evaluations = stepper.independent(result.scene.effects), stepper.evaluations
             steps += result.work["particle_steps"] / n
             sums += evaluations(result.work, n, independent)
-            # A rejection is of those that a sum of forces is of: of one particle, or of all.
+            # A rejected step counts as a force evaluation does: of one particle, or of all.
             rejections += evaluations(
                 dict.fromkeys(result.work, result.work.get("rejections", 0)), n, independent
             )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tisim.errors import must
+from tisim.errors import Words, must
 
 STEPS_AT_MOST = 100_000
 """The search ends after so many steps at most; some hundreds are usual."""
@@ -62,7 +62,12 @@ def bounding_ellipsoid(
     scale = float(np.abs(r - middle).max() + size.max()) or 1.0
     x, size = (r - middle) / scale, size / scale
     flat = int((np.linalg.svd(x - x.mean(axis=0), compute_uv=False) > 1e-9).sum())
-    must(bool(size.max() > 0) or flat == 3, "particles", "spheres, or points not all in a plane", "points")
+    must(
+        bool(size.max() > 0) or flat == 3,
+        "particles",
+        "spheres, or points not all in a plane",
+        Words("points"),
+    )
     points, growth = _outermost(x, size), np.inf
     weights = np.full(len(points), 1 / len(points))
     for _ in range(CUTS):

@@ -21,7 +21,8 @@ Name = Annotated[
     str | None,
     typer.Argument(
         metavar="NAME",
-        help="One of them, in full: impact. Or those of a family or a room, a line each: operators, pair. "
+        help="One of them, in full: impact. Or a category, with a line for each of its members: operators, "
+        "pair. "
         "All, without.",
     ),
 ]
@@ -36,11 +37,9 @@ def effects(name: Name = None, plugins: Plugins = None) -> None:
     groups = reference.groups()
     if name is None:
         _print_list(reference.entries())
-        print(
-            f"'tisim effects NAME' explains one, or lists those of a family or a room: {', '.join(groups)}."
-        )
+        print(f"'tisim effects NAME' explains one, or lists a category: {', '.join(groups)}.")
         return
-    # A room may have the name of its first law, such as impact: that is explained, and the others are listed.
+    # A category may have the name of its first law, such as impact: that is explained, and others are listed.
     if name not in groups or name in reference.names():
         out().print(_describe(reference.find(name)))
     if name in groups:

@@ -47,13 +47,14 @@ def new(what: What, name: Name, kind: Kind = None) -> None:
     must(kind is None or what == "effect", "--kind", "given for an effect only", kind)
     must(kind is None or kind in FORCES, "--kind", f"one of {', '.join(FORCES)}", kind)
     must(name.isidentifier() and name == name.lower() and not keyword.iskeyword(name), "name",
-         "a name of Python in lower case", name)  # fmt: skip
+         "a lower-case Python identifier", name)  # fmt: skip
     template = (kind or FORCES[0]) if what == "effect" else what
     files = {Path(f"{name}.py"): f"{template}.txt", Path(f"test_{name}.py"): f"test_{template}.txt"}
     if USES[what] == SCENE_COMMAND:
         files[Path(f"{name}.toml")] = f"scene_{template}.txt"
     for path in files:
-        must(not regular_file.exists(path), "file to write", "one that is not there yet", str(path))
+        if regular_file.exists(path):
+            raise InputError(f"{path} must be a new file; it already exists")
     _check_name(what, name)
     fields = {"name": name, "Class": "".join(word.capitalize() for word in name.split("_"))}
     for path, text in files.items():

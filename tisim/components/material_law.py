@@ -10,7 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Component
 from tisim.components.invalid import text_of, unit_of
 from tisim.components.materials import Material, Materials, Touching
-from tisim.errors import must
+from tisim.errors import Words, must
 
 
 class UsesMaterials(Component):
@@ -51,7 +51,10 @@ class MaterialLaw(UsesMaterials):
 
     def check_materials(self, materials: Materials) -> None:
         must(
-            bool(materials.named) or not self.uses, "materials", f"given, as {self.label} needs them", "none"
+            bool(materials.named) or not self.uses,
+            "materials",
+            f"given, as {self.label} needs them",
+            Words("none"),
         )
         for name in self.uses:
             info = Material.model_fields[name]
@@ -59,7 +62,7 @@ class MaterialLaw(UsesMaterials):
             for pair in materials.touching():
                 for label in pair.lacking(name):
                     rule = f"given ({what}), as {self.label} needs it"
-                    must(False, f"materials.{label}.{name}", rule, "nothing")
+                    must(False, f"materials.{label}.{name}", rule, Words("nothing"))
 
     @property
     def several(self) -> bool:

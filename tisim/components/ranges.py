@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from tisim.errors import must
+from tisim.errors import Words, must
 
 LEAST, MOST = 1e-100, 1e100
 """Lengths (m) and masses (kg) that are not 0 have magnitudes between these."""
@@ -51,7 +51,9 @@ def check_memory(what: str, number: int, bytes_each: float = BYTES) -> None:
 
     there = runtime.memory()
     rule = f"within the {there / 1e9:.0f} GB that this process may have"
-    must(number * bytes_each <= there, f"memory for {what}", rule, f"{number * bytes_each / 1e9:.3g} GB")
+    must(
+        number * bytes_each <= there, f"memory for {what}", rule, Words(f"{number * bytes_each / 1e9:.3g} GB")
+    )
 
 
 def check_resolved(what: str, places: np.ndarray, radius: float) -> None:

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any, TypeVar, get_args
 
 from tisim.components.component import Component
-from tisim.errors import InputError, abbreviated, must, printable
+from tisim.errors import InputError, Words, abbreviated, must, printable
 
 Part = TypeVar("Part", bound=Component)
 HERE = Path()
@@ -41,7 +41,7 @@ def from_dict(base: type[Part], data: Any, where: str, folder: Path = HERE) -> P
     folder : that from which names of files in the data lead; the working directory unless given.
     """
     values: dict[str, Any] = {"kind": data} if isinstance(data, str) else table(data, where)
-    must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
+    must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", Words("nothing"))
     kind = base.named(values.pop("kind"), f"{where}.kind")
     return kind(**_with_parts(kind, values, where, folder))
 

@@ -10,7 +10,7 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.components.ranges import WHOLE
 from tisim.effects.base import Constraint, Effect, PairEvent, Pairwise
-from tisim.errors import InputError, must
+from tisim.errors import InputError, Words, must
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -30,7 +30,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     low, high = scene.domain.bounds()
     if low is not None:
         inside = (start["position"] >= low) & (start["position"] < high) | ~np.array(scene.domain.joined())
-        must(bool(inside.all()), "particles.position", "inside the domain", "a particle outside")
+        must(bool(inside.all()), "particles.position", "inside the domain", Words("a particle outside"))
         check_sides(scene, start)
     field_names = {f.name for f in fields} | SHARED.keys()
     for name in start:
@@ -49,7 +49,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         scene.stepper.control.suits_start(start["radius"], start["velocity"])
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
-        must(rest, "particles.velocity", "0 where particles are fixed", "one that moves")
+        must(rest, "particles.velocity", "0 where particles are fixed", Words("one that moves"))
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             check_field(f, start[f.name], n)
@@ -78,10 +78,10 @@ def check_held(scene: Scene, start: Arrays) -> None:
         if constraint.mark in start or not later:
             held = constraint.held(start, scene.domain)
             rule = f"{constraint.marks()} for some particles, as effects.{constraint.label} holds those"
-            must(later or bool(held.any()), f"particles.{constraint.mark}", rule, "none of it")
+            must(later or bool(held.any()), f"particles.{constraint.mark}", rule, Words("none of it"))
             by += held
         rule = f"held by one of {', '.join(one.label for one in constraints)}"
-        must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max(initial=0)}")
+        must(bool((by <= 1).all()), "particles", rule, Words(f"one held by {by.max(initial=0)}"))
         for effect in scene.effects:
             where = f"quantities of grains of effects.{effect.label}"
             rule = f"without {constraint.mark}, as effects.{constraint.label} holds no grains that are put in"

@@ -11,7 +11,7 @@ from tisim.effects.base import DerivedQuantity
 from tisim.engine.crowding import check_places, warn_of_overlaps
 from tisim.engine.loading import check_field, check_start
 from tisim.engine.monitor import Monitor
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.interactions.loads import FORCE, TORQUE
 from tisim.scene.initial_state import check_sizes
 from tisim.worlds.status import NEVER, WorldStatus
@@ -100,7 +100,12 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
     status, goal, pauses = now["status"].copy(), now["goal"].copy(), s.read("pause_time")
     reason = simulation.monitor.status(w, now).reason
     must(status[w] == WorldStatus.RUNNING, "world to write to", "one that runs", reason)
-    must(now["underway"][w] == 0, "world to write to", "between two steps", "one whose step is under way")
+    must(
+        now["underway"][w] == 0,
+        "world to write to",
+        "between two steps",
+        Words("one whose step is under way"),
+    )
     now[name][w, simulation.in_order(w, now)] = values
     # As at a start, of this world alone.
     for quantity, start in (("approach_time", np.inf), ("fastest", 0.0), ("events", 0)):

@@ -16,7 +16,7 @@ from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
-from tisim.errors import InputError, RunError, is_number, is_whole, must
+from tisim.errors import InputError, RunError, Words, is_number, is_whole, must
 from tisim.neighbours import near_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.placed_together import placed_together
@@ -270,7 +270,7 @@ class Simulation(CompiledWorlds):
 
     def _check_loaded(self) -> None:
         """Raise InputError before the first ``load``."""
-        must(len(self.scenes) > 0, "simulation", "loaded with a scene before that", "none")
+        must(len(self.scenes) > 0, "simulation", "loaded with a scene before that", Words("none"))
 
     def _edited(self, w: int) -> dict[str, str]:
         """Return what has been written to a world besides its scene."""

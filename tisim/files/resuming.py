@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tisim.errors import must
+from tisim.errors import Words, must
 
 
 def resumes(
@@ -23,7 +23,7 @@ def resumes(
     ``--fresh``, False for ``--resume``, None where neither is given.
     """
     place = "output folder"
-    must(fresh is not False or not overwrite, "--overwrite", "given without --resume", "both")
+    must(fresh is not False or not overwrite, "--overwrite", "given without --resume", Words("both"))
     must(fresh is not False or resumable, place, f"one that an interrupted {command} has left", str(folder))
     resume = resumable and not fresh and not overwrite
     must(resume or overwrite or not results, place, f"without {results} (or give --overwrite)", str(folder))

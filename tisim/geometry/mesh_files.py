@@ -71,6 +71,7 @@ class MeshFile:
 
     def __init__(self, path: Path, where: str) -> None:
         self.path, self.where = path, where
+        self.private = False
 
     def read(self) -> Mesh:
         """Return the mesh; raise InputError if the file is not one, or is damaged."""
@@ -78,6 +79,8 @@ class MeshFile:
         other = regular_file.irregular(self.path)
         if other is not None:
             self.refuse("a regular file", other)
+        # A surface of a scene that others wrote may be a link to a private file, which is not quoted.
+        self.private = self.path.resolve().suffix.lower() != self.path.suffix.lower()
         try:
             size = self.path.stat().st_size
             if size > MOST_BYTES:
@@ -96,6 +99,8 @@ class MeshFile:
 
     def refuse(self, rule: str, received: object, line: int | None = None) -> NoReturn:
         text = received if isinstance(received, str) else abbreviated(received)
+        if self.private:
+            text = "a link to a file of another kind"
         at = "" if line is None else f", line {line}"
         message = f"{printable(self.where)} must be {rule}; received {printable(text)} "
         raise InputError(f"{message}({printable(str(self.path))}{at})") from None

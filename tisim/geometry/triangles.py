@@ -11,7 +11,7 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.arrays import Rows, equal
 from tisim.components.component import parameter
-from tisim.errors import MeshWarning, is_number, must, printable
+from tisim.errors import MeshWarning, Words, is_number, must, printable
 from tisim.files import regular_file
 from tisim.geometry.mesh_check import MeshCheck
 from tisim.geometry.mesh_files import MeshFile
@@ -79,7 +79,7 @@ class TriangulatedSurface(Shape):
         rule = f"whole numbers below the number of vertices, {count}"
         must(bool(whole.all()), f"{label}.faces", rule, self.faces[~whole][:1].tolist())
         number = len(self.corners())
-        must(number > 0, f"{label}.faces", "triangles with an area", "none")
+        must(number > 0, f"{label}.faces", "triangles with an area", Words("none"))
         must(number <= MOST_LISTED, f"{label}.faces", f"at most {MOST_LISTED} triangles", number)
         return self
 

@@ -22,7 +22,7 @@ from tisim.backend import runtime
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observer
 from tisim.engine.simulation import Simulation
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.files import checksum
 from tisim.io.checkpoint_columns import check_columns
 from tisim.scene.initial_state import Arrays
@@ -125,7 +125,12 @@ def restore(simulation: Simulation, path: str | Path) -> None:
 def _read(group: h5py.Group, names: Iterable[str]) -> Arrays:
     """Return data sets of a checkpoint by name."""
     for name in names:
-        must(isinstance(group.get(name), h5py.Dataset), "checkpoint", f"one that holds {name}", "one without")
+        must(
+            isinstance(group.get(name), h5py.Dataset),
+            "checkpoint",
+            f"one that holds {name}",
+            Words("one without"),
+        )
     return {name: np.asarray(group[name]) for name in names}
 
 
@@ -147,5 +152,5 @@ class PeriodicCheckpoint(Observer):
 
 def _require_equal(name: str, value: Any, received: Any) -> None:
     if name == "scenes":
-        must(value == received, "checkpoint", "of the same scenes", "one of others")
+        must(value == received, "checkpoint", "of the same scenes", Words("one of others"))
     must(value == received, f"checkpoint's {name}", str(value), received)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tisim.engine.loading import check_field
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.worlds.columns import WORLD_COUNTERS
 from tisim.worlds.fields import Field
 from tisim.worlds.status import WorldStatus
@@ -35,7 +35,7 @@ def check_columns(columns: Columns, own: Columns, fields: Sequence[Field], world
             column.shape == there.shape and column.dtype == there.dtype,
             f"checkpoint's {name}",
             rule,
-            f"{column.dtype}, {column.shape}",
+            Words(f"{column.dtype}, {column.shape}"),
         )
     capacity = own["mass"].shape[1]
     _within(columns, "count", 0, capacity)

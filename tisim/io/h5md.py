@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 from tisim.components.domain import Domain
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.scene.initial_state import Arrays
 from tisim.worlds.fields import Field
 
@@ -154,7 +154,7 @@ def read_scene(file: h5py.File, name: str) -> str:
     dataset = file[f"{SCENES}/{name}"]
     text = dataset[:].tobytes()
     intact = zlib.crc32(text) == dataset.attrs["crc32"]
-    must(intact, "file", "undamaged", "a scene whose checksum does not fit")
+    must(intact, "file", "undamaged", Words("a scene whose checksum does not fit"))
     return text.decode()
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import h5py
 
 from tisim.components import serialization
-from tisim.errors import InputError, must
+from tisim.errors import InputError, Words, must
 from tisim.files import checksum, regular_file
 from tisim.files.superblock import SIGNATURE, SIZE, is_valid
 from tisim.io import checkpoint, recorded_trajectory, run_folder
@@ -62,13 +62,13 @@ def _read_hdf5(path: Path) -> Any:
     with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", READABLE)), "r") as file:
         kind = str(file.attrs.get("format", "none"))
     rule = f"{READABLE}; what is in a search is listed by `tisim cache`"
-    must(kind != SEARCH_FORMAT, "file to read", rule, f"{path}, of a search")
+    must(kind != SEARCH_FORMAT, "file to read", rule, Words(f"{path}, of a search"))
     readers: dict[str, Callable[[Path], Any]] = {
         RESULT: run_folder.read_result,
         checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot,
         storage.COST_FORMAT: storage.rows,
     }
-    must(kind in readers, "file to read", READABLE, f"{path}, of the format {kind}")
+    must(kind in readers, "file to read", READABLE, Words(f"{path}, of the format {kind}"))
     return readers[kind](path)
 
 
@@ -79,7 +79,7 @@ def _read_text(path: Path) -> Any:
         text = content.decode()
         if text.lstrip().startswith("{"):
             versions = json.loads(text)
-            must("tisim" in versions, "file to read", READABLE, f"{path}, JSON of something else")
+            must("tisim" in versions, "file to read", READABLE, Words(f"{path}, JSON of something else"))
             return versions
         table = serialization.parse(text)
     except (UnicodeDecodeError, RecursionError, ValueError) as error:

@@ -16,7 +16,7 @@ from typing import TypeVar
 import h5py
 import numpy as np
 
-from tisim.errors import InputError, must
+from tisim.errors import InputError, Words, must
 from tisim.files import checksum, regular_file
 from tisim.files.shared_hdf5 import SharedFile
 from tisim.files.superblock import SIGNATURE, SIZE, is_valid
@@ -102,7 +102,7 @@ class Frames:
                 intact,
                 "file",
                 "undamaged",
-                f"frame {k}, the checksum of whose time and measures does not fit",
+                Words(f"frame {k}, the checksum of whose time and measures does not fit"),
             )
         return steps[:count], times, checksums, series
 
@@ -135,7 +135,7 @@ class Frames:
             name: np.asarray(element["value"][k])[present] for name, element in group.items() if name != "box"
         }
         intact = h5md.frame_checksum(int(checksums[k, 0]), arrays) == checksums[k, 1]
-        must(intact, "file", "undamaged", f"frame {k}, whose checksum does not fit")
+        must(intact, "file", "undamaged", Words(f"frame {k}, whose checksum does not fit"))
         measures = {name: float(values[k]) for name, values in series.items()}
         return Frame(float(times[k]), int(steps[k]), arrays, measures)
 
@@ -219,7 +219,7 @@ def _open_file(path: Path) -> Iterator[_RetryingFile]:
             yield file
         return
     with SharedFile(real) as source, contextlib.closing(_RetryingFile(source)) as file:
-        must(source.whole, "file", "whole", f"{path}, which is cut short")
+        must(source.whole, "file", "whole", Words(f"{path}, which is cut short"))
         file.read(lambda hdf5: _check_creator(hdf5, path, rule))
         yield file
 

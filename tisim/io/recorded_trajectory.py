@@ -11,7 +11,7 @@ from typing import Self, overload
 
 import numpy as np
 
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.io.reader import Frame, Frames, frames, world_count
 from tisim.scene.scene import Scene
 
@@ -89,7 +89,7 @@ class RecordedTrajectory(RecordedWorld):
 
     def _frames(self) -> AbstractContextManager[Frames]:
         rule = "of one world (or ask worlds[w])"
-        must(len(self.worlds) == 1, "trajectory", rule, f"one of {len(self.worlds)}")
+        must(len(self.worlds) == 1, "trajectory", rule, Words(f"one of {len(self.worlds)}"))
         return self.worlds[0]._frames()
 
     def __enter__(self) -> Self:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tisim.engine.simulation import Simulation
-from tisim.errors import is_number, is_whole, must
+from tisim.errors import Words, is_number, is_whole, must
 from tisim.files import regular_file
 from tisim.io.recorder import Recorder
 from tisim.io.trajectory import Trajectory
@@ -73,6 +73,6 @@ def recording_from_options(
     if frames is None and every is None:
         resumable = resume and regular_file.exists(path)
         rule = "given as before, to go on with trajectory.h5 (or give --fresh)"
-        must(not resumable, "--frames or --every", rule, "neither")
+        must(not resumable, "--frames or --every", rule, Words("neither"))
         return None
     return Recording(path, frames, every)

@@ -28,7 +28,7 @@ import numpy as np
 from tisim import version
 from tisim.engine.assembly import measured, needed_fields
 from tisim.engine.simulation import Simulation
-from tisim.errors import InputError, RunError, must
+from tisim.errors import InputError, RunError, Words, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file, temporary_name
 from tisim.files.growing_hdf5 import GrowingFile
@@ -112,7 +112,9 @@ class Trajectory:
         new = path.with_name(temporary_name(path.name))
         with frames(path) as before, ExitStack() as cleanup:
             same_scene = world_count(path) == 1 and before.scene.digest() == scene.digest()
-            must(same_scene, "trajectory to go on with", "of the same scene", f"{path}, of another one")
+            must(
+                same_scene, "trajectory to go on with", "of the same scene", Words(f"{path}, of another one")
+            )
             cleanup.callback(new.unlink, missing_ok=True)
             trajectory = cls(replace(recording, path=new), [scene], real)
             cleanup.push(trajectory)

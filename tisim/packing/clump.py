@@ -15,7 +15,7 @@ from scipy.special import logsumexp, softmax
 from tisim.components.arrays import Numbers, Rows, equal
 from tisim.components.component import Component, parameter
 from tisim.components.ranges import LEAST, MOST
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.geometry.sphere_union import sphere_union
 
 SYMMETRIC, ROUNDED = 1e-9, 1e-12
@@ -68,14 +68,16 @@ class Clump(Component):
     def _sound(self) -> Self:
         given = [name for name in ("density", "mass", "inertia") if getattr(self, name) is not None]
         rule = "given density, or mass and inertia"
-        must(given in (["density"], ["mass", "inertia"]), "clump", rule, " and ".join(given) or "none")
+        must(given in (["density"], ["mass", "inertia"]), "clump", rule, Words(" and ".join(given) or "none"))
         n = len(self.centres)
         must(len(self.radii) in (1, n), "clump.radii", f"one value or {n} of them", len(self.radii))
         must(bool((self.radii > 0).all()), "clump.radii", "greater than 0", float(self.radii.min()))
         apart = np.linalg.norm(self.centres[:, None] - self.centres, axis=2)
         within = apart + self.radius <= self.radius[:, None]
         np.fill_diagonal(within, False)
-        must(not within.any(), "clump", "of spheres none of which lies within another", "one that does")
+        must(
+            not within.any(), "clump", "of spheres none of which lies within another", Words("one that does")
+        )
         if self.inertia is not None:
             tensor = self.inertia
             symmetric = tensor.shape == (3, 3) and np.allclose(tensor, tensor.T, rtol=SYMMETRIC, atol=0)

@@ -10,7 +10,7 @@ from scipy import special
 
 from tisim.components.component import option, parameter
 from tisim.components.ranges import LEAST
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.packing.sizes import By, SizeDistribution
 
 NODES = 1000
@@ -40,7 +40,7 @@ class TruncatedSizes(SizeDistribution):
         must(self.largest > self.smallest, f"{self.label}.largest", "above smallest", self.largest)
         low, high = self.cumulative(np.array([self.smallest, self.largest]))
         rule = "so that the law has sizes between smallest and largest"
-        must(high - low > 1e-9, self.label, rule, f"{high - low:.3g} of it")
+        must(high - low > 1e-9, self.label, rule, Words(f"{high - low:.3g} of it"))
         return self
 
     def cumulative(self, radius: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tisim.errors import InputError, RunError, must
+from tisim.errors import InputError, RunError, Words, must
 from tisim.files.atomic import replacing
 from tisim.io.reader import Frames
 from tisim.plotting import cloud
@@ -68,7 +68,7 @@ def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
     """Return what writes such a file; raise InputError when there is no movie to make, or nothing to make it
     with."""
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
-    must(len(frames) > 1, "file", "one with 2 frames or more", f"{len(frames)} frames")
+    must(len(frames) > 1, "file", "one with 2 frames or more", Words(f"{len(frames)} frames"))
     if path.suffix == ".mp4":
         if not FFMpegWriter.isAvailable():
             raise InputError(f"movie must be a .gif where ffmpeg is not installed; received {path.name!r}")

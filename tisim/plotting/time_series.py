@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.io.reader import Frames
 from tisim.plotting.cloud import start_and_end
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity, scale_of
@@ -56,7 +56,7 @@ def _mean(values: np.ndarray, mass: np.ndarray) -> np.ndarray:
 
 def clouds(frames: Frames) -> Figure:
     """Draw the first and the last frame side by side. Raise InputError when there is none."""
-    must(len(frames) > 0, "file", "one with a frame", "one with none yet")
+    must(len(frames) > 0, "file", "one with a frame", Words("one with none yet"))
     first, last = frames[0], frames[-1]
     states, times = (first.arrays, last.arrays), (first.time, last.time)
     return start_and_end(states, times, frames.scene, "last frame" if frames.missing else "end")
@@ -77,7 +77,12 @@ def quantities(frames: Frames) -> Figure:
     drawn instead, and in a sheared box what is drawn is relative to the flow. A number of particles that
     stays the same is written above.
     """
-    must(len(frames) > 1, "file", "one with 2 frames or more to draw against time", f"{len(frames)} frames")
+    must(
+        len(frames) > 1,
+        "file",
+        "one with 2 frames or more to draw against time",
+        Words(f"{len(frames)} frames"),
+    )
     series = history(frames)
     changes = bool(np.ptp(series.number))
     figure = empty(7.2, 7.6 if changes else 5.6, pad=0.08)

@@ -12,7 +12,7 @@ from tisim.components.component import Text, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.materials import Materials
 from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.packing.grains import (
     GrainClass,
     check_quantities,
@@ -72,11 +72,13 @@ class Cloud(Start):
         sites = self.placement.sites()
         rule = "given" if sites is None else f"{sites}, as the placement has sites, or left out"
         agrees = self.number is not None if sites is None else self.number in (None, sites)
-        must(agrees, "cloud.number", rule, "nothing" if self.number is None else self.number)
+        must(agrees, "cloud.number", rule, Words("nothing") if self.number is None else self.number)
         given = [name for name in ("radius", "density", "grains") if getattr(self, name)]
         rule = "given radius and density, or grains"
-        must(given in (["radius", "density"], ["grains"]), "cloud", rule, " and ".join(given) or "none")
-        must(all(one.clump is None for one in self.grains), "cloud.grains", "spheres", "clumps")
+        must(
+            given in (["radius", "density"], ["grains"]), "cloud", rule, Words(" and ".join(given) or "none")
+        )
+        must(all(one.clump is None for one in self.grains), "cloud.grains", "spheres", Words("clumps"))
         own = {"position", "velocity", "radius", "mass", "temperature", "id", "material"}
         own |= {"charge"} if self.specific_charge is not None else set()
         for name, value in self.quantities.items():

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.components.component import Component, parameter
-from tisim.errors import must
+from tisim.errors import Words, must
 
 
 class Pulse(Component):
@@ -50,7 +50,10 @@ class Blast(Pulse):
         # Nearer than the rounding of the coordinates, a direction would be one of rounding errors.
         moved = distance > 1e-12 * np.abs(position).max(initial=0.0)
         must(
-            bool(moved.any()), "particles of a blast", "apart from their centre of mass", f"{len(mass)} in it"
+            bool(moved.any()),
+            "particles of a blast",
+            "apart from their centre of mass",
+            Words(f"{len(mass)} in it"),
         )
         speed = np.sqrt(2 * self.energy / mass[moved].sum())
         pulse = np.zeros_like(position)

@@ -10,7 +10,7 @@ from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect
-from tisim.errors import InputError, abbreviated, did_you_mean, must, printable
+from tisim.errors import InputError, Words, abbreviated, did_you_mean, must, printable
 from tisim.scene import plugins
 from tisim.scene.initial_state import Start
 from tisim.steppers.base import Stepper
@@ -43,7 +43,7 @@ def scene_fields(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return what a scene is made of, given its plain data, and the folder from which names of files in it
     lead; InputError names the key that is wrong."""
     rest = serialization.table(data, "scene")
-    must("particles" in rest, "scene.particles", "given", "nothing")
+    must("particles" in rest, "scene.particles", "given", Words("nothing"))
     plugins.load_parts()
     fields: dict[str, Any] = {
         "particles": serialization.from_dict(Start, rest.pop("particles"), "particles", folder)

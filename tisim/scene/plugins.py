@@ -17,7 +17,7 @@ from types import ModuleType
 from tisim import components, effects, operators, packing, scene, sources, steppers
 from tisim.components import serialization
 from tisim.components.component import Component
-from tisim.errors import InputError, must, printable
+from tisim.errors import InputError, Words, must, printable
 from tisim.files import python_file
 
 GROUP = "tisim.effects"
@@ -96,5 +96,5 @@ def _check(module: ModuleType) -> None:
                 other is kind or other.kind() != kind.kind(),
                 f"name of {module.__name__}.{kind.__name__}",
                 "one that no other kind has",
-                f"{kind.kind()}, as {other.__module__}.{other.__name__} has",
+                Words(f"{kind.kind()}, as {other.__module__}.{other.__name__} has"),
             )

@@ -18,7 +18,7 @@ from tisim.components.material_law import UsesMaterials
 from tisim.components.materials import Material, MaterialPair, Materials
 from tisim.components.sheared_box import ShearedBox
 from tisim.effects.base import Effect
-from tisim.errors import InputError, abbreviated, must
+from tisim.errors import InputError, Words, abbreviated, must
 from tisim.files import python_file
 from tisim.scene import plain_data, plugins
 from tisim.scene.initial_state import Arrays, Start
@@ -86,7 +86,7 @@ class Scene(Component):
             effect.suits(self.domain)
             effect.suits_others(self.effects)
         rule = "at least one, or put in by an effect such as insertion_by_flux"
-        must(self.capacity() > 0, "particles", rule, "none")
+        must(self.capacity() > 0, "particles", rule, Words("none"))
         if "stepper" in self.model_fields_set:
             rule = "left out where a stepper is given, which has settings of its own"
             must(self.accuracy == ACCURACY, "scene.accuracy", rule, self.accuracy)

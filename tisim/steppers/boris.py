@@ -35,7 +35,7 @@ class Boris(Stepper):
 
     Forces are those at the middle of the step, F = F_0 + J v, J that of ``velocity_jacobian``. For the
     Lorentz force the middle equation is Boris' rotation: it keeps the speed to rounding whatever the step.
-    There is one sum of forces a step; torques turn particles by one kick, at the middle.
+    There is one force evaluation a step; torques turn particles by one kick, at the middle.
 
     Source: J. P. Boris, Proc. 4th Conf. Numerical Simulation of Plasmas (1970) 3-67; C. K. Birdsall, A. B.
     Langdon, Plasma Physics via Computer Simulation (1985), section 4-3.

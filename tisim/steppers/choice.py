@@ -23,7 +23,7 @@ import numpy as np
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent, PairForce, kinks
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.operators.base import Operator
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
@@ -72,9 +72,9 @@ def choose(
     """
     for effect in effects:
         rule = f"given, as the length of a step is part of the law of effects.{effect.label}"
-        must(not effect.step_dependent, "scene.stepper", rule, "none")
+        must(not effect.step_dependent, "scene.stepper", rule, Words("none"))
         rule = f"given, as effects.{effect.label} puts in particles later, whose sizes are not known here"
-        must(not len(effect.largest_newcomers()["radius"]), "scene.stepper", rule, "none")
+        must(not len(effect.largest_newcomers()["radius"]), "scene.stepper", rule, Words("none"))
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
     steps = {effect.label: effect.critical_step(start, speed, effects) for effect in effects}
@@ -144,7 +144,7 @@ def _meetings(
     for effect in effects:
         rule = f"given, as none steps collisions and effects.{effect.label} together"
         suits = ApproachTime.kind() not in effect.incompatible_controls and not effect.gyrates(effects)
-        must(suits, "scene.stepper", rule, "none")
+        must(suits, "scene.stepper", rule, Words("none"))
     control, events = ApproachTime(), any(isinstance(effect, PairEvent) for effect in effects)
     smallest = float(start["radius"].min(initial=math.inf))
     shortest, longest = control.shortest, control.longest
@@ -173,7 +173,7 @@ def _leapfrog(
     _check_told(steps, f"effects.{why}")
     touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
     rule = f"given, as no critical time step is known for {why}"
-    must(bool(critical) or not touching, "scene.stepper", rule, "none")
+    must(bool(critical) or not touching, "scene.stepper", rule, Words("none"))
     longest, label = leapfrog_step(effects, critical, accuracy)
     # Without a motion that has a critical step the whole is divided, and where something acts once a step or
     # begins on the way.
@@ -183,7 +183,7 @@ def _leapfrog(
     others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
     if gyrates and others:
         rule = f"given, as none steps a magnetic force and effects.{others[0]} to second order"
-        must(False, "scene.stepper", rule, "none")
+        must(False, "scene.stepper", rule, Words("none"))
     stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
     reason = (
         f"a leapfrog, for {why}: steps of {accuracy:g} of the duration, as no critical time step is known"
@@ -246,7 +246,7 @@ def _check_told(steps: Mapping[str, float | None], what: str) -> None:
     """Raise InputError where an effect does not tell its critical step, which one with ``what`` goes by."""
     for label, step in steps.items():
         rule = f"given, as no critical time step is known for effects.{label}, which {what} would need"
-        must(step is not None, "scene.stepper", rule, "none")
+        must(step is not None, "scene.stepper", rule, Words("none"))
 
 
 def _length(step: float) -> float:

@@ -4,10 +4,9 @@ A leapfrog follows a motion of angular frequency omega in steps below the critic
 ones it alternates and grows. From one step to the next such a motion changes the acceleration of a particle
 by omega^2 times its displacement, whatever the law. So the guard needs no knowledge of laws: it compares the
 two. The limit is below half of the critical step, 1/omega, because of forces that fall off with distance,
-such as gravity. Where they throw a particle out of their reach in a single step, the displacement is at least
-what the lost force makes in that step, so (omega dt)^2 is never found above 1; it is near 1 where the force was
-large enough to matter. Laws that ask for their own critical step at each contact, such as those of grains, are
-not asked again.
+such as gravity. Such a force may throw a particle out of its reach in a single step. The displacement is then
+that which the lost force made, so (omega dt)^2 comes out just below 1. Laws that ask for their own critical
+step at each contact, such as those of grains, are not asked again.
 
 Source: M. P. Allen, D. J. Tildesley, Computer Simulation of Liquids (2017), section 3.2.
 """

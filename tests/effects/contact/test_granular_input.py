@@ -46,7 +46,7 @@ WRONG = {
     "material.restitution must be at most 1.0; received 1.5": lambda: material(restitution=1.5),
     "material.friction must be at least 0.0; received -0.1": lambda: material(friction=-0.1),
     "material.friction must be a finite number; received nan": lambda: material(friction=float("nan")),
-    "walls must be given a plane or a surface; received 'none'": lambda: Walls(planes=()),
+    "walls must be given a plane or a surface; received none": lambda: Walls(planes=()),
     "plane.normal must be a direction; received (0.0, 0.0, 0.0)": lambda: Plane(normal=(0, 0, 0)),
     "plane.normal must be a direction; received (0.0, 0.0, 1e-200)": lambda: Plane(normal=(0, 0, 1e-200)),
     f"{ALONE}; received 'walls'": lambda: one(Walls(planes=[Plane()])),
@@ -54,11 +54,11 @@ WRONG = {
     "stepper.control must be one that suits granular, such as fixed_step or that of an implicit "
     "stepper; received 'approach_time'": lambda: one(HERTZ_MINDLIN, stepper=Verlet()),
     "effects.granular must be given once; received 2": lambda: one(HERTZ_MINDLIN, HERTZ_MINDLIN),
-    "materials must be given, as hertz_material needs them; received 'none'": lambda: one(
+    "materials must be given, as hertz_material needs them; received none": lambda: one(
         HERTZ_MINDLIN, materials={}
     ),
     "materials.grain.friction must be given (coefficient mu of friction), as mindlin_force needs it; "
-    "received 'nothing'": lambda: one(HERTZ_MINDLIN, materials=LACKING),
+    "received nothing": lambda: one(HERTZ_MINDLIN, materials=LACKING),
     "material_pairs.grain-clay must be named after two of its materials (grain), as in steel-rubber; "
     "received 'grain-clay'": lambda: one(
         HERTZ_MINDLIN, material_pairs={"grain-clay": MaterialPair(friction=1)}
@@ -73,8 +73,9 @@ WRONG = {
     ),
     "walls.material must be one of the materials of the scene (grain); received 'grian'; did you "
     "mean 'grain'?": lambda: one(HERTZ_MINDLIN, Walls(planes=[Plane()], material="grian")),
-    "granular.tangential must be given, as the resistance to twisting goes by it; "
-    "received 'nothing'": lambda: Granular(twisting=TwistingMarshall()),
+    "granular.tangential must be given, as the resistance to twisting goes by it; received nothing": lambda: (
+        Granular(twisting=TwistingMarshall())
+    ),
     "granular.cohesion must be left out, as jkr is adhesive itself; received 'dmt'": lambda: Granular(
         normal=JKR(), cohesion=DMT()
     ),

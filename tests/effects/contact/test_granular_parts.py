@@ -169,7 +169,7 @@ def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(nam
 
 
 @pytest.mark.slow
-def test_a_contact_that_is_pressed_twisted_eased_and_twisted_back_yields_no_work():
+def test_a_contact_that_is_pressed_twisted_unloaded_and_twisted_back_yields_no_work():
     """Twisted: half of what the spring has lost times the square of the angle is lost."""
     n, angle = 500, 1e-4
     still, down = np.zeros(n), np.linspace(PRESSED, 0.005, n)

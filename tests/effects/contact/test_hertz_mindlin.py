@@ -105,7 +105,7 @@ def test_coulombs_limit_holds_with_the_damping_and_is_left_at_once():
 
 
 def test_a_closed_path_yields_no_work():
-    """Pressed, sheared, eased, sheared back and pressed again: half (S_1 - S_0) u^2 is lost, nothing won."""
+    """Pressed, sheared, unloaded, sheared back and pressed again: half (S_1 - S_0) u^2 is lost, none won."""
     n = 500
     still, down = np.zeros(n), np.linspace(PRESSED, EASED, n)
     overlap = np.concatenate([still + PRESSED, down, still + EASED, down[::-1]])

@@ -151,8 +151,8 @@ def test_command(tmp_path, monkeypatch, capsys):
     runs = len(Cache(store))
     for more, code, message in (
         (["--evaluations", "61", "--repeats", "1"], 0, f"compare.h5, which has {runs} runs"),
-        (["--precision", "f32"], 2, "without another comparison (or give --out or --overwrite); received"),
-        (["--fresh"], 2, "without what a comparison has found (or give --overwrite)"),
+        (["--precision", "f32"], 2, "free of another comparison; received"),
+        (["--fresh"], 2, "without results of a comparison (or give --overwrite)"),
     ):
         with pytest.raises(SystemExit) as exit_:
             main([*command, "--set", "search.ensemble.max_starts=4", "--fresh-starts", "4", *more])

@@ -46,24 +46,27 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     folder = tmp_path / "s"
     assert optimize("--seed", 1)[0] == 0
     first, runs = contents(folder), len(Cache(folder / "search.h5"))
-    rule = "output folder must be without another search (or give --out or --overwrite); received 's'"
+    rule = "output folder must be free of another search; received 's', which holds one that differs"
     for other, differ in {
-        ("--seed", 2): "search.seed = 1 and not 2",
+        ("--seed", 2): "search.seed is 1 there and 2 here",
         ("--seed", 1, "--population", 9, "--set", "search.ensemble.block=2"): (
-            "search.ensemble.block = 6 and not 2, search.options.population = 8 and not 9"
+            "search.ensemble.block is 6 there and 2 here; search.options.population is 8 there and 9 here"
         ),
     }.items():
         code, err = optimize(*other)
-        assert (code, err.strip()) == (2, f"{rule}, where one has {differ}")
+        assert (code, err.strip()) == (
+            2,
+            f"{rule} ({differ}). Use another --out, or --overwrite to replace it",
+        )
         assert contents(folder) == first
     code, err = optimize("--seed", 1, "--generations", 2)
     assert code == 0
     assert f"going on with s/search.h5, which has {runs} runs" in " ".join(err.split())
     assert contents(folder)["best.csv"] != first["best.csv"]
     code, err = optimize("--seed", 2, "--overwrite", "--resume")
-    assert (code, err.strip()) == (2, "--overwrite must be given without --resume; received 'both'")
+    assert (code, err.strip()) == (2, "--overwrite must be given without --resume; received both")
     code, err = optimize("--seed", 2, "--fresh")
-    message = "output folder must be without what a search has found (or give --overwrite); received 's'"
+    message = "output folder must be without results of a search (or give --overwrite); received 's'"
     assert (code, err.strip()) == (2, message)
     code, err = optimize("--seed", 2, "--overwrite", "--target", 1e9, "--generations", 0)
     assert code == 0

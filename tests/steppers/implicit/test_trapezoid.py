@@ -201,7 +201,7 @@ def test_linear_terms_in_velocity_are_solved_exactly():
 
 def test_the_force_of_the_last_iterate_but_one_is_good_enough():
     """A step begins with the force that its last iterate was made with: at any tolerance the error is that of
-    the solved rule, with down to one sum of forces for a step."""
+    the solved rule, with down to one force evaluation for a step."""
     errors, sums = [], []
     for tolerance in (1e-2, 1e-12):
         setup = charged(

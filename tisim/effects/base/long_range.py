@@ -27,7 +27,7 @@ class LongRangeSum(ABC):
 
         They read positions, other fields and derived quantities that are set before; they write nothing but
         the memory of the sum. What they come to may depend neither on the order of parallel work nor on what
-        was there before: it is asked for anew in each sum of forces. The first ones are ``OnOccasion``, as
+        was there before: it is asked for anew in each force evaluation. The first ones are ``OnOccasion``, as
         all sums are that stand several times in a step, and ask for what is repeated. Where positions are not
         finite they must end all the same; what is not finite is left to the forces to show.
         """

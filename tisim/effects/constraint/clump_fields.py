@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation as Turn
 from tisim.components.domain import Domain
 from tisim.effects.base import Field
 from tisim.effects.base.constraint import BODY_MASS
-from tisim.errors import must
+from tisim.errors import Words, must
 
 NO_CLUMP = -1
 """What a particle that is of no clump has as its ``clump``."""
@@ -74,7 +74,7 @@ def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
         rows = ((first, firsts), (member, firsts + number - lead), (size, np.repeat(sizes, sizes)))
         whole = all(np.array_equal(values, right) for values, right in rows)
         whole = whole and np.array_equal(clump, clump[lead]) and len(np.unique(clump)) == len(leads)
-    must(whole, "particles", "those of whole clumps, as Particles.of_clumps makes them", "others")
+    must(whole, "particles", "those of whole clumps, as Particles.of_clumps makes them", Words("others"))
     if len(held):
         _check_bodies(start, domain, held, np.repeat(held[leads], sizes))
 
@@ -99,7 +99,7 @@ def _check_bodies(
         apart = np.where(domain.joined(), apart - turns, apart)
     rule = "where their clumps are, as Particles.of_clumps makes them"
     near = np.linalg.norm(apart, axis=1) <= APART * start["radius"][held]
-    must(bool(near.all()), "particles.position", rule, "one elsewhere")
+    must(bool(near.all()), "particles.position", rule, Words("one elsewhere"))
     lag = start["velocity"][held] - velocity - np.cross(spin, arm)
     fastest = np.linalg.norm(velocity, axis=1).max() + np.linalg.norm(np.cross(spin, arm), axis=1).max()
     alike = np.linalg.norm(lag, axis=1) <= APART * fastest
@@ -107,5 +107,5 @@ def _check_bodies(
         bool(alike.all()),
         "particles.velocity",
         "those of their clumps, as Particles.of_clumps makes them",
-        "others",
+        Words("others"),
     )

@@ -20,7 +20,7 @@ from tisim.effects.contact.wall_ring import Bundling, Doubting
 from tisim.effects.contact.wall_search import CONTACTS, Faces
 from tisim.effects.motion.base import Fixed, Motion, MotionState
 from tisim.effects.motion.resultant import resultant, resultant_units
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.geometry.box import BoxSurface
 from tisim.geometry.cone import ConicalSurface
 from tisim.geometry.cylinder import CylindricalSurface
@@ -47,7 +47,7 @@ class Walls(WallContacts, UsesMaterials, Force):
     it from one triangle to the next. None is felt through the periodic faces of a box: a surface at one must
     go on to the opposite one, as a floor does, or is refused.
 
-    Bodies that move by themselves, or whose forces are told by themselves, are walls of their own names. The
+    Bodies that move by themselves, or whose forces are reported separately, are walls of their own names. The
     result tells the force (N) and the torque (N m) of the grains on the body, about the origin or the centre
     of its rotation, as ``measures["NAME_force_x"]`` and so on, and ``state["NAME_loads"]`` those of the body
     on each grain.
@@ -74,7 +74,7 @@ class Walls(WallContacts, UsesMaterials, Force):
     @model_validator(mode="after")
     def _there(self) -> Walls:
         there = any(getattr(self, name) for name, _ in self.lists()) or self.surface is not None
-        must(there, self.label, "given a plane or a surface", "none")
+        must(there, self.label, "given a plane or a surface", Words("none"))
         return self
 
     def members(self) -> dict[str, Component]:
@@ -105,7 +105,7 @@ class Walls(WallContacts, UsesMaterials, Force):
                     f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
                     f"{'xyz'[axis]}, or go on flat from one to the other: it is not felt through them"
                 )
-                must(False, f"{self.label}.{name}", rule, "one that ends or bends there")
+                must(False, f"{self.label}.{name}", rule, Words("one that ends or bends there"))
 
     def _named_shapes(self) -> Iterator[tuple[str, Shape]]:
         for name, _ in self.lists():

@@ -12,7 +12,7 @@ from scipy.constants import mu_0
 from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint, Effect, PairForce, parameter
 from tisim.effects.magnetic.moment import MOMENT, Moment
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.numerics.quaternions import turned
 from tisim.numerics.random_streams import MOMENTS
 from tisim.operators.base import Operator
@@ -52,7 +52,7 @@ class PermanentMoment(Operator):
         if self.magnetisation == 0:
             return {}
         rule = f"left out, as effects.{self.label}.magnetisation gives it"
-        must("moment" not in start, "particles.moment", rule, "given")
+        must("moment" not in start, "particles.moment", rule, Words("given"))
         draw = np.random.Generator(np.random.Philox(key=[seed, MOMENTS]))
         direction = draw.normal(size=(len(start["radius"]), 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)

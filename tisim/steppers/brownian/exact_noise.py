@@ -7,7 +7,7 @@ from tisim.backend import runtime
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.interactions.pair_sum import PairSum
 from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
@@ -36,7 +36,7 @@ class Exact:
         self.rows = -(-(3 * self.s.capacity + COLUMNS) // TILE_ROWS) * TILE_ROWS
         rule = f"within the {runtime.memory() / 1e9:.0f} GB that this process may have"
         fits = self.bytes() <= runtime.memory()
-        must(fits, "memory for diffusion matrices", rule, f"{self.bytes() / 1e9:.0f} GB")
+        must(fits, "memory for diffusion matrices", rule, Words(f"{self.bytes() / 1e9:.0f} GB"))
         self.matrix = ti.field(self.s.real)
         builder = Builder()
         builder.dense(ti.i, self.s.worlds).dense(ti.jk, (self.rows, self.rows)).place(self.matrix)

@@ -39,7 +39,7 @@ class Collocation(Stepper):
     It is symmetric, as the trapezoidal rule is, which it is for s = 2. The equations are solved by sweeps
     over the stages, each with what is newest of the others. The first sweep starts from the polynomial of the
     last step; what it turns out to be off at one stage tells what it is off at the later ones, so that one or
-    two sweeps are enough: some s - 1 to 2 (s - 1) sums of forces for a step. The part of the force that is
+    two sweeps are enough: some s - 1 to 2 (s - 1) force evaluations for a step. The part of the force that is
     linear in velocity is solved exactly with each stage. Spin is stepped as velocity is. What the first sweep
     starts from is made anew when there have been impacts.
 

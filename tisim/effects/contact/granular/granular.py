@@ -36,7 +36,7 @@ from tisim.effects.contact.granular.parts import (
     TwistingResistance,
 )
 from tisim.effects.contact.granular.spring import carried, midway, projected
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.numerics.vectors import piece
 
 
@@ -107,7 +107,7 @@ class Granular(ContactGuards, GranularContact):
         label = self.label
         wants = self.twisting is not None and self.twisting.needs_tangential
         rule = "given, as the resistance to twisting goes by it"
-        must(self.tangential is not None or not wants, f"{label}.tangential", rule, "nothing")
+        must(self.tangential is not None or not wants, f"{label}.tangential", rule, Words("nothing"))
         double = self.normal.adhesive and self.cohesion is not None
         rule = f"left out, as {self.normal.kind()} is adhesive itself"
         must(not double, f"{label}.cohesion", rule, self.cohesion and self.cohesion.kind())

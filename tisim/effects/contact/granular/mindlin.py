@@ -9,7 +9,7 @@ from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular.parts import TangentialForce
-from tisim.effects.contact.granular.spring import eased, slipping
+from tisim.effects.contact.granular.spring import slipping, unloaded
 
 
 class TangentialSpring(TangentialForce):
@@ -48,13 +48,13 @@ class MindlinForce(TangentialSpring):
         F_t = T + gamma_t u,    dT/dt = S_t u,    |F_t| <= mu N,    S_t = 4 G*/E* S_n
 
     S_t is 8 G* a beside Hertz's force. T turns with the pair; while surfaces slide it is what Coulomb's limit
-    leaves of it; and it falls as S_t does while they are eased, as a spring that is lighter holds less.
-    Without that a contact that is pressed, sheared, eased and sheared back would yield work. It is
+    leaves of it; and it falls as S_t does while they are unloaded, as a spring that is lighter holds less.
+    Without that a contact that is pressed, sheared, unloaded and sheared back would yield work. It is
     ``mindlin_rescale/force`` of LAMMPS.
 
     Source: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259, in the incremental form of O. R. Walton and R. L.
-    Braun, J. Rheol. 30 (1986) 949, eased as by C. Thornton, S. J. Cummins and P. W. Cleary, Powder Technol.
-    210 (2011) 189.
+    Braun, J. Rheol. 30 (1986) 949, unloaded as by C. Thornton, S. J. Cummins and P. W. Cleary, Powder
+    Technol. 210 (2011) 189.
     """
 
     memory: ClassVar[int] = 4
@@ -67,7 +67,7 @@ class MindlinForce(TangentialSpring):
     @ti.func
     def force(self, w, pair, normal, stiffness, damping, limit, sliding, past, dt):
         spring = self.spring(w, pair, stiffness)
-        elastic = eased(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
+        elastic = unloaded(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
         elastic += spring * dt * sliding
         drag = self.dashpot(w, pair, damping) * sliding
         grip, known = slipping(elastic, drag, self.coulomb(w, pair) * limit)

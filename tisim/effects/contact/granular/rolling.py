@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular.parts import RollingResistance
-from tisim.effects.contact.granular.spring import eased, slipping
+from tisim.effects.contact.granular.spring import slipping, unloaded
 
 
 class RollingCDT(RollingResistance):
@@ -46,8 +46,8 @@ class RollingEPSD(RollingResistance):
         k = 9/4 mu_r^2 S_n,    gamma = 2 eta sqrt(k m*)
 
     v_r is R* times the relative spin across the normal. T turns with the pair and falls as k does while it is
-    eased, as the force of ``mindlin_force`` does; past the limit its origin is dragged along. The damping is
-    that of m* on the spring.
+    unloaded, as the force of ``mindlin_force`` does; past the limit its origin is dragged along. The damping
+    is that of m* on the spring.
 
     Source: K. Iwashita and M. Oda, J. Eng. Mech. 124 (1998) 285, as type C of J. Ai, J.-F. Chen, J. M. Rotter
     and J. Y. Ooi, Powder Technol. 206 (2011) 269, who take the inertia of both grains for the damping.
@@ -78,7 +78,7 @@ class RollingEPSD(RollingResistance):
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
         spring = self.spring(w, pair, stiffness)
-        elastic = eased(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
+        elastic = unloaded(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
         elastic += spring * dt * rolling
         drag = self.dashpot(w, pair, stiffness, mass) * rolling
         grip, known = slipping(elastic, drag, self.coulomb(w, pair) * limit)

@@ -85,7 +85,7 @@ def slipping(elastic, drag, limit):
 
 
 @ti.func
-def eased(stiffness, before):
+def unloaded(stiffness, before):
     """Return the part of an elastic force that a spring holds which was stiffer ``before``: at constant force
     more would come back than was put in."""
     return ti.min(stiffness / ti.max(before, NO_GRIP), 1.0)

@@ -7,7 +7,7 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
 from tisim.effects.contact.granular.parts import TwistingResistance
-from tisim.effects.contact.granular.spring import eased
+from tisim.effects.contact.granular.spring import unloaded
 
 
 @ti.func
@@ -23,8 +23,8 @@ class TwistingMarshall(TwistingResistance):
         M = T + gamma_t a^2/2 Omega,    dT/dt = S_t a^2/2 Omega,    |M| <= 2/3 a mu N
 
     S_t, gamma_t and mu are those of the tangential force, a is the radius of the circle, and Omega the
-    relative spin about the normal. T falls as its stiffness does while it is eased; ``twisting marshall`` of
-    LAMMPS remembers the angle.
+    relative spin about the normal. T falls as its stiffness does while it is unloaded; ``twisting marshall``
+    of LAMMPS remembers the angle.
 
     Source: J. S. Marshall, J. Comput. Phys. 228 (2009) 1541.
     """
@@ -47,7 +47,7 @@ class TwistingMarshall(TwistingResistance):
     @ti.func
     def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):
         stiffness = self.spring(w, pair, circle, spring)
-        elastic = eased(stiffness, past[1]) * past[0] + stiffness * dt * twisting
+        elastic = unloaded(stiffness, past[1]) * past[0] + stiffness * dt * twisting
         drag = self.dashpot(w, pair, circle, dashpot) * twisting
         couple, known = _slipping(elastic, drag, self.coulomb(w, pair, circle, friction) * limit)
         return couple, ti.Vector([known, stiffness])
