@@ -1,4 +1,4 @@
-"""Means of random runs, how well they are known, and what may be said of them."""
+"""Statements about means of random runs, for the checks of cases."""
 
 from __future__ import annotations
 
@@ -6,43 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from tisim.numerics.statistics import CONFIDENCE, half_width
-
-
-@dataclass(frozen=True)
-class Mean:
-    """The mean of independent runs, and half the width of its confidence interval (CONFIDENCE)."""
-
-    value: float
-    half: float
-
-    @classmethod
-    def of(cls, runs: ArrayLike) -> Mean:
-        """Return the mean of two runs or more, its interval by Student's t."""
-        return cls(float(np.mean(np.asarray(runs, float))), float(half_width(runs)))
-
-    def minus(self, other: Mean) -> Mean:
-        """Return the difference of two independent means."""
-        return Mean(self.value - other.value, float(np.hypot(self.half, other.half)))
-
-    def over(self, other: Mean) -> Mean:
-        """Return the ratio of two independent means, to first order in their errors."""
-        ratio = self.value / other.value
-        return Mean(ratio, abs(ratio) * float(np.hypot(self.half / self.value, other.half / other.value)))
-
-    def __str__(self) -> str:
-        """Return it with two digits of the interval, and none of the mean that are beyond those."""
-        if not (np.isfinite([self.value, self.half]).all() and self.half > 0):
-            return f"{self.value:.4g} ± {self.half:.2g}"
-        # Of the interval as it is rounded, which may have a digit more before the point.
-        digits = 1 - int(np.floor(np.log10(float(f"{self.half:.1e}"))))
-        if -4 < digits < 6:
-            value, half = (f"{round(one, digits):.{max(digits, 0)}f}" for one in (self.value, self.half))
-            return f"{value} ± {half}"
-        beyond = int(np.floor(np.log10(abs(self.value)))) + digits if self.value else 0
-        return f"{self.value:.{max(beyond + 1, 1)}g} ± {self.half:.2g}"
+from tisim.analysis import Mean
+from tisim.numerics.statistics import CONFIDENCE
 
 
 @dataclass(frozen=True)

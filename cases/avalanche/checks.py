@@ -15,8 +15,9 @@ from cases.avalanche.scene import DIAMETERS, FLUX, RELAXATION, magnetism
 from cases.avalanche.sizes import DEFAULT
 from cases.avalanche.stages import Avalanche, avalanches
 from cases.case import Check
-from cases.statistics import Claim, Mean, Shown
+from cases.statistics import Claim, Shown
 from tisim import Particles, Result, Scene, run
+from tisim.analysis import Mean
 from tisim.steppers import FixedStep, Verlet
 
 SEEDS = 3

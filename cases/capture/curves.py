@@ -23,8 +23,8 @@ from cases.capture.statistics import (
     mean,
     results,
 )
-from cases.statistics import Mean
 from tisim import Result
+from tisim.analysis import Mean
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.plotting.style import empty, legend_beside, letters, plain
 

@@ -16,8 +16,9 @@ import numpy as np
 from cases.capture import scene as capture
 from cases.case import Check
 from cases.runs import sound
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim
 from tisim import Result, Scene, run
+from tisim.analysis import Mean
 from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from cases.cascade.capture_times import CAPTURED_SHARE, captured_at, time_to
 from cases.cascade.scene import STAGE, Cascade, Orientation
 from cases.cascade.statistics import OFF, ORIENTATIONS, PUBLISHED_TIMES, RANDOM
-from cases.statistics import Mean
+from tisim.analysis import Mean
 from tisim.engine.batches import Progress
 from tisim.plotting.style import empty, legend_beside, letters, plain
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 from cases.capture.statistics import CHECK_REPEATS
 from cases.cascade.capture_times import CAPTURED_SHARE, captured_at, time_to
 from cases.cascade.scene import STAGE, Cascade, Orientation
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim
+from tisim.analysis import Mean
 
 PUBLISHED_TIMES = {25: (1100.0, 500.0), 125: (12.5, 5.5)}
 """The time to 90 %, s, of random and optimal cascades by radius in nm (B16 section 6.4.5)."""

@@ -22,7 +22,8 @@ from cases.coalescence.regime import COMPARED, regime
 from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
 from cases.coalescence.scaling import critical_spin, mean_density
 from cases.coalescence.scene import DEFAULT, scene
-from cases.statistics import Claim, Mean, Shown
+from cases.statistics import Claim, Shown
+from tisim.analysis import Mean
 
 ROUNDING = 1e-11
 """Momenta may be off by so much of the sum of what the grains have."""

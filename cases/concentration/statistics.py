@@ -11,9 +11,9 @@ from cases.capture.statistics import grouped
 from cases.case import Check
 from cases.concentration import scene as concentration
 from cases.concentration.scene import chain_length, coupling
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim
 from tisim import Result, RunError
-from tisim.analysis import head_to_tail, labels, mean_size, near
+from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 from tisim.scene.initial_state import Arrays
 
 GAMMA = {25: 1.0, 125: 825.0}

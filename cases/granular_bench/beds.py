@@ -22,8 +22,8 @@ from scipy.constants import g as STANDARD_GRAVITY
 from cases.granular_bench.measures import discharge, heap, repose
 from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 from cases.runs import sound
-from cases.statistics import Mean
 from tisim import Result, run
+from tisim.analysis import Mean
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, panel, walls_at
 from tisim.plotting.style import empty, letters, plain

@@ -14,8 +14,9 @@ from cases.mrf_shear.regime import regime
 from cases.mrf_shear.runs import cells, paired
 from cases.mrf_shear.scene import LOWER, RATES, UPPER
 from cases.runs import overlap
-from cases.statistics import Claim, Mean, Shown
+from cases.statistics import Claim, Shown
 from tisim import Result
+from tisim.analysis import Mean
 
 CHECK_STARTS = 3
 """Each setting is run from so many starts."""

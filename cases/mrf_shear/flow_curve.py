@@ -18,9 +18,8 @@ from cases.mrf_shear.grains import mixture
 from cases.mrf_shear.measures import flux, shear_rate, shear_stress
 from cases.mrf_shear.runs import Settings, cells
 from cases.mrf_shear.scene import RATES
-from cases.statistics import Mean
 from tisim import Result
-from tisim.analysis import BinghamFit, Estimate, fit_bingham
+from tisim.analysis import BinghamFit, Estimate, Mean, fit_bingham
 from tisim.effects import CARBONYL_IRON
 from tisim.engine.batches import Progress
 

@@ -10,8 +10,8 @@ import numpy as np
 from cases.mrf_shear.measures import shear_stress
 from cases.mrf_shear.scene import MAGNETISING_TIME, scene
 from cases.runs import sound
-from cases.statistics import Mean
 from tisim import Result, Scene, run
+from tisim.analysis import Mean
 from tisim.engine.batches import Progress
 
 Settings = Mapping[str, Any]

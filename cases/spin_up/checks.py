@@ -14,7 +14,8 @@ from cases.spin_up.published import DEFORMATION, DISRUPTION
 from cases.spin_up.regime import regime
 from cases.spin_up.scene import DEFAULT
 from cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
-from cases.statistics import Claim, Mean, Shown
+from cases.statistics import Claim, Shown
+from tisim.analysis import Mean
 
 ROUNDING = 1e-11
 """Momenta may be off by so much of the sum of what the grains have."""

@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cases.case import Check
-from cases.statistics import Claim, Mean, Shown
+from cases.statistics import Claim, Shown
 from cases.valve.measures import drag_pressure, held_pressure, unhindered_rate
 from cases.valve.runs import ARRESTED, Flow, left, left_of
 from cases.valve.sizes import GRADIENT, LENGTH
 from cases.valve.studies import ValveRuns, by_throat
+from tisim.analysis import Mean
 
 STARTS = 6
 """Each valve is run from so many starts; the narrow one, in the field and without one, from twice as many,

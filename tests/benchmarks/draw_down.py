@@ -21,7 +21,7 @@ import numpy as np
 
 import tisim
 from cases.granular_bench.problem import EXAMPLES, KNOWN, SIMULATED, UNCERTAINTIES, misfit, other_runs
-from cases.statistics import Mean
+from tisim.analysis import Mean
 
 FRICTIONS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 ROLLING_FRICTIONS = (0.19, 0.23, 0.27, 0.31, 0.35)

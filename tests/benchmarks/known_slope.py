@@ -17,7 +17,7 @@ import numpy as np
 import tisim
 from cases.avalanche.measures import repose
 from cases.avalanche.problem import EXAMPLE, KNOWN, other_runs
-from cases.statistics import Mean
+from tisim.analysis import Mean
 
 
 def main() -> None:

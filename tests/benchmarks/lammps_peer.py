@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from cases.statistics import Mean
+from tisim.analysis import Mean
 from tisim.numerics.statistics import half_width
 
 State = dict[str, np.ndarray]

@@ -20,7 +20,7 @@ import tisim
 from cases.mrf_shear.flow_curve import AS_PUBLISHED, MIXED, VARIATIONS, Curve
 from cases.mrf_shear.runs import grouped
 from cases.mrf_shear.scene import RATES, SEARCHED, SWEPT, scene
-from cases.statistics import Mean
+from tisim.analysis import Mean
 
 
 def main() -> None:

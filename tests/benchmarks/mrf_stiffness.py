@@ -21,7 +21,7 @@ from cases.mrf_shear.grains import LARGE_RADIUS
 from cases.mrf_shear.measures import shear_stress
 from cases.mrf_shear.scene import SEARCHED, impact_step, scene
 from cases.runs import overlap, sound
-from cases.statistics import Mean
+from tisim.analysis import Mean
 
 
 def main() -> None:

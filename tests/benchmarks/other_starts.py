@@ -20,9 +20,9 @@ import numpy as np
 import tisim
 from cases.case import every
 from cases.runs import OTHER_STARTS
-from cases.statistics import Mean
 from optimize import Problem
 from tisim import Result
+from tisim.analysis import Mean
 
 
 def designs(problem: Problem, file: Path, most: int) -> list[dict[str, float]]:

@@ -80,7 +80,7 @@ WRONG = {
     "particles.material must be one, or 2 of them; received 3": lambda: two((0, 1, 1)),
     "particles.material must be names or numbers; received 0.5": lambda: two(0.5),
     "materials.rubber.young must be given (Young's modulus E, Pa), as hertz_material needs it; received "
-    "'nothing'": lambda: two(materials={"steel": STEEL, "rubber": Material(poisson=0.4)}),
+    "nothing": lambda: two(materials={"steel": STEEL, "rubber": Material(poisson=0.4)}),
 }
 
 

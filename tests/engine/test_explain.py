@@ -21,7 +21,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.components.materials import Materials
 from tisim.effects import Granular, MindlinForce, RollingEPSD, Rotation, Walls
 from tisim.engine.allocation import Allocation
-from tisim.engine.explain import explain, known_effects, render
+from tisim.engine.explain import brief, explain, known_effects, render
 from tisim.engine.explained_parts import explained, explained_materials
 from tisim.geometry import Plane
 from tisim.interactions.spatial_sort import SORTED_FROM
@@ -113,6 +113,18 @@ def test_memory_beside_the_state_is_what_is_allocated_for_a_step(kind):
     assert known == sum(tree.bytes for tree in beside) > 0
     for tree in trees:
         tree.destroy()
+
+
+def test_the_brief_form_fits_a_screen_and_counts_the_rest():
+    explanation = explain(agglomeration(BEST, 1, grains=60))
+    stream = io.StringIO()
+    Console(file=stream, width=100).print(brief(explanation))
+    output = stream.getvalue()
+    assert "hardness = 265480 Pa" in output
+    assert "heat_capacity = 1796.3 J/(kg K)" in output
+    assert f"{len(explanation.absent_effects)} other effects of tisim" in output
+    assert "temperature" not in output.split("Not compiled")[1]
+    assert len(output.splitlines()) < 40 < len(text(explanation).splitlines())
 
 
 def test_parameters_have_units_and_sources():

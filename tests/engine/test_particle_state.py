@@ -80,6 +80,7 @@ def test_a_world_written_to_goes_on_as_one_that_starts_so():
     simulation.run(steps=130)
     same(untouched, simulation.results()[0])
     assert "edited" not in simulation.results()[0].settings
+    assert simulation.results()[0].start["id"].tolist() == list(range(len(result.start["mass"])))
 
 
 def test_forces_are_those_of_what_was_written():

@@ -326,6 +326,43 @@ def elastic_grains(draw):
 
 
 @family
+def adhesive_grains(draw):
+    """Two elastic grains that adhere, as DMT or JKR, hit head on and part: of DMT the energy stays, of JKR
+    the work is lost that it takes to part them beyond the touch."""
+    radius, _, mass, _ = grains_of(draw)
+    young, energy = decades(draw, 1e6, 1e8), decades(draw, 1e-4, 3e-2) * radius / 1e-4
+    reduced, mean, soft = mass / 2, radius / 2, 0.5 * young / (1 - 0.25**2)
+    # JKR's curve between the touch and its end, by the circle of contact.
+    ratio = np.pi * energy / soft
+    circle = np.geomspace((mean**2 * ratio / 4) ** (1 / 3), (4 * mean**2 * ratio) ** (1 / 3), 20_001)
+    gap = 2 * np.sqrt(ratio * circle) - circle**2 / mean
+    pull = 4 * soft * np.sqrt(ratio * circle**3) - 4 / 3 * soft * circle**3 / mean
+    parting = float(np.sum(0.5 * (pull[1:] + pull[:-1]) * -np.diff(gap)))
+    jkr = draw.uniform() < 0.5
+    lost = parting if jkr else 0.0
+    adhesion = 4 * np.pi * energy * mean * (3 * np.pi * energy / (soft * mean)) ** (2 / 3) * mean
+    before = max(adhesion * decades(draw, 0.1, 1e3), 1.3 * lost)
+    speed = np.sqrt(2 * before / reduced)
+    law = laws.Granular(normal=laws.JKR()) if jkr else laws.Granular(cohesion=laws.DMT())
+    # Long enough for what is left of the speed, and for some swings.
+    slowest = speed * np.sqrt(1 - lost / before)
+    scene = tisim.Scene(
+        particles=particles(
+            [[-1.02 * radius, 0, 0], [1.02 * radius, 0, 0]], [[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]],
+            radius, mass,
+        ),
+        materials={"grain": tisim.Material(young=young, poisson=0.25, surface_energy=energy)},
+        effects=(law,),
+        duration=0.04 * radius / speed + 0.1 * radius / slowest + 30 * np.sqrt(mass / (young * radius)),
+    )  # fmt: skip
+
+    def error(result):
+        return float(abs(kinetic(result.state) - (before - lost)) / max(before, adhesion))
+
+    return scene, error
+
+
+@family
 def damped_grains(draw):
     """Two damped grains hit each other head on: their restitution is that of the material."""
     radius, rho, mass, young = grains_of(draw)

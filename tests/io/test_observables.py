@@ -96,7 +96,7 @@ def test_a_scene_in_which_nothing_is_measured_has_none(tmp_path):
 def test_a_number_that_is_damaged_is_refused(file):
     with h5py.File(file, "r+") as damaged:
         damaged["observables/all/floor_force_z/value"][2] += 1e-9
-    with pytest.raises(InputError, match="undamaged; received 'frame 2"), frames(file) as sequence:
+    with pytest.raises(InputError, match="undamaged; received frame 2"), frames(file) as sequence:
         len(sequence)
 
 

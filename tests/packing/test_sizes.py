@@ -223,7 +223,7 @@ WRONG = {
     ),
     "both": (
         lambda: Cloud(number=1, radius=1.0, density=1.0, grains=MIXTURE),
-        "cloud must be given radius and density, or grains; received 'radius and density and grains'",
+        "cloud must be given radius and density, or grains; received radius and density and grains",
     ),
     "a number for a material": (
         lambda: Cloud(

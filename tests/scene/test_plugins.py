@@ -73,7 +73,7 @@ def test_a_name_that_is_taken_is_refused_and_nothing_of_the_file_is_known(own_fi
     plugins.load(own_file("own_laws.py", LAW))
     path = own_file("more_laws.py", LAW.replace("Pull", name))
     message = (
-        rf"^name of more_laws.{name} must be one that no other .*; received '{name.lower()}, as {other} has'"
+        rf"^name of more_laws.{name} must be one that no other .*; received {name.lower()}, as {other} has"
     )
     with pytest.raises(InputError, match=message):
         plugins.load(path)

@@ -31,6 +31,7 @@ from .gravitation import angular_momentum as angular_momentum
 from .gravitation import gravitational_energy as gravitational_energy
 from .gravitation import virial_ratio as virial_ratio
 from .heap import angle_of_repose as angle_of_repose
+from .mean import Mean as Mean
 from .profiles import granular_temperature as granular_temperature
 from .profiles import layer_means as layer_means
 from .radial_distribution import radial_distribution as radial_distribution

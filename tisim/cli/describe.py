@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
 from rich.text import Text
 
 from tisim.backend import runtime
@@ -24,6 +27,9 @@ from tisim.errors import RunError
 
 VERDICTS = {True: Text("pass", "green"), False: Text("FAIL", "bold red"), None: Text("")}
 """What is printed of a check that holds, of one that does not, and of a number that is only shown."""
+Everything = Annotated[
+    bool, typer.Option("--all", help="Also memory, phases of a step, sources, and what is not compiled.")
+]
 
 
 def cases() -> None:
@@ -48,15 +54,16 @@ def cases() -> None:
 def explain(
     target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
     size: Size = None, device: Device = "cpu", precision: Precision = "f64", plugins: Plugins = None,
+    everything: Everything = False,
 ) -> None:  # fmt: skip
-    """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
-    from tisim.engine.explain import explain, render
+    """Describe a scene: its effects, materials, stepper and critical time steps, and the size of the rest."""
+    from tisim.engine.explain import brief, explain, render
 
     runtime.init(device, precision)
     _, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
     with err().status("compiling"):
         explanation = explain(scene)
-    out().print(render(explanation))
+    out().print(render(explanation) if everything else brief(explanation))
 
 
 def check(

@@ -71,8 +71,9 @@ class ContactProperties(Component):
 
 
 HARMONIC = ("stiffness", "rolling_stiffness", "twisting_stiffness")
-"""These properties of two materials are mixed by the harmonic mean, as springs in a row are; the others are
-mixed by the geometric one."""
+"""These properties of two materials are mixed by the harmonic mean, 2 k_i k_j / (k_i + k_j), twice the
+stiffness of two springs in series: two grains of one material then touch with its own k. The others are mixed
+by the geometric mean."""
 
 
 class Material(ContactProperties):

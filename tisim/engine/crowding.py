@@ -33,7 +33,7 @@ SAMPLE = 64
 """Where many overlap their pairs are estimated by so many particles."""
 MOST_PAIRS = 2_000_000
 """Above this number, overlapping pairs are counted but not examined one by one."""
-MOST_LISTED = 1000
+MOST_NEAR = 1000
 """A skin by which a particle lists more others than this, in lists of more than MOST_PAIRS, is refused: going
 through such lists takes longer than any list lasts."""
 
@@ -66,8 +66,8 @@ def check_skin(scene: Scene, start: Arrays) -> None:
     crowd = _Crowd(scene, start)
     sample = range(0, crowd.number, -(-crowd.number // SAMPLE))
     each = float(np.mean([crowd.overlapped(i, scene.skin)[0] for i in sample]))
-    if each > MOST_LISTED and 0.5 * each * crowd.number > MOST_PAIRS:
-        rule = f"so small that a particle has at most {MOST_LISTED} others within it"
+    if each > MOST_NEAR and 0.5 * each * crowd.number > MOST_PAIRS:
+        rule = f"so small that a particle has at most {MOST_NEAR} others within it"
         received = f"{scene.skin:g} m, within which each has about {each:.0f} of {crowd.number} particles"
         raise InputError(f"scene.skin must be {rule}; received {received}")
 

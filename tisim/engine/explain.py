@@ -133,14 +133,41 @@ def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tu
         yield name, ", ".join(kinds_)
 
 
-def render(explanation: Explanation) -> RenderableType:
-    """Return the explanation for a terminal."""
-    head = Text.assemble(
+def brief(explanation: Explanation) -> RenderableType:
+    """Return the explanation for one screen of a terminal: effects and materials with their parameters, the
+    stepper, and counts of the rest."""
+    made_of = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
+    made_of.add_column(no_wrap=True)
+    made_of.add_column(overflow="fold")
+    parts = (*explanation.effects, explanation.others[0], *explanation.materials)
+    for part in (one for whole in parts for one in whole.all()):
+        made_of.add_row(Text(part.name, "bold"), part.summary)
+        if part.parameters:
+            values = (
+                f"{name} = {value} {unit}".rstrip()
+                for name, value, unit, _ in part.parameters
+                if value not in ("none", "0 in all")
+            )
+            made_of.add_row("", Text("; ".join(values), "dim"))
+    absent = (
+        f"Not compiled, nothing allocated: {len(explanation.absent_effects)} other effects of tisim, "
+        f"{len(explanation.absent_fields)} fields"
+    )
+    more = "--all lists them, the memory, the phases of a step, and the source of each part"
+    return Group(_head(explanation), "", _time_steps(explanation), "", made_of, "", absent, more)
+
+
+def _head(explanation: Explanation) -> Text:
+    return Text.assemble(
         (explanation.name, "bold"),
         f": {explanation.particles} particles, room for {explanation.capacity}; {explanation.precision}; "
         f"schedule '{explanation.schedule}'; {_bytes(explanation.bytes)} per world; "
         f"at least {explanation.steps:.3g} steps",
     )
+
+
+def render(explanation: Explanation) -> RenderableType:
+    """Return the whole explanation for a terminal."""
     what = _table("It has", "effect", "what it is", "source")
     for whole in (*explanation.effects, *explanation.others):
         for part in whole.all():
@@ -161,7 +188,7 @@ def render(explanation: Explanation) -> RenderableType:
     left_out = absent if explanation.absent_effects else Text("It leaves out no effect that tisim knows.")
     of_materials = (materials, "") if explanation.materials else ()
     return Group(
-        head,
+        _head(explanation),
         "",
         _time_steps(explanation),
         "",

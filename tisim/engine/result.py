@@ -42,7 +42,8 @@ class Result:
 
     state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, that
         of the last good step; for particles that do not feel each other and take implicit or Brownian steps
-        of their own, of the last good step of the particle that failed. start : the same at the start.
+        of their own, of the last good step of the particle that failed. start : the same at the start,
+        where ids are numbers from 0 in the order of the arrays.
     time : s, of ``state``. work : counts until then (steps, particle_steps, and what the effects count).
         measures : quantities of the world that its effects keep, at the end. wall_s : wall seconds of
         the batch that this world was part of, per world; set-up, compilation and observers are not

@@ -238,7 +238,7 @@ class Simulation(CompiledWorlds):
                 Result(
                     scene=self.scenes[w],
                     state=state,
-                    start=self.starts[w],
+                    start={**self.starts[w], "id": np.arange(len(self.starts[w]["mass"]))},
                     time=float(good["time"][w]),
                     work={name: int(count[w]) for name, count in counts.items()},
                     status=self.monitor.status(w, now),

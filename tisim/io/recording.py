@@ -30,7 +30,7 @@ class Recording:
     every: float | None = None
 
     def __post_init__(self) -> None:
-        received = "both" if self.every is not None else "neither"
+        received = Words("both" if self.every is not None else "neither")
         must((self.frames is None) != (self.every is None), "recording", "given frames or every", received)
         must(
             self.frames is None or is_whole(self.frames, 1),

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import PARTICLES, check_direction, check_resolved
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.geometry.directions import along_axis
 from tisim.packing import region
 from tisim.packing.random_sequential import place
@@ -138,7 +138,7 @@ class Lattice(Placement):
         must(min(self.shape) > 0, "lattice.shape", "at least 1 in each direction", self.shape)
         rule = f"of at most {PARTICLES:.0e} sites together"
         must(self.sites() <= PARTICLES, "lattice.shape", rule, self.shape)
-        received = "both" if self.size is not None else "neither"
+        received = Words("both" if self.size is not None else "neither")
         must((self.spacing is None) != (self.size is None), "lattice", "given spacing or size", received)
         for n, length in zip(self.shape, self.size or (), strict=False):
             rule = "above 0 along an axis with several sites, and 0 along others"

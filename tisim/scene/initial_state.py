@@ -14,7 +14,7 @@ from tisim.components.domain import Box, Domain, Open
 from tisim.components.materials import Materials
 from tisim.components.plain_numbers import DEEPEST, broken_rule, plain
 from tisim.components.ranges import MOST, limits
-from tisim.errors import InputError, abbreviated, must
+from tisim.errors import InputError, Words, abbreviated, must
 from tisim.packing.clump import Clump, clump_columns, sphere_columns
 from tisim.packing.tried_places import Packing
 
@@ -217,7 +217,7 @@ class Particles(Start):
         arrays = {
             name: self._column(name, getattr(self, name), n) for name in ("position", "velocity", "radius")
         }
-        received = "both" if self.mass is not None else "neither"
+        received = Words("both" if self.mass is not None else "neither")
         must((self.mass is None) != (self.density is None), "particles", "given mass or density", received)
         farthest = float(np.abs(arrays["position"]).max(initial=0.0))
         must(farthest <= MOST, "particles.position", f"at most {MOST:g} m from the origin", farthest)

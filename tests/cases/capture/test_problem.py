@@ -6,7 +6,7 @@ import pytest
 from cases.capture import problem as filters
 from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
 from cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim
 from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.evaluation.runs import start_seed
 from optimize.report.comparison import FRESH
@@ -14,6 +14,7 @@ from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
 from tisim import InputError, Result, Status, run
+from tisim.analysis import Mean
 from tisim.sources import MagneticCylinders, MagneticField
 
 FIBRES = {"flux": 0.8, "field_angle": 90.0, "aspect": 2.5, "number": 8.2, "spacing": 3.0}

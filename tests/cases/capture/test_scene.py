@@ -8,8 +8,9 @@ import pytest
 
 from cases.capture import CASE, curves, figures, statistics
 from cases.capture import scene as capture
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim
 from tisim import Recording, run
+from tisim.analysis import Mean
 from tisim.io.reader import frames
 
 

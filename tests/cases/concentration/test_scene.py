@@ -19,9 +19,9 @@ from cases.concentration.statistics import (
     held_fraction,
     results,
 )
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim
 from tisim import Particles, RunError, Simulation, run
-from tisim.analysis import head_to_tail, labels, mean_size, near
+from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 
 
 @pytest.mark.parametrize("angle", [0.0, 90.0])

@@ -22,7 +22,7 @@ from cases.mrf_shear.regime import approach_time, magnetisation, mason_number, r
 from cases.mrf_shear.runs import paired
 from cases.mrf_shear.scene import LOWER, UPPER, scene
 from cases.runs import overlap
-from cases.statistics import Mean
+from tisim.analysis import Mean
 
 R, UM = LARGE_RADIUS, 1e-6
 CELL = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0)

@@ -132,6 +132,44 @@ def test_a_top_spun_about_its_intermediate_axis_flips():
     np.testing.assert_allclose(along, turns[:, 1] / PEAR.body.moments[1] / 500, atol=0.02)
 
 
+def random_clump(rng):
+    """Some spheres, each beside the one before, with an inertia that such spheres can have."""
+    while True:
+        number = rng.integers(2, 5)
+        steps = rng.normal(size=(number, 3))
+        steps *= R * rng.uniform(0.6, 1.5, (number, 1)) / np.linalg.norm(steps, axis=1)[:, None]
+        try:
+            return Clump(centres=steps.cumsum(axis=0), radii=R * rng.uniform(0.5, 1, number), density=2500.0)
+        except InputError:
+            continue
+
+
+@pytest.mark.long
+def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
+    """Tops of any inertia, spun about any axis, at 0.03 rad a step: docs/bodies.md states the errors."""
+    spins = rng.normal(size=(60, 3))
+    spins *= 500 / np.linalg.norm(spins, axis=1)[:, None]
+    shapes = [random_clump(rng) for _ in spins]
+    scenes = [
+        clumps(shape, [(0, 0, 0)], (), 0.03 / 500, 3000, angular_velocity=tuple(spin), name="top")
+        for shape, spin in zip(shapes, spins, strict=True)
+    ]
+    simulation = compiled(scenes[0], len(scenes), 4)
+    simulation.load(scenes)
+    energies = [[clump_bodies(scene.start()).energy[0] for scene in scenes]]
+    for _ in range(100):
+        simulation.run(steps=30)
+        energies.append([clump_bodies(result.state).energy[0] for result in simulation.results()])
+    errors = np.abs(np.array(energies) / energies[0] - 1)
+    largest = errors.max(axis=0)
+    with capsys.disabled():
+        print(f"\nenergy of free tops: median {np.median(largest):.1e}, largest {largest.max():.1e}")
+    assert 2e-5 < np.median(largest) < 5e-5
+    assert largest.max() < 1e-4
+    # It does not grow: the second half is as the first.
+    assert (errors[50:].max(axis=0) < 1.5 * errors[:50].max(axis=0)).all()
+
+
 @pytest.mark.long
 def test_a_clump_on_springs_is_its_numpy_twin():
     """Forces on the members make force and torque on the body: to second order."""

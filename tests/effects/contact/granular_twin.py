@@ -21,7 +21,8 @@ class TwinLaw:
     levers : "contact" has spins move surfaces that are R - delta / 2 from the centres, where forces act;
     "radius" does as LAMMPS: spins move surfaces at R, where walls act too; a contact that begins has no
     tangential or rolling force if its damping alone is beyond the limit; a couple of twisting that is beyond
-    its limit acts against the twist of now; and JKR ends where its pull is largest.
+    its limit acts against the twist of now; JKR ends where its pull is largest; and forces that jump at the
+    touch, or where JKR ends, are not spread over two steps.
     frame : "turning" has springs turn with the normal and about it, by the mean of both spins, and be drawn
     by the surfaces midway in a step; "projected" puts them into the plane of now, as LAMMPS does.
     """
@@ -128,6 +129,16 @@ class TwinLaw:
             limit = np.abs(elastic + 2 * parting)
         if self.cohesion == "dmt":
             limit = np.abs(elastic - pull + 2 * pull)
+        if self.levers == "contact":
+            steps = dt * np.abs(opening)
+            if self.cohesion == "dmt":
+                pull = pull * spread(overlap, steps)
+            if self.normal == "jkr":
+                begun, last = past[:, ATTACHED], overlap + self.gap(which, radius)
+                begins = np.where(begun < 1, 1 - spread(overlap, steps), 0)
+                ends = np.where(opening > 0, 1 - spread(last, steps), 0)
+                press = press + parting * (8 / 9 * begins + 5 / 9 * ends)
+                known[:, ATTACHED] = np.where((begun < 1) & (opening < 0) & (overlap < 2 * steps), 0.5, 1)
         force, couple = -(press - pull)[:, None] * normal, np.zeros_like(normal)
         spring, drag, friction = self.tangential_constants(which, stiffness, damping)
         if self.tangential:
@@ -225,6 +236,13 @@ class TwinLaw:
             held = np.where(np.abs(total) > most, np.sign(twisting) * most, total)
         elastic = np.where(held == total, elastic, held - damping * twisting)
         return held, np.column_stack([elastic, stiffness])
+
+
+def spread(depth, step):
+    """The factor of a force that jumps at depth 0, which a contact at the present speed passes in steps (m):
+    so that the work from there on does not depend on the place of the first step within."""
+    s = depth / np.where(step > 0, step, np.nan)
+    return np.where(s < 1, 1.5 * s, np.where(s < 2, 2 - s / 2, 1.0))
 
 
 def cross(n):

@@ -44,6 +44,13 @@ def lagging_contact(accuracy: float) -> float:
     return min(accuracy / 0.1, elastic_contact(accuracy))
 
 
+def adhesive_contact(accuracy: float) -> float:
+    """Return the same for grains that pull each other in full as soon as they touch: the energy of an impact
+    was off by at most 2.5 of the square of the step over the critical one, times that energy or that of
+    adhesion."""
+    return min(math.sqrt(accuracy / 2.5), elastic_contact(accuracy))
+
+
 def impact_stiffness(
     push: Callable[[np.ndarray], np.ndarray], mass: float, radius: float, speed: float
 ) -> float:

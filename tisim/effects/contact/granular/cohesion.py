@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
-from tisim.effects.contact.granular.parts import Cohesion
+from tisim.effects.contact.granular.parts import Cohesion, Overlap
 
 
 class SJKR(Cohesion):
@@ -35,8 +35,8 @@ class SJKR(Cohesion):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"density": pair.mixed("cohesion_energy_density")}
 
-    def deepest_pull(self, pair: Touching, radius: float) -> float:
-        return 2 * math.pi * pair.mixed("cohesion_energy_density") * radius * radius
+    def pulls(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+        return 2 * math.pi * pair.mixed("cohesion_energy_density") * radius * overlap
 
     @ti.func
     def pull(self, w, pair, radius, overlap):
@@ -52,17 +52,22 @@ class DMT(Cohesion):
     gamma is the surface energy, half the work of adhesion. A constant force is held by every normal force:
     beside ``hertz_material`` two that nothing presses rest at delta = (3 pi gamma / (E* R*))^(2/3) R*.
     Coulomb's limit is taken of |F_n + 2 F|, with F_n the elastic and cohesive force, so that it is mu F where
-    the contact is about to part.
+    the contact is about to part. The force begins and ends in full where surfaces touch; there it is spread
+    over two steps, so that its work does not depend on where in a step they meet (jump.py).
 
     Source: B. V. Derjaguin, V. M. Muller and Y. P. Toporov, J. Colloid Interface Sci. 53 (1975) 314; L21 Eq.
     (4.5); J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.
     """
 
     adhesive: ClassVar[bool] = True
+    jumps: ClassVar[bool] = True
     uses: ClassVar = ("surface_energy",)
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"line": 4 * math.pi * pair.mixed("surface_energy")}
+
+    def pulls(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+        return 4 * math.pi * pair.mixed("surface_energy") * radius + 0.0 * overlap
 
     @ti.func
     def pull(self, w, pair, radius, overlap):

@@ -54,6 +54,6 @@ def check_wall(
 def _check(law: Granular, pair: Touching, radius: float, what: str) -> None:
     """Compare both at an overlap of R* (m)."""
     if law.cohesion is not None:
-        push, pull = law.normal.push(pair, radius, radius), law.cohesion.deepest_pull(pair, radius)
+        push, pull = law.normal.push(pair, radius, radius), law.cohesion.pulls(pair, radius, radius)
         rule = f"below what {law.normal.kind()} pushes with at an overlap of R*, {push:.4g} N, where {what}"
         must(pull < push, f"{law.label}.cohesion", rule, float(f"{pull:.4g}"))

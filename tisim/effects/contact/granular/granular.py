@@ -12,9 +12,11 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Component
 from tisim.components.domain import Domain
 from tisim.components.material_law import MaterialLaw
+from tisim.components.materials import Touching
 from tisim.effects.base import Effect, option
 from tisim.effects.base.critical_step import (
     SLIDING,
+    adhesive_contact,
     critical_step,
     elastic_contact,
     impact_stiffness,
@@ -26,6 +28,7 @@ from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.granular.guards import ContactGuards
 from tisim.effects.contact.granular.hertz import HertzMaterial
 from tisim.effects.contact.granular.hooke import Hooke
+from tisim.effects.contact.granular.jump import spread
 from tisim.effects.contact.granular.mindlin import LinearSpring, MindlinDisplacement
 from tisim.effects.contact.granular.parts import (
     Cohesion,
@@ -138,16 +141,22 @@ class Granular(ContactGuards, GranularContact):
         for material, mass, radius in smallest_grains(start):
             # With grains of its own material, and with grains and walls of others.
             for pair in pairs[material * number : (material + 1) * number]:
-                push = partial(self.normal.push, pair, 0.5 * radius)
+                push = partial(self.push, pair, 0.5 * radius)
                 stiffness = impact_stiffness(push, 0.5 * mass, 0.5 * radius, speed)
                 sliding = self.tangential.ratio(pair) if self.tangential else 0.0
                 step = critical_step(max(1.0, SLIDING * sliding) * stiffness, 0.5 * mass)
                 shortest = min(shortest, step)
         return shortest if shortest > 0 else None
 
+    def push(self, pair: Touching, radius: float, overlap: np.ndarray) -> np.ndarray:
+        """Return the force (N) at overlaps (m), with its cohesion, at this R* (m)."""
+        pull = self.cohesion.pulls(pair, radius, overlap) if self.cohesion is not None else 0.0
+        return self.normal.push(pair, radius, overlap) - pull
+
     def part_of_critical_step(self, accuracy: float) -> float:
         lags = (self.damping, self.tangential, self.rolling, self.twisting) != (None,) * 4
-        return lagging_contact(accuracy) if lags else elastic_contact(accuracy)
+        part = lagging_contact(accuracy) if lags else elastic_contact(accuracy)
+        return min(part, adhesive_contact(accuracy)) if self.adhesive else part
 
     def suits_wall(
         self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], material: int, label: str
@@ -250,10 +259,15 @@ class Granular(ContactGuards, GranularContact):
         if ti.static(self.adhesive):
             limit = ti.abs(elastic + self.adhesion(w, pair, radius, deep))
         if ti.static(self.has("cohesion")):
-            press -= self.cohesion.pull(w, pair, radius, deep)
-        force = -press * normal
+            pull = self.cohesion.pull(w, pair, radius, deep)
+            if ti.static(self.cohesion.jumps):
+                pull *= spread(deep, ti.abs(opening), dt)
+            press -= pull
         if ti.static(self.normal.memory > 0):
-            known[0] = 1.0
+            jump, begun = self.normal.spread_jumps(w, pair, radius, overlap, opening, past[0], dt)
+            press += jump
+            known[0] = begun
+        force = -press * normal
 
         if ti.static(self.has("tangential")):
             begin, size = ti.static(self.slots()["tangential"])

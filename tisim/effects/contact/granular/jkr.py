@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
+from tisim.effects.contact.granular.jump import spread
 from tisim.effects.contact.granular.parts import NormalForce, Overlap
 from tisim.numerics.roots import cube_root
 
 LEAST_ROOT = 1e-9
 """Roots of lengths are not below this, m^(1/2): its fourth power is a number of f32."""
+CIRCLES = 8192
+"""The force at given overlaps is read off a curve of this number of circles of contact."""
+BEGINNING = 0.5
+"""A contact remembers this in its first two steps, and 1 later."""
 
 
 class JKR(NormalForce):
@@ -24,7 +31,8 @@ class JKR(NormalForce):
     the largest pull is F_c = 3 pi gamma R*. It lasts to delta = -3/2 (pi gamma / E*)^(2/3) (R*/2)^(1/3),
     where the equation ends, at F_n = -5/9 F_c. Two that nothing presses rest at delta = (pi gamma / E*)^(2/3)
     (3 R*)^(1/3), at any gamma: what is pressed deeper is pushed back. LAMMPS ends it where the pull is
-    largest. Coulomb's limit is taken of |F_n + 2 F_c|.
+    largest. Coulomb's limit is taken of |F_n + 2 F_c|. Where a contact begins, and where it ends, the pull is
+    spread over two steps, so that its work does not depend on where in a step that is (jump.py).
 
     Source: K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; C. Thornton and
     Z. Ning, Powder Technol. 99 (1998) 154; J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.
@@ -47,10 +55,14 @@ class JKR(NormalForce):
         }
 
     def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        # At the overlap that a circle of contact would have without adhesion, and at rest at least.
-        rest = (math.pi * pair.mixed("surface_energy") / pair.effective_young) ** (2 / 3)
-        deep = overlap + rest * (3 * radius) ** (1 / 3)
-        return 4 / 3 * pair.effective_young * (radius * deep) ** 0.5 * deep
+        young, ratio = pair.effective_young, math.pi * pair.mixed("surface_energy") / pair.effective_young
+        smallest = (0.25 * radius * radius * ratio) ** (1 / 3)  # where the equation ends
+        largest = 2 * (np.sqrt(radius * np.max(overlap)) + smallest)
+        circle = smallest + (largest - smallest) * np.linspace(0, 1, CIRCLES) ** 2
+        depth = circle**2 / radius - 2 * np.sqrt(ratio * circle)
+        force = 4 / 3 * young * circle**3 / radius - 4 * young * np.sqrt(ratio * circle**3)
+        pushes: Overlap = np.interp(overlap, depth, force)
+        return pushes
 
     @ti.func
     def circle(self, w, pair, radius, overlap):
@@ -81,6 +93,16 @@ class JKR(NormalForce):
     @ti.func
     def pull_off(self, w, pair, radius):
         return self.most(w, pair) * radius
+
+    @ti.func
+    def spread_jumps(self, w, pair, radius, overlap, opening, begun, dt):
+        most, speed = self.most(w, pair) * radius, ti.abs(opening)
+        # At the gap of its end it passes only to end there; at 0 it begins, or is just passed again.
+        last = overlap + self.separation_gap(w, pair, radius)
+        ends = ti.select(opening > 0.0, 1.0 - spread(last, speed, dt), 0.0)
+        begins = ti.select(begun < 1.0, 1.0 - spread(overlap, speed, dt), 0.0)
+        beginning = (begun < 1.0) & (opening < 0.0) & (overlap < 2.0 * speed * dt)
+        return most * (8.0 / 9.0 * begins + 5.0 / 9.0 * ends), ti.select(beginning, BEGINNING, 1.0)
 
     @ti.func
     def separation_gap(self, w, pair, radius):

@@ -70,6 +70,15 @@ class NormalForce(ContactPart):
         return 0.0 * radius
 
     @ti.func
+    def spread_jumps(self, w, pair, radius, overlap, opening, begun, dt):
+        """Return what is added to the elastic force (N) in the steps in which a contact begins or ends (see
+        jump.py), and what the contact remembers of this, given ``begun``: above 0, as there is a contact.
+
+        opening : speed at which the surfaces separate, m/s.
+        """
+        return 0.0 * overlap, 1.0
+
+    @ti.func
     def separation_gap(self, w, pair, radius):
         """Return the gap (m) up to which a contact that has begun lasts."""
         return 0.0 * radius
@@ -198,15 +207,17 @@ class Cohesion(ContactPart):
     adhesive : whether Coulomb's limit knows of it, as of the force that parts the two. by_overlap : whether
     it grows with the overlap, so that what two that touch do goes by which normal force is beside it. Where
     it is then not below the elastic force at an overlap of R*, grains are refused, or their world stops.
+    jumps : whether it begins in full at the touch; it is then spread over two steps (see jump.py).
     """
 
     contract: ClassVar[bool] = True
     adhesive: ClassVar[bool] = False
     by_overlap: ClassVar[bool] = False
+    jumps: ClassVar[bool] = False
 
-    def deepest_pull(self, pair: Touching, radius: float) -> float:
-        """Return its force (N) at an overlap of R* (m), where it grows with the overlap."""
-        return 0.0
+    def pulls(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+        """Return its force (N) at an overlap (m), or at an array of them, at this R* (m)."""
+        return 0.0 * overlap
 
     @ti.func
     def pull(self, w, pair, radius, overlap):

@@ -1,0 +1,27 @@
+"""Adhesive forces that jump where a contact begins or ends.
+
+A stepper sees such a force from the first step on that ends within the contact. It counts the work of half a
+step, whatever part of that step was within. So a pair that meets at a speed v gains or loses up to F v dt / 2
+at each jump, by chance: with the steps of an elastic contact, a quarter of the energy of adhesion.
+
+Here the force grows with the depth within the contact over two steps, instead of jumping. With s the depth in
+steps at the present speed, s = depth / (v dt), it is multiplied by
+
+    3 s / 2  for s < 1,    2 - s / 2  for 1 < s < 2,    1  beyond.
+
+At s and s + 1, the two steps after the jump, these add up to s + 3/2. With the half steps of a leapfrog that
+is the work F v dt (s + 1) which the force does up to the second of them, whatever s. A contact at rest has
+its full force.
+"""
+
+from tisim.backend.taichi import ti
+
+
+@ti.func
+def spread(depth, speed, dt):
+    """Return the factor by which a force is multiplied that jumps at depth 0 (m), in steps of dt (s) at this
+    speed (m/s, >= 0) along the normal."""
+    travel = speed * dt
+    within = depth < 2.0 * travel
+    steps = depth / ti.select(within, travel, 1.0)
+    return ti.select(within, ti.min(1.5 * steps, 2.0 - 0.5 * steps), 1.0)
