@@ -22,6 +22,6 @@ def spread(depth, speed, dt):
     """Return the factor by which a force is multiplied that jumps at depth 0 (m), in steps of dt (s) at this
     speed (m/s, >= 0) along the normal."""
     travel = speed * dt
-    within = depth < 2.0 * travel
+    within = (travel > 0.0) & (depth < 2.0 * travel)
     steps = depth / ti.select(within, travel, 1.0)
     return ti.select(within, ti.min(1.5 * steps, 2.0 - 0.5 * steps), 1.0)
