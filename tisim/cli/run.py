@@ -96,7 +96,8 @@ def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -
 
         def report(simulation: Simulation) -> None:
             description = f"{name}, {simulation.remaining_steps():.3g} steps to go"
-            bar.update(task, completed=simulation.fraction(), description=description)
+            # Of a run that has failed it is not the whole that is done.
+            bar.update(task, completed=float(simulation.simulated()[0]), description=description)
             ctrl_c.check()
 
         try:

@@ -54,9 +54,8 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         if f.name in start:
             check_field(f, start[f.name], n)
     check_held(scene, start)
-    acting = scene.acting()
-    for effect in acting:
-        effect.suits_start(start, acting, scene.domain)
+    for effect in scene.acting():
+        effect.suits_start(start, scene)
     with np.errstate(over="ignore", invalid="ignore"):
         momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
     must(bool(np.isfinite(momentum)), "particles.velocity", "of a momentum that is a number", float(momentum))

@@ -202,12 +202,16 @@ class Simulation(CompiledWorlds):
         return bool((going & (now["time"] < until)).any())
 
     def fraction(self) -> float:
-        """Return the part of the simulated time that is done, the mean over worlds; 1 for a world that has
-        failed."""
+        """Return the part of the work that is done, the mean over worlds; 1 for a world that has failed."""
+        ended = self.s.read("status")[: len(self.scenes)] != WorldStatus.RUNNING
+        return float(np.where(ended, 1.0, self.simulated()).mean())
+
+    def simulated(self) -> np.ndarray:
+        """Return the part of its time that each loaded world has simulated, shape (worlds,)."""
         n = len(self.scenes)
-        now = self.s.snapshot(("status", "time", "reached", "end"))
-        fractions = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
-        return float(np.where(now["status"][:n] != WorldStatus.RUNNING, 1.0, fractions).mean())
+        now = self.s.snapshot(("time", "reached", "end"))
+        parts: np.ndarray = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
+        return parts
 
     def remaining_steps(self) -> float:
         """Return the steps before the world that has most of them, if they go on as long as its last one;

@@ -12,7 +12,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, parameter
 from tisim.components.directed import Directed
-from tisim.geometry.shape import SEAM, Shape
+from tisim.geometry.shape import SEAM, Shape, same_line
 
 
 class Plane(Directed, Shape):
@@ -42,6 +42,9 @@ class Plane(Directed, Shape):
         normal = np.array(self.normal)
         leans: np.ndarray = np.abs(normal) > SEAM * np.linalg.norm(normal)
         return leans
+
+    def turns_into_itself(self, centre: np.ndarray, axis: np.ndarray) -> bool:
+        return same_line(centre, np.array(self.unit_vector()), centre, axis)
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         away: np.ndarray = (places - np.array(self.point)) @ np.array(self.unit_vector())

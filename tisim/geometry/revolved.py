@@ -13,6 +13,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Vector, option, parameter
 from tisim.components.ranges import check_direction
 from tisim.geometry.directions import across
+from tisim.geometry.shape import same_line
 from tisim.geometry.surface import Surface
 
 
@@ -50,6 +51,10 @@ class RevolvedSurface(Surface):
         ends = np.array([np.array(origin), np.array(origin) + length * axis])
         sides = np.array([low, high])[:, None] * wide
         return (ends - sides).min(axis=0), (ends + sides).max(axis=0)
+
+    def turns_into_itself(self, centre: np.ndarray, axis: np.ndarray) -> bool:
+        origin, direction, *_ = self.generator()
+        return same_line(np.array(origin), np.array(direction), centre, axis)
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         origin, direction, length, low, high = self.generator()

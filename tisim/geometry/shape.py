@@ -13,6 +13,14 @@ SEAM = 1e-6
 """What ends within this part of a box's side of a face ends at the face."""
 
 
+def same_line(place: np.ndarray, direction: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> bool:
+    """Return whether a place lies on an axis through ``centre``, and a direction along it."""
+    away = np.cross(place - centre, axis)
+    size = np.linalg.norm(np.abs(place) + np.abs(centre))
+    lies = np.linalg.norm(away) <= SEAM * size
+    return bool(lies and np.linalg.norm(np.cross(direction, axis)) <= SEAM * np.linalg.norm(direction))
+
+
 class Shape(Component):
     """A shape tells how far a place is from its surface. Most are rows of lists, as those of walls."""
 
@@ -42,6 +50,10 @@ class Shape(Component):
         slack = SEAM * (high - low)
         near: np.ndarray = (extent[0] - reach < low) | (extent[1] + reach > high)
         return near & ~((extent[0] <= low + slack) & (extent[1] >= high - slack))
+
+    def turns_into_itself(self, centre: np.ndarray, axis: np.ndarray) -> bool:
+        """Return whether it is the same at any angle about an axis in a direction through a place (m)."""
+        return False
 
     @ti.func
     def distance(self, w, k, r):

@@ -4,6 +4,7 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, parameter
+from tisim.geometry.shape import same_line
 from tisim.geometry.surface import Surface
 
 
@@ -29,6 +30,9 @@ class SphericalSurface(Surface):
 
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.centre) - self.radius, np.array(self.centre) + self.radius
+
+    def turns_into_itself(self, centre: np.ndarray, axis: np.ndarray) -> bool:
+        return same_line(np.array(self.centre), axis, centre, axis)
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         away: np.ndarray = np.linalg.norm(places - np.array(self.centre), axis=1) - self.radius

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import tisim
-from tisim.effects import Granular, Walls
+from tisim.effects import Granular, Oscillation, Rotation, Servo, Translation, Walls
 from tisim.geometry import (
     BoxSurface,
     ConicalSurface,
@@ -72,7 +72,7 @@ FELT = {
 }
 
 
-def scene(**walls):
+def scene(duration=1e-6, **walls):
     """Return a grain that lies in a floor at 0.02 m by OVERLAP, in the middle."""
     return tisim.Scene(
         particles=tisim.Particles(
@@ -83,14 +83,14 @@ def scene(**walls):
         effects=(Granular(), Walls(**walls)),
         domain=BOX,
         stepper=Verlet(control=FixedStep(dt=1e-6)),
-        duration=1e-6,
+        duration=duration,
     )  # fmt: skip
 
 
 def start(made):
     """Look at the start of a scene as a run does, without compiling it."""
     for effect in made.acting():
-        effect.suits_start(made.start(), made.acting(), made.domain)
+        effect.suits_start(made.start(), made)
 
 
 def test_a_run_looks():
@@ -120,6 +120,43 @@ def test_what_goes_on_from_face_to_face_is_felt(name):
     (result,) = tisim.run([scene(**FELT[name])])
     force = 4 / 3 * 1e7 / (2 * (1 - 0.25**2)) * np.sqrt(RADIUS) * OVERLAP**1.5
     assert result.measures["walls_force_z"] == pytest.approx(-force, rel=1e-3)
+
+
+BALL = {"spheres": [SphericalSurface(centre=(0.05, 0.05, 0.05), radius=0.01)]}
+PADDLE = {"surface": quad((0.03, 0.05, 0.03), (0.07, 0.05, 0.03), (0.07, 0.05, 0.07), (0.03, 0.05, 0.07))}
+MIDDLE, ABOUT_Z, ABOUT_Y = (0.05, 0.05, 0.05), (0, 0, 1.0), (0, 1.0, 0)
+DRUM = {"cylinders": [CylindricalSurface(start=(0, 0.05, 0.05), end=(SIDE, 0.05, 0.05), radius=0.03)]}
+MOVED = {
+    "a ball that comes to a face": (BALL, Translation(velocity=(1.0, 0, 0)), 0.0351, False),
+    "a ball that stops before": (BALL, Translation(velocity=(1.0, 0, 0)), 0.0349, True),
+    "a ball that starts late": (BALL, Translation(velocity=(1.0, 0, 0), begin=0.01), 0.044, True),
+    "a ball along what is not periodic": (BALL, Translation(velocity=(0, 0, 1.0)), 1.0, True),
+    "a ball that swings far": (BALL, Oscillation(amplitude=(0, 0.0351, 0), frequency=1.0), 1.0, False),
+    "a ball that swings": (BALL, Oscillation(amplitude=(0, 0.0349, 0), frequency=1.0), 1.0, True),
+    "a ball on a servo": (BALL, Servo(force=1.0, direction=(1, 0, 0), limit=0.1), 0.351, False),
+    "a ball on a slow servo": (BALL, Servo(force=1.0, direction=(1, 0, 0), limit=0.1), 0.349, True),
+    "a ball that goes round": (BALL, Rotation(rate=ABOUT_Z, centre=(0.03, 0.05, 0)), 1.0, False),
+    "a ball about itself": (BALL, Rotation(rate=ABOUT_Z, centre=MIDDLE), 1.0, True),
+    "a paddle": (PADDLE, Rotation(rate=ABOUT_Z, centre=MIDDLE), 1.0, True),
+    "a paddle off its middle": (PADDLE, Rotation(rate=ABOUT_Z, centre=(0.03, 0.05, 0)), 1.0, False),
+    "a turntable": ({"planes": [Plane(point=(0, 0, 0.02))]}, Rotation(rate=ABOUT_Z), 1.0, True),
+    "a floor that tilts": ({"planes": [Plane(point=(0, 0, 0.02))]}, Rotation(rate=ABOUT_Y), 1.0, False),
+    "a drum": (DRUM, Rotation(rate=(1.0, 0, 0), centre=MIDDLE), 1.0, True),
+    "a drum that turns over": (DRUM, Rotation(rate=ABOUT_Z, centre=MIDDLE), 1.0, False),
+    "a floor that is lifted": ({"surface": FLOOR}, Translation(velocity=(0, 0, 0.01)), 1.0, True),
+    "a floor that is drawn away": ({"surface": FLOOR}, Translation(velocity=(0.01, 0, 0)), 1.0, False),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_a_wall_that_comes_to_a_face_as_it_moves_is_refused(name):
+    walls, motion, duration, taken = MOVED[name]
+    made = scene(**walls, motion=motion, duration=duration)
+    if taken:
+        start(made)
+    else:
+        with pytest.raises(tisim.InputError, match="received one that ends or bends there as it moves"):
+            start(made)
 
 
 SHAPES = [

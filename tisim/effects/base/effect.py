@@ -17,6 +17,7 @@ from tisim.worlds.fields import Field
 
 if TYPE_CHECKING:
     from tisim.components.domain import Domain
+    from tisim.scene.scene import Scene
 
 
 LONGEST_PART = 0.35
@@ -163,9 +164,9 @@ class Effect(LawHints, Component):
         asked whether it can hold all pairs of them."""
         return {"radius": np.zeros(0), "material": np.zeros(0, int)}
 
-    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
-        """Raise InputError unless it can act on the particles of a start, by field name, among the effects of
-        the scene; by default it can."""
+    def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
+        """Raise InputError unless it can act on the particles of a start, by field name, in its scene; by
+        default it can."""
 
     def at_start(self, masses: np.ndarray) -> Self:
         """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from tisim.numerics.quaternions import brought, rotated
 INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
 """The slot of a number has where in memory the member of that number is; it says nothing of the particle in
 the slot."""
+
+if TYPE_CHECKING:
+    from tisim.scene.scene import Scene
 
 
 class RigidClumps(Constraint):
@@ -55,7 +58,8 @@ class RigidClumps(Constraint):
         held: np.ndarray = start["clump"] != NO_CLUMP
         return held
 
-    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
+    def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
+        domain, effects = scene.domain, scene.acting()
         (low, high), imaged = domain.bounds(), np.array(domain.imaged())
         touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
         if low is None or high is None or not imaged.any() or not touching or not len(start["mass"]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -16,6 +16,7 @@ from tisim.components.materials import Materials
 from tisim.effects.base import Effect, Field, Force, option
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.wall_contacts import WallContacts
+from tisim.effects.contact.wall_faces import check_faces
 from tisim.effects.contact.wall_ring import Bundling, Doubting
 from tisim.effects.contact.wall_search import CONTACTS, Faces
 from tisim.effects.motion.base import Fixed, Motion, MotionState
@@ -31,6 +32,9 @@ from tisim.geometry.sphere import SphericalSurface
 from tisim.geometry.surface import Surface
 from tisim.geometry.triangles import TriangulatedSurface
 from tisim.worlds.bound import Peers
+
+if TYPE_CHECKING:
+    from tisim.scene.scene import Scene
 
 FIELDS = ("past", "surface_past", "loads", "touched", "clear")
 """A grain remembers of a wall, where there is need: what its contacts with planes do, and with surfaces, the
@@ -84,34 +88,21 @@ class Walls(WallContacts, UsesMaterials, Force):
     def check_materials(self, materials: Materials) -> None:
         self.material_index(materials)
 
-    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
+    def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
+        effects = scene.acting()
         for law in effects:
             if isinstance(law, GranularContact):
                 law.suits_wall(start, effects, self.material_index(self._materials), self.label)
         later = [effect.largest_newcomers()["radius"] for effect in effects]
         radii = np.concatenate([start["radius"], *later])
-        self._check_faces(domain, float(radii.max(initial=0.0)))
-
-    def _check_faces(self, domain: Domain, reach: float) -> None:
-        """Raise InputError where a surface is within reach (m) of a joined face, through which it is not
-        felt, unless it goes on from face to face."""
-        (low, high), shift = domain.bounds(), np.array(self.motion.shift())
-        if low is None or high is None:
-            return
-        for name, shape in self._named_shapes():
-            ends = shape.ends_at(low - shift, high - shift, reach) & np.array(domain.joined())
-            for axis in np.flatnonzero(ends):
-                rule = (
-                    f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
-                    f"{'xyz'[axis]}, or go on flat from one to the other: it is not felt through them"
-                )
-                must(False, f"{self.label}.{name}", rule, Words("one that ends or bends there"))
+        reach = float(radii.max(initial=0.0))
+        check_faces(self._named_shapes(), self.motion, scene.domain, reach, scene.duration)
 
     def _named_shapes(self) -> Iterator[tuple[str, Shape]]:
         for name, _ in self.lists():
-            yield from ((name, shape) for shape in getattr(self, name))
+            yield from ((f"{self.label}.{name}", shape) for shape in getattr(self, name))
         if self.surface:
-            yield "surface", self.surface
+            yield f"{self.label}.surface", self.surface
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]

@@ -1,7 +1,9 @@
 """The contract of motions of walls, and walls at rest."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector
@@ -42,6 +44,16 @@ class Motion(Component):
     def shift(self) -> Vector:
         """Return how far (m) the body is at the time 0 from where its shapes say."""
         return 0.0, 0.0, 0.0
+
+    def shifts(self, duration: float) -> Sequence[Vector]:
+        """Return displacements (m) of the body from where its shapes say, between which all of those in a
+        run of some duration (s) lie."""
+        return (self.shift(),)
+
+    def axis(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return a place (m) on the axis about which the body turns, and the direction of that; None for one
+        that does not turn."""
+        return None
 
     @ti.func
     def to_body(self, kept, w, r, t):

@@ -1,6 +1,7 @@
 """Oscillation along a line, such as that of a shaken plate."""
 
 import math
+from collections.abc import Sequence
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Vector, parameter
@@ -22,7 +23,13 @@ class Oscillation(Motion):
         return 2 * math.pi * self.frequency * math.hypot(*self.amplitude)
 
     def shift(self) -> Vector:
-        x, y, z = (math.sin(self.phase) * part for part in self.amplitude)
+        return self._swung(math.sin(self.phase))
+
+    def shifts(self, duration: float) -> Sequence[Vector]:
+        return (self.shift(), self._swung(1.0), self._swung(-1.0)) if duration > 0 else (self.shift(),)
+
+    def _swung(self, part: float) -> Vector:
+        x, y, z = (part * component for component in self.amplitude)
         return x, y, z
 
     @ti.func

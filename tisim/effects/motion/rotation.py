@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.effects.base import Vector, parameter
 from tisim.effects.motion.base import Motion
@@ -32,6 +34,10 @@ class Rotation(Motion):
         size = math.hypot(*self.rate)
         axis = [component / size for component in self.rate] if size > 0 else [0.0, 0.0, 1.0]
         return [*super().values(), *axis, size]
+
+    def axis(self) -> tuple[np.ndarray, np.ndarray] | None:
+        size = math.hypot(*self.rate)
+        return (np.array(self.centre), np.array(self.rate) / size) if size > 0 else None
 
     def top_speed(self, extent: float) -> float:
         # Where the body ends is not known in open space.

@@ -1,6 +1,9 @@
 """A servo, which moves a wall until particles resist it with a wanted force."""
 
+from collections.abc import Sequence
 from typing import ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.directed import Directed
@@ -30,6 +33,10 @@ class Servo(Directed, Motion):
     force: float = parameter("N", "wanted force F", examples=[10.0], gt=0)
     direction: Vector = parameter("", "direction in which it pushes", (0.0, 0.0, -1.0))
     limit: float = parameter("m/s", "speed v_max against no resistance", examples=[0.1], gt=0)
+
+    def shifts(self, duration: float) -> Sequence[Vector]:
+        farthest = self.limit * duration * np.array(self.unit_vector())
+        return tuple(farthest.tolist()), tuple((-farthest).tolist())
 
     @ti.func
     def displacement(self, kept, w, t):

@@ -1,6 +1,7 @@
 """Translation at a constant velocity, at once or from a time on, such as that of a gate."""
 
 import math
+from collections.abc import Sequence
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Vector, parameter
@@ -18,6 +19,10 @@ class Translation(Motion):
 
     def top_speed(self, extent: float) -> float:
         return math.hypot(*self.velocity)
+
+    def shifts(self, duration: float) -> Sequence[Vector]:
+        x, y, z = (max(duration - self.begin, 0.0) * component for component in self.velocity)
+        return (0.0, 0.0, 0.0), (x, y, z)
 
     @ti.func
     def displacement(self, w, t):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -41,6 +41,9 @@ from tisim.effects.contact.granular.parts import (
 from tisim.effects.contact.granular.spring import carried, midway, projected
 from tisim.errors import Words, must
 from tisim.numerics.vectors import piece
+
+if TYPE_CHECKING:
+    from tisim.scene.scene import Scene
 
 
 @ti.func
@@ -129,9 +132,9 @@ class Granular(ContactGuards, GranularContact):
                 tried.append(law)
         return tuple(tried)
 
-    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], domain: Domain) -> None:
+    def suits_start(self, start: Mapping[str, np.ndarray], scene: "Scene") -> None:
         if self.by_overlap:
-            check_grains(self, self._materials, with_newcomers(start, effects))
+            check_grains(self, self._materials, with_newcomers(start, scene.acting()))
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]

@@ -1,0 +1,66 @@
+"""Walls at the periodic faces of a box.
+
+A grain at one face does not feel a wall at the opposite one. So a surface must stay farther from those faces
+than the largest grain reaches, or go on flat from one to the other, wherever the motion of its body takes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import product
+
+import numpy as np
+
+from tisim.components.domain import Domain
+from tisim.effects.motion.base import Motion
+from tisim.errors import Words, must
+from tisim.geometry.shape import SEAM, Shape
+
+
+def check_faces(
+    shapes: Iterable[tuple[str, Shape]], motion: Motion, domain: Domain, reach: float, duration: float
+) -> None:
+    """Raise InputError where a shape, called so in messages, comes within reach (m) of a joined face in a run
+    of some duration (s), unless it goes on from that face to the opposite one."""
+    (low, high), joined = domain.bounds(), np.array(domain.joined())
+    if low is None or high is None or not joined.any():
+        return
+    for name, shape in shapes:
+        at_start = _ends(shape, motion, low, high, reach, 0.0)
+        for axis in np.flatnonzero(joined & _ends(shape, motion, low, high, reach, duration)):
+            rule = (
+                f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
+                f"{'xyz'[axis]}, or go on flat from one to the other: it is not felt through them"
+            )
+            received = "one that ends or bends there" + ("" if at_start[axis] else " as it moves")
+            must(False, name, rule, Words(received))
+
+
+def _ends(
+    shape: Shape, motion: Motion, low: np.ndarray, high: np.ndarray, reach: float, duration: float
+) -> np.ndarray:
+    """Return along which axes it ends, or bends, within reach of a face at some time, shape (3,)."""
+    ends = np.zeros(3, bool)
+    for shift in map(np.array, motion.shifts(duration)):
+        ends |= shape.ends_at(low - shift, high - shift, reach)
+    turning = motion.axis()
+    if turning is not None and duration > 0 and not shape.turns_into_itself(*turning):
+        ends |= _ends_turned(shape, *turning, low, high, reach)
+    return ends
+
+
+def _ends_turned(
+    shape: Shape, centre: np.ndarray, axis: np.ndarray, low: np.ndarray, high: np.ndarray, reach: float
+) -> np.ndarray:
+    """Return the same of a shape that turns about an axis, by the ring around it that it may come into."""
+    # Along the axis of rotation nothing changes.
+    turned = np.abs(axis) < 1.0 - SEAM
+    if (extent := shape.extent()) is None:
+        return turned
+    corners = np.array(list(product(*np.stack(extent, axis=1)))) - centre
+    along = corners @ axis
+    widest = np.linalg.norm(corners - along[:, None] * axis, axis=1).max() * np.sqrt(1.0 - axis**2)
+    lowest = centre + np.minimum(along.min() * axis, along.max() * axis) - widest
+    highest = centre + np.maximum(along.min() * axis, along.max() * axis) + widest
+    near: np.ndarray = (lowest - reach < low) | (highest + reach > high)
+    return turned & near
