@@ -5,7 +5,16 @@ import pytest
 
 import tisim
 from tisim import effects as laws
-from tisim.steppers import Boris, FixedStep, Verlet
+from tisim.steppers import (
+    Boris,
+    Collocation,
+    ErrorControl,
+    FixedStep,
+    IterationControl,
+    StageControl,
+    Trapezoid,
+    Verlet,
+)
 
 pytestmark = pytest.mark.long
 
@@ -99,3 +108,44 @@ def restarts():
 
 def test_a_checkpoint_has_what_rounding_has_taken(single):
     assert single("steppers.test_single_precision", "restarts")
+
+
+ASKED = {
+    "scene.accuracy": {"accuracy": 1e-5},
+    "stages": {"stepper": Collocation(control=StageControl(error=1e-7))},
+    "error": {"stepper": Trapezoid(control=ErrorControl(error=1e-7))},
+    "tolerance": {"stepper": Trapezoid(control=IterationControl(tolerance=1e-9))},
+    "the default": {},
+    "the default of collocation": {"stepper": Collocation()},
+    "fine enough": {"stepper": Trapezoid(control=ErrorControl(error=1e-6, tolerance=1e-6))},
+}
+
+
+def refusals():
+    """Return what is said of each error that is asked for; nothing where it runs."""
+    said = {}
+    for name, asked in ASKED.items():
+        scene = tisim.Scene(
+            particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=1e-3, mass=1e-3),
+            effects=(laws.Tether(stiffness=(1e3,) * 3),),
+            duration=1e-3,
+            **asked,
+        )
+        try:
+            tisim.run(scene)
+            said[name] = ""
+        except tisim.InputError as refused:
+            said[name] = str(refused)
+    return said
+
+
+def test_errors_that_it_cannot_reach_are_refused(single):
+    said = single("steppers.test_single_precision", "refusals")
+    rule = "must be at least {} in f32, which rounds positions by 1.2e-07; received {}"
+    assert said == {
+        "scene.accuracy": f"scene.accuracy {rule.format('2e-05', '1e-05')}",
+        "stages": f"stepper.control.error {rule.format('1e-06', '1e-07')}",
+        "error": f"stepper.control.error {rule.format('1e-06', '1e-07')}",
+        "tolerance": f"stepper.control.tolerance {rule.format('1e-06', '1e-09')}",
+        **dict.fromkeys(("the default", "the default of collocation", "fine enough"), ""),
+    }

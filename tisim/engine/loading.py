@@ -19,6 +19,8 @@ from tisim.worlds.status import NO_ONE, WorldStatus
 
 ROUNDED_SIDE = 1e-6
 """By this part a law may reach farther than half a side, as single precision rounds."""
+LEAST_ERRORS = {"f32": 1e-6, "f64": 2e-15}
+"""The least relative errors that steps may be asked for: some eight times by which positions are rounded."""
 
 
 def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
@@ -54,6 +56,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         if f.name in start:
             check_field(f, start[f.name], n)
     check_held(scene, start)
+    check_rounding(scene)
     for effect in scene.acting():
         effect.suits_start(start, scene)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -149,6 +152,18 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
         narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDED_SIDE) < reach)
         rule = f"at least {2 * reach:g} m wide where it is periodic, twice as far as {laws} reaches"
         must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
+
+
+def check_rounding(scene: Scene) -> None:
+    """Raise InputError where the stepper is asked for errors that the precision of the run does not hold."""
+    precision = runtime.current().precision
+    for name, error in scene.stepper.control.asked().items():
+        where, received, least = f"stepper.control.{name}", error, LEAST_ERRORS[precision]
+        if "stepper" not in scene.model_fields_set:
+            # The stepper was chosen for it, in proportion.
+            where, received, least = "scene.accuracy", scene.accuracy, scene.accuracy / error * least
+        rule = f"at least {least:.3g} in {precision}, which rounds positions by {np.finfo(_real()).eps:.1e}"
+        must(error > 0.999 * LEAST_ERRORS[precision], where, rule, received)
 
 
 def check_field(f: Field, values: np.ndarray, n: int, where: str = "particles") -> None:

@@ -62,6 +62,11 @@ class StepControl(Component):
         """Return the number of steps that a run of this duration (s) takes at least."""
         return 1.0
 
+    def asked(self) -> dict[str, float]:
+        """Return the relative errors that steps are asked for, by the names of its settings; by default
+        none."""
+        return {}
+
     def suits_start(self, radius: np.ndarray, velocity: np.ndarray) -> None:
         """Raise InputError when its steps do not suit a start of hard particles that collide: their radii
         (m, shape (n,)) and velocities (m/s, shape (n, 3)); by default they do."""

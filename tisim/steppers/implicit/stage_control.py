@@ -71,6 +71,9 @@ class StageControl(ImplicitControl):
 
     accuracy_parameters = (AccuracyParameter(error=1),)
 
+    def asked(self) -> dict[str, float]:
+        return {"error": self.error}
+
     @property
     def at_end(self) -> bool:
         return self.per == "run"

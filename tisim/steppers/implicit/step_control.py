@@ -120,6 +120,9 @@ class IterationControl(ImplicitControl):
         AccuracyParameter(tolerance=1, converges=False),
     )
 
+    def asked(self) -> dict[str, float]:
+        return {"tolerance": self.tolerance}
+
     @ti.func
     def solved(self, w, change):
         """Return whether the iteration may end, its last relative change having been this."""
@@ -187,6 +190,9 @@ class ErrorControl(IterationControl):
     )
 
     accuracy_parameters = (AccuracyParameter(error=1, tolerance=1),)
+
+    def asked(self) -> dict[str, float]:
+        return {"error": self.error, **super().asked()}
 
     @property
     def at_end(self) -> bool:
