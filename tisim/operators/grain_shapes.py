@@ -11,6 +11,7 @@ from tisim.components.component import Component
 from tisim.effects.base import Effect, option
 from tisim.effects.constraint.rigid_clumps import RigidClumps
 from tisim.numerics.quaternions import rotated
+from tisim.packing.clump import length
 from tisim.packing.grains import GrainClass
 
 
@@ -36,6 +37,13 @@ class GrainShapes(Effect):
     def largest_spheres(self) -> list[float]:
         """Return the radius (m) of the largest sphere that a grain of each class may have."""
         return [float(one.sizes.nodes()[0][-1] * one.spheres()[:, 3].max()) for one in self.grains]
+
+    def longest(self) -> list[float]:
+        """Return the length (m), from surface to surface, of the largest grain of each class."""
+        return [
+            float(one.sizes.nodes()[0][-1] * length(one.spheres()[:, :3], one.spheres()[:, 3]))
+            for one in self.grains
+        ]
 
     def farthest(self) -> float:
         """Return how far (m) the largest grain reaches from its centre."""

@@ -91,6 +91,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         return {
             "radius": np.repeat(self.largest_spheres(), of_each),
             "material": np.repeat(material, of_each),
+            "length": np.repeat(self.longest(), of_each),
         }
 
     def newcomers(self) -> Mapping[str, np.ndarray]:

@@ -109,6 +109,12 @@ class Clump(Component):
         return ClumpBody(mass, solid.volume, moments, axes, places, mass * _shares(places, self.radius))
 
 
+def length(places: np.ndarray, radii: np.ndarray) -> float:
+    """Return the largest distance (m) from surface to surface across spheres at places (m, shape (n, 3))."""
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + radii[:, None] + radii[None]
+    return float(apart.max(initial=0.0))
+
+
 def _principal(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return principal moments and axes, as columns that make a right-handed system; those of the template
     where these are principal already."""

@@ -423,6 +423,24 @@ def test_a_scene_file_holds_clumps():
     assert Scene.from_dict(made.to_dict()).digest() == made.digest()
 
 
+def put_in(shape, side):
+    """A scene into whose periodic box clumps come, of a box that is wide enough to start from."""
+    # Of the volume of the two spheres of a dumbbell.
+    grains = GrainClass(sizes=EqualSizes(radius=2 ** (1 / 3) * R), density=2500.0, clump=shape)
+    return Scene(
+        particles=Particles(position=np.zeros((0, 3)), velocity=np.zeros((0, 3)), radius=R, density=2500.0),
+        effects=(
+            RigidClumps(),
+            Granular(),
+            InsertionByFlux(grains=[grains], flux=10.0, number=4, low=(0, 0, 0), high=(side, side, side)),
+        ),
+        materials={"glass": Material(young=1e7, poisson=0.25)},
+        domain=Box(low=(0, 0, 0), high=(side,) * 3),
+        stepper=fixed(1e-6),
+        duration=1e-5,
+    )
+
+
 @pytest.mark.parametrize(("side", "fits"), [(0.0759, False), (0.0761, True)])
 def test_a_rod_whose_ends_another_may_touch_at_once_in_an_image_is_refused(side, fits):
     """66 mm long, with spheres of 10 mm."""
@@ -450,5 +468,16 @@ def test_the_longest_clump_is_found_whatever_the_order_of_its_members():
 
 
 def test_clumps_may_all_be_put_in_later_in_a_periodic_box():
-    made = clumps(DUMBBELL, [(0, 0, 0)], domain=Box(low=(-1, -1, -1), high=(1, 1, 1)))
-    RigidClumps().suits_start({"mass": np.zeros(0)}, made)
+    made = put_in(DUMBBELL, 0.1)
+    made.acting()[0].suits_start(made.start(), made)
+
+
+def test_clumps_that_are_put_in_later_must_fit_the_box_too():
+    """Of the largest of their sizes: a dumbbell is 4 R long, and another takes 2 R."""
+    for side, fits in ((6.1 * R, True), (5.9 * R, False)):
+        made = put_in(DUMBBELL, side)
+        if fits:
+            made.acting()[0].suits_start(made.start(), made)
+        else:
+            with pytest.raises(InputError, match=r"box must be at least 0.006 m wide where it is periodic"):
+                made.acting()[0].suits_start(made.start(), made)

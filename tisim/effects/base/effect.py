@@ -160,9 +160,9 @@ class Effect(LawHints, Component):
 
     def largest_newcomers(self) -> Mapping[str, np.ndarray]:
         """Return ``radius`` (m) and ``material``, its index, of the largest two particles of each class that
-        it may put in, or of the largest one of each where it puts in one alone; by default of none. A law is
-        asked whether it can hold all pairs of them."""
-        return {"radius": np.zeros(0), "material": np.zeros(0, int)}
+        it may put in, or of the largest one of each where it puts in one alone, and ``length`` (m), that of
+        their clumps; by default of none. A law is asked whether it can hold all pairs of them."""
+        return {"radius": np.zeros(0), "material": np.zeros(0, int), "length": np.zeros(0)}
 
     def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
         """Raise InputError unless it can act on the particles of a start, by field name, in its scene; by

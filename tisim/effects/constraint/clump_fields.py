@@ -11,6 +11,7 @@ from tisim.components.domain import Domain
 from tisim.effects.base import Field
 from tisim.effects.base.constraint import BODY_MASS
 from tisim.errors import Words, must
+from tisim.packing.clump import length
 
 NO_CLUMP = -1
 """What a particle that is of no clump has as its ``clump``."""
@@ -48,8 +49,7 @@ def longest_clump(start: Mapping[str, np.ndarray]) -> float:
     longest = 0.0
     for members in np.split(held, np.flatnonzero(np.diff(start["clump"][held])) + 1):
         places, radii = start["clump_offset"][members], start["radius"][members]
-        apart = np.linalg.norm(places[:, None] - places[None], axis=2) + radii[:, None] + radii[None]
-        longest = max(longest, float(apart.max(initial=0.0)))
+        longest = max(longest, length(places, radii))
     return longest
 
 

@@ -62,10 +62,14 @@ class RigidClumps(Constraint):
         domain, effects = scene.domain, scene.acting()
         (low, high), imaged = domain.bounds(), np.array(domain.imaged())
         touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
-        if low is None or high is None or not imaged.any() or not touching or not len(start["mass"]):
+        if low is None or high is None or not imaged.any() or not touching:
             return
+        later = [effect.largest_newcomers() for effect in effects]
+        own = longest_clump(start) if len(start["mass"]) else 0.0
+        lengths = np.concatenate([[own], *(one["length"] for one in later)])
+        radii = np.concatenate([start["radius"], *(one["radius"] for one in later)])
         # Another one may touch both of its ends, one of them in an image.
-        taken = longest_clump(start) + 2 * float(start["radius"].max(initial=0.0))
+        taken = float(lengths.max() + 2 * radii.max(initial=0.0))
         rule = f"at least {taken:g} m wide where it is periodic, what its longest clump and a particle take"
         must(not (imaged & (high - low < taken)).any(), domain.label, rule, (high - low).tolist())
 
