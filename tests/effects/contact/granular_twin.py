@@ -130,15 +130,17 @@ class TwinLaw:
         if self.cohesion == "dmt":
             limit = np.abs(elastic - pull + 2 * pull)
         if self.levers == "contact":
-            steps = dt * np.abs(opening)
+            speed = np.abs(opening)
             if self.cohesion == "dmt":
-                pull = pull * spread(overlap, steps)
+                pull = pull * spread(overlap, speed, dt, pull, mass)
             if self.normal == "jkr":
                 begun, last = past[:, ATTACHED], overlap + self.gap(which, radius)
-                begins = np.where(begun < 1, 1 - spread(overlap, steps), 0)
-                ends = np.where(opening > 0, 1 - spread(last, steps), 0)
-                press = press + parting * (8 / 9 * begins + 5 / 9 * ends)
-                known[:, ATTACHED] = np.where((begun < 1) & (opening < 0) & (overlap < 2 * steps), 0.5, 1)
+                first, other = 8 / 9 * parting, 5 / 9 * parting
+                begins = np.where(begun < 1, 1 - spread(overlap, speed, dt, first, mass), 0)
+                ends = np.where(opening > 0, 1 - spread(last, speed, dt, other, mass), 0)
+                press = press + first * begins + other * ends
+                new = (begun < 1) & (opening < 0) & (overlap < 2 * speed * dt)
+                known[:, ATTACHED] = np.where(new, 0.5, 1)
         force, couple = -(press - pull)[:, None] * normal, np.zeros_like(normal)
         spring, drag, friction = self.tangential_constants(which, stiffness, damping)
         if self.tangential:
@@ -238,10 +240,11 @@ class TwinLaw:
         return held, np.column_stack([elastic, stiffness])
 
 
-def spread(depth, step):
-    """The factor of a force that jumps at depth 0, which a contact at the present speed passes in steps (m):
-    so that the work from there on does not depend on the place of the first step within."""
-    s = depth / np.where(step > 0, step, np.nan)
+def spread(depth, speed, dt, force, mass):
+    """The factor of a force that jumps at depth 0: so that its work from there on does not depend on the
+    place of the first step within. Nothing where it hardly changes the speed in a step, or turns it."""
+    moves = (force * dt < mass * speed) & (force * dt > 1e-6 * mass * speed)
+    s = depth / np.where(moves, speed * dt, np.nan)
     return np.where(s < 1, 1.5 * s, np.where(s < 2, 2 - s / 2, 1.0))
 
 

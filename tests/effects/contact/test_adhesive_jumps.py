@@ -78,8 +78,10 @@ def test_work_of_adhesion_does_not_depend_on_the_phase_of_a_step(name):
 
 
 def test_the_spread_force_does_the_work_of_a_jump():
-    """At a constant speed, with the half steps of a leapfrog: wherever the first step within ends."""
+    """At a constant speed, with the half steps of a leapfrog, wherever the first step within ends."""
     within = np.arange(100)[None] + PHASES[:, None]
-    work = spread(within, 1.0).sum(axis=1) - 0.5
+    work = spread(within, 1.0, 1.0, 0.1, 1.0).sum(axis=1) - 0.5
     np.testing.assert_allclose(work, within[:, -1], rtol=1e-14)
-    assert (spread(np.array([0.0, 1e-9]), 0.0) == 1).all()
+    # At rest, slow, and of heavy bodies it is the force of the law.
+    for speed, mass in ((0.0, 1.0), (0.09, 1.0), (1.0, 1.1e5)):
+        assert (spread(np.array([0.0, 1e-9]), speed, 1.0, 0.1, mass) == 1).all()

@@ -264,10 +264,10 @@ class Granular(ContactGuards, GranularContact):
         if ti.static(self.has("cohesion")):
             pull = self.cohesion.pull(w, pair, radius, deep)
             if ti.static(self.cohesion.jumps):
-                pull *= spread(deep, ti.abs(opening), dt)
+                pull *= spread(deep, ti.abs(opening), dt, pull, mass)
             press -= pull
         if ti.static(self.normal.memory > 0):
-            jump, begun = self.normal.spread_jumps(w, pair, radius, overlap, opening, past[0], dt)
+            jump, begun = self.normal.spread_jumps(w, pair, radius, mass, overlap, opening, past[0], dt)
             press += jump
             known[0] = begun
         force = -press * normal

@@ -95,14 +95,15 @@ class JKR(NormalForce):
         return self.most(w, pair) * radius
 
     @ti.func
-    def spread_jumps(self, w, pair, radius, overlap, opening, begun, dt):
-        most, speed = self.most(w, pair) * radius, ti.abs(opening)
+    def spread_jumps(self, w, pair, radius, mass, overlap, opening, begun, dt):
+        speed = ti.abs(opening)
+        first, last = 8.0 / 9.0 * self.most(w, pair) * radius, 5.0 / 9.0 * self.most(w, pair) * radius
         # At the gap of its end it passes only to end there; at 0 it begins, or is just passed again.
-        last = overlap + self.separation_gap(w, pair, radius)
-        ends = ti.select(opening > 0.0, 1.0 - spread(last, speed, dt), 0.0)
-        begins = ti.select(begun < 1.0, 1.0 - spread(overlap, speed, dt), 0.0)
+        left = overlap + self.separation_gap(w, pair, radius)
+        ends = ti.select(opening > 0.0, 1.0 - spread(left, speed, dt, last, mass), 0.0)
+        begins = ti.select(begun < 1.0, 1.0 - spread(overlap, speed, dt, first, mass), 0.0)
         beginning = (begun < 1.0) & (opening < 0.0) & (overlap < 2.0 * speed * dt)
-        return most * (8.0 / 9.0 * begins + 5.0 / 9.0 * ends), ti.select(beginning, BEGINNING, 1.0)
+        return first * begins + last * ends, ti.select(beginning, BEGINNING, 1.0)
 
     @ti.func
     def separation_gap(self, w, pair, radius):

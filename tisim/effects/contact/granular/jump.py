@@ -10,18 +10,24 @@ steps at the present speed, s = depth / (v dt), it is multiplied by
     3 s / 2  for s < 1,    2 - s / 2  for 1 < s < 2,    1  beyond.
 
 At s and s + 1, the two steps after the jump, these add up to s + 3/2. With the half steps of a leapfrog that
-is the work F v dt (s + 1) which the force does up to the second of them, whatever s. A contact at rest has
-its full force.
+is the work F v dt (s + 1) which the force does up to the second of them, whatever s.
+
+A pair that is at rest or drawn apart slowly, whose momentum m v along the normal is less than F dt, has the
+full force, and so has one that is so heavy and fast that F dt is below a millionth of m v: there the work of
+half a step matters little.
 """
 
 from tisim.backend.taichi import ti
 
+NEGLIGIBLE = 1e-6
+"""Below this part of a momentum the work of half a step is let be."""
+
 
 @ti.func
-def spread(depth, speed, dt):
-    """Return the factor by which a force is multiplied that jumps at depth 0 (m), in steps of dt (s) at this
-    speed (m/s, >= 0) along the normal."""
-    travel = speed * dt
-    within = (travel > 0.0) & (depth < 2.0 * travel)
+def spread(depth, speed, dt, force, mass):
+    """Return the factor by which a force (N) is multiplied that jumps at depth 0 (m), in steps of dt (s), at
+    a speed (m/s, >= 0) along the normal of two with this m* (kg)."""
+    travel, share = speed * dt, force * dt
+    within = (share < mass * speed) & (share > NEGLIGIBLE * (mass * speed)) & (depth < 2.0 * travel)
     steps = depth / ti.select(within, travel, 1.0)
     return ti.select(within, ti.min(1.5 * steps, 2.0 - 0.5 * steps), 1.0)

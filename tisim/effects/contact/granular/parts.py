@@ -70,7 +70,7 @@ class NormalForce(ContactPart):
         return 0.0 * radius
 
     @ti.func
-    def spread_jumps(self, w, pair, radius, overlap, opening, begun, dt):
+    def spread_jumps(self, w, pair, radius, mass, overlap, opening, begun, dt):
         """Return what is added to the elastic force (N) in the steps in which a contact begins or ends (see
         jump.py), and what the contact remembers of this, given ``begun``: above 0, as there is a contact.
 
