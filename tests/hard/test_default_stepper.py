@@ -251,6 +251,43 @@ class TestTheGuard:
         )  # fmt: skip
         assert "critical time step" in tisim.run(scene).status.reason
 
+    @pytest.mark.parametrize(("factor", "ok"), [(0.7, True), (1.02, False)])
+    def test_beside_contacts_a_motion_that_grows_stops_its_world(self, factor, ok):
+        """Laws of contact guard their own steps, but not those of a spring beside them."""
+        dt = factor * 2 / (2 * np.pi * 1e3)
+        scene = tisim.Scene(
+            particles=tisim.Particles(
+                position=[(0, 0, 0), (1, 0, 0)], velocity=[(0.1, 0, 0), (0, 0, 0)], radius=1e-3, mass=1e-6
+            ),
+            materials={"grain": tisim.Material(young=1e3, poisson=0.25)},
+            effects=(laws.Tether(stiffness=(4 * np.pi**2,) * 3), laws.Granular()),
+            stepper=Verlet(control=FixedStep(dt=dt)),
+            duration=0.1,
+        )
+        result = tisim.run(scene)
+        assert result.status.ok == ok, result.status.reason
+        assert ok or "effects.tether" in result.status.reason
+
+    def test_a_wall_that_is_drawn_away_at_once_does_not_stop_it(self):
+        """Its dashpot pulls at a grain in the first step alone, which is no motion that grows."""
+        radius, mass = 1e-3, 1e-5
+        scene = tisim.Scene(
+            particles=tisim.Particles(
+                position=[(radius - 1e-6, 0, 0)], velocity=[(0, 0, 0)], radius=radius, mass=mass
+            ),
+            materials={
+                "grain": tisim.Material(stiffness=1e3, restitution=0.3),
+            },
+            effects=(
+                laws.Granular(normal=laws.Hooke(), damping=laws.RestitutionDamping()),
+                laws.Walls(planes=[Plane(normal=(1, 0, 0))], motion=laws.Translation(velocity=(-50.0, 0, 0))),
+                laws.Tether(stiffness=(1e-3,) * 3),
+            ),
+            stepper=Verlet(control=FixedStep(dt=1e-5)),
+            duration=1e-3,
+        )
+        assert tisim.run(scene).check().state["velocity"][0, 0] < -1e-2
+
     def test_verlet_is_refused_beside_a_magnetic_force(self):
         with pytest.raises(tisim.InputError, match=r"stepper must be one that turns velocities"):
             tisim.Scene(

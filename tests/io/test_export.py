@@ -162,8 +162,10 @@ def test_a_result_has_its_start_and_end(tmp_path):
     write(result, RunFolder(tmp_path))
     read = ase.io.read(export(tmp_path / "result.h5", "xyz", tmp_path), index=":", format="extxyz")
     assert [atoms.positions[0, 0] for atoms in read] == [0.0, pytest.approx(3e-3)]
-    with pytest.raises(InputError, match=r"file must be a trajectory.h5 for format h5md"):
-        export(tmp_path / "result.h5", "h5md", tmp_path)
+    with frames(export(tmp_path / "result.h5", "h5md", tmp_path)) as copy:
+        assert [frame.time for frame in copy] == [0.0, result.time]
+        assert [frame.arrays["position"][0, 0] for frame in copy] == [0.0, pytest.approx(3e-3)]
+        assert [frame.arrays["id"].tolist() for frame in copy] == [[0], [0]]
 
 
 def test_other_formats_are_refused(file, tmp_path):

@@ -22,7 +22,7 @@ from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import Controller, FixedStep
-from tisim.steppers.step_guard import STEP_EXCESS, check_step, guard_fields
+from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_fields
 from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 
@@ -98,7 +98,7 @@ class BorisRotation(PerParticle):
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
         self.linear, self.turning = with_jacobian(context.single_forces), context.turning
-        self.guarded = FORCE_BEFORE in context.s.fields
+        self.guarded, self.patient = FORCE_BEFORE in context.s.fields, STRAINED in context.s.fields
 
     @ti.func
     def run(self, w, i):
@@ -129,7 +129,7 @@ class BorisRotation(PerParticle):
             if ti.static(self.turning):
                 torque = s.torque[w, i]
             if s.steps[w] > 1:
-                check_step(s, w, i, free, torque, self.turning)
+                check_step(s, w, i, free, torque, self.turning, self.patient)
             s.force_before[w, i] = free
             if ti.static(self.turning):
                 s.torque_before[w, i] = torque

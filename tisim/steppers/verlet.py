@@ -25,7 +25,7 @@ from tisim.steppers.constraints import advance_bodies, kick_bodies, put_held, st
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
-from tisim.steppers.step_guard import STEP_EXCESS, check_step, guard_fields
+from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_fields
 from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle, Phase
 
@@ -129,7 +129,7 @@ class Kick(PerParticle):
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
         self.turning, self.constraints = context.turning, context.constraints
-        self.guarded = FORCE_BEFORE in context.s.fields
+        self.guarded, self.patient = FORCE_BEFORE in context.s.fields, STRAINED in context.s.fields
 
     @ti.func
     def run(self, w, i):
@@ -138,7 +138,7 @@ class Kick(PerParticle):
                 torque = 0.0 * self.s.force[w, i]
                 if ti.static(self.turning):
                     torque = self.s.torque[w, i]
-                check_step(self.s, w, i, self.s.force[w, i], torque, self.turning)
+                check_step(self.s, w, i, self.s.force[w, i], torque, self.turning, self.patient)
             half_kick(self.s, w, i, self.turning)
 
 
