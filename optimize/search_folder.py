@@ -93,9 +93,9 @@ def refuse(folder: Path, command: str, stored: Mapping[str, Any], requested: Map
     old = _leaves(stored)
     new = _leaves(json.loads(canonical(requested)))
     names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-    # Of a problem file only a hash is kept.
+    # Of the functions only a checksum is kept.
     differences = "; ".join(
-        "the problem file has changed"
+        "the problem file, or what its functions use, has changed"
         if name == "problem_code"
         else f"{name} is {_shown(old, name)} there and {_shown(new, name)} here"
         for name in names

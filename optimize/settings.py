@@ -15,7 +15,7 @@ from optimize.storage.record import canonical
 from tisim.components.component import Checked
 from tisim.errors import must
 
-IDENTITY_FORMAT = 2
+IDENTITY_FORMAT = 3
 """The version of the identity below; it is raised when a search of before cannot be resumed any more."""
 
 
@@ -74,7 +74,17 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "format": IDENTITY_FORMAT,
         "problem": problem.name,
         "problem_version": problem.version,
-        **({"problem_code": problem.identity} if problem.identity else {}),
+        "problem_code": problem.identity,
+        "genes": {
+            gene.name: f"{gene.low!r} to {gene.high!r} {gene.unit}".rstrip() + f", {gene.scale}"
+            for gene in problem.genome.genes
+        },
+        "gene_order": list(problem.genome.names),
+        "objectives": {
+            one.name: ("largest" if one.maximise else "least") + (f", {one.unit}" if one.unit else "")
+            for one in problem.objectives
+        },
+        "objective_order": [one.name for one in problem.objectives],
         "search": settings.model_dump(mode="json", exclude=left_out),
         "evaluator": dict(evaluator),
     }

@@ -79,7 +79,7 @@ class Runs:
         self, problem: Problem, evaluator: Evaluator, cache: Cache, seed: int, common: bool = True
     ) -> None:
         self.problem, self.evaluator, self.cache = problem, evaluator, cache
-        self.seed, self.common, self.code = seed, common, problem.identity
+        self.seed, self.common, self.code = seed, common, problem.objective_identity
         self.evaluations = 0
         self.hits = 0
         self._requested: set[str] = set()

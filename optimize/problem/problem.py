@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from optimize.problem.fingerprint import fingerprint
 from optimize.problem.genome import Genome
 from optimize.problem.objective import Objective
-from tisim.errors import must
-from tisim.files import python_file
+from optimize.storage.record import canonical
+from tisim.errors import InputError, must
+from tisim.files import python_file, regular_file
+from tisim.files.python_file import sha256
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,8 +40,10 @@ class Problem:
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
     met_at : the fitness at which a design meets all that is asked, and so does any better one; the report
         then has how far each gene spreads over those that the search has seen. For one objective only.
-    code : what tells its code from that of another problem of this name and version; by default a checksum of
-        the files, outside of this package, that define scene and objectives. Part of the cache key.
+    code : a text that tells it from another problem of this name and version, in place of the checksums of
+        scene and objectives, of their files and of all that they are bound to (see fingerprint.py).
+    files : data files that scene or objectives read when they are called; a checksum of their content is part
+        of the key of a value. An objective that reads another file is refused.
     Raises InputError for an empty name, and for objectives that are none or not told apart by their names.
     """
 
@@ -55,6 +61,7 @@ class Problem:
     details: Callable[[Mapping[str, float], Result], Mapping[str, float]] | None = None
     met_at: float | None = None
     code: str = ""
+    files: Sequence[str | Path] = ()
 
     def __post_init__(self) -> None:
         must(
@@ -78,9 +85,15 @@ class Problem:
 
     @property
     def identity(self) -> str:
-        """See ``code``; empty for a problem of this package, whose ``version`` says what it means."""
-        files = python_file.module_checksums(self.scene, *(objective.of for objective in self.objectives))
-        return self.code or "-".join(checksum[:12] for checksum in files.values())
+        """A checksum of scene and objectives and what they are bound to, as it is now; see ``code``."""
+        # A value has the digest of its scene in its key, whatever made the scene.
+        return f"{self.code or checksum_of(self.scene)}-{self.objective_identity}"
+
+    @property
+    def objective_identity(self) -> str:
+        """The same of the objectives and of data files alone, which with a scene decide a value."""
+        functions = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
+        return sha256(canonical([self.code or functions, [sha256(read(file)) for file in self.files]]))[:24]
 
     @property
     def several(self) -> bool:
@@ -91,3 +104,18 @@ class Problem:
         """Return the objectives' values with the sign that makes all of them to be minimised, and back
         again."""
         return tuple(o.sign * value for o, value in zip(self.objectives, values, strict=True))
+
+
+def checksum_of(function: Callable[..., Any], what: str = "") -> str:
+    """Return a checksum of a function, of the files that define it and of all that it is bound to; ``what``
+    as for a fingerprint."""
+    files = python_file.module_checksums(function)
+    return sha256(canonical([fingerprint(function, what), *files.values()]))[:24]
+
+
+def read(file: str | Path) -> bytes:
+    """Return the content of a data file of a problem; InputError where there is none."""
+    content = regular_file.content(Path(file))
+    if content is None:
+        raise InputError(f"files of a problem must exist; received {str(file)!r}")
+    return content

@@ -128,13 +128,12 @@ def test_wrong_settings_are_refused_before_anything_runs():
 
 
 def test_another_objective_has_another_identity():
-    """Of functions of one file nothing but the file tells them apart; of this package its version does."""
-    from cases.vibration.problem import problem as built_in
-
-    assert problem("default", "").identity
-    assert not built_in().identity
-    assert replace(built_in(), scene=problem).identity == problem("default", "").identity
-    assert replace(built_in(), code="mine").identity == "mine"
+    one = problem("default", "")
+    assert one.identity == problem("default", "").identity
+    assert replace(one, objective=lambda result: 0.0).identity != one.identity
+    assert replace(one, scene=lambda design, seed: one.scene(design, seed)).identity != one.identity
+    assert replace(one, scene=lambda design, seed: None).objective_identity == one.objective_identity
+    assert replace(one, code="mine").identity == replace(one, code="mine", objective=len).identity
 
 
 def test_importing_it_loads_nothing_heavy():

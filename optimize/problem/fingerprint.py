@@ -1,0 +1,210 @@
+"""Fingerprints of functions: checksums that differ where a function may give something else.
+
+An objective is a function, and the cache of a search reuses the values that it gave. So the key of a value
+has the code of the function and all that it is bound to: arguments of a ``functools.partial``, variables of
+the functions around it, default values, attributes of objects, global variables that it names, and the same
+of each function that it calls. Two equal fingerprints stand for equal functions, in any process. What cannot
+be compared by its value is refused.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+import hashlib
+import pickle
+import site
+import sys
+import sysconfig
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from tisim.errors import InputError, abbreviated
+from tisim.files.python_file import OWN_PACKAGES
+
+PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
+"""Types whose ``repr`` says all of a value."""
+
+
+def fingerprint(value: Any, what: str = "") -> str:
+    """Return the fingerprint of a function, or of another value, hex.
+
+    what : it, in the InputError that is raised where it is bound to something that cannot be compared; where
+    it is empty, such a thing counts by its class alone.
+    """
+    return _Fingerprint(what).of(value).hex()
+
+
+class _Fingerprint:
+    """A walk through what a value is made of; an object that is part of itself is entered once."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self.depths: dict[int, int] = {}
+        # With the object, or another one could come to have the same number.
+        self.known: dict[int, tuple[Any, bytes]] = {}
+
+    def of(self, value: Any) -> bytes:
+        """Return the digest of a value."""
+        if isinstance(value, PLAIN):
+            return _digest(type(value).__name__, repr(value))
+        if isinstance(value, np.generic | np.ndarray) and value.dtype != object:
+            array = np.asarray(value)
+            extra = () if not np.ma.isMaskedArray(value) else (self.of(np.ma.getmaskarray(value)),)
+            return _digest("array", array.dtype.str, repr(array.shape), array.tobytes(), *extra)
+        if id(value) in self.known:
+            return self.known[id(value)][1]
+        if id(value) in self.depths:
+            return _digest("part of itself", repr(len(self.depths) - self.depths[id(value)]))
+        self.depths[id(value)] = len(self.depths)
+        digest = _digest(*self.parts(value))
+        del self.depths[id(value)]
+        self.known[id(value)] = value, digest
+        return digest
+
+    def parts(self, value: Any) -> Iterator[bytes | str]:
+        """Yield what a value is made of."""
+        kind = type(value)
+        yield f"{kind.__module__}.{kind.__qualname__}"
+        if isinstance(value, types.FunctionType):
+            yield from self.function(value)
+        elif isinstance(value, functools.partial):
+            yield from (self.of(part) for part in (value.func, value.args, value.keywords))
+        elif isinstance(value, types.MethodType):
+            yield from (self.of(value.__func__), self.of(value.__self__))
+        elif isinstance(value, type | types.ModuleType | types.BuiltinFunctionType | np.ufunc):
+            yield from self.named(value)
+        elif isinstance(value, list | tuple | np.ndarray):
+            yield from map(self.of, value)
+        elif isinstance(value, Mapping):
+            yield from self.unordered((key, item) for key, item in value.items())
+        elif isinstance(value, set | frozenset):
+            yield from self.unordered(value)
+        elif isinstance(value, enum.Enum | Path):
+            yield str(value)
+        elif hasattr(value, "__wrapped__"):
+            yield self.of(value.__wrapped__)
+        else:
+            yield from self.object(value)
+
+    def unordered(self, items: Iterable[Any]) -> Iterator[bytes]:
+        """Yield the digests of items in an order of their own."""
+        yield from sorted(map(self.of, items))
+
+    def named(self, value: Any) -> Iterator[bytes | str]:
+        """Yield the name of a class, a module or a built-in function; of a class of the user its methods
+        too."""
+        yield f"{getattr(value, '__module__', '')}:{getattr(value, '__qualname__', value.__name__)}"
+        if isinstance(value, type) and _of_user(value):
+            for name, member in sorted(vars(value).items()):
+                function = getattr(member, "__func__", getattr(member, "fget", member))
+                if isinstance(function, types.FunctionType):
+                    yield from (name, self.of(function))
+                elif isinstance(member, PLAIN) and not name.startswith("__"):
+                    yield from (name, self.of(member))
+        own = getattr(value, "__self__", None)
+        if isinstance(value, types.BuiltinFunctionType) and not isinstance(own, types.ModuleType | None):
+            yield self.of(own)
+
+    def function(self, function: types.FunctionType) -> Iterator[bytes | str]:
+        """Yield what a function is: by its name where it is of a package, which has a version; by its code
+        and the globals that this names where it is the user's. And what it is bound to."""
+        yield f"{function.__module__}:{function.__qualname__}"
+        if hasattr(function, "__wrapped__"):
+            yield self.of(function.__wrapped__)
+        yield self.of(function.__defaults__)
+        yield self.of(function.__kwdefaults__)
+        for cell in function.__closure__ or ():
+            try:
+                content = cell.cell_contents
+            except ValueError:
+                continue  # A variable that is not set yet.
+            yield self.of(content)
+        if _of_user(function):
+            names: set[str] = set()
+            yield from self.code(function.__code__, names)
+            for name in sorted(names & function.__globals__.keys()):
+                yield from (name, self.of(function.__globals__[name]))
+
+    def code(self, code: types.CodeType, names: set[str]) -> Iterator[bytes | str]:
+        """Yield a code, without its places in a file, and add the names that it uses."""
+        names.update(code.co_names)
+        yield from (code.co_code, repr(code.co_names), repr(code.co_varnames), repr(code.co_freevars))
+        for constant in code.co_consts:
+            if isinstance(constant, types.CodeType):
+                yield from self.code(constant, names)
+            else:
+                yield self.of(constant)
+
+    def object(self, value: Any) -> Iterator[bytes | str]:
+        """Yield an object by its class and its attributes; one without any, by its pickle."""
+        yield self.of(type(value))
+        if isinstance(value, BaseModel):
+            # Not what it has computed of its fields since.
+            yield self.of({name: getattr(value, name) for name in type(value).model_fields})
+            return
+        if dataclasses.is_dataclass(value):
+            yield self.of({field.name: getattr(value, field.name) for field in dataclasses.fields(value)})
+            return
+        if hasattr(value, "__dict__") and _plain_attributes(type(value)):
+            computed = {
+                name
+                for kind in type(value).__mro__
+                for name, member in vars(kind).items()
+                if isinstance(member, functools.cached_property)
+            }
+            slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
+            given = {name: getattr(value, name) for name in slots if hasattr(value, name)}
+            yield self.of(given | {k: v for k, v in vars(value).items() if k not in computed})
+            return
+        try:
+            yield pickle.dumps(value, protocol=4)
+        except Exception as error:
+            if not self.what:
+                return
+            raise InputError(
+                f"{self.what} must use values that can be told apart, or its problem a `code`, a text that "
+                f"changes with them; received {abbreviated(value)} ({error})"
+            ) from error
+
+
+def _digest(*parts: bytes | str) -> bytes:
+    """Return the SHA-256 of parts, each with its length."""
+    total = hashlib.sha256()
+    for part in parts:
+        data = part.encode(errors="surrogatepass") if isinstance(part, str) else part
+        total.update(len(data).to_bytes(8, "little"))
+        total.update(data)
+    return total.digest()
+
+
+def _plain_attributes(kind: type) -> bool:
+    """Return whether all classes of an object are made in Python, so that its attributes are all of it."""
+    return kind.__reduce__ is object.__reduce__ and all(
+        base is object or base.__flags__ & (1 << 9) for base in kind.__mro__
+    )
+
+
+def _of_user(item: Callable[..., Any] | type) -> bool:
+    """Return whether a function or class is of a file of the user, a notebook or a terminal: neither of
+    tisim, nor of Python, nor installed."""
+    root = (getattr(item, "__module__", None) or "").partition(".")[0]
+    if root in OWN_PACKAGES or root in sys.stdlib_module_names - {"__main__"}:
+        return False
+    module = sys.modules.get(item.__module__ or "")
+    path = getattr(module, "__file__", None)
+    return path is None or not any(Path(path).is_relative_to(folder) for folder in _installed())
+
+
+@functools.cache
+def _installed() -> tuple[str, ...]:
+    """Return the folders that packages are installed in."""
+    paths = sysconfig.get_paths()
+    folders = {paths[name] for name in ("purelib", "platlib", "stdlib", "platstdlib")}
+    return (*folders, *site.getsitepackages(), site.getusersitepackages())

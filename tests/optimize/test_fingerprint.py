@@ -1,0 +1,188 @@
+"""Values of objectives are reused for the same function bound to the same things, and for no other."""
+
+import functools
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import optimize
+from optimize.problem.fingerprint import fingerprint
+from tests.optimize.drift_case import problem
+from tisim import InputError
+
+LEVEL = 1.0
+TABLE = np.arange(4.0)
+
+
+def miss(result, target):
+    return abs(result - target)
+
+
+def of_global(result):
+    return abs(result - LEVEL)
+
+
+def through_another(result):
+    return of_global(result) + TABLE.sum()
+
+
+def of_closure(target):
+    return lambda result: abs(result - target)
+
+
+class Target:
+    def __init__(self, target):
+        self.target = target
+
+    def __call__(self, result):
+        return miss(result, self.target)
+
+    def by_method(self, result):
+        return abs(result - self.target)
+
+
+@dataclass
+class Weights:
+    names: tuple
+    weights: dict
+
+    @functools.cached_property
+    def total(self):
+        return sum(self.weights.values())
+
+
+def with_default(target):
+    def inner(result, wanted=target):
+        return result - wanted
+
+    return inner
+
+
+MAKERS = {
+    "partial by name": lambda value: functools.partial(miss, target=value),
+    "partial of a partial": lambda value: functools.partial(functools.partial(miss), 0.0, value),
+    "closure": of_closure,
+    "default": with_default,
+    "object": Target,
+    "method": lambda value: Target(value).by_method,
+    "array": lambda value: of_closure(np.array([1.0, value])),
+    "array of f32": lambda value: of_closure(np.array([1.0, value], np.float32)),
+    "masked array": lambda value: of_closure(np.ma.array([1.0, 2.0], mask=[False, value > 1])),
+    "dictionary": lambda value: of_closure({"a": {"b": [1, (2, value)]}}),
+    "set": lambda value: of_closure({1.0, value, "x"}),
+    "data class": lambda value: of_closure(Weights(("a",), {"a": value})),
+    "namespace": lambda value: of_closure(SimpleNamespace(a=value)),
+    "path": lambda value: of_closure(Path(f"target{value}.csv")),
+    "cached function": lambda value: functools.lru_cache(of_closure(value)),
+}
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_what_a_function_is_bound_to_counts(name):
+    make = MAKERS[name]
+    assert fingerprint(make(0.5), name) == fingerprint(make(0.5), name)
+    assert fingerprint(make(0.5), name) != fingerprint(make(1.5), name)
+
+
+def test_globals_count_and_so_do_those_of_functions_that_are_called(monkeypatch):
+    before = fingerprint(of_global, "x"), fingerprint(through_another, "x")
+    assert before == (fingerprint(of_global, "x"), fingerprint(through_another, "x"))
+    with monkeypatch.context() as patch:
+        patch.setitem(globals(), "LEVEL", 2.0)
+        assert fingerprint(of_global, "x") != before[0]
+        assert fingerprint(through_another, "x") != before[1]
+    monkeypatch.setitem(globals(), "TABLE", TABLE + 1)
+    assert fingerprint(through_another, "x") != before[1]
+
+
+def test_what_was_computed_of_an_object_since_does_not_count():
+    weights = Weights(("a",), {"a": 1.0})
+    before = fingerprint(of_closure(weights), "x")
+    assert weights.total == 1.0
+    assert fingerprint(of_closure(weights), "x") == before
+
+
+def test_code_that_was_typed_anew_counts():
+    """As in a notebook, where there is no file."""
+    names = {}
+    exec("def f(r): return r - 1", names)
+    before = fingerprint(names["f"], "x")
+    exec("def f(r): return r - 1", names)
+    assert fingerprint(names["f"], "x") == before
+    exec("def f(r): return r - 2", names)
+    assert fingerprint(names["f"], "x") != before
+
+
+def test_objects_that_hold_each_other_end():
+    one, other = SimpleNamespace(a=1), SimpleNamespace(a=2)
+    one.other, other.other = other, one
+    before = fingerprint(of_closure(one), "x")
+    assert fingerprint(of_closure(one), "x") == before
+    other.a = 3
+    assert fingerprint(of_closure(one), "x") != before
+
+
+def test_what_cannot_be_compared_is_refused():
+    lock = threading.Lock()
+    with pytest.raises(
+        InputError, match=r"^objective R must use values that can be told apart, or its problem"
+    ):
+        fingerprint(of_closure(lock), "objective R")
+    # Of a scene, which has a digest of its own, it counts by its class.
+    assert fingerprint(of_closure(lock)) == fingerprint(of_closure(threading.Lock()))
+
+
+SCRIPT = """
+from tests.optimize import test_fingerprint as t
+print(*(t.fingerprint(make(0.5), name) for name, make in t.MAKERS.items()))
+"""
+
+
+def test_it_is_the_same_in_another_process():
+    command = [sys.executable, "-c", SCRIPT]
+    root = Path(__file__).parents[2]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root).stdout.split()
+    assert told == [fingerprint(make(0.5), name) for name, make in MAKERS.items()]
+
+
+FEW = {
+    "generations": 0, "options": {"population": 4},
+    "ensemble": {"max_starts": 1, "min_starts": 1, "block": 1},
+}  # fmt: skip
+
+
+def away(result, target):
+    return abs(result.state["mass"][0] - target)
+
+
+@pytest.mark.long
+def test_another_target_in_the_same_folder_is_another_search(tmp_path):
+    """Its values are not those of the first."""
+
+    def of(target):
+        objective = functools.partial(
+            lambda result, target: abs(result.state["mass"][0] - target), target=target
+        )
+        return replace(problem("default", ""), objective=objective)
+
+    first = optimize.run(of(0.25), out=tmp_path, **FEW)
+    assert first.evaluations > 0
+    assert optimize.run(of(0.25), out=tmp_path, **FEW).evaluations == 0
+    with pytest.raises(InputError, match=r"the problem file, or what its functions use, has changed"):
+        optimize.run(of(0.5), out=tmp_path, **FEW)
+
+
+@pytest.mark.long
+def test_another_range_of_a_gene_is_another_search(tmp_path):
+    made = problem("default", "")
+    optimize.run(made, out=tmp_path, **FEW)
+    gene, *others = made.genome.genes
+    wider = replace(made, genome=optimize.Genome((replace(gene, high=2 * gene.high), *others)))
+    with pytest.raises(InputError, match=rf"genes.{gene.name} is '.* to .*' there and '.*' here"):
+        optimize.run(wider, out=tmp_path, **FEW)
