@@ -48,6 +48,18 @@ REFUSED = {
     "a post": {
         "cylinders": [CylindricalSurface(start=(0.002, 0.05, 0), end=(0.002, 0.05, SIDE), radius=0.01)]
     },
+    "a duct of pieces of two radii": {
+        "cylinders": [
+            CylindricalSurface(start=(-0.02, 0.05, 0.06), end=(0.03, 0.05, 0.06), radius=0.04),
+            CylindricalSurface(start=(0.03, 0.05, 0.06), end=(SIDE + 0.02, 0.05, 0.06), radius=0.041),
+        ]
+    },
+    "a duct that ends at a face": {
+        "cylinders": [
+            CylindricalSurface(start=(-0.02, 0.05, 0.06), end=(0.03, 0.05, 0.06), radius=0.04),
+            CylindricalSurface(start=(0.03, 0.05, 0.06), end=(SIDE - 0.001, 0.05, 0.06), radius=0.04),
+        ]
+    },
     "a cone": {
         "cones": [
             ConicalSurface(
@@ -67,6 +79,12 @@ FELT = {
     },
     "a cylinder from face to face": {
         "cylinders": [CylindricalSurface(start=(0, 0.05, 0.06), end=(SIDE, 0.05, 0.06), radius=0.04)]
+    },
+    "a duct of two pieces that reach beyond": {
+        "cylinders": [
+            CylindricalSurface(start=(-0.02, 0.05, 0.06), end=(0.03, 0.05, 0.06), radius=0.04),
+            CylindricalSurface(start=(0.03, 0.05, 0.06), end=(SIDE + 0.02, 0.05, 0.06), radius=0.04),
+        ]
     },
     "a box wider than the other": {"boxes": [BoxSurface(low=(0, 0, 0.02), high=(SIDE, SIDE, 0.09))]},
 }

@@ -1,7 +1,8 @@
 """Walls at the periodic faces of a box.
 
 A grain at one face does not feel a wall at the opposite one. So a surface must stay farther from those faces
-than the largest grain reaches, or go on flat from one to the other, wherever the motion of its body takes it.
+than the largest grain reaches, or be the same at both, wherever the motion of its body takes it: as a floor
+that goes on flat from one to the other does, or a duct of several pieces that reaches beyond both.
 """
 
 from __future__ import annotations
@@ -16,21 +17,30 @@ from tisim.effects.motion.base import Motion
 from tisim.errors import Words, must
 from tisim.geometry.shape import SEAM, Shape
 
+PLACES, FEWEST_PLACES = 40_000, 200
+"""The number of places at which a body is compared at two faces, and how many of them must be near it."""
+ALIKE = 1e-6
+"""Distances from it may differ by this part of the reach."""
+
 
 def check_faces(
     shapes: Iterable[tuple[str, Shape]], motion: Motion, domain: Domain, reach: float, duration: float
 ) -> None:
     """Raise InputError where a shape, called so in messages, comes within reach (m) of a joined face in a run
-    of some duration (s), unless it goes on from that face to the opposite one."""
+    of some duration (s), unless the body is the same at the opposite one."""
     (low, high), joined = domain.bounds(), np.array(domain.joined())
     if low is None or high is None or not joined.any():
         return
+    shapes = list(shapes)
+    body = [shape for _, shape in shapes]
     for name, shape in shapes:
         at_start = _ends(shape, motion, low, high, reach, 0.0)
         for axis in np.flatnonzero(joined & _ends(shape, motion, low, high, reach, duration)):
+            if _is_alike(body, motion, int(axis), low, high, reach, duration):
+                continue
             rule = (
                 f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
-                f"{'xyz'[axis]}, or go on flat from one to the other: it is not felt through them"
+                f"{'xyz'[axis]}, or be the same at both, as one that goes on flat: it is not felt through them"
             )
             received = "one that ends or bends there" + ("" if at_start[axis] else " as it moves")
             must(False, name, rule, Words(received))
@@ -64,3 +74,27 @@ def _ends_turned(
     highest = centre + np.maximum(along.min() * axis, along.max() * axis) + widest
     near: np.ndarray = (lowest - reach < low) | (highest + reach > high)
     return turned & near
+
+
+def _is_alike(
+    body: list[Shape], motion: Motion, axis: int, low: np.ndarray, high: np.ndarray, reach: float,
+    duration: float,
+) -> bool:  # fmt: skip
+    """Return whether a body is as far from places within reach (m) of the two faces across an axis as from
+    their images, by places at random."""
+    turning = motion.axis()
+    if turning is not None and not all(shape.turns_into_itself(*turning) for shape in body):
+        return False
+    rng = np.random.Generator(np.random.Philox(0))
+    places, apart = rng.uniform(low, high, (PLACES, 3)), np.zeros(3)
+    apart[axis] = high[axis] - low[axis]
+    # On either side of the lower face, and their images on either side of the upper one.
+    places[:, axis] = low[axis] + rng.uniform(-reach, reach, PLACES)
+    for shift in map(np.array, motion.shifts(duration)):
+        here, there = (
+            np.min([shape.distances(at - shift) for shape in body], axis=0) for at in (places, places + apart)
+        )
+        near = np.minimum(np.abs(here), np.abs(there)) < reach
+        if near.sum() < FEWEST_PLACES or not (np.abs(here - there)[near] < ALIKE * reach).all():
+            return False
+    return True

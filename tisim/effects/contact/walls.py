@@ -49,7 +49,7 @@ class Walls(WallContacts, UsesMaterials, Force):
     itself. Other surfaces have two sides, and rims; where they meet, at an edge or a seam, a grain feels the
     nearer one, and at a concave edge both. What a contact remembers lies with the grain, and goes along with
     it from one triangle to the next. None is felt through the periodic faces of a box: a surface at one must
-    go on to the opposite one, as a floor does, or is refused.
+    be the same at the opposite one, as a floor is, or is refused.
 
     Bodies that move by themselves, or whose forces are reported separately, are walls of their own names. The
     result tells the force (N) and the torque (N m) of the grains on the body, about the origin or the centre
