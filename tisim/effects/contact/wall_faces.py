@@ -40,7 +40,8 @@ def check_faces(
                 continue
             rule = (
                 f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
-                f"{'xyz'[axis]}, or be the same at both, as one that goes on flat: it is not felt through them"
+                f"{'xyz'[axis]}, or be the same at both, as one that goes on flat: it is not felt through "
+                "them"
             )
             received = "one that ends or bends there" + ("" if at_start[axis] else " as it moves")
             must(False, name, rule, Words(received))
