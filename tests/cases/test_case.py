@@ -30,3 +30,17 @@ def test_what_a_case_imports_late_is_there_and_takes_what_it_is_called_with(name
     assert functions.keys() <= ARGUMENTS.keys()
     for field, late in functions.items():
         inspect.signature(late.function).bind(*ARGUMENTS[field])
+
+
+@pytest.mark.parametrize("name", every())
+def test_every_scene_of_a_moderate_size_may_begin(name):
+    """Its effects take its start; nothing is compiled."""
+    case, begun = every()[name], 0
+    for size in case.sizes:
+        scene = case.scene(size, 1)
+        if scene.capacity() < 5000:
+            start = scene.start()
+            for effect in scene.acting():
+                effect.suits_start(start, scene)
+            begun += 1
+    assert begun > 0

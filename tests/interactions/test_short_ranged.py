@@ -222,7 +222,7 @@ def of_chunks(setup, slots, monkeypatch):
 SHELL = {"stiffness": 5.0, "width": 0.25}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_contacts_within_a_far_cut_off_are_those_of_the_twin(monkeypatch):
     """Grains part within the reach of another law, and what they remember is forgotten. Pairs reach particles
     of another chunk, too."""

@@ -113,10 +113,8 @@ def test_a_checkpoint_has_what_rounding_has_taken(single):
 ASKED = {
     "scene.accuracy": {"accuracy": 1e-5},
     "stages": {"stepper": Collocation(control=StageControl(error=1e-7))},
-    "error": {"stepper": Trapezoid(control=ErrorControl(error=1e-7))},
     "tolerance": {"stepper": Trapezoid(control=IterationControl(tolerance=1e-9))},
     "the default": {},
-    "the default of collocation": {"stepper": Collocation()},
     "fine enough": {"stepper": Trapezoid(control=ErrorControl(error=1e-6, tolerance=1e-6))},
 }
 
@@ -145,7 +143,6 @@ def test_errors_that_it_cannot_reach_are_refused(single):
     assert said == {
         "scene.accuracy": f"scene.accuracy {rule.format('2e-05', '1e-05')}",
         "stages": f"stepper.control.error {rule.format('1e-06', '1e-07')}",
-        "error": f"stepper.control.error {rule.format('1e-06', '1e-07')}",
         "tolerance": f"stepper.control.tolerance {rule.format('1e-06', '1e-09')}",
-        **dict.fromkeys(("the default", "the default of collocation", "fine enough"), ""),
+        **dict.fromkeys(("the default", "fine enough"), ""),
     }

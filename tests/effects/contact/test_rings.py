@@ -77,6 +77,7 @@ def test_contacts_apart_push_each_by_its_own(number):
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.linalg.norm(expected))
 
 
+@pytest.mark.slow
 def test_a_ring_of_more_facets_is_not_stiffer():
     """From some number on the force does not grow with that of facets."""
     scenes = [lodged(number, sunk=1e-4, aside=(0.0, 0.0), steps=1, dt=1e-12) for number in (16, 32, 64, 128)]
