@@ -105,19 +105,37 @@ def test_every_near_pair_is_listed_once(rng, monkeypatch, domain, schedule):
     simulation.close()
 
 
-def burst(seed=2, n=240):
+class SolidShell(SoftShell):
+    """One that holds particles apart."""
+
+    solid = True
+
+
+def burst(seed=2, n=240, law=SoftShell):
     """A cloud that falls together, so that its list overflows on the way."""
     draw = np.random.default_rng(seed)
     position = draw.uniform(-1.0, 1.0, (n, 3))
     return scene(
         position,
         -0.9 * position,
-        (SoftShell(stiffness=1e-3, width=0.05),),
+        (law(stiffness=1e-3, width=0.05),),
         radius=0.02,
         mass=1.0,
         dt=5e-3,
         steps=180,
     )
+
+
+def test_solid_particles_whose_list_overflows_on_the_way_go_on():
+    """The step after is not taken for one in which they pass through each other."""
+    made = burst(law=SolidShell)
+    simulation = Simulation(made)
+    simulation.load(made)
+    simulation.run()
+    (result,) = simulation.results()
+    assert result.status.ok, result.status.reason
+    assert simulation.assembly.pairs.half_list.row > half_list.ListSizes().row
+    simulation.close()
 
 
 @pytest.fixture(scope="module")

@@ -181,10 +181,13 @@ class HalfList(NeighbourRows):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
             square += self.since[w, k] ** 2
             step += self.s.displacement[w, k] ** 2
-        # Two that meet head on move past each other by twice as much.
+        # Two that meet head on move past each other by twice as much. A list that has just been made longer
+        # does not know the smallest radius yet, and is about to be made anew.
         smallest = ti.cast(self.grid.smallest[w], ti.f64)
-        if ti.static(self.solid) and self.s.count[w] > 1 and step > smallest * smallest:
-            ti.atomic_max(self.s.failed[w], WorldStatus.OUTRUN)
+        if ti.static(self.solid):
+            outrun = smallest > 0.0 and step > smallest * smallest
+            if outrun and self.s.count[w] > 1:
+                ti.atomic_max(self.s.failed[w], WorldStatus.OUTRUN)
         apart = 2.0 * ti.sqrt(square)
         if ti.static(self.images > 0):
             apart += self.sheared(w, self.s.time[w] + self.s.dt[w] - self.made[w])
