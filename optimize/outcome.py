@@ -29,6 +29,7 @@ class Progress:
     fraction : of this generation, 0..1. best : value of each objective, the best that any design of the hall
     has; empty until one is known. designs : in the hall. best_design : of one objective; None until one is
     known. evaluations, hits : run, and found in the cache. elapsed_s : wall seconds since the search began.
+    failure : why a design of this generation failed, while none is known that did not.
     """
 
     generation: int
@@ -40,6 +41,7 @@ class Progress:
     evaluations: int
     hits: int
     elapsed_s: float
+    failure: str = ""
 
 
 @dataclass(frozen=True)

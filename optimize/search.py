@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from optimize.evaluation.ensemble import Ensemble
 from optimize.evaluation.runs import Evaluator
@@ -20,6 +21,7 @@ from optimize.problem.problem import Problem
 from optimize.search_records import searches, store
 from optimize.settings import Settings, fit, identity
 from optimize.storage.cache import Cache
+from tisim.errors import RunError
 
 
 class _OutOfTime(Exception):
@@ -118,8 +120,16 @@ class _Search:
                 **statistics(self.problem, population, self.hall.strings),
             )
             self._store()
+            reasons = [string.estimates[0].reason for string in population if string.estimates]
+            failed = not self.hall.strings and reasons
             if self.on_generation is not None:
-                self.on_generation(self._progress(generation, 1.0))
+                progress = self._progress(generation, 1.0)
+                self.on_generation(replace(progress, failure=reasons[0]) if failed else progress)
+            if failed and not self.ensemble.runs.requested:
+                raise RunError(
+                    f"no design of the {len(reasons)} of the first generation has a scene; the first is "
+                    f"{reasons[0]}"
+                )
             self.outcome.stopped = self._stop(generation)
             if self.outcome.stopped:
                 return

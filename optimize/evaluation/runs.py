@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from optimize.problem.calls import FaultyProblem, make_scene, value_of
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
 from optimize.storage.record import Record, canonical, evaluation_key
@@ -71,6 +72,7 @@ class Sample:
 class Runs:
     """Runs what is requested and not known. evaluations, hits : runs made, and found in the cache instead;
     together they are the different runs that were requested, the same for a search that was resumed.
+    requested : all of them, those that were asked for twice too.
 
     common : start k is the same for every design.
     """
@@ -82,6 +84,7 @@ class Runs:
         self.seed, self.common, self.code = seed, common, problem.objective_identity
         self.evaluations = 0
         self.hits = 0
+        self.requested = 0
         self._requested: set[str] = set()
 
     def add(
@@ -101,7 +104,9 @@ class Runs:
             for start in starts:
                 seed = start_seed(self.seed, start, None if self.common else sample.design)
                 try:
-                    scene = self.problem.scene(sample.design, seed)
+                    scene = make_scene(self.problem, sample.design, seed)
+                except FaultyProblem:
+                    raise
                 except InputError as error:
                     sample.reason = sample.reason or f"infeasible: {error}"
                     break
@@ -113,6 +118,7 @@ class Runs:
                 elif key not in self._requested:
                     self.hits += 1
                 self._requested.add(key)
+        self.requested += len(requested)
         self._run(missing, report)
         for sample, start, seed, key in requested:
             record = self.cache.get(key)
@@ -140,7 +146,7 @@ class Runs:
         ok, reason = result.status.ok, result.status.reason or "failed without a reason"
         values = (math.nan,) * len(self.problem.objectives)
         if ok:
-            values = tuple(float(objective.of(result)) for objective in self.problem.objectives)
+            values = tuple(value_of(one, result, self.problem) for one in self.problem.objectives)
             for objective, value in zip(self.problem.objectives, values, strict=True):
                 if ok and not math.isfinite(value):
                     ok, reason = (

@@ -54,7 +54,7 @@ class Display:
 
     def _best(self, where: Progress) -> str:
         if not where.best:
-            return "best none yet"
+            return f"best none yet; the first failed: {where.failure}" if where.failure else "best none yet"
         pairs = zip(self.problem.objectives, where.best, strict=True)
         if self.problem.several:
             best = "".join(f"  {o.name} {value:.4g} {o.unit}".rstrip() for o, value in pairs)

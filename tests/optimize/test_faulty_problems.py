@@ -1,0 +1,106 @@
+"""Functions of a problem that are at fault end a search with a line that says so, and where."""
+
+import numpy as np
+import pytest
+
+from optimize.evaluation.ensemble import EnsembleSettings
+from optimize.search import search
+from optimize.settings import Settings
+from optimize.storage.cache import Cache
+from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
+from tisim import InputError, RunError
+
+SETTINGS = Settings(
+    generations=3, options={"population": 6, "parents": 2},
+    ensemble=EnsembleSettings(max_starts=1, min_starts=1, block=1),
+)  # fmt: skip
+
+
+def run(tmp_path, **changes):
+    with Cache(tmp_path / "search.h5") as cache:
+        return search(fake_problem(**changes), FakeEvaluator(), cache, SETTINGS)
+
+
+def fails(result):
+    return result.value / 0
+
+
+NO_NUMBERS = {
+    "nothing": (lambda r: None, "None"),
+    "a text": (lambda r: "0.3", "'0.3'"),
+    "a flag": (lambda r: True, "True"),
+    "a flag of NumPy": (lambda r: np.bool_(True), r"(np\.)?True"),
+    "an array": (lambda r: np.array([1.0]), r"array\(\[1.\]\)"),
+    "a complex number": (lambda r: 1j, "1j"),
+    "a masked value": (lambda r: np.ma.masked, "masked"),
+    "an error": (fails, r"ZeroDivisionError: .* \(test_faulty_problems.py, line \d+\)"),
+}
+
+
+@pytest.mark.parametrize("name", NO_NUMBERS)
+def test_an_objective_that_gives_no_number_is_refused(tmp_path, name):
+    objective, received = NO_NUMBERS[name]
+    with pytest.raises(InputError, match=rf"^objective fitness must return a number; received {received}"):
+        run(tmp_path, objective=objective)
+
+
+@pytest.mark.parametrize("number", [np.float32(0.5), np.int64(3), np.array(0.5), 7])
+def test_any_real_number_is_one(tmp_path, number):
+    assert run(tmp_path, objective=lambda r: number).best is not None
+
+
+def misspelt(design, seed):
+    return design["y"]
+
+
+SCENES = {
+    "misspelt": (misspelt, r"KeyError: 'y' \(test_faulty_problems.py, line \d+\)"),
+    "nothing": (lambda design, seed: None, "None"),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_function_at_fault_is_refused(tmp_path, name):
+    function, received = SCENES[name]
+    rule = "scene of problem bowl must return a Scene, or raise InputError to refuse a design"
+    with pytest.raises(InputError, match=rf"^{rule}; received {received}"):
+        run(tmp_path, scene=function)
+
+
+def refused(design, seed):
+    raise InputError("speed must be below 1 m/s; received 2.0")
+
+
+def test_a_search_of_which_every_design_is_refused_ends_and_says_why(tmp_path):
+    with pytest.raises(
+        RunError, match=r"^no design of the 6 of the first generation .* speed must be below 1"
+    ):
+        run(tmp_path, scene=refused)
+
+
+def test_a_search_of_which_some_designs_are_refused_goes_on(tmp_path):
+    def some(design, seed):
+        return FakeScene(design, seed) if design["x0"] > 0.3 else refused(design, seed)
+
+    outcome = run(tmp_path, scene=some)
+    assert outcome.best is not None
+    assert outcome.stopped == "generations"
+
+
+def test_an_objective_that_reads_a_file_must_declare_it(tmp_path):
+    """Or its values would be reused when the file has changed."""
+    target = tmp_path / "target.csv"
+    target.write_text("0.25")
+
+    def miss(result):
+        return abs(result.value - float(target.read_text()))
+
+    with pytest.raises(
+        InputError, match=r"^objective fitness must read only `files` .* received .*target.csv"
+    ):
+        run(tmp_path, objective=miss)
+    first = run(tmp_path, objective=miss, files=[target])
+    assert first.evaluations > 0
+    assert run(tmp_path, objective=miss, files=[target]).evaluations == 0
+    target.write_text("0.75")
+    assert run(tmp_path, objective=miss, files=[target]).evaluations > 0
