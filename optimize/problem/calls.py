@@ -14,15 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tisim.errors import InputError, abbreviated, printable
+from tisim.files.python_file import OWN_PACKAGES
 
 if TYPE_CHECKING:
     from optimize.problem.objective import Objective
     from optimize.problem.problem import Problem
     from tisim import Result, Scene
 
-PACKAGES = tuple(Path(__file__).parents[2] / name for name in ("tisim", "optimize"))
+PACKAGES = tuple(Path(__file__).parents[2] / name for name in sorted(OWN_PACKAGES))
 SOURCES = (".py", ".pyc", ".so", ".pyd")
 """Files with these endings are opened by imports."""
+SYSTEM = tuple(map(Path, ("/usr", "/lib", "/etc", "/dev", "/proc", "/sys")))
+"""What is in these folders, or in hidden ones such as ~/.cache, is no data of a user."""
 
 
 def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scene:
@@ -83,7 +86,7 @@ def _note(event: str, arguments: tuple[Any, ...]) -> None:
     path, mode, *_ = arguments
     if isinstance(path, str | bytes) and (mode is None or "r" in str(mode)):
         name = path.decode(errors="surrogateescape") if isinstance(path, bytes) else path
-        if not name.endswith(SOURCES) and not name.startswith(("/dev/", "/proc/", "/sys/")):
+        if not name.endswith(SOURCES):
             files.add(Path(name))
 
 
@@ -92,7 +95,7 @@ _hook: list[Callable[..., Any]] = []
 
 @contextmanager
 def _files_read() -> Iterator[set[Path]]:
-    """Collect the paths of the files that are opened for reading within, links followed."""
+    """Collect the paths of the user's files that are opened for reading within, links followed."""
     if not _hook:
         # A hook is for ever.
         sys.addaudithook(_note)
@@ -104,6 +107,12 @@ def _files_read() -> Iterator[set[Path]]:
     finally:
         _reading.files = None
         resolved = {path.resolve() for path in found if path.is_file()}
-        installed = Path(sys.prefix).resolve(), Path(sys.base_prefix).resolve()
         found.clear()
-        found.update(path for path in resolved if not any(path.is_relative_to(base) for base in installed))
+        found.update(filter(_is_of_user, resolved))
+
+
+def _is_of_user(path: Path) -> bool:
+    """Return whether a file is neither installed nor the system's."""
+    installed = Path(sys.prefix).resolve(), Path(sys.base_prefix).resolve(), *PACKAGES
+    hidden = any(part.startswith(".") for part in path.parts)
+    return not hidden and not any(path.is_relative_to(base) for base in (*installed, *SYSTEM))
