@@ -23,6 +23,9 @@ from optimize.settings import Settings, fit, identity
 from optimize.storage.cache import Cache
 from tisim.errors import RunError
 
+MOST_REFUSED = 200
+"""A search ends where the scene function has refused this number of designs, and taken none."""
+
 
 class _OutOfTime(Exception):
     """The wall-clock budget has been spent in the middle of a generation."""
@@ -70,7 +73,7 @@ class _Search:
         )
         self.hall = Hall(settings.hall_of_fame)
         self.ranked: list[Individual] = []
-        self.stagnation = 0
+        self.stagnation = self.refused = 0
         self.outcome = Outcome(problem, settings, identity(problem, settings, evaluator.settings))
         self.began = time.monotonic()
 
@@ -125,10 +128,11 @@ class _Search:
             if self.on_generation is not None:
                 progress = self._progress(generation, 1.0)
                 self.on_generation(replace(progress, failure=reasons[0]) if failed else progress)
-            if failed and not self.ensemble.runs.requested:
+            self.refused += len(reasons)
+            last = generation == self.settings.generations
+            if failed and not self.ensemble.runs.requested and (last or self.refused >= MOST_REFUSED):
                 raise RunError(
-                    f"no design of the {len(reasons)} of the first generation has a scene; the first is "
-                    f"{reasons[0]}"
+                    f"the scene function refused all of the first {self.refused} designs; one is {reasons[0]}"
                 )
             self.outcome.stopped = self._stop(generation)
             if self.outcome.stopped:

@@ -95,7 +95,7 @@ def refuse(folder: Path, command: str, stored: Mapping[str, Any], requested: Map
     names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
     # Of the functions only a checksum is kept.
     differences = "; ".join(
-        "the problem file, or what its functions use, has changed"
+        "the problem file, or a value that its functions use, has changed"
         if name == "problem_code"
         else f"{name} is {_shown(old, name)} there and {_shown(new, name)} here"
         for name in names

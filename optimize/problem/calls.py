@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numbers
+import os
 import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +27,7 @@ PACKAGES = tuple(Path(__file__).parents[2] / name for name in sorted(OWN_PACKAGE
 SOURCES = (".py", ".pyc", ".so", ".pyd")
 """Files with these endings are opened by imports."""
 SYSTEM = tuple(map(Path, ("/usr", "/lib", "/etc", "/dev", "/proc", "/sys")))
-"""What is in these folders, or in hidden ones such as ~/.cache, is no data of a user."""
+"""What is in these folders is no data of a user."""
 
 
 def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scene:
@@ -54,13 +56,18 @@ def value_of(objective: Objective, result: Result, problem: Problem) -> float:
     except Exception as error:
         raise FaultyProblem(f"{rule}; received {_told(error)}") from error
     if unknown := sorted(str(path) for path in read - known):
-        rule = f"objective {objective.name} must read only `files` of its problem, as its values are kept"
-        raise FaultyProblem(f"{rule}; received {printable(unknown[0])}")
-    if isinstance(value, np.ndarray) and value.shape == () and not np.ma.isMaskedArray(value):
+        raise FaultyProblem(
+            f"objective {objective.name} must read no file but those in Problem(files=[...]), as its values "
+            f"are used again while these are the same; received {printable(unknown[0])}"
+        )
+    if isinstance(value, np.ndarray) and value.shape == () and not np.ma.is_masked(value):
         value = value[()]
-    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real | Decimal):
         raise FaultyProblem(f"{rule}; received {abbreviated(value)}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise FaultyProblem(f"{rule} of 64 bits; received {abbreviated(value)}") from None
 
 
 class FaultyProblem(InputError):
@@ -70,7 +77,7 @@ class FaultyProblem(InputError):
 def _told(error: Exception) -> str:
     """Return an error of a function of the user in a line, with its place in the user's file."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [one for one in frames if not any(Path(one.filename).is_relative_to(p) for p in PACKAGES)]
+    own = [one for one in frames if _is_of_user(Path(one.filename))]
     place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
     return printable(f"{type(error).__name__}: {' '.join(str(error).split())}") + printable(place)
 
@@ -83,11 +90,16 @@ def _note(event: str, arguments: tuple[Any, ...]) -> None:
     files: set[Path] | None = getattr(_reading, "files", None)
     if files is None or event != "open":
         return
-    path, mode, *_ = arguments
-    if isinstance(path, str | bytes) and (mode is None or "r" in str(mode)):
-        name = path.decode(errors="surrogateescape") if isinstance(path, bytes) else path
-        if not name.endswith(SOURCES):
-            files.add(Path(name))
+    path, _mode, flags = arguments
+    if not isinstance(path, str | bytes) or not isinstance(flags, int):
+        return
+    name = path.decode(errors="surrogateescape") if isinstance(path, bytes) else path
+    writes = flags & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    if writes:
+        # What is read back later was written for that.
+        _reading.written.add(Path(name).absolute())
+    elif not name.endswith(SOURCES) and Path(name).absolute() not in _reading.written:
+        files.add(Path(name).absolute())
 
 
 _hook: list[Callable[..., Any]] = []
@@ -101,18 +113,20 @@ def _files_read() -> Iterator[set[Path]]:
         sys.addaudithook(_note)
         _hook.append(_note)
     found: set[Path] = set()
-    _reading.files = found
+    _reading.files, _reading.written = found, set()
     try:
         yield found
     finally:
         _reading.files = None
-        resolved = {path.resolve() for path in found if path.is_file()}
+        read = {path.resolve() for path in filter(_is_of_user, found) if path.is_file()}
         found.clear()
-        found.update(filter(_is_of_user, resolved))
+        found.update(read)
 
 
 def _is_of_user(path: Path) -> bool:
-    """Return whether a file is neither installed nor the system's."""
-    installed = Path(sys.prefix).resolve(), Path(sys.base_prefix).resolve(), *PACKAGES
-    hidden = any(part.startswith(".") for part in path.parts)
-    return not hidden and not any(path.is_relative_to(base) for base in (*installed, *SYSTEM))
+    """Return whether a file is neither installed, nor the system's, nor kept by a program in the home."""
+    installed = Path(sys.prefix), Path(sys.base_prefix), *PACKAGES
+    home = os.environ.get("HOME") or os.environ.get("USERPROFILE") or "."
+    kept = tuple(Path(home) / name for name in (".cache", ".config", ".local", ".matplotlib"))
+    metadata = any(part.endswith((".egg-info", ".dist-info")) for part in path.parts)
+    return not metadata and not any(path.is_relative_to(base) for base in (*installed, *SYSTEM, *kept))

@@ -9,10 +9,10 @@ be compared by its value is refused.
 
 from __future__ import annotations
 
-import dataclasses
 import enum
 import functools
 import hashlib
+import inspect
 import pickle
 import site
 import sys
@@ -26,7 +26,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from tisim.errors import InputError, abbreviated
-from tisim.files.python_file import OWN_PACKAGES
+from tisim.files.python_file import OWN_PACKAGES, sha256
 
 PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
 """Types whose ``repr`` says all of a value."""
@@ -81,7 +81,7 @@ class _Fingerprint:
         elif isinstance(value, type | types.ModuleType | types.BuiltinFunctionType | np.ufunc):
             yield from self.named(value)
         elif isinstance(value, list | tuple | np.ndarray):
-            yield from map(self.of, value)
+            yield from map(self.of, np.atleast_1d(value) if isinstance(value, np.ndarray) else value)
         elif isinstance(value, Mapping):
             yield from self.unordered((key, item) for key, item in value.items())
         elif isinstance(value, set | frozenset):
@@ -98,19 +98,29 @@ class _Fingerprint:
         yield from sorted(map(self.of, items))
 
     def named(self, value: Any) -> Iterator[bytes | str]:
-        """Yield the name of a class, a module or a built-in function; of a class of the user its methods
-        too."""
+        """Yield the name of a class, a module or a built-in function; of a class of the user its members
+        too, and of a module of the user its file."""
         yield f"{getattr(value, '__module__', '')}:{getattr(value, '__qualname__', value.__name__)}"
         if isinstance(value, type) and _of_user(value):
+            yield from map(self.of, value.__bases__)
             for name, member in sorted(vars(value).items()):
-                function = getattr(member, "__func__", getattr(member, "fget", member))
-                if isinstance(function, types.FunctionType):
-                    yield from (name, self.of(function))
-                elif isinstance(member, PLAIN) and not name.startswith("__"):
-                    yield from (name, self.of(member))
+                yield from self.member(name, member)
+        elif isinstance(value, types.ModuleType) and _of_user(value):
+            file = getattr(value, "__file__", None)
+            yield sha256(Path(file).read_bytes()) if file else ""
         own = getattr(value, "__self__", None)
         if isinstance(value, types.BuiltinFunctionType) and not isinstance(own, types.ModuleType | None):
             yield self.of(own)
+
+    def member(self, name: str, member: Any) -> Iterator[bytes | str]:
+        """Yield a member of a class of the user: a method, or a value that is not made by Python itself."""
+        function = next(
+            (getattr(member, at) for at in ("__func__", "fget", "func") if hasattr(member, at)), member
+        )
+        if isinstance(function, types.FunctionType):
+            yield from (name, self.of(function))
+        elif not name.startswith(("__", "_abc_")) and not inspect.isdatadescriptor(member):
+            yield from (name, self.of(member))
 
     def function(self, function: types.FunctionType) -> Iterator[bytes | str]:
         """Yield what a function is: by its name where it is of a package, which has a version; by its code
@@ -130,7 +140,12 @@ class _Fingerprint:
             names: set[str] = set()
             yield from self.code(function.__code__, names)
             for name in sorted(names & function.__globals__.keys()):
-                yield from (name, self.of(function.__globals__[name]))
+                value = function.__globals__[name]
+                yield from (name, self.of(value))
+                if isinstance(value, types.ModuleType) and _of_user(value):
+                    # What is named of it, such as ``target`` in ``settings.target``.
+                    for attribute in sorted(names & vars(value).keys()):
+                        yield from (attribute, self.of(vars(value)[attribute]))
 
     def code(self, code: types.CodeType, names: set[str]) -> Iterator[bytes | str]:
         """Yield a code, without its places in a file, and add the names that it uses."""
@@ -146,11 +161,10 @@ class _Fingerprint:
         """Yield an object by its class and its attributes; one without any, by its pickle."""
         yield self.of(type(value))
         if isinstance(value, BaseModel):
-            # Not what it has computed of its fields since.
+            # Of those of tisim not what they have computed of their fields since.
             yield self.of({name: getattr(value, name) for name in type(value).model_fields})
-            return
-        if dataclasses.is_dataclass(value):
-            yield self.of({field.name: getattr(value, field.name) for field in dataclasses.fields(value)})
+            if _of_user(type(value)):
+                yield self.of([value.__pydantic_private__, value.__pydantic_extra__])
             return
         if hasattr(value, "__dict__") and _plain_attributes(type(value)):
             computed = {
@@ -169,8 +183,8 @@ class _Fingerprint:
             if not self.what:
                 return
             raise InputError(
-                f"{self.what} must use values that can be told apart, or its problem a `code`, a text that "
-                f"changes with them; received {abbreviated(value)} ({error})"
+                f"{self.what} must use only values that can be compared; received {abbreviated(value)} "
+                f"({error}). Or give Problem(code=...), a text that you change with that value"
             ) from error
 
 
@@ -191,13 +205,14 @@ def _plain_attributes(kind: type) -> bool:
     )
 
 
-def _of_user(item: Callable[..., Any] | type) -> bool:
-    """Return whether a function or class is of a file of the user, a notebook or a terminal: neither of
-    tisim, nor of Python, nor installed."""
-    root = (getattr(item, "__module__", None) or "").partition(".")[0]
+def _of_user(item: Callable[..., Any] | type | types.ModuleType) -> bool:
+    """Return whether a function, class or module is of a file of the user, a notebook or a terminal: neither
+    of tisim, nor of Python, nor installed."""
+    whose = item.__name__ if isinstance(item, types.ModuleType) else getattr(item, "__module__", None) or ""
+    root = whose.partition(".")[0]
     if root in OWN_PACKAGES or root in sys.stdlib_module_names - {"__main__"}:
         return False
-    module = sys.modules.get(item.__module__ or "")
+    module = sys.modules.get(whose)
     path = getattr(module, "__file__", None)
     return path is None or not any(Path(path).is_relative_to(folder) for folder in _installed())
 

@@ -73,6 +73,7 @@ class Problem:
         names = [objective.name for objective in self.objectives]
         must(bool(names) and len(set(names)) == len(names), "objectives", "one or more, all different", names)
         must(len(names) == 1 or not self.derived, "derived", "empty for several objectives", [*self.derived])
+        must(not isinstance(self.files, str | Path), "files", "a list of paths", self.files)
         one = len(names) == 1 or self.met_at is None
         must(one, "met_at", "left out for several objectives", self.met_at)
 
@@ -115,7 +116,7 @@ def checksum_of(function: Callable[..., Any], what: str = "") -> str:
 
 def read(file: str | Path) -> bytes:
     """Return the content of a data file of a problem; InputError where there is none."""
-    content = regular_file.content(Path(file))
+    content = regular_file.content(regular_file.target(Path(file)))
     if content is None:
         raise InputError(f"files of a problem must exist; received {str(file)!r}")
     return content

@@ -39,7 +39,7 @@ def test_another_objective_in_the_file_is_another_search(tisim, own_file):
     own_file("my_drift.py", PROBLEM.replace(".mean()", ".max()"))
     code, _, err = tisim(*SEARCH)
     assert code == 2
-    assert "(the problem file, or what its functions use, has changed)" in " ".join(err.split())
+    assert "(the problem file, or a value that its functions use, has changed)" in " ".join(err.split())
     assert tisim(*SEARCH, "--out", "t")[0] == 0
     assert not stored_runs & runs("t/search.h5")
 

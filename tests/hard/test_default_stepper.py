@@ -235,7 +235,8 @@ class TestTheGuard:
 
     @pytest.mark.parametrize("angle", [0.9, 1.2, 1.6, 2.0, 2.4, 2.8, 3.5, 5.0, 10.0])
     @pytest.mark.parametrize("softening", [None, 1e-3])
-    def test_bodies_that_fall_together_and_are_thrown_apart_stop_their_world(self, angle, softening):
+    @pytest.mark.parametrize("beside", [(), (laws.Gravity(),)], ids=["alone", "gravity"])
+    def test_bodies_that_fall_together_and_are_thrown_apart_stop_their_world(self, angle, softening, beside):
         """From rest, at a distance of 1 cm. ``angle`` is omega dt there; the energy is off by 1 to 1e48 times
         in what such steps give."""
         d, omega = 0.01, 1e3
@@ -245,7 +246,7 @@ class TestTheGuard:
                 position=[(-d / 2, 0, 0), (d / 2, 0, 0)], velocity=[(0, 0, 0), (0, 0, 0)],
                 radius=1e-6, mass=0.5 * omega**2 * d**3 / 6.6743e-11,
             ),
-            effects=(gravity,),
+            effects=(gravity, *beside),
             stepper=Verlet(control=FixedStep(dt=angle / omega)),
             duration=0.03,
         )  # fmt: skip

@@ -1,6 +1,7 @@
 """Values of objectives are reused for the same function bound to the same things, and for no other."""
 
 import functools
+import importlib
 import subprocess
 import sys
 import threading
@@ -57,6 +58,22 @@ class Weights:
         return sum(self.weights.values())
 
 
+@dataclass
+class OfFile:
+    """What it wants is no field of it."""
+
+    name: str
+
+    def __post_init__(self):
+        self.target = float(self.name)
+
+
+def with_base(value):
+    """An object of a class whose base has a value and a method that uses it."""
+    base = type("Base", (), {"target": [value], "miss": lambda self, result: abs(result - self.target[0])})
+    return type("Objective", (base,), {"__call__": lambda self, result: self.miss(result)})()
+
+
 def with_default(target):
     def inner(result, wanted=target):
         return result - wanted
@@ -77,6 +94,9 @@ MAKERS = {
     "dictionary": lambda value: of_closure({"a": {"b": [1, (2, value)]}}),
     "set": lambda value: of_closure({1.0, value, "x"}),
     "data class": lambda value: of_closure(Weights(("a",), {"a": value})),
+    "data class that computes": lambda value: of_closure(OfFile(str(value))),
+    "class with a base": with_base,
+    "array of objects": lambda value: of_closure(np.array(value, dtype=object)),
     "namespace": lambda value: of_closure(SimpleNamespace(a=value)),
     "path": lambda value: of_closure(Path(f"target{value}.csv")),
     "cached function": lambda value: functools.lru_cache(of_closure(value)),
@@ -99,6 +119,26 @@ def test_globals_count_and_so_do_those_of_functions_that_are_called(monkeypatch)
         assert fingerprint(through_another, "x") != before[1]
     monkeypatch.setitem(globals(), "TABLE", TABLE + 1)
     assert fingerprint(through_another, "x") != before[1]
+
+
+def test_what_is_named_of_a_module_of_the_user_counts(tmp_path, monkeypatch):
+    """Its file, and a value that was set in it since."""
+    monkeypatch.syspath_prepend(tmp_path)
+    text = "LEVEL = 1.0\n\n\ndef miss(result):\n    return abs(result - LEVEL)\n"
+    (tmp_path / "own_levels.py").write_text(text)
+    module = importlib.import_module("own_levels")
+    names = {"own_levels": module}
+    exec("def of_value(r): return r - own_levels.LEVEL\ndef of_call(r): return own_levels.miss(r)", names)
+    for function in names["of_value"], names["of_call"]:
+        before = fingerprint(function, "x")
+        assert fingerprint(function, "x") == before
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "LEVEL", 2.0)
+            assert fingerprint(function, "x") != before
+        (tmp_path / "own_levels.py").write_text(text + "\n")
+        assert fingerprint(function, "x") != before
+        (tmp_path / "own_levels.py").write_text(text)
+    monkeypatch.delitem(sys.modules, "own_levels")
 
 
 def test_what_was_computed_of_an_object_since_does_not_count():
@@ -130,9 +170,7 @@ def test_objects_that_hold_each_other_end():
 
 def test_what_cannot_be_compared_is_refused():
     lock = threading.Lock()
-    with pytest.raises(
-        InputError, match=r"^objective R must use values that can be told apart, or its problem"
-    ):
+    with pytest.raises(InputError, match=r"^objective R must use only values that can be compared; "):
         fingerprint(of_closure(lock), "objective R")
     # Of a scene, which has a digest of its own, it counts by its class.
     assert fingerprint(of_closure(lock)) == fingerprint(of_closure(threading.Lock()))
@@ -174,7 +212,7 @@ def test_another_target_in_the_same_folder_is_another_search(tmp_path):
     first = optimize.run(of(0.25), out=tmp_path, **FEW)
     assert first.evaluations > 0
     assert optimize.run(of(0.25), out=tmp_path, **FEW).evaluations == 0
-    with pytest.raises(InputError, match=r"the problem file, or what its functions use, has changed"):
+    with pytest.raises(InputError, match=r"the problem file, or a value that its functions use, has changed"):
         optimize.run(of(0.5), out=tmp_path, **FEW)
 
 

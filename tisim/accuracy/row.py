@@ -111,7 +111,7 @@ def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
 
     def beaten(row: Row) -> bool:
         return any(
-            other.median < row.median and other.at_most(quantity) < row.at_most(quantity) for other in fast
+            other.median < row.median and other.at_most(quantity) < row.at_most(quantity) for other in good
         )
 
     return sorted(fast, key=lambda row: (beaten(row), row.sums * row.starts, row.median))

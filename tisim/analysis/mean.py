@@ -32,7 +32,10 @@ class Mean:
 
         InputError unless there are one or more finite numbers.
         """
-        values = np.asarray(runs, float)
+        try:
+            values = np.asarray(runs, float)
+        except (TypeError, ValueError):
+            values = np.zeros((0,))
         sound = values.ndim == 1 and len(values) > 0 and bool(np.isfinite(values).all())
         must(sound, "runs", "a list of finite numbers, one for each run", runs)
         return cls(float(np.mean(values)), float(half_width(values)))

@@ -28,7 +28,7 @@ REASONS: dict[int, str] = {
     WorldStatus.STEP_TOO_SHORT: "the implicit equations of a step cannot be solved even at the shortest step",
     WorldStatus.FORCE_TOO_STEEP: "a force so strong that it asks for a step shorter than the shortest",
     WorldStatus.NOT_POSITIVE_DEFINITE: "the diffusion matrix is not positive definite",
-    WorldStatus.STEP_TOO_LONG: "a step too long beside the critical time step (2/omega) of the forces",
+    WorldStatus.STEP_TOO_LONG: "a step too long for the forces, whose critical time step is 2/omega",
     WorldStatus.LIST_OVERFLOW: "more near pairs than their list has room for",
     WorldStatus.OUTRUN: "a step so long that grains may pass through each other",
 }

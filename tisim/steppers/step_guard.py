@@ -44,7 +44,9 @@ def guard_fields(effects: Sequence[Effect]) -> tuple[Field, ...]:
     """Return the fields that the guard reads in a scene of these effects."""
     if not guards(effects):
         return ()
-    beside = any(isinstance(e, Force | PairForce) and e.guards_steps for e in effects)
+    # Contacts and bonds; gravity guards its own steps too, as there is nothing to guard.
+    laws = [e for e in effects if isinstance(e, Force | PairForce)]
+    beside = any(e.guards_steps and e.leapfrog for e in laws)
     torques = (TORQUE_BEFORE,) if turning(effects) else ()
     return (FORCE_BEFORE, *torques, *((STRAINED,) if beside else ()))
 

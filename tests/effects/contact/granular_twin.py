@@ -244,7 +244,7 @@ def spread(depth, speed, dt, force, mass):
     """The factor of a force that jumps at depth 0: so that its work from there on does not depend on the
     place of the first step within. Nothing where it hardly changes the speed in a step, or turns it."""
     moves = (force * dt < mass * speed) & (force * dt > 1e-6 * mass * speed)
-    s = depth / np.where(moves, speed * dt, np.nan)
+    s = np.maximum(depth, 0) / np.where(moves, speed * dt, np.nan)
     return np.where(s < 1, 1.5 * s, np.where(s < 2, 2 - s / 2, 1.0))
 
 

@@ -67,14 +67,14 @@ LAWS = {"dmt": Granular(cohesion=DMT()), "jkr": Granular(normal=JKR())}
 @pytest.mark.long
 @pytest.mark.parametrize("name", LAWS)
 def test_work_of_adhesion_does_not_depend_on_the_phase_of_a_step(name):
-    """DMT's energy is kept; JKR takes the work of parting. A force that simply jumps is off by 0.02 here, by
-    chance, and by half as much in half of the steps."""
+    """DMT's energy is kept; JKR takes the work of parting. A force that simply jumps is off by up to 0.036
+    and 0.013 here, by chance."""
     law = LAWS[name]
     lost = 0.0 if name == "dmt" else parting() / (3 * max(rest()[1], parting()))
     coarse, fine = (left_over(law, steps) - (1 - lost) for steps in (100, 200))
     print(name, np.abs(coarse).max(), np.ptp(coarse), np.abs(fine).max(), np.ptp(fine))
-    assert np.abs(coarse).max() < 3e-3
-    assert np.abs(fine).max() < 1e-3
+    assert np.abs(coarse).max() < (1e-3 if name == "dmt" else 3e-3)
+    assert np.abs(fine).max() < (3e-4 if name == "dmt" else 1e-3)
 
 
 def test_the_spread_force_does_the_work_of_a_jump():

@@ -16,11 +16,13 @@ from tisim.components.domain import Domain
 from tisim.effects.motion.base import Motion
 from tisim.errors import Words, must
 from tisim.geometry.shape import SEAM, Shape
+from tisim.geometry.triangles import TriangulatedSurface
 
-PLACES, FEWEST_PLACES = 40_000, 200
-"""The number of places at which a body is compared at two faces, and how many of them must be near it."""
-ALIKE = 1e-6
-"""Distances from it may differ by this part of the reach."""
+PLACES, TRIES, FEWEST_PLACES = 200_000, 20, 200
+"""Numbers of places at which a body is compared at two faces, at most so often; and how many of them must be
+near it."""
+ALIKE = 1e-4
+"""Distances from it may differ by this part of the reach, and by what single precision rounds coordinates."""
 
 
 def check_faces(
@@ -52,8 +54,14 @@ def _ends(
 ) -> np.ndarray:
     """Return along which axes it ends, or bends, within reach of a face at some time, shape (3,)."""
     ends = np.zeros(3, bool)
-    for shift in map(np.array, motion.shifts(duration)):
+    shifts = np.array(motion.shifts(duration))
+    travel = np.ptp(shifts, axis=0)
+    for shift in shifts:
         ends |= shape.ends_at(low - shift, high - shift, reach)
+        if isinstance(shape, TriangulatedSurface):
+            # Between the extremes of a motion another part of it may pass a face.
+            for axis in np.flatnonzero(travel):
+                ends[axis] |= shape.ends_at(low - shift, high - shift, reach + travel[axis])[axis]
     turning = motion.axis()
     if turning is not None and duration > 0 and not shape.turns_into_itself(*turning):
         ends |= _ends_turned(shape, *turning, low, high, reach)
@@ -83,19 +91,38 @@ def _is_alike(
 ) -> bool:  # fmt: skip
     """Return whether a body is as far from places within reach (m) of the two faces across an axis as from
     their images, by places at random."""
-    turning = motion.axis()
+    turning, shifts = motion.axis(), np.array(motion.shifts(duration))
     if turning is not None and not all(shape.turns_into_itself(*turning) for shape in body):
         return False
-    rng = np.random.Generator(np.random.Philox(0))
-    places, apart = rng.uniform(low, high, (PLACES, 3)), np.zeros(3)
+    if np.ptp(shifts[:, axis]) > 0:
+        # Between the extremes of the motion its parts may lie otherwise.
+        return False
+    apart = np.zeros(3)
     apart[axis] = high[axis] - low[axis]
-    # On either side of the lower face, and their images on either side of the upper one.
-    places[:, axis] = low[axis] + rng.uniform(-reach, reach, PLACES)
-    for shift in map(np.array, motion.shifts(duration)):
+    tolerance = ALIKE * reach + float(np.finfo(np.float32).eps * np.abs([low, high]).max())
+    return all(
+        _is_alike_at(body, shift, axis, low, high, apart, reach, tolerance)
+        for shift in np.unique(shifts, axis=0)
+    )
+
+
+def _is_alike_at(
+    body: list[Shape], shift: np.ndarray, axis: int, low: np.ndarray, high: np.ndarray, apart: np.ndarray,
+    reach: float, tolerance: float,
+) -> bool:  # fmt: skip
+    """Return the same for one displacement (m) of the body."""
+    rng, found = np.random.Generator(np.random.Philox(0)), 0
+    for _ in range(TRIES):
+        places = rng.uniform(low, high, (PLACES, 3))
+        # On either side of the lower face, and their images on either side of the upper one.
+        places[:, axis] = low[axis] + rng.uniform(-reach, reach, PLACES)
         here, there = (
             np.min([shape.distances(at - shift) for shape in body], axis=0) for at in (places, places + apart)
         )
         near = np.minimum(np.abs(here), np.abs(there)) < reach
-        if near.sum() < FEWEST_PLACES or not (np.abs(here - there)[near] < ALIKE * reach).all():
+        if not (np.abs(here - there)[near] < tolerance).all():
             return False
-    return True
+        found += int(near.sum())
+        if found >= FEWEST_PLACES:
+            return True
+    return False

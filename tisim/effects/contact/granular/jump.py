@@ -9,8 +9,8 @@ steps at the present speed, s = depth / (v dt), it is multiplied by
 
     3 s / 2  for s < 1,    2 - s / 2  for 1 < s < 2,    1  beyond.
 
-At s and s + 1, the two steps after the jump, these add up to s + 3/2. With the half steps of a leapfrog that
-is the work F v dt (s + 1) which the force does up to the second of them, whatever s.
+At s and s + 1, the two steps after the jump, these add up to s + 3/2. As a leapfrog does half of the work of
+a kick before a step and half after it, that is the work of the force from the jump on, whatever s.
 
 A pair that is at rest or drawn apart slowly, whose momentum m v along the normal is less than F dt, has the
 full force, and so has one that is so heavy and fast that F dt is below a millionth of m v: there the work of
@@ -29,5 +29,5 @@ def spread(depth, speed, dt, force, mass):
     a speed (m/s, >= 0) along the normal of two with this m* (kg)."""
     travel, share = speed * dt, force * dt
     within = (share < mass * speed) & (share > NEGLIGIBLE * (mass * speed)) & (depth < 2.0 * travel)
-    steps = depth / ti.select(within, travel, 1.0)
+    steps = ti.max(depth, 0.0) / ti.select(within, travel, 1.0)
     return ti.select(within, ti.min(1.5 * steps, 2.0 - 0.5 * steps), 1.0)
