@@ -20,7 +20,7 @@ from tisim import Particles, Result, Scene, run
 from tisim.analysis import Mean
 from tisim.steppers import FixedStep, Verlet
 
-SEEDS = 3
+SEEDS = 6
 """There are so many random starts of each avalanche."""
 MAGNETISATION = 11.9e3
 """A/m; that of a single grain at 5 mT (L21 section 4.5)."""
