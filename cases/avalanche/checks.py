@@ -20,7 +20,7 @@ from tisim import Particles, Result, Scene, run
 from tisim.analysis import Mean
 from tisim.steppers import FixedStep, Verlet
 
-SEEDS = 6
+CHECKED_SEEDS = 6
 """There are so many random starts of each avalanche."""
 MAGNETISATION = 11.9e3
 """A/m; that of a single grain at 5 mT (L21 section 4.5)."""
@@ -28,7 +28,7 @@ BALANCE = 0.02
 """How far the load on the walls may be from the weight of the grains where they count as at rest."""
 
 
-def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
+def check(seeds: int = CHECKED_SEEDS) -> Iterator[Check | Claim | Shown]:
     """Yield what must hold of two grains, and of avalanches from some starts."""
     yield from of_two_grains()
     wanted = [(d, field, seed) for d in DIAMETERS for field in (0.0, FLUX) for seed in range(seeds)]

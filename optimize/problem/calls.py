@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from optimize.problem.problem import Problem
     from tisim import Result, Scene
 
-PACKAGES = tuple(Path(__file__).parents[2] / name for name in sorted(OWN_PACKAGES))
+OWN_FOLDERS = tuple(Path(__file__).parents[2] / name for name in sorted(OWN_PACKAGES))
 SOURCES = (".py", ".pyc", ".so", ".pyd")
 """Files with these endings are opened by imports."""
 SYSTEM = tuple(map(Path, ("/usr", "/lib", "/etc", "/dev", "/proc", "/sys")))
@@ -125,7 +125,7 @@ def _files_read() -> Iterator[set[Path]]:
 
 def _is_of_user(path: Path) -> bool:
     """Return whether a file is neither installed, nor the system's, nor kept by a program in the home."""
-    installed = Path(sys.prefix), Path(sys.base_prefix), *PACKAGES
+    installed = Path(sys.prefix), Path(sys.base_prefix), *OWN_FOLDERS
     home = os.environ.get("HOME") or os.environ.get("USERPROFILE") or "."
     kept = tuple(Path(home) / name for name in (".cache", ".config", ".local", ".matplotlib"))
     metadata = any(part.endswith((".egg-info", ".dist-info")) for part in path.parts)

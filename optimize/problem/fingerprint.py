@@ -28,7 +28,7 @@ from pydantic import BaseModel
 from tisim.errors import InputError, abbreviated
 from tisim.files.python_file import OWN_PACKAGES, sha256
 
-PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
+BY_REPR = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
 """Types whose ``repr`` says all of a value."""
 
 
@@ -52,7 +52,7 @@ class _Fingerprint:
 
     def of(self, value: Any) -> bytes:
         """Return the digest of a value."""
-        if isinstance(value, PLAIN):
+        if isinstance(value, BY_REPR):
             return _digest(type(value).__name__, repr(value))
         if isinstance(value, np.generic | np.ndarray) and value.dtype != object:
             array = np.asarray(value)

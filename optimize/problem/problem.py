@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from optimize.problem.fingerprint import fingerprint
 from optimize.problem.genome import Genome
 from optimize.problem.objective import Objective
-from optimize.storage.record import canonical
 from tisim.errors import InputError, must
 from tisim.files import python_file, regular_file
 from tisim.files.python_file import sha256
@@ -94,7 +94,7 @@ class Problem:
     def objective_identity(self) -> str:
         """The same of the objectives and of data files alone, which with a scene decide a value."""
         functions = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
-        return sha256(canonical([self.code or functions, [sha256(read(file)) for file in self.files]]))[:24]
+        return _checksum([self.code or functions, [sha256(read(file)) for file in self.files]])
 
     @property
     def several(self) -> bool:
@@ -111,7 +111,12 @@ def checksum_of(function: Callable[..., Any], what: str = "") -> str:
     """Return a checksum of a function, of the files that define it and of all that it is bound to; ``what``
     as for a fingerprint."""
     files = python_file.module_checksums(function)
-    return sha256(canonical([fingerprint(function, what), *files.values()]))[:24]
+    return _checksum([fingerprint(function, what), *files.values()])
+
+
+def _checksum(value: Any) -> str:
+    """Return a short checksum of texts, in lists and dictionaries."""
+    return sha256(json.dumps(value, sort_keys=True).encode())[:24]
 
 
 def read(file: str | Path) -> bytes:

@@ -127,7 +127,7 @@ def test_what_would_have_to_be_felt_through_a_face_is_refused(name):
     with pytest.raises(
         tisim.InputError, match=r"^walls\.\w+ must be farther than the largest radius, 0.005 m"
     ):
-        tisim.run(scene(**REFUSED[name]))
+        start(scene(**REFUSED[name]))
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -18,10 +18,10 @@ from tisim.errors import Words, must
 from tisim.geometry.shape import SEAM, Shape
 from tisim.geometry.triangles import TriangulatedSurface
 
-PLACES, TRIES, FEWEST_PLACES = 200_000, 20, 200
+COMPARED_PLACES, TRIES, FEWEST_PLACES = 200_000, 20, 200
 """Numbers of places at which a body is compared at two faces, at most so often; and how many of them must be
 near it."""
-ALIKE = 1e-4
+SAME_DISTANCE = 1e-4
 """Distances from it may differ by this part of the reach, and by what single precision rounds coordinates."""
 
 
@@ -99,7 +99,7 @@ def _is_alike(
         return False
     apart = np.zeros(3)
     apart[axis] = high[axis] - low[axis]
-    tolerance = ALIKE * reach + float(np.finfo(np.float32).eps * np.abs([low, high]).max())
+    tolerance = SAME_DISTANCE * reach + float(np.finfo(np.float32).eps * np.abs([low, high]).max())
     return all(
         _is_alike_at(body, shift, axis, low, high, apart, reach, tolerance)
         for shift in np.unique(shifts, axis=0)
@@ -113,9 +113,9 @@ def _is_alike_at(
     """Return the same for one displacement (m) of the body."""
     rng, found = np.random.Generator(np.random.Philox(0)), 0
     for _ in range(TRIES):
-        places = rng.uniform(low, high, (PLACES, 3))
+        places = rng.uniform(low, high, (COMPARED_PLACES, 3))
         # On either side of the lower face, and their images on either side of the upper one.
-        places[:, axis] = low[axis] + rng.uniform(-reach, reach, PLACES)
+        places[:, axis] = low[axis] + rng.uniform(-reach, reach, COMPARED_PLACES)
         here, there = (
             np.min([shape.distances(at - shift) for shape in body], axis=0) for at in (places, places + apart)
         )
