@@ -33,7 +33,7 @@ def check_refused(read, text, message, folder):
     with pytest.raises(InputError, match="must be a CSV file that can be read"):
         read(folder / "absent.csv")
     if hasattr(os, "mkfifo"):
-        # Reading one that nobody writes to would wait for ever.
+        # Opening a fifo would wait for a writer for ever.
         os.mkfifo(folder / "fifo.csv")
         with pytest.raises(InputError, match="must be a CSV file that can be read; received a fifo"):
             read(folder / "fifo.csv")

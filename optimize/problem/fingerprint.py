@@ -54,7 +54,7 @@ class _Fingerprint:
         """Return the digest of a value."""
         if isinstance(value, BY_REPR):
             return _digest(type(value).__name__, repr(value))
-        if isinstance(value, np.generic | np.ndarray) and value.dtype != object:
+        if isinstance(value, np.generic | np.ndarray) and not value.dtype.hasobject:
             array = np.asarray(value)
             extra = () if not np.ma.isMaskedArray(value) else (self.of(np.ma.getmaskarray(value)),)
             return _digest("array", array.dtype.str, repr(array.shape), array.tobytes(), *extra)

@@ -92,7 +92,7 @@ class Problem:
 
     @property
     def objective_identity(self) -> str:
-        """The same of the objectives and of data files alone, which with a scene decide a value."""
+        """A checksum of the objectives and the data files. Together with a scene they decide a value."""
         functions = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
         return _checksum([self.code or functions, [sha256(read(file)) for file in self.files]])
 

@@ -201,7 +201,7 @@ def away(result, target):
 
 @pytest.mark.long
 def test_another_target_in_the_same_folder_is_another_search(tmp_path):
-    """Its values are not those of the first."""
+    """The second search is refused; it does not reuse the values of the first."""
 
     def of(target):
         objective = functools.partial(

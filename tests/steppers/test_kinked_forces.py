@@ -24,7 +24,7 @@ LARGEST = {
     "run": dict.fromkeys(KINDS, 15.0) | dict.fromkeys(PAIRS, 100.0),
     "step": dict.fromkeys(KINDS, 50.0) | dict.fromkeys(PAIRS, 800.0),
 }
-"""By what an error is asked of, as docs/steppers.md has it."""
+"""The largest ratio that docs/steppers.md states, with a margin: for errors per run and per step."""
 
 
 def ratios(name, make, number):

@@ -212,7 +212,7 @@ class Monitor:
     def _outrun(self, w: int, then: Image) -> str:
         """Return which particle of a world moves too far in a step, and below which length it does not."""
         n, dt = int(then["count"][w]), float(then["dt"][w])
-        # The square of what is beyond 1e154 m/s is no number, and the largest component says as much.
+        # The square of a speed above 1e154 m/s overflows; its largest component is near enough.
         speed = np.abs(then["velocity"][w, :n] - then["frame"][w]).max(axis=1)
         if speed.max() < 1e150:
             speed = np.linalg.norm(then["velocity"][w, :n] - then["frame"][w], axis=1)

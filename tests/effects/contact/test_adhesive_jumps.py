@@ -77,6 +77,36 @@ def test_work_of_adhesion_does_not_depend_on_the_phase_of_a_step(name):
     assert np.abs(fine).max() < (3e-4 if name == "dmt" else 1e-3)
 
 
+def left_over_in_numpy(steps, spreads):
+    """Return the same of DMT's adhesion in NumPy, by a leapfrog, whose force jumps or is spread."""
+    overlap, adhesion = rest()
+    dt = 2 * np.pi * np.sqrt(REDUCED / (2 * SOFT * np.sqrt(MEAN * overlap))) / steps
+    before = 3 * max(adhesion, parting())
+    speed = np.sqrt(2 * before / REDUCED)
+    pull = 4 * np.pi * GRAIN.surface_energy * MEAN
+
+    def force(depth, v):
+        factor = spread(depth, np.abs(v), dt, pull, REDUCED) if spreads else 1.0
+        return np.where(depth >= 0, 4 / 3 * SOFT * np.sqrt(MEAN * np.abs(depth)) * depth - pull * factor, 0)
+
+    depth, v, f = -(20 + PHASES) * dt * speed, np.full(len(PHASES), speed), np.zeros(len(PHASES))
+    for _ in range(40 + 4 * steps):
+        v = v - dt / 2 * f / REDUCED
+        depth = depth + dt * v
+        f = force(depth, v)
+        v = v - dt / 2 * f / REDUCED
+    assert (depth < 0).all()
+    return (v / speed) ** 2
+
+
+def test_a_force_that_jumps_is_off_by_what_the_docs_say():
+    """docs/granular.md has both figures: 3.6e-2 for a force that jumps, 7e-4 for one that is spread."""
+    jumps, spread_out = (np.abs(left_over_in_numpy(100, spreads) - 1).max() for spreads in (False, True))
+    print(f"off by {jumps:.1e} where the force jumps, {spread_out:.1e} where it is spread")
+    assert jumps == pytest.approx(3.6e-2, rel=0.05)
+    assert spread_out == pytest.approx(7e-4, rel=0.1)
+
+
 def test_the_spread_force_does_the_work_of_a_jump():
     """At a constant speed, with the half steps of a leapfrog, wherever the first step within ends."""
     within = np.arange(100)[None] + PHASES[:, None]

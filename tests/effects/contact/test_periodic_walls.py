@@ -111,6 +111,14 @@ def start(made):
         effect.suits_start(made.start(), made)
 
 
+def test_a_mesh_that_does_not_tell_its_distances_is_refused_beside_a_duct(monkeypatch):
+    """One of very many triangles is not taken for one that is the same at both faces."""
+    monkeypatch.setattr("tisim.geometry.triangles.MOST_DISTANCES", 1)
+    both = FELT["a duct of two pieces that reach beyond"] | {"surface": STAIR}
+    with pytest.raises(tisim.InputError, match="it is not felt through them"):
+        start(scene(**both))
+
+
 @pytest.mark.parametrize("radius", [1e-5, 1e-4])
 def test_a_duct_of_pieces_is_taken_for_small_grains_too(radius):
     made = scene(**FELT["a duct of two pieces that reach beyond"])

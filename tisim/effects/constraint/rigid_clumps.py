@@ -177,8 +177,8 @@ class RigidClumps(Constraint):
         q, momentum = self.orientation(s, w, leader), s.clump_angular_momentum[w, leader]
         moments, arm = s.clump_inertia[w, leader], rotated(q, s.clump_offset[w, i])
         spin = angular_velocity(q, momentum, moments)
-        # It turned freely, dw/dt = -I^-1 (w x L), and the arm midway between both is what is left of that at
-        # the end without turn x it.
+        # The body turned freely, dw/dt = -I^-1 (w x L). The arm midway in the step, a, follows from that at
+        # its end, which is a + turn x a.
         spin += half * angular_velocity(q, spin.cross(momentum), moments)
         turn = half * spin
         arm = (arm - turn.cross(arm) + turn.dot(arm) * turn) / (1.0 + turn.norm_sqr())

@@ -18,9 +18,9 @@ from tisim.errors import Words, must
 from tisim.geometry.shape import SEAM, Shape
 from tisim.geometry.triangles import TriangulatedSurface
 
-COMPARED_PLACES, TRIES, FEWEST_PLACES = 200_000, 20, 200
-"""Numbers of places at which a body is compared at two faces, at most so often; and how many of them must be
-near it."""
+FIRST_PLACES, MOST_PLACES, FEWEST_PLACES = 4000, 2**22, 200
+"""A body is compared at two faces at places at random, at first a few, then at twice as many each time, until
+at least FEWEST_PLACES of them were near it."""
 SAME_DISTANCE = 1e-4
 """Distances from it may differ by this part of the reach, and by what single precision rounds coordinates."""
 
@@ -28,8 +28,8 @@ SAME_DISTANCE = 1e-4
 def check_faces(
     shapes: Iterable[tuple[str, Shape]], motion: Motion, domain: Domain, reach: float, duration: float
 ) -> None:
-    """Raise InputError where a shape, called so in messages, comes within reach (m) of a joined face in a run
-    of some duration (s), unless the body is the same at the opposite one."""
+    """Raise InputError for a shape that comes within reach (m) of a joined face in a run of some duration
+    (s), unless the body is the same at the opposite face. shapes : each with its name for messages."""
     (low, high), joined = domain.bounds(), np.array(domain.joined())
     if low is None or high is None or not joined.any():
         return
@@ -52,7 +52,7 @@ def check_faces(
 def _ends(
     shape: Shape, motion: Motion, low: np.ndarray, high: np.ndarray, reach: float, duration: float
 ) -> np.ndarray:
-    """Return along which axes it ends, or bends, within reach of a face at some time, shape (3,)."""
+    """Return the axes along which a shape ends, or bends, within reach of a face at some time: shape (3,)."""
     ends = np.zeros(3, bool)
     shifts = np.array(motion.shifts(duration))
     travel = np.ptp(shifts, axis=0)
@@ -71,7 +71,7 @@ def _ends(
 def _ends_turned(
     shape: Shape, centre: np.ndarray, axis: np.ndarray, low: np.ndarray, high: np.ndarray, reach: float
 ) -> np.ndarray:
-    """Return the same of a shape that turns about an axis, by the ring around it that it may come into."""
+    """Return the same for a shape that turns about an axis, which may come anywhere in a ring around it."""
     # Along the axis of rotation nothing changes.
     turned = np.abs(axis) < 1.0 - SEAM
     if (extent := shape.extent()) is None:
@@ -89,8 +89,8 @@ def _is_alike(
     body: list[Shape], motion: Motion, axis: int, low: np.ndarray, high: np.ndarray, reach: float,
     duration: float,
 ) -> bool:  # fmt: skip
-    """Return whether a body is as far from places within reach (m) of the two faces across an axis as from
-    their images, by places at random."""
+    """Return whether a body looks the same from both faces across an axis: its distance from places within
+    reach (m) of one face is that from their images at the other."""
     turning, shifts = motion.axis(), np.array(motion.shifts(duration))
     if turning is not None and not all(shape.turns_into_itself(*turning) for shape in body):
         return False
@@ -110,19 +110,24 @@ def _is_alike_at(
     body: list[Shape], shift: np.ndarray, axis: int, low: np.ndarray, high: np.ndarray, apart: np.ndarray,
     reach: float, tolerance: float,
 ) -> bool:  # fmt: skip
-    """Return the same for one displacement (m) of the body."""
-    rng, found = np.random.Generator(np.random.Philox(0)), 0
-    for _ in range(TRIES):
-        places = rng.uniform(low, high, (COMPARED_PLACES, 3))
+    """Return this for one displacement (m) of the body, by comparing at random places."""
+    rng, found, number = np.random.Generator(np.random.Philox(0)), 0, FIRST_PLACES
+    while number <= MOST_PLACES:
+        places = rng.uniform(low, high, (number, 3))
         # On either side of the lower face, and their images on either side of the upper one.
-        places[:, axis] = low[axis] + rng.uniform(-reach, reach, COMPARED_PLACES)
+        places[:, axis] = low[axis] + rng.uniform(-reach, reach, number)
+        # Each shape, as a mesh of too many triangles does not tell its distances, and is then refused.
         here, there = (
-            np.min([shape.distances(at - shift) for shape in body], axis=0) for at in (places, places + apart)
+            np.array([shape.distances(at - shift) for shape in body]) for at in (places, places + apart)
         )
+        if not (np.isfinite(here).all() and np.isfinite(there).all()):
+            return False
+        here, there = here.min(axis=0), there.min(axis=0)
         near = np.minimum(np.abs(here), np.abs(there)) < reach
         if not (np.abs(here - there)[near] < tolerance).all():
             return False
         found += int(near.sum())
         if found >= FEWEST_PLACES:
             return True
+        number *= 2
     return False

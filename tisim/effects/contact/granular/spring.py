@@ -30,7 +30,8 @@ NO_GRIP = 1e-30
 
 @ti.func
 def tilted(before, normal):
-    """Return by what the direction midway between two is along normal + it, given unit vectors."""
+    """Return the tilt: the direction midway between ``before`` and ``normal``, both unit vectors, is along
+    normal + tilt."""
     along = before.dot(normal)
     return (before - along * normal) / (1.0 + along)
 
@@ -55,8 +56,8 @@ def midway(slip, opening, normal, tilt, turn):
     """Return a velocity (m/s) of surfaces past each other midway in a step as the contact has turned it since
     then, to second order in the step.
 
-    What it is across the normal of then it is across that of now, where it has turned by half of the step's
-    turn. opening : what it is to be along the normal. tilt, turn : see ``carried``.
+    The part across the normal of then becomes the part across that of now, turned by half of the step's turn.
+    opening : the speed along the normal that is returned. tilt, turn : see ``carried``.
     """
     along = slip.dot(normal)
     return slip + (opening - along) * normal - along * tilt + turn * normal.cross(slip)
