@@ -1,0 +1,110 @@
+"""Bayesian optimisation: the designs that are run next are those that a Gaussian process expects most from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import Field
+from scipy.stats import qmc
+
+from optimize.methods.base import SearchMethod
+from optimize.methods.individual import Individual
+from optimize.surrogate.acquisition import Worth
+from optimize.surrogate.belief import Belief
+from optimize.surrogate.gaussian_process import Array
+from optimize.surrogate.trust_region import TrustRegion
+from tisim.components.component import Checked
+
+_ROUNDS, _DRAWN = 6, 200
+"""Rounds in which the designs worth most are changed a little, and how many are made in each."""
+_WIDE = 0.2
+"""Largest standard deviation of a change, in widths of a gene's range."""
+_GROWTH = 20
+"""A batch is at least the number of designs that are known over this, so that making the process anew does
+not cost more and more of the search."""
+
+
+class GaussianProcessOptions(Checked):
+    """The settings of Bayesian optimisation.
+
+    population : designs per generation, more once some hundred are known. first : designs of generation 0
+    (None: twice the genes, 10 at least).
+    """
+
+    population: int = Field(8, ge=1)
+    first: int | None = Field(None, ge=2)
+
+    @classmethod
+    def kind(cls) -> str:
+        """Return the name of these settings in messages, as in ``--set search.options.population=4``."""
+        return "search.options"
+
+
+class GaussianProcessSearch(SearchMethod):
+    """Bayesian optimisation with a Gaussian process of known noise; see optimize.surrogate.
+
+    Generation 0 is a scrambled Sobol' sequence. Then each batch is chosen by expected improvement, or by the
+    hypervolume of several objectives, from designs all over the range and around the best. Where designs are
+    without noise, half of the batch is chosen by a process of its own in a region around the best, which
+    shrinks and grows as it finds less or more (D. Eriksson and others, NeurIPS 32 (2019)).
+    """
+
+    name = "gaussian-process"
+    several = True
+    own_starts = True
+    Options = GaussianProcessOptions
+
+    def __init__(self, genes: int, objectives: int, options: GaussianProcessOptions, seed: int) -> None:
+        self.options, self.genes, self.objectives = options, genes, objectives
+        self.rng = np.random.default_rng(np.random.SeedSequence([seed, 5]))
+        self.belief = Belief()
+        self.region = TrustRegion(genes)
+        self.strings: list[Individual] = []
+        self.local = 0
+
+    def ask(self) -> list[Individual]:
+        known = [string for string in self.strings if not string.failed]
+        if len(known) < 2:
+            count = self.options.first or max(10, 2 * self.genes)
+            points = qmc.Sobol(self.genes, rng=self.rng).random(count)
+            return [Individual(point, self.objectives) for point in points]
+        count = max(self.options.population, len(self.strings) // _GROWTH)
+        self.belief.learn(self.strings)
+        local = np.empty((0, self.genes))
+        if self.belief.exact and self.objectives == 1:
+            local = self.region.propose(self.belief, (count + 1) // 2, self.rng)
+        self.local = len(local)
+        worth = Worth(self.belief, self.rng)
+        everywhere = worth.batch(self._candidates(worth), count - len(local))
+        return [Individual(point, self.objectives) for point in np.vstack([local, everywhere])]
+
+    def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
+        known = {tuple(string) for string in self.strings}
+        self.strings += [string for string in population if tuple(string) not in known]
+        if self.local:
+            self.region.learn(population[: self.local])
+
+    def _candidates(self, worth: Worth) -> Array:
+        """Return designs all over the range and around the best, and around those of them worth most."""
+        points = self.belief.points[self.belief.chosen]
+        best = points[np.argsort(self.belief.means[:, 0])[:5]] if self.objectives == 1 else self.belief.points[worth.on_front]
+        drawn = [self.rng.random((3 * _DRAWN, self.genes)), changed(best, _WIDE, 2 * _DRAWN, self.rng)]
+        values = [worth.of(points) for points in drawn]
+        for turn in range(_ROUNDS):
+            order = np.argsort(-np.concatenate(values))[: 12 * self.objectives]
+            points = changed(np.vstack(drawn)[order], 0.6**turn * _WIDE, _DRAWN, self.rng)
+            drawn.append(points)
+            values.append(worth.of(points))
+        return np.vstack(drawn)
+
+
+def changed(points: Array, widest: float, count: int, rng: np.random.Generator) -> Array:
+    """Return points of the unit cube, (count, genes), that differ from some of these in one gene or more, by
+    normal numbers whose standard deviation is ``widest`` or less, on a logarithmic scale."""
+    genes = points.shape[1]
+    base = points[rng.integers(len(points), size=count)]
+    which = rng.random((count, genes)) < max(0.3, 2.0 / genes)
+    which[np.arange(count), rng.integers(genes, size=count)] = True
+    width = widest * 10.0 ** rng.uniform(-1.5, 0.0, (count, 1))
+    return np.clip(base + width * rng.standard_normal((count, genes)) * which, 0.0, 1.0)

@@ -1,0 +1,150 @@
+"""Which designs are worth a run: those that may improve on what is known, alone and as a batch.
+
+One cost: the expected improvement on the least posterior mean of the designs that were run (J. Mockus (1975);
+D. R. Jones, M. Schonlau and W. J. Welch, J. Global Optim. 13 (1998) 455-492, Eq. 15), its logarithm, which
+does not underflow (S. Ament and others, NeurIPS 36 (2023)). Several costs: the hypervolume that the lower
+confidence bound of a design would add to the front (W. Ponweiser and others, PPSN X, LNCS 5199 (2008) 784).
+
+A batch is chosen one by one. A design that is chosen is taken to have the mean that is expected, which leaves
+all means as they are and makes the process surer around it (the kriging believer of D. Ginsbourger, R. Le
+Riche and L. Carraro (2010)).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import log_ndtr
+from scipy.stats import norm
+
+from optimize.surrogate.belief import Belief, beaten_by
+from optimize.surrogate.gaussian_process import Array
+
+_CONFIDENCE = 1.0
+"""Standard deviations between the mean and the bound that several costs are judged by."""
+_MONTE_CARLO = 2000
+"""Points by which a hypervolume of three costs or more is measured."""
+_MOST_RANKED = 400
+"""Designs of which a batch is chosen; of more, those that are worth most alone."""
+_APART = 1e-6
+"""Designs of a batch differ by this in a gene at least, in widths of its range."""
+
+
+class Worth:
+    """What a run of each design would be worth, by a belief.
+
+    rng : for volumes in three dimensions or more, which are sampled.
+    """
+
+    def __init__(self, belief: Belief, rng: np.random.Generator) -> None:
+        self.belief = belief
+        means = belief.means
+        self.best = means.min(axis=0)
+        self.on_front = belief.chosen[beaten_by(means) == 0]
+        self.front = means[beaten_by(means) == 0]
+        if means.shape[1] > 1:
+            self.volume = _Volume(self.front, rng)
+
+    def __call__(self, means: Array, deviations: Array) -> Array:
+        """Return the worth of designs by mean and standard deviation of their costs, (m, objectives) both."""
+        if means.shape[1] == 1:
+            return log_expected_improvement(means[:, 0], deviations[:, 0], self.best[0])
+        return self.volume.improvement(means - _CONFIDENCE * deviations)
+
+    def of(self, points: Array) -> Array:
+        """Return the worth of points of the unit cube, shape (m,)."""
+        return self(*self.belief.predict(points))
+
+    def batch(self, points: Array, count: int, apart: float = _APART) -> Array:
+        """Return the points that are worth most together, (count, genes), of many, (m, genes)."""
+        belief = self.belief
+        means, deviations = belief.predict(points)
+        if len(points) > _MOST_RANKED:
+            # What is worth little alone is worth less beside others.
+            kept = np.argsort(-self(means, deviations), kind="stable")[:_MOST_RANKED]
+            points, means, deviations = points[kept], means[kept], deviations[kept]
+        at = belief.features(points)
+        explained = [model.half_solved(at) for model in belief.models]
+        rows: list[list[Array]] = [[] for _ in belief.models]
+        chosen: list[int] = []
+        barred = np.zeros(len(points), dtype=bool)
+        for _ in range(min(count, len(points))):
+            worth = np.where(barred, -np.inf, self(means, deviations))
+            pick = int(np.argmax(worth))
+            chosen.append(pick)
+            barred |= np.abs(points - points[pick]).max(axis=1) < apart
+            for k, model in enumerate(belief.models):
+                left = model.covariance(at, at[pick : pick + 1])[:, 0] - explained[k].T @ explained[k][:, pick]
+                left = left - sum((row * row[pick] for row in rows[k]), np.zeros(len(points)))
+                noise = belief.one_start[k] / belief.starts / model.scale**2 + model.nugget
+                row = left / np.sqrt(max(left[pick], 1e-12) + noise)
+                rows[k].append(row)
+                variance = (deviations[:, k] / model.scale) ** 2 - row**2
+                deviations[:, k] = model.scale * np.sqrt(np.maximum(variance, 1e-12))
+            if means.shape[1] > 1:
+                self.volume.add(means[pick] - _CONFIDENCE * deviations[pick])
+        return points[chosen]
+
+
+def log_expected_improvement(mean: Array, deviation: Array, best: float) -> Array:
+    """Return log E[max(best - f, 0)] of normal f, all of one shape."""
+    z = (best - mean) / deviation
+    # phi(z) + z Phi(z) = phi(z) (1 + z Phi(z) / phi(z)); far below, 1 + z Phi / phi tends to 1 / z^2.
+    with np.errstate(over="ignore"):
+        ratio = np.exp(np.minimum(log_ndtr(z) - norm.logpdf(z), 700.0))
+    far = z < -30.0
+    tail = np.where(far, np.maximum(z * z, 1.0) ** -1.0, np.maximum(1.0 + np.where(far, 0.0, z) * ratio, 1e-300))
+    return norm.logpdf(z) + np.log(tail) + np.log(deviation)
+
+
+class _Volume:
+    """The hypervolume between a front and a point that is worse than all of it.
+
+    E. Zitzler and L. Thiele, PPSN V, LNCS 1498 (1998) 292-301. Exact for two costs; for more, by points drawn
+    evenly.
+    """
+
+    def __init__(self, front: Array, rng: np.random.Generator) -> None:
+        self.low = front.min(axis=0)
+        span = np.ptp(front, axis=0)
+        self.span = np.where(span > 0, span, 1.0)
+        self.reference = front.max(axis=0) + 0.1 * self.span
+        self.front = front
+        if front.shape[1] > 2:
+            low, high = self.low - self.span, self.reference
+            self.samples = low + rng.random((_MONTE_CARLO, front.shape[1])) * (high - low)
+            self.free = ~np.any(np.all(front[None] <= self.samples[:, None], axis=2), axis=1)
+
+    def add(self, costs: Array) -> None:
+        """Take a design of these costs into the front."""
+        front = np.vstack([self.front, costs])
+        self.front = front[beaten_by(front) == 0]
+        if front.shape[1] > 2:
+            self.free &= ~np.all(costs <= self.samples, axis=1)
+
+    def improvement(self, costs: Array) -> Array:
+        """Return the hypervolume that each of these, (m, objectives), would add; for those that add none a
+        negative number, the nearer to 0 the nearer it is to adding any."""
+        scaled = (costs - self.low) / self.span
+        if costs.shape[1] == 2:
+            added = self._exact(scaled)
+        else:
+            free = self.samples[self.free]
+            below = np.ones((len(costs), len(free)), dtype=bool)
+            for cost, sample in zip(costs.T, free.T, strict=True):
+                below &= cost[:, None] <= sample[None, :]
+            added = below.sum(axis=1) / _MONTE_CARLO
+        front = (self.front - self.low) / self.span
+        # How much better in each cost it had to be, to be no worse than a design of the front in one.
+        behind = np.max(np.min(scaled[:, None, :] - front[None], axis=2), axis=1)
+        return np.where(added > 0, added, -np.maximum(behind, 0.0) - 1e-12)
+
+    def _exact(self, scaled: Array) -> Array:
+        front = (self.front - self.low) / self.span
+        reference = (self.reference - self.low) / self.span
+        front = front[np.argsort(front[:, 0])]
+        edges = np.concatenate([[-np.inf], front[:, 0], reference[:1]])
+        heights = np.concatenate([reference[1:], front[:, 1]])
+        left = np.maximum(scaled[:, :1], edges[None, :-1])
+        width = np.maximum(np.minimum(edges[1:], reference[0])[None] - left, 0.0)
+        height = np.maximum(np.minimum(heights, reference[1])[None] - scaled[:, 1:], 0.0)
+        return np.asarray((width * height).sum(axis=1))

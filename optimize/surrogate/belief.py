@@ -1,0 +1,135 @@
+"""What a search believes of designs that it has not run: a Gaussian process for each cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import yeojohnson
+
+from optimize.methods.individual import Individual
+from optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
+
+MOST_LEARNED = 500
+"""Designs from which a process is made. Of more, half of this number are the best, the rest is drawn evenly."""
+_PRIOR_STARTS = 8
+"""Starts that the noise of all designs together counts for beside the starts of the design itself."""
+_SKEWED = 0.5
+"""Skewness of the costs above which they are transformed: a few large ones would hide all differences
+between small ones."""
+
+
+class Belief:
+    """A belief holds a Gaussian process for each cost, in units that ``transformed`` gives.
+
+    features : of points of the unit cube, (n, genes) -> (n, features).
+    The noise of the mean of n starts is the variance of those starts over n; variances of single designs, from
+    two starts or so, are drawn towards that of all designs. A failed design has the worst cost that is known.
+    """
+
+    def __init__(self, features: Callable[[Array], Array] = np.asarray) -> None:
+        self.features = features
+        self.models: list[GaussianProcess] = []
+        self._parameters: list[Parameters | None] = []
+        self.starts = 1
+
+    def learn(self, strings: Sequence[Individual], iterations: int = 30) -> None:
+        """Learn from strings of known fitness, of which one or more has not failed."""
+        self.strings = list(strings)
+        self.points = np.array([list(string) for string in strings])
+        costs, self.noise = costs_and_noise(strings)
+        self.exact = not np.any(self.noise)
+        self.starts = int(np.median([string.estimates[0].starts for string in strings])) or 1
+        self.costs, slopes = _transformed(costs)
+        chosen = _representative(costs, MOST_LEARNED)
+        self.chosen = chosen
+        variances = self.noise * slopes**2
+        self.one_start = np.array([_pooled(strings, k) for k in range(costs.shape[1])]) * np.mean(
+            slopes[chosen] ** 2, axis=0
+        )
+        at = self.features(self.points[chosen])
+        starts = self._parameters or [None] * costs.shape[1]
+        self.models = [
+            GaussianProcess(at, cost[chosen], variance[chosen], start=start, iterations=iterations)
+            for cost, variance, start in zip(self.costs.T, variances.T, starts, strict=True)
+        ]
+        self._parameters = [model.parameters for model in self.models]
+
+    @property
+    def means(self) -> Array:
+        """The posterior mean of each cost of the designs it is made of, (chosen, objectives); without noise,
+        the costs themselves: what the process smooths away is there, though it cannot tell where."""
+        if self.exact:
+            return self.costs[self.chosen]
+        return self.predict(self.points[self.chosen])[0]
+
+    def predict(self, points: Array) -> tuple[Array, Array]:
+        """Return mean and standard deviation of each cost at points of the unit cube, (m, objectives)."""
+        at = self.features(np.atleast_2d(points))
+        means, deviations = zip(*(model.predict(at) for model in self.models), strict=True)
+        return np.column_stack(means), np.column_stack(deviations)
+
+
+def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
+    """Return the costs of strings and the variances of these means, both (strings, objectives)."""
+    costs = np.array([string.fitness.values for string in strings], dtype=float)
+    good = np.all(np.isfinite(costs), axis=1)
+    for column in costs.T:
+        column[~good] = column[good].max()
+    noise = np.empty_like(costs)
+    for k in range(costs.shape[1]):
+        pooled = _pooled(strings, k)
+        for i, string in enumerate(strings):
+            estimate = string.estimates[k]
+            n = max(estimate.starts, 1)
+            own = estimate.std**2 if n > 1 and math.isfinite(estimate.std) else pooled
+            noise[i, k] = (_PRIOR_STARTS * pooled + (n - 1) * own) / (_PRIOR_STARTS + n - 1) / n
+    return costs, noise
+
+
+def _pooled(strings: Sequence[Individual], objective: int) -> float:
+    """Return the variance of a cost from start to start, of all designs together; 0 where it is not known."""
+    squares, freedom = 0.0, 0
+    for string in strings:
+        estimate = string.estimates[objective]
+        if estimate.ok and estimate.starts > 1 and math.isfinite(estimate.std):
+            squares += (estimate.starts - 1) * estimate.std**2
+            freedom += estimate.starts - 1
+    return squares / freedom if freedom else 0.0
+
+
+def _transformed(costs: Array) -> tuple[Array, Array]:
+    """Return costs in units in which they are not skewed to large values, and the slope of the new unit.
+
+    I.-K. Yeo and R. A. Johnson, Biometrika 87 (2000) 954-959. Other columns are returned as they are.
+    """
+    new, slopes = costs.copy(), np.ones_like(costs)
+    for k, column in enumerate(costs.T):
+        deviation = column.std()
+        z = (column - column.mean()) / (deviation or 1.0)
+        if np.mean(z**3) < _SKEWED:
+            continue
+        new[:, k], power = yeojohnson(z)
+        slopes[:, k] = np.where(z < 0, (1 - np.minimum(z, 0)) ** (1 - power), (1 + np.maximum(z, 0)) ** (power - 1))
+        slopes[:, k] /= deviation
+    return new, slopes
+
+
+def _representative(costs: Array, most: int) -> Array:
+    """Return the indices of at most that number of designs: the best, and others drawn evenly from the rest."""
+    if len(costs) <= most:
+        return np.arange(len(costs))
+    order = np.lexsort([costs[:, 0], beaten_by(costs)])
+    best, others = order[: most // 2], order[most // 2 :]
+    return np.concatenate([best, others[np.linspace(0, len(others) - 1, most - len(best)).astype(int)]])
+
+
+def beaten_by(costs: Array) -> NDArray[np.int64]:
+    """Return by how many of the others each design is dominated: no better in any cost, and worse in one."""
+    if costs.shape[1] == 1:
+        return np.searchsorted(np.sort(costs[:, 0]), costs[:, 0])
+    no_better = np.all(costs[:, None, :] >= costs[None, :, :], axis=2)
+    worse = np.any(costs[:, None, :] > costs[None, :, :], axis=2)
+    return np.asarray((no_better & worse).sum(axis=1))

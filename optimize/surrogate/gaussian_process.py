@@ -1,0 +1,198 @@
+"""A Gaussian process: a smooth function through values of known noise, and how unsure it is between them.
+
+C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press (2006), here GPML:
+prediction Eq. 2.25 and 2.26, marginal likelihood Eq. 2.30, its gradient Eq. 5.9, Matern covariance Eq. 4.17.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.optimize import minimize
+
+Array = NDArray[np.float64]
+
+MOST_FITTED = 300
+"""Points from which the length scales are fitted; of more, this number is drawn. Fitting costs their cube."""
+_JITTER = 1e-8
+"""Least noise variance, in units of the variance of the values: rounding of nearly equal points."""
+_SPREAD = {"length": 1.0, "signal": 1.5, "nugget": 2.0}
+"""Standard deviations of the logarithms of the parameters in their priors."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Parameters of the covariance, in units of the standardised values.
+
+    lengths : shape (features,), in units of the feature. signal : variance of the function. nugget : variance
+    that is added to the noise which is known.
+    """
+
+    lengths: Array
+    signal: float
+    nugget: float
+
+    @classmethod
+    def prior(cls, features: int) -> Parameters:
+        """Return the medians of the priors.
+
+        Length scales grow with the root of the dimension, as distances do: C. Hvarfner, E. O. Hellsten and
+        L. Nardi, Vanilla Bayesian optimization performs great in high dimensions, ICML (2024).
+        """
+        return cls(np.full(features, 0.35 * math.sqrt(features)), 1.0, 1e-3)
+
+    @property
+    def logarithms(self) -> Array:
+        return np.log([*self.lengths, self.signal, self.nugget])
+
+    @classmethod
+    def of(cls, logarithms: Array) -> Parameters:
+        values = np.exp(logarithms)
+        return cls(values[:-2], float(values[-2]), float(values[-1]))
+
+
+class GaussianProcess:
+    """A Gaussian process with the Matern 5/2 covariance, a length scale for each feature and a constant mean.
+
+    points : shape (n, features). values : shape (n,). variance : of the noise in each value, shape (n,).
+    parameters : given, or fitted from those given in ``start`` by the largest posterior density. noise_free :
+    no variance is added to what is given.
+    """
+
+    def __init__(
+        self,
+        points: Array,
+        values: Array,
+        variance: Array,
+        parameters: Parameters | None = None,
+        start: Parameters | None = None,
+        noise_free: bool = False,
+        iterations: int = 50,
+    ) -> None:
+        self.points = np.asarray(points, dtype=float)
+        values = np.asarray(values, dtype=float)
+        self.centre, self.scale = float(np.mean(values)), float(np.std(values)) or 1.0
+        self.values = (values - self.centre) / self.scale
+        self.noise = np.asarray(variance, dtype=float) / self.scale**2
+        self.noise_free = noise_free
+        if parameters is None:
+            parameters = self._fitted(start, iterations)
+        self.parameters = parameters
+        covariance = _matern(self.points, self.points, parameters)
+        covariance[np.diag_indices_from(covariance)] += self._diagonal(parameters.nugget)
+        self._factor = _factor(covariance)
+        ones = np.ones(len(self.points))
+        self._ones = cho_solve(self._factor, ones)
+        self._mean = float(self._ones @ self.values) / float(self._ones @ ones)
+        self._weights = cho_solve(self._factor, self.values - self._mean)
+
+    def predict(self, points: Array) -> tuple[Array, Array]:
+        """Return mean and standard deviation of the function, without noise, at points (m, features)."""
+        across = _matern(np.atleast_2d(points), self.points, self.parameters)
+        mean = self._mean + across @ self._weights
+        solved = solve_triangular(self._factor[0], across.T, lower=True, check_finite=False)
+        left = self.parameters.signal - np.einsum("ij,ij->j", solved, solved)
+        return self.centre + self.scale * mean, self.scale * np.sqrt(np.maximum(left, 1e-12))
+
+    def half_solved(self, points: Array) -> Array:
+        """Return L^-1 k for each point, shape (n, m), of which products are what the data explain of the
+        covariance: k(a, b) - half_solved(a).T @ half_solved(b) is the covariance that is left."""
+        across = _matern(self.points, np.atleast_2d(points), self.parameters)
+        return solve_triangular(self._factor[0], across, lower=True, check_finite=False)
+
+    def covariance(self, points: Array, others: Array) -> Array:
+        """Return the covariance of the function before any data, shape (m, k), in standardised units."""
+        return _matern(points, others, self.parameters)
+
+    @property
+    def nugget(self) -> float:
+        """The variance that a value has beside its known noise, in standardised units."""
+        return _JITTER if self.noise_free else self.parameters.nugget + _JITTER
+
+    def _diagonal(self, nugget: float) -> Array:
+        return self.noise + (_JITTER if self.noise_free else nugget + _JITTER)
+
+    def _fitted(self, start: Parameters | None, iterations: int) -> Parameters:
+        """Return the parameters of largest posterior density, from those of the prior and from ``start``."""
+        prior = Parameters.prior(self.points.shape[1])
+        chosen = np.arange(len(self.points))
+        if len(chosen) > MOST_FITTED:
+            # The best are kept: the search is there. The rest is drawn evenly.
+            best = np.argsort(self.values, kind="stable")[: MOST_FITTED // 2]
+            others = np.setdiff1d(chosen, best)
+            step = np.linspace(0, len(others) - 1, MOST_FITTED - len(best)).astype(int)
+            chosen = np.concatenate([best, others[step]])
+        likelihood = _Likelihood(
+            self.points[chosen], self.values[chosen], self.noise[chosen], prior, self.noise_free
+        )
+        bounds = [(math.log(0.01), math.log(100.0))] * self.points.shape[1]
+        bounds += [(math.log(1e-3), math.log(1e3)), (math.log(1e-8), math.log(2.0))]
+        best_value, best_at = math.inf, prior.logarithms
+        for begin in [prior] if start is None else [start]:
+            found = minimize(
+                likelihood, np.clip(begin.logarithms, *np.transpose(bounds)), jac=True, method="L-BFGS-B",
+                bounds=bounds, options={"maxiter": iterations},
+            )  # fmt: skip
+            if found.fun < best_value:
+                best_value, best_at = float(found.fun), found.x
+        return Parameters.of(best_at)
+
+
+class _Likelihood:
+    """Minus the logarithm of the posterior density of the parameters, and its gradient (GPML Eq. 5.8, 5.9)."""
+
+    def __init__(self, points: Array, values: Array, noise: Array, prior: Parameters, exact: bool) -> None:
+        self.values, self.noise, self.exact = values, noise, exact
+        self.squares = (points[:, None, :] - points[None, :, :]) ** 2
+        self.prior = prior.logarithms
+        features = points.shape[1]
+        self.spread = np.array([_SPREAD["length"]] * features + [_SPREAD["signal"], _SPREAD["nugget"]])
+
+    def __call__(self, logarithms: Array) -> tuple[float, Array]:
+        parameters = Parameters.of(logarithms)
+        inverse_squares = parameters.lengths**-2
+        root = np.sqrt(5.0 * (self.squares @ inverse_squares))
+        decay = np.exp(-root)
+        correlation = (1.0 + root + root**2 / 3.0) * decay
+        nugget = 0.0 if self.exact else parameters.nugget
+        covariance = parameters.signal * correlation
+        covariance[np.diag_indices_from(covariance)] += self.noise + nugget + _JITTER
+        factor = _factor(covariance)
+        n = len(self.values)
+        inverse = cho_solve(factor, np.eye(n), check_finite=False)
+        ones = inverse.sum(axis=1)
+        residual = self.values - float(ones @ self.values) / float(ones.sum())
+        weights = inverse @ residual
+        value = 0.5 * float(residual @ weights) + float(np.log(np.diag(factor[0])).sum())
+        # d K / d log l_j = s (5/3) (1 + r) exp(-r) (x_j - x'_j)^2 / l_j^2, r the root above.
+        outer = 0.5 * (inverse - np.outer(weights, weights))
+        common = outer * (parameters.signal * (5.0 / 3.0) * (1.0 + root) * decay)
+        gradient = np.empty_like(logarithms)
+        gradient[:-2] = np.tensordot(common, self.squares, axes=2) * inverse_squares
+        gradient[-2] = np.sum(outer * correlation) * parameters.signal
+        gradient[-1] = 0.0 if self.exact else np.trace(outer) * nugget
+        off = (logarithms - self.prior) / self.spread
+        return value + 0.5 * float(off @ off), gradient + off / self.spread
+
+
+def _matern(one: Array, other: Array, parameters: Parameters) -> Array:
+    """Return the covariance of the function between points, shape (m, n) (GPML Eq. 4.17)."""
+    a, b = one / parameters.lengths, other / parameters.lengths
+    squares = (a**2).sum(1)[:, None] + (b**2).sum(1)[None, :] - 2.0 * a @ b.T
+    root = np.sqrt(5.0 * np.maximum(squares, 0.0))
+    return parameters.signal * (1.0 + root + root**2 / 3.0) * np.exp(-root)
+
+
+def _factor(covariance: Array) -> tuple[Array, bool]:
+    """Return the lower Cholesky factor; where rounding has left none, of the covariance and a little more."""
+    more = 0.0
+    while True:
+        try:
+            shifted = covariance + more * np.eye(len(covariance)) if more else covariance
+            return cho_factor(shifted, lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            more = 10.0 * more or 1e-8 * float(np.trace(covariance)) / len(covariance)

@@ -1,0 +1,80 @@
+"""A region around the best design with a Gaussian process of its own: it converges where one of the whole range,
+which must be true everywhere, does not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from optimize.methods.individual import Individual
+from optimize.surrogate.acquisition import Worth
+from optimize.surrogate.belief import Belief
+from optimize.surrogate.gaussian_process import Array
+
+_FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-6
+"""Half-widths of the region in the unit cube: at first, the largest, and that at which it has converged."""
+_APART = 0.1
+"""Where a region has converged no other begins within this distance, in any gene."""
+_ROUNDS, _DRAWN, _BEST = 6, 200, 12
+
+
+class TrustRegion:
+    """A trust region for one cost without noise.
+
+    centre : the best design outside regions that have converged. half_width : of the region around it.
+    """
+
+    def __init__(self, genes: int) -> None:
+        self.genes = genes
+        self.half_width = _FIRST
+        self.converged: list[Array] = []
+        self.centre = np.full(genes, 0.5)
+        self.cost = np.inf
+        self.belief = Belief()
+
+    def propose(self, belief: Belief, count: int, rng: np.random.Generator) -> Array:
+        """Return the designs in the region that are worth a run, (count, genes), by all that is known."""
+        costs = np.array([string.fitness.values[0] for string in belief.strings])
+        open_to = np.ones(len(costs), dtype=bool)
+        for old in self.converged:
+            open_to &= np.abs(belief.points - old).max(axis=1) > _APART
+        if not np.any(np.isfinite(costs[open_to])):
+            return np.empty((0, self.genes))
+        best = np.flatnonzero(open_to)[np.argmin(costs[open_to])]
+        self.centre, self.cost = belief.points[best], float(costs[best])
+        # As many as a quadratic function has coefficients, and some more.
+        enough = max(40, min(200, (self.genes + 1) * (self.genes + 2)))
+        nearest = np.argsort(((belief.points - self.centre) ** 2).sum(axis=1), kind="stable")[:enough]
+        self.belief.features = self._within
+        self.belief.learn([belief.strings[i] for i in nearest])
+        worth = Worth(self.belief, rng)
+        low = np.maximum(self.centre - self.half_width, 0.0)
+        high = np.minimum(self.centre + self.half_width, 1.0)
+        drawn = [low + rng.random((_DRAWN, self.genes)) * (high - low), self.centre[None]]
+        values = [worth.of(points) for points in drawn]
+        for turn in range(_ROUNDS):
+            order = np.argsort(-np.concatenate(values))[:_BEST]
+            best_points = np.vstack(drawn)[order]
+            width = self.half_width * 0.6**turn * 10.0 ** rng.uniform(-1.5, 0.0, (_DRAWN, 1))
+            base = best_points[rng.integers(len(best_points), size=_DRAWN)]
+            drawn.append(np.clip(base + 0.5 * width * rng.standard_normal(base.shape), low, high))
+            values.append(worth.of(drawn[-1]))
+        return worth.batch(np.vstack(drawn), count, apart=1e-3 * self.half_width)
+
+    def learn(self, proposed: Sequence[Individual]) -> None:
+        """Move the size of the region by what the designs that it proposed are worth."""
+        good = [string for string in proposed if string.fitness.valid and not string.failed]
+        best = min(good, key=lambda string: string.fitness.values, default=None)
+        if best is None or best.fitness.values[0] >= self.cost:
+            self.half_width *= 0.5
+        else:
+            moved = float(np.abs(np.array(best) - self.centre).max())
+            grown = 2.0 * self.half_width if moved > 0.5 * self.half_width else 0.7 * self.half_width
+            self.half_width = min(_LARGEST, max(grown, 2.0 * moved))
+        if self.half_width < _SMALLEST:
+            self.converged.append(self.centre)
+            self.half_width = _FIRST
+
+    def _within(self, points: Array) -> Array:
+        return (np.atleast_2d(points) - self.centre) / self.half_width
