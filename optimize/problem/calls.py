@@ -39,7 +39,7 @@ def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scen
     except InputError:
         raise
     except Exception as error:
-        raise FaultyProblem(f"{rule}; received {_told(error)}") from error
+        raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
     if not callable(getattr(scene, "digest", None)):
         raise FaultyProblem(f"{rule}; received {abbreviated(scene)}")
     return scene
@@ -54,7 +54,7 @@ def value_of(objective: Objective, result: Result, problem: Problem) -> float:
         with _files_read() as read:
             value: Any = objective.of(result)
     except Exception as error:
-        raise FaultyProblem(f"{rule}; received {_told(error)}") from error
+        raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
     if unknown := sorted(str(path) for path in read - known):
         raise FaultyProblem(
             f"objective {objective.name} must read no file but those in Problem(files=[...]), as its values "
@@ -74,7 +74,7 @@ class FaultyProblem(InputError):
     """A function of a problem is at fault: the search ends, and what it has found so far stays."""
 
 
-def _told(error: Exception) -> str:
+def error_told(error: Exception) -> str:
     """Return an error of a function of the user in a line, with its place in the user's file."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [one for one in frames if _is_of_user(Path(one.filename))]
