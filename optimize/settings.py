@@ -77,6 +77,11 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "problem_code": problem.identity,
         "genes": {gene.name: gene.described for gene in problem.genome.genes},
         "gene_order": list(problem.genome.names),
+        **(
+            {"constraints": {one.name: one.described for one in problem.constraints}}
+            if problem.constraints
+            else {}
+        ),
         "objectives": {
             one.name: ("largest" if one.maximise else "least") + (f", {one.unit}" if one.unit else "")
             for one in problem.objectives

@@ -48,7 +48,8 @@ def plain_value(value: Any, what: str) -> Value:
         return value
     must(is_number(value), what, "a text, a number or a flag", value)
     whole = isinstance(value, numbers.Integral)
-    must(abs(value) <= WHOLE_WITHIN if whole else math.isfinite(value), what, "finite", value)
+    able = abs(value) <= WHOLE_WITHIN if whole else math.isfinite(value)
+    must(able, what, "finite, and within +-2^50 where it is whole", value)
     return int(value) if whole else float(value)
 
 
