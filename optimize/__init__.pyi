@@ -6,7 +6,12 @@ from .outcome import (
 from .outcome import (
     Outcome as Outcome,
 )
-from .problem.constraint import Constraint as Constraint
+from .problem.constraint import (
+    DesignConstraint as DesignConstraint,
+)
+from .problem.constraint import (
+    ResultConstraint as ResultConstraint,
+)
 from .problem.genes import (
     Choice as Choice,
 )
@@ -15,10 +20,10 @@ from .problem.genes import (
 )
 from .problem.genome import Genome as Genome
 from .problem.given_genes import (
-    Dependent as Dependent,
+    DependentGene as DependentGene,
 )
 from .problem.given_genes import (
-    Fixed as Fixed,
+    FixedGene as FixedGene,
 )
 from .problem.objective import Objective as Objective
 from .problem.problem import Problem as Problem

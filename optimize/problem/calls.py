@@ -20,7 +20,7 @@ from tisim.errors import InputError, Words, abbreviated, must, printable
 from tisim.files.python_file import OWN_PACKAGES
 
 if TYPE_CHECKING:
-    from optimize.problem.constraint import Constraint
+    from optimize.problem.constraint import InequalityConstraint
     from optimize.problem.objective import Objective
     from optimize.problem.problem import Problem
     from tisim import Scene
@@ -63,7 +63,7 @@ def value_of(objective: Objective, result: Any, problem: Problem) -> float:
     return _number(f"objective {objective.name}", objective.of, result, problem)
 
 
-def constraint_value(constraint: Constraint, of: Any, problem: Problem) -> float:
+def constraint_value(constraint: InequalityConstraint, of: Any, problem: Problem) -> float:
     """Return the value of a constraint of a result, or of a design; as ``value_of`` an objective's."""
     return _number(f"constraint {constraint.name}", constraint.of, of, problem)
 

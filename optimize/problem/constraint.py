@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar
 
 from tisim.errors import is_number, must
 
 
 @dataclass(frozen=True)
-class Constraint:
+class InequalityConstraint:
     """A quantity that must not be above, or below, a bound. A design that keeps to all is feasible.
 
     name : heading in tables; unit : of the values, "" if they have none.
-    of : Result -> value in that unit, a mean over the random starts as an objective is; or, with on="design",
-        design -> value, which is known before anything runs: a design that does not keep to it costs no run.
+    of : gives the value in that unit, of what the kind of constraint says.
     at_most, at_least : the bounds, one or both; a value at a bound is allowed.
     scale : the excess that counts as much as an excess of 1 of another constraint; None for the magnitude of
         the bound, or 1 where that is 0. It orders infeasible designs among each other, and nothing else.
@@ -28,7 +27,6 @@ class Constraint:
     unit: str = ""
     at_most: float | None = None
     at_least: float | None = None
-    on: Literal["run", "design"] = "run"
     scale: float | None = None
 
     def __post_init__(self) -> None:
@@ -36,7 +34,6 @@ class Constraint:
         must(isinstance(self.name, str) and bool(self.name.strip()), "constraint name", "a non-empty string",
              self.name)  # fmt: skip
         must(callable(self.of), f"of of {what}", "a function of a result or a design", self.of)
-        must(self.on in ("run", "design"), f"on of {what}", "'run' or 'design'", self.on)
         must(bool(self.bounds), what, "at_most or at_least a number, or both", None)
         for bound in self.bounds:
             must(is_number(bound) and math.isfinite(bound), f"bound of {what}", "a finite number", bound)
@@ -44,6 +41,8 @@ class Constraint:
             must(self.at_least < self.at_most, f"at_least of {what}", "below at_most", self.at_least)
         positive = self.scale is None or (is_number(self.scale) and 0 < self.scale < math.inf)
         must(positive, f"scale of {what}", "a finite number above 0", self.scale)
+
+    kind: ClassVar[str]
 
     @property
     def bounds(self) -> tuple[float, ...]:
@@ -67,7 +66,7 @@ class Constraint:
         """All that decides what is allowed, in words; part of the identity of a search."""
         scale = "" if self.scale is None else f", scale {self.scale!r}"
         ends = f"{self.at_least!r} to {self.at_most!r}"
-        return f"{ends} {self.unit}".rstrip() + f", of the {self.on}{scale}"
+        return f"{ends} {self.unit}".rstrip() + f", of the {self.kind}{scale}"
 
     def violation(self, value: float) -> float:
         """Return 0 where a value is allowed; else how far it is beyond the bound, in parts of ``scale``.
@@ -80,3 +79,19 @@ class Constraint:
 
     def _scale(self, bound: float) -> float:
         return self.scale or abs(bound) or 1.0
+
+
+@dataclass(frozen=True)
+class ResultConstraint(InequalityConstraint):
+    """An inequality of a run: ``of`` takes its Result (of a plain function its FunctionResult). Like an
+    objective it is a mean over the random starts."""
+
+    kind = "result"
+
+
+@dataclass(frozen=True)
+class DesignConstraint(InequalityConstraint):
+    """An inequality of a design: ``of`` takes its values by name. It is known before anything runs, so that a
+    design that does not keep to it costs no run."""
+
+    kind = "design"

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def total_violation(violations: ArrayLike) -> NDArray[np.float64]:
-    """Return the sum over the constraints, the last axis, of scaled excesses (``Constraint.violation``)."""
+    """Return the sum over the constraints, the last axis, of scaled excesses
+    (``InequalityConstraint.violation``)."""
     return np.sum(np.asarray(violations, dtype=float), axis=-1)
 
 

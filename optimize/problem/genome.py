@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from optimize.problem.gene_values import Value
 from optimize.problem.genes import Gene, Searched
-from optimize.problem.given_genes import Dependent, Fixed
+from optimize.problem.given_genes import DependentGene, FixedGene
 from tisim.errors import InputError, Words, abbreviated, must
 
 __all__ = ["Gene", "Genome", "SearchBox"]
-AnyGene = Searched | Fixed | Dependent
+AnyGene = Searched | FixedGene | DependentGene
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Genome:
     def __post_init__(self) -> None:
         object.__setattr__(self, "genes", tuple(self.genes))
         for gene in self.genes:
-            must(isinstance(gene, AnyGene), "gene", "a Gene, Choice, Fixed or Dependent", gene)
+            must(isinstance(gene, AnyGene), "gene", "a Gene, Choice, FixedGene or DependentGene", gene)
         names = [gene.name for gene in self.genes]
         must(len(self.searched) > 0, "genome", "one gene or more that is searched", self.genes)
         must(len(set(names)) == len(names), "gene names", "all different", names)
@@ -73,7 +73,7 @@ class Genome:
         """
         whole = self.complete(design)
         for gene in self.genes:
-            if isinstance(gene, Fixed) and gene.name in design:
+            if isinstance(gene, FixedGene) and gene.name in design:
                 must(design[gene.name] == gene.value, f"gene {gene.name}", gene.described, design[gene.name])
         return np.array([gene.encode(whole[gene.name]) for gene in self.searched])
 
@@ -86,9 +86,9 @@ class Genome:
         missing = [gene.name for gene in self.searched if gene.name not in design]
         must(not missing, "design", f"of the genes {', '.join(g.name for g in self.searched)}", [*design])
         values = {gene.name: design[gene.name] for gene in self.searched}
-        values |= {gene.name: gene.value for gene in self.genes if isinstance(gene, Fixed)}
+        values |= {gene.name: gene.value for gene in self.genes if isinstance(gene, FixedGene)}
         for gene in self.genes:
-            if isinstance(gene, Dependent):
+            if isinstance(gene, DependentGene):
                 values[gene.name] = gene.value(values)
         return {name: values[name] for name in self.names}
 
@@ -108,7 +108,7 @@ class Genome:
         for name, value in values.items():
             gene = genes.get(name)
             if isinstance(gene, Searched):
-                genes[name] = Fixed(name, gene.decode(gene.encode(value)), gene.unit)
+                genes[name] = FixedGene(name, gene.decode(gene.encode(value)), gene.unit)
                 continue
             free = ", ".join(gene.name for gene in self.searched)
             raise InputError(f"gene to fix must be one of {free}; received {abbreviated(name)}")

@@ -13,7 +13,7 @@ from tisim.errors import InputError, abbreviated, must
 
 
 @dataclass(frozen=True)
-class Fixed(Named):
+class FixedGene(Named):
     """A value that every design has: it is in tables and reports, and the search does not change it."""
 
     name: str
@@ -36,7 +36,7 @@ class Fixed(Named):
 
 
 @dataclass(frozen=True)
-class Dependent(Named):
+class DependentGene(Named):
     """A value that follows from the others of a design: it is in tables and reports, and not searched.
 
     of : function of the design, which has all genes but the dependent ones, and of these those that stand

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from optimize.problem.calls import function_name
-from optimize.problem.constraint import Constraint
+from optimize.problem.constraint import DesignConstraint, InequalityConstraint, ResultConstraint
 from optimize.problem.fingerprint import fingerprint
 from optimize.problem.function import PlainFunction, ValueOf
 from optimize.problem.gene_values import Value
 from optimize.problem.genome import AnyGene, Genome
-from optimize.problem.given_genes import Dependent
+from optimize.problem.given_genes import DependentGene
 from optimize.problem.objective import Objective
 from tisim.errors import InputError, must
 from tisim.files import python_file, regular_file
@@ -46,7 +46,7 @@ class Problem:
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
     met_at : the fitness at which a design meets all that is asked, and so does any better one; the report
         then has how far each gene spreads over those that the search has seen. For one objective only.
-    constraints : what a design must keep to beside; see Constraint.
+    constraints : what a design must keep to beside: any number of ResultConstraints and DesignConstraints.
     code : a text that tells it from another problem of this name and version, in place of the checksums of
         scene and objectives, of their files and of all that they are bound to (see fingerprint.py).
     files : data files that scene or objectives read when they are called; a checksum of their content is part
@@ -69,7 +69,7 @@ class Problem:
     met_at: float | None = None
     code: str = ""
     files: Sequence[str | Path] = ()
-    constraints: Sequence[Constraint] = ()
+    constraints: Sequence[InequalityConstraint] = ()
 
     def __post_init__(self) -> None:
         must(
@@ -85,7 +85,8 @@ class Problem:
         one = len(names) == 1 or self.met_at is None
         must(one, "met_at", "left out for several objectives", self.met_at)
         for constraint in self.constraints:
-            must(isinstance(constraint, Constraint), "constraint", "a Constraint", constraint)
+            able = isinstance(constraint, ResultConstraint | DesignConstraint)
+            must(able, "constraint", "a ResultConstraint or a DesignConstraint", constraint)
         headings = [*self.genome.names, *names, *(constraint.name for constraint in self.constraints)]
         twice = sorted({name for name in headings[len(self.genome.names) :] if headings.count(name) > 1})
         must(not twice or not self.constraints, "names of constraints",
@@ -131,14 +132,14 @@ class Problem:
         return self.function is not None and not self.function.takes_seed
 
     @property
-    def design_constraints(self) -> tuple[Constraint, ...]:
+    def design_constraints(self) -> tuple[InequalityConstraint, ...]:
         """The constraints that are known before anything runs."""
-        return tuple(one for one in self.constraints if one.on == "design")
+        return tuple(one for one in self.constraints if isinstance(one, DesignConstraint))
 
     @property
-    def run_constraints(self) -> tuple[Constraint, ...]:
+    def result_constraints(self) -> tuple[InequalityConstraint, ...]:
         """The constraints of a quantity of a run."""
-        return tuple(one for one in self.constraints if one.on == "run")
+        return tuple(one for one in self.constraints if isinstance(one, ResultConstraint))
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -157,7 +158,7 @@ class Problem:
     def _design_checksums(self) -> list[str]:
         """Return checksums of the functions that decide what is run of a design."""
         functions = {
-            f"gene {gene.name}": gene.of for gene in self.genome.genes if isinstance(gene, Dependent)
+            f"gene {gene.name}": gene.of for gene in self.genome.genes if isinstance(gene, DependentGene)
         }
         functions |= {f"constraint {one.name}": one.of for one in self.design_constraints}
         return [checksum_of(self.scene), *(checksum_of(of, what) for what, of in functions.items())]
@@ -171,7 +172,7 @@ class Problem:
     def _run_checksums(self) -> dict[str, str]:
         """Return checksums of the functions that decide what a run is worth, by name."""
         checksums = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
-        functions = {f"constraint {one.name}": one.of for one in self.run_constraints}
+        functions = {f"constraint {one.name}": one.of for one in self.result_constraints}
         if self.function is not None:
             functions[f"function {function_name(self.function.of)}"] = self.function.of
         return checksums | {what: checksum_of(of, what) for what, of in functions.items()}

@@ -6,7 +6,7 @@ import math
 import pytest
 
 import optimize
-from optimize import Constraint, Gene, Problem
+from optimize import DesignConstraint, Gene, Problem, ResultConstraint
 from optimize.evaluation.runs import Runs, Sample
 from optimize.problem.calls import constraint_value, make_scene
 from optimize.problem.function import FunctionCall
@@ -14,7 +14,7 @@ from optimize.tables import best_columns
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError
 
-FIRST = Constraint("first", lambda design: design["x0"], "m", at_most=0.5, on="design")
+FIRST = DesignConstraint("first", lambda design: design["x0"], "m", at_most=0.5)
 
 
 @pytest.mark.parametrize(
@@ -36,35 +36,46 @@ FIRST = Constraint("first", lambda design: design["x0"], "m", at_most=0.5, on="d
     ],
 )
 def test_a_violation_is_the_excess_in_parts_of_the_bound(bounds, value, violation):
-    assert Constraint("mass", len, "kg", **bounds).violation(value) == pytest.approx(violation)
+    assert ResultConstraint("mass", len, "kg", **bounds).violation(value) == pytest.approx(violation)
 
 
 def test_a_rule_is_told_in_words():
-    assert Constraint("mass", len, "kg", at_most=3.0).rule == "at most 3 kg"
-    assert Constraint("mass", len, at_least=1, at_most=2.5).label == "mass, at least 1 and at most 2.5"
+    assert ResultConstraint("mass", len, "kg", at_most=3.0).rule == "at most 3 kg"
+    assert ResultConstraint("mass", len, at_least=1, at_most=2.5).label == "mass, at least 1 and at most 2.5"
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Constraint("", len, at_most=1), "constraint name must be a non-empty string"),
-        (lambda: Constraint("m", 1.0, at_most=1), "of of constraint m must be a function"),
-        (lambda: Constraint("m", len), "constraint m must be at_most or at_least a number, or both"),
-        (lambda: Constraint("m", len, at_most=math.inf), "bound of constraint m must be a finite number"),
-        (lambda: Constraint("m", len, at_most="1"), "bound of constraint m must be a finite number"),
+        (lambda: ResultConstraint("", len, at_most=1), "constraint name must be a non-empty string"),
+        (lambda: ResultConstraint("m", 1.0, at_most=1), "of of constraint m must be a function"),
+        (lambda: ResultConstraint("m", len), "constraint m must be at_most or at_least a number, or both"),
         (
-            lambda: Constraint("m", len, at_most=1, at_least=1),
+            lambda: ResultConstraint("m", len, at_most=math.inf),
+            "bound of constraint m must be a finite number",
+        ),
+        (lambda: ResultConstraint("m", len, at_most="1"), "bound of constraint m must be a finite number"),
+        (
+            lambda: ResultConstraint("m", len, at_most=1, at_least=1),
             "at_least of constraint m must be below at_most",
         ),
-        (lambda: Constraint("m", len, at_most=1, on="scene"), "on of constraint m must be 'run' or 'design'"),
-        (lambda: Constraint("m", len, at_most=1, scale=0.0), "scale of constraint m must be a finite number"),
-        (lambda: fake_problem(constraints=["m"]), "constraint must be a Constraint; received 'm'"),
+        (
+            lambda: ResultConstraint("m", len, at_most=1, scale=0.0),
+            "scale of constraint m must be a finite number",
+        ),
+        (
+            lambda: fake_problem(constraints=["m"]),
+            "constraint must be a ResultConstraint or a DesignConstraint; received 'm'",
+        ),
         (lambda: fake_problem(constraints=[FIRST, FIRST]), "names of constraints must be other than"),
         (
-            lambda: fake_problem(constraints=[Constraint("x1", len, at_most=1)]),
+            lambda: fake_problem(constraints=[ResultConstraint("x1", len, at_most=1)]),
             "names of constraints must be",
         ),
-        (lambda: fake_problem(constraints=[Constraint("fitness", len, at_most=1)]), "names of constraints"),
+        (
+            lambda: fake_problem(constraints=[ResultConstraint("fitness", len, at_most=1)]),
+            "names of constraints",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):
@@ -98,7 +109,7 @@ def test_an_infeasible_design_costs_no_run():
 
 def test_a_search_keeps_to_it_and_reports_it():
     """The bowl is least at 0.3, which is not allowed."""
-    below = Constraint("first", lambda design: design["x0"], at_most=0.1, on="design")
+    below = DesignConstraint("first", lambda design: design["x0"], at_most=0.1)
     problem = Problem.of_function(
         lambda design: (design["x0"] - 0.3) ** 2, [Gene("x0", "m", 0.0, 1.0)], constraints=[below]
     )
@@ -115,7 +126,7 @@ def test_a_constraint_at_fault_is_told_in_a_line():
         (lambda design: None, "None"),
         (lambda design: design["x0"] > 1, "False"),
     ):
-        problem = fake_problem(genes=1, constraints=[Constraint("c", of, at_most=1, on="design")])
+        problem = fake_problem(genes=1, constraints=[DesignConstraint("c", of, at_most=1)])
         with pytest.raises(InputError, match=rf"^constraint c must return a number; received {received}"):
             make_scene(problem, {"x0": 0.5}, 1)
 
@@ -123,7 +134,7 @@ def test_a_constraint_at_fault_is_told_in_a_line():
 def test_a_constraint_that_reads_a_file_must_declare_it(tmp_path):
     limit = tmp_path / "limit.txt"
     limit.write_text("0.5")
-    constraint = Constraint("c", lambda result: float(limit.read_text()), at_most=1)
+    constraint = ResultConstraint("c", lambda result: float(limit.read_text()), at_most=1)
     with pytest.raises(InputError, match=r"^constraint c must read no file but those in Problem"):
         constraint_value(constraint, None, fake_problem(constraints=[constraint]))
     declared = fake_problem(constraints=[constraint], files=[limit])
@@ -137,16 +148,16 @@ def far(result, limit):
 def test_a_run_is_another_with_another_constraint_and_a_search_with_another_bound():
     """Values of a run are stored beside those of its objectives, those of a design and bounds are not."""
 
-    def of(on, limit, **bounds):
-        constraint = Constraint("c", functools.partial(far, limit=limit), on=on, **(bounds or {"at_most": 1}))
+    def of(kind, limit, **bounds):
+        constraint = kind("c", functools.partial(far, limit=limit), **(bounds or {"at_most": 1}))
         return fake_problem(constraints=[constraint])
 
-    assert of("run", 0.5).objective_identity == of("run", 0.5).objective_identity
-    assert of("run", 0.5).objective_identity != of("run", 1.5).objective_identity
-    assert of("run", 0.5).objective_identity != fake_problem().objective_identity
-    assert of("design", 0.5).objective_identity == of("design", 1.5).objective_identity
-    assert of("design", 0.5).identity != of("design", 1.5).identity
-    described = [of("run", 0.5, **bounds).constraints[0].described for bounds in (
+    assert of(ResultConstraint, 0.5).objective_identity == of(ResultConstraint, 0.5).objective_identity
+    assert of(ResultConstraint, 0.5).objective_identity != of(ResultConstraint, 1.5).objective_identity
+    assert of(ResultConstraint, 0.5).objective_identity != fake_problem().objective_identity
+    assert of(DesignConstraint, 0.5).objective_identity == of(DesignConstraint, 1.5).objective_identity
+    assert of(DesignConstraint, 0.5).identity != of(DesignConstraint, 1.5).identity
+    described = [of(ResultConstraint, 0.5, **bounds).constraints[0].described for bounds in (
         {"at_most": 1}, {"at_most": 2}, {"at_least": 1}, {"at_most": 1, "scale": 2}
     )]  # fmt: skip
     assert len(set(described)) == 4
@@ -154,7 +165,7 @@ def test_a_run_is_another_with_another_constraint_and_a_search_with_another_boun
 
 def test_a_bound_is_part_of_the_identity_of_a_search():
     def identity(bound):
-        problem = fake_problem(constraints=[Constraint("c", len, at_most=bound)])
+        problem = fake_problem(constraints=[ResultConstraint("c", len, at_most=bound)])
         return optimize.settings.identity(problem, optimize.Settings(), {})
 
     assert identity(1.0) == identity(1.0) != identity(2.0)

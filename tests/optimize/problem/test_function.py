@@ -204,7 +204,7 @@ def test_it_cannot_change_the_design_of_the_search():
 
 
 def test_a_record_of_what_designs_are_worth(tmp_path):
-    problem = Problem.of_function(noisy, [*ONE, optimize.Fixed("k", 2)])
+    problem = Problem.of_function(noisy, [*ONE, optimize.FixedGene("k", 2)])
     record = FitnessRecord.measure(problem, {"low": {"x": 0.1}}, starts=3)
     record.save(tmp_path / "fitness.json")
     assert record.values["low"]["value"] == [noisy({"x": 0.1}, seed) for seed in range(3)]
@@ -220,7 +220,7 @@ def test_a_gene_is_fixed_in_a_problem():
 
 
 def test_where_a_constraint_refuses_every_design_the_error_says_why():
-    far = optimize.Constraint("far", lambda design: design["x"], "m", at_most=-1, on="design")
+    far = optimize.DesignConstraint("far", lambda design: design["x"], "m", at_most=-1)
     problem = Problem.of_function(lambda design: 0.0, ONE, name="p", constraints=[far])
     with pytest.raises(RunError, match=r"infeasible: far must be at most -1 m; received 0\.\d+ m$"):
         optimize.run(problem, generations=2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import optimize
-from optimize import Choice, Dependent, Fixed, Gene, Genome
+from optimize import Choice, DependentGene, FixedGene, Gene, Genome
 from tisim import InputError
 
 BLADES = Gene("blades", "", 2, 7, integer=True)
@@ -106,9 +106,9 @@ def test_two_categories_are_at_distance_1_and_ordered_ones_by_their_places():
 def test_fixed_and_dependent_genes_are_in_the_design_and_not_in_the_cube():
     genome = Genome(
         (
-            Dependent("area", "m^2", lambda design: design["width"] * design["height"]),
-            Gene("width", "m", 1.0, 2.0), Fixed("height", 3.0, "m"), Fixed("lid", True),
-            Dependent("volume", "m^3", lambda design: 2 * design["area"]),
+            DependentGene("area", "m^2", lambda design: design["width"] * design["height"]),
+            Gene("width", "m", 1.0, 2.0), FixedGene("height", 3.0, "m"), FixedGene("lid", True),
+            DependentGene("volume", "m^3", lambda design: 2 * design["area"]),
         )
     )  # fmt: skip
     assert len(genome) == 1
@@ -127,7 +127,7 @@ def test_a_dependent_gene_cannot_change_the_design():
         return 1.0
 
     with pytest.raises(InputError, match=r"dependent gene y must return .*; received TypeError"):
-        Genome((Gene("x", "", 0, 1), Dependent("y", "", meddle))).decode([0.5])
+        Genome((Gene("x", "", 0, 1), DependentGene("y", "", meddle))).decode([0.5])
 
 
 @pytest.mark.parametrize(
@@ -144,13 +144,13 @@ def test_a_dependent_gene_cannot_change_the_design():
 def test_a_dependent_gene_at_fault_is_told_in_a_line(of, received):
     rule = "dependent gene y must return a finite number, a text or a flag"
     with pytest.raises(InputError, match=rf"^{rule}; received {received}"):
-        Genome((Gene("x", "", 0, 1), Dependent("y", "", of))).decode([0.5])
+        Genome((Gene("x", "", 0, 1), DependentGene("y", "", of))).decode([0.5])
 
 
 def test_numpy_values_become_those_of_python():
     genome = Genome((
-        Choice("n", (np.int64(1), np.float32(2.5), "auto")), Fixed("f", np.bool_(True)),
-        Dependent("d", "", lambda design: np.float64(2.0)),
+        Choice("n", (np.int64(1), np.float32(2.5), "auto")), FixedGene("f", np.bool_(True)),
+        DependentGene("d", "", lambda design: np.float64(2.0)),
     ))  # fmt: skip
     assert [type(value) for value in genome.decode([0.4]).values()] == [float, bool, float]
     assert genome.encode({"n": np.int64(1)}) == pytest.approx([1 / 6])
@@ -212,10 +212,10 @@ DESIGN = GENOME.decode(np.full(7, 0.5))
         (lambda: Choice("c", ("a", "b\n")), r"choice of c must be a printable text"),
         (lambda: Choice("c", ("a", "b" * 41)), r"choice of c must be a printable text of at most 40"),
         (lambda: Choice("c", ("a", None)), r"choice of c must be a text, a number or a flag; received None"),
-        (lambda: Fixed("f", [1]), r"fixed gene f must be a text, a number or a flag; received \[1\]"),
-        (lambda: Dependent("d", "", 3.0), r"of of dependent gene d must be a function of the design"),
-        (lambda: Genome((Fixed("f", 1),)), r"genome must be one gene or more that is searched"),
-        (lambda: Genome(("x",)), r"gene must be a Gene, Choice, Fixed or Dependent; received 'x'"),
+        (lambda: FixedGene("f", [1]), r"fixed gene f must be a text, a number or a flag; received \[1\]"),
+        (lambda: DependentGene("d", "", 3.0), r"of of dependent gene d must be a function of the design"),
+        (lambda: Genome((FixedGene("f", 1),)), r"genome must be one gene or more that is searched"),
+        (lambda: Genome(("x",)), r"gene must be a Gene, Choice, FixedGene or DependentGene; received 'x'"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(make, message):
@@ -226,8 +226,8 @@ def test_what_cannot_be_is_refused(make, message):
 def test_what_a_gene_may_be_and_what_it_follows_from_are_part_of_the_search():
     def of(**changes):
         genes = {
-            "n": Gene("n", "", 1, 4, integer=True), "c": Choice("c", ("a", "b")), "f": Fixed("f", 1.0),
-            "d": Dependent("d", "", lambda design: design["n"]), **changes,
+            "n": Gene("n", "", 1, 4, integer=True), "c": Choice("c", ("a", "b")), "f": FixedGene("f", 1.0),
+            "d": DependentGene("d", "", lambda design: design["n"]), **changes,
         }  # fmt: skip
         problem = optimize.Problem.of_function(lambda design: 0.0, tuple(genes.values()), name="p")
         return problem.identity, [gene.described for gene in problem.genome.genes]
@@ -235,7 +235,7 @@ def test_what_a_gene_may_be_and_what_it_follows_from_are_part_of_the_search():
     assert of() == of()
     others = (
         {"n": Gene("n", "", 1, 4)}, {"n": Gene("n", "", 1, 5, integer=True)}, {"c": Choice("c", ("b", "a"))},
-        {"c": Choice("c", ("a", "b"), ordered=True)}, {"f": Fixed("f", 2.0)},
-        {"d": Dependent("d", "", lambda design: -design["n"])},
+        {"c": Choice("c", ("a", "b"), ordered=True)}, {"f": FixedGene("f", 2.0)},
+        {"d": DependentGene("d", "", lambda design: -design["n"])},
     )  # fmt: skip
     assert len({str(of(**changes)) for changes in ({}, *others)}) == 1 + len(others)
