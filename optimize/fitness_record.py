@@ -54,7 +54,9 @@ class FitnessRecord:
         """
         must(bool(designs), "designs", "at least one", dict(designs))
         must(starts >= 1, "starts", "at least 1", starts)
-        whole = {name: problem.genome.complete(design) for name, design in designs.items()}
+        whole = {
+            name: problem.genome.complete(design, f"design {name!r}") for name, design in designs.items()
+        }
         results = _results(
             problem, [problem.scene(d, seed) for d in whole.values() for seed in range(starts)]
         )

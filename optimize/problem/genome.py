@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from optimize.problem.gene_values import Value
 from optimize.problem.genes import Gene, Searched
 from optimize.problem.given_genes import DependentGene, FixedGene
-from tisim.errors import InputError, Words, abbreviated, must
+from tisim.errors import InputError, abbreviated, must
 
 __all__ = ["Gene", "Genome", "SearchBox"]
 AnyGene = Searched | FixedGene | DependentGene
@@ -77,14 +77,12 @@ class Genome:
                 must(design[gene.name] == gene.value, f"gene {gene.name}", gene.described, design[gene.name])
         return np.array([gene.encode(whole[gene.name]) for gene in self.searched])
 
-    def complete(self, design: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a design with its fixed and dependent values, in the order of the genome. InputError for a
-        searched gene that is missing and for an unknown one."""
-        for name in design:
-            known = name in self.names
-            must(known, "gene", f"one of {', '.join(self.names)}", Words(abbreviated(name)))
-        missing = [gene.name for gene in self.searched if gene.name not in design]
-        must(not missing, "design", f"of the genes {', '.join(g.name for g in self.searched)}", [*design])
+    def complete(self, design: Mapping[str, Any], what: str = "design") -> dict[str, Any]:
+        """Return a design with its fixed and dependent values, in the order of the genome. InputError, naming
+        it as ``what``, where a searched gene is missing, or one is unknown."""
+        searched = [gene.name for gene in self.searched]
+        right = set(searched) <= set(design) <= set(self.names)
+        must(right, what, f"of the genes {', '.join(searched)}", [*design])
         values = {gene.name: design[gene.name] for gene in self.searched}
         values |= {gene.name: gene.value for gene in self.genes if isinstance(gene, FixedGene)}
         for gene in self.genes:
