@@ -230,7 +230,7 @@ def test_what_a_gene_may_be_and_what_it_follows_from_are_part_of_the_search():
             "d": DependentGene("d", "", lambda design: design["n"]), **changes,
         }  # fmt: skip
         problem = optimize.Problem.of_function(lambda design: 0.0, tuple(genes.values()), name="p")
-        return problem.identity, [gene.described for gene in problem.genome.genes]
+        return optimize.settings.identity(problem, optimize.Settings(), {})
 
     assert of() == of()
     others = (

@@ -1,6 +1,7 @@
 """Designs with whole numbers, texts and flags in all that a search shows."""
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -12,6 +13,8 @@ from optimize.outcome import Outcome
 from optimize.report import report
 from optimize.report.display import Display
 from optimize.settings import Settings
+from optimize.storage.record import Record
+from tests.optimize.fake_runs import fake_record
 
 GENES = (
     Gene("speed", "m/s", 1.0, 9.0), Gene("blades", "", 2, 5, integer=True), Choice("wall", ("flat", "round")),
@@ -77,6 +80,14 @@ def test_the_spread_of_those_that_meet_has_names_of_choices():
 def test_the_bar_tells_the_best_design():
     text = Display(PROBLEM, 3, Console(file=io.StringIO()))._design(PROBLEM.genome.decode([0.5] * 4))
     assert text == "speed 5 m/s, blades 4, wall round, open True, gap 2.5 mm, tip 10 m/s"
+
+
+def test_what_was_run_is_read_again_from_a_journal():
+    record = replace(fake_record(1), design=PROBLEM.genome.decode([0.5] * 4))
+    again = Record.parse(record.payload())
+    assert again == record
+    types = [type(again.design[name]) for name in PROBLEM.genome.names]
+    assert types == [float, int, str, bool, float, float]
 
 
 def test_a_folder_and_plain_data_have_every_kind(outcome, tmp_path):
