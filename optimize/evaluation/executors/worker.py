@@ -81,9 +81,9 @@ def pack_scenes(scenes: Sequence[Scene]) -> bytes:
     try:
         return pickle.dumps(scenes)
     except (pickle.PicklingError, AttributeError) as error:
-        raise InputError(
-            f"scene, or function, must be made of what a worker can import; received {error}"
-        ) from None
+        called = isinstance(scenes[0], FunctionCall)
+        rule = "function must be one" if called else "scene must be made of classes"
+        raise InputError(f"{rule} that a worker can import; received {error}") from None
 
 
 def run(scenes: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
