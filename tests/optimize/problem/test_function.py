@@ -134,7 +134,7 @@ def test_worker_processes_call_it_too():
     here = optimize.run(problem, **settings)
     there = optimize.run(problem, executor="processes:2", **settings)
     assert there.designs == here.designs
-    with pytest.raises(InputError, match="^function must be one that a worker can import; received"):
+    with pytest.raises(InputError, match=r"^function must be one that a worker can import; received"):
         optimize.run(Problem.of_function(lambda d: 0.0, ONE), executor="processes:2", **settings)
 
 
