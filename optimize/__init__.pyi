@@ -6,11 +6,24 @@ from .outcome import (
 from .outcome import (
     Outcome as Outcome,
 )
-from .problem.genome import (
+from .problem.constraint import (
+    DesignConstraint as DesignConstraint,
+)
+from .problem.constraint import (
+    ResultConstraint as ResultConstraint,
+)
+from .problem.genes import (
+    Choice as Choice,
+)
+from .problem.genes import (
     Gene as Gene,
 )
-from .problem.genome import (
-    Genome as Genome,
+from .problem.genome import Genome as Genome
+from .problem.given_genes import (
+    DependentGene as DependentGene,
+)
+from .problem.given_genes import (
+    FixedGene as FixedGene,
 )
 from .problem.objective import Objective as Objective
 from .problem.problem import Problem as Problem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import tisim
+from optimize.evaluation.function_evaluator import FunctionEvaluator
 from optimize.problem.problem import Problem
 from tisim.backend import runtime
 from tisim.errors import InputError, RunError, must
@@ -53,11 +54,11 @@ class FitnessRecord:
         """
         must(bool(designs), "designs", "at least one", dict(designs))
         must(starts >= 1, "starts", "at least 1", starts)
-        genes = [gene.name for gene in problem.genome.genes]
-        for name, design in designs.items():
-            must(set(design) == set(genes), f"design {name!r}", f"of the genes {', '.join(genes)}", [*design])
-        results = iter(
-            tisim.run([problem.scene(d, seed) for d in designs.values() for seed in range(starts)])
+        whole = {
+            name: problem.genome.complete(design, f"design {name!r}") for name, design in designs.items()
+        }
+        results = _results(
+            problem, [problem.scene(d, seed) for d in whole.values() for seed in range(starts)]
         )
         values: Values = {name: {one.name: [] for one in problem.objectives} for name in designs}
         for name in designs:
@@ -68,7 +69,8 @@ class FitnessRecord:
                 for objective in problem.objectives:
                     values[name][objective.name].append(float(objective.of(result)))
         plain = {name: dict(design) for name, design in designs.items()}
-        return cls(problem.name, plain, values, runtime.current().settings, _platform())
+        settings = {} if problem.function else runtime.current().settings
+        return cls(problem.name, plain, values, settings, _platform())
 
     def again(self, problem: Problem) -> FitnessRecord:
         """Return what the same designs and starts give now; InputError for another problem."""
@@ -113,6 +115,13 @@ class FitnessRecord:
             return cls(**data)
         except (ValueError, KeyError, TypeError, AttributeError):
             raise InputError(f"fitness record must be a file of one; received {str(path)!r}") from None
+
+
+def _results(problem: Problem, scenes: Sequence[Any]) -> Iterator[Any]:
+    """Return the results of scenes, or of calls of a plain function, in order."""
+    if problem.function is not None:
+        return (result for _, result in FunctionEvaluator().evaluate(scenes))
+    return iter(tisim.run(scenes))
 
 
 def _deviation(recorded: list[float], now: list[float]) -> float:

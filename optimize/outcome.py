@@ -11,6 +11,7 @@ from deap import tools
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.hall_of_fame import compromise
 from optimize.methods.individual import Individual
+from optimize.problem.gene_values import Value
 from optimize.problem.problem import Problem
 from optimize.settings import Settings, search_name
 from optimize.tables import best_columns, logbook_columns
@@ -37,7 +38,7 @@ class Progress:
     fraction: float
     best: tuple[float, ...]
     designs: int
-    best_design: dict[str, float] | None
+    best_design: dict[str, Value] | None
     evaluations: int
     hits: int
     elapsed_s: float
@@ -48,13 +49,13 @@ class Progress:
 class Design:
     """A design is one that a search has found, in physical units.
 
-    genes : the value of each gene, by name, in its unit. values : of each objective, by name, in its unit:
-    the mean over random starts, the fresh ones where there are any. intervals : half-widths of their 95 %
-    confidence intervals. starts : how many there were. converged : whether the last of them changed the mean
-    by less than the tolerance that was asked for.
+    genes : the value of each gene, by name, in its unit: a number, a text or a flag. values : of each
+    objective, by name, in its unit: the mean over random starts, the fresh ones where there are any.
+    intervals : half-widths of their 95 % confidence intervals. starts : how many there were. converged :
+    whether the last of them changed the mean by less than the tolerance that was asked for.
     """
 
-    genes: dict[str, float]
+    genes: dict[str, Any]
     values: dict[str, float]
     intervals: dict[str, float]
     starts: int

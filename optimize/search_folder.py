@@ -5,7 +5,7 @@ best.csv          the best designs, all digits
 met.csv           all that meet what is asked, where the problem says which do
 convergence.png   (and .pdf) best and mean fitness by generation; of several objectives the best of each
 front.png         (and .pdf) the front of several objectives
-best_scene.toml   the best design from the first random start, for ``tisim run``
+best_scene.toml   the best design from the first random start, for ``tisim run``; none of a plain function
 best_cloud.png    that run at start and end, where the problem says how to draw it
 best_run.csv      what that run shows beside what was wanted, where the problem says what
 """

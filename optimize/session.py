@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from optimize.evaluation.executors import evaluator_named
+from optimize.evaluation.executors import evaluator_for
 from optimize.evaluation.runs import Evaluator, start_seed
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress
@@ -51,15 +51,8 @@ def run(
     """
     search_settings = Settings(**proposed(problem, settings, settings.get("method")))
     fit(problem, search_settings)
-    in_this_process = executor == "batch"
     with ExitStack() as stack:
-        if in_this_process:
-            stack.enter_context(runtime.turn)
-        current = runtime.current()
-        threads = current.threads if in_this_process else 0
-        evaluator = stack.enter_context(
-            closing(evaluator_named(executor, current.device, current.precision, threads, current.arithmetic))
-        )
+        evaluator = _evaluator(problem, executor, stack)
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
             return session(problem, search_settings, evaluator, Path(out), say, bar, print_stopping)
@@ -72,6 +65,20 @@ def run(
                 err() if verbose else Console(quiet=True),
                 print_stopping,
             )
+
+
+def _evaluator(problem: Problem, executor: str, stack: ExitStack) -> Evaluator:
+    """Return the evaluator of that name with the settings of ``tisim.init``, which for a plain function are
+    not asked for; the stack closes it, and holds the turn of this process meanwhile."""
+    if problem.function is not None:
+        return stack.enter_context(closing(evaluator_for(problem, executor)))
+    in_this_process = executor == "batch"
+    if in_this_process:
+        stack.enter_context(runtime.turn)
+    now = runtime.current()
+    threads = now.threads if in_this_process else 0
+    settings = now.device, now.precision, threads, now.arithmetic
+    return stack.enter_context(closing(evaluator_for(problem, executor, *settings)))
 
 
 def session(
@@ -137,9 +144,10 @@ def _show_best(
     design = problem.genome.decode(best)
     own = None if settings.ensemble.common_starts else design
     scene = problem.scene(design, start_seed(settings.seed, 0, own))
-    text = folder / "best_scene.toml"
-    replace_file(text, scene.to_toml().encode())
-    paths = [text]
+    paths = []
+    if problem.function is None:
+        paths.append(folder / "best_scene.toml")
+        replace_file(paths[-1], scene.to_toml().encode())
     if problem.picture is None and problem.details is None:
         return paths
     _, result = next(evaluator.evaluate([scene]))

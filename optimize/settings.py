@@ -75,11 +75,13 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "problem": problem.name,
         "problem_version": problem.version,
         "problem_code": problem.identity,
-        "genes": {
-            gene.name: f"{gene.low!r} to {gene.high!r} {gene.unit}".rstrip() + f", {gene.scale}"
-            for gene in problem.genome.genes
-        },
+        "genes": {gene.name: gene.described for gene in problem.genome.genes},
         "gene_order": list(problem.genome.names),
+        **(
+            {"constraints": {one.name: one.described for one in problem.constraints}}
+            if problem.constraints
+            else {}
+        ),
         "objectives": {
             one.name: ("largest" if one.maximise else "least") + (f", {one.unit}" if one.unit else "")
             for one in problem.objectives

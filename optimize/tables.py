@@ -10,14 +10,16 @@ from deap import tools
 
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
+from optimize.problem.calls import constraint_value
 from optimize.problem.problem import Problem
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
-    """Return the columns of Z04's tables 1 to 3 in one: rank, every gene in its unit, each objective with the
-    half-width of its 95 % confidence interval, the derived columns of the problem, starts, whether their mean
-    converged; the same from fresh starts where the designs have been confirmed. Heading -> values, best
-    first; of several objectives the front along the first, the best of that first.
+    """Return the columns of Z04's tables 1 to 3 in one: rank, every gene in its unit, each constraint of the
+    design, each objective with the half-width of its 95 % confidence interval, the derived columns of the
+    problem, starts, whether their mean converged; the same from fresh starts where the designs have been
+    confirmed. Heading -> values, best first; of several objectives the front along the first, the best of
+    that first.
     """
     estimates = [string.estimates for string in hall]
     number = "front" if problem.several else "rank"
@@ -25,6 +27,8 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
     designs = [problem.genome.decode(string) for string in hall]
     for gene in problem.genome.genes:
         columns[gene.label] = [design[gene.name] for design in designs]
+    for constraint in problem.design_constraints:
+        columns[constraint.label] = [constraint_value(constraint, one, problem) for one in designs]
     columns |= _objectives(problem, estimates, "")
     columns["starts"] = [of_all[0].starts for of_all in estimates]
     columns["converged"] = ["yes" if of_all[0].converged else "no" for of_all in estimates]

@@ -47,6 +47,10 @@ class EnsembleSettings(Checked):
         """Return the name of these settings in messages, as in ``--set search.ensemble.block=2``."""
         return "search.ensemble"
 
+    def once(self) -> EnsembleSettings:
+        """Return the settings for a problem of which all starts of a design give the same."""
+        return self.model_copy(update={"min_starts": 1, "max_starts": 1, "block": 1})
+
     @model_validator(mode="after")
     def _ordered(self) -> EnsembleSettings:
         must(
@@ -75,7 +79,8 @@ class Ensemble:
         seed: int,
         budget: int | None = None,
     ) -> None:
-        self.settings, self.objectives = settings, len(problem.objectives)
+        self.settings = settings.once() if problem.deterministic else settings
+        self.objectives = len(problem.objectives)
         self.runs = Runs(problem, evaluator, cache, seed, settings.common_starts)
         self.budget = math.inf if budget is None else budget
         self.exhausted = False

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Evaluator(Protocol):
-    """Runs scenes.
+    """Runs scenes, or calls functions (FunctionCall to FunctionResult).
 
     settings : all about it that may change a fitness (precision, device kind); part of the cache key.
     """
@@ -30,8 +30,8 @@ class Evaluator(Protocol):
     settings: dict[str, Any]
 
     def evaluate(
-        self, scenes: Sequence[Scene], progress: Callable[[float], None] | None = None
-    ) -> Iterator[tuple[int, Result]]:
+        self, scenes: Sequence[Any], progress: Callable[[float], None] | None = None, /
+    ) -> Iterator[tuple[int, Any]]:
         """Yield (index into scenes, Result) once for each scene, in any order, as soon as it is finished.
 
         progress, if given, is called now and then with the finished fraction of this call, 0..1.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import numbers
 import os
 import sys
@@ -15,13 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tisim.errors import InputError, abbreviated, printable
+from tisim.errors import InputError, Words, abbreviated, must, printable
 from tisim.files.python_file import OWN_PACKAGES
 
 if TYPE_CHECKING:
+    from optimize.problem.constraint import InequalityConstraint
     from optimize.problem.objective import Objective
     from optimize.problem.problem import Problem
-    from tisim import Result, Scene
+    from tisim import Scene
 
 OWN_FOLDERS = tuple(Path(__file__).parents[2] / name for name in sorted(OWN_PACKAGES))
 SOURCES = (".py", ".pyc", ".so", ".pyd")
@@ -31,33 +33,77 @@ SYSTEM = tuple(map(Path, ("/usr", "/lib", "/etc", "/dev", "/proc", "/sys")))
 
 
 def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scene:
-    """Return the scene of a design. InputError where its function refuses the design, which is its right;
-    FaultyProblem where the function is at fault."""
+    """Return the scene of a design. InputError where its function refuses the design, which is its right, or
+    the design does not keep to a constraint; FaultyProblem where the function is at fault."""
+    check_design(problem, design)
     rule = f"scene of problem {problem.name} must return a Scene, or raise InputError to refuse a design"
     try:
         scene = problem.scene(design, seed)
     except InputError:
         raise
     except Exception as error:
-        raise FaultyProblem(f"{rule}; received {_told(error)}") from error
+        raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
     if not callable(getattr(scene, "digest", None)):
         raise FaultyProblem(f"{rule}; received {abbreviated(scene)}")
     return scene
 
 
-def value_of(objective: Objective, result: Result, problem: Problem) -> float:
+def check_design(problem: Problem, design: Mapping[str, Any]) -> None:
+    """Raise InputError for a design that does not keep to a constraint of the design, before anything of it
+    is made; FaultyProblem where such a function is at fault."""
+    for constraint in problem.design_constraints:
+        value = constraint_value(constraint, design, problem)
+        must(constraint.violation(value) == 0, constraint.name, constraint.rule,
+             Words(f"{value:.10g} {constraint.unit}".rstrip()))  # fmt: skip
+
+
+def value_of(objective: Objective, result: Any, problem: Problem) -> float:
     """Return the value of an objective. FaultyProblem unless it is a real number, NaN and infinity among
     them, and no file was read for it that is not in the files of the problem."""
-    rule = f"objective {objective.name} must return a number"
+    return _number(f"objective {objective.name}", objective.of, result, problem)
+
+
+def constraint_value(constraint: InequalityConstraint, of: Any, problem: Problem) -> float:
+    """Return the value of a constraint of a result, or of a design; as ``value_of`` an objective's."""
+    return _number(f"constraint {constraint.name}", constraint.of, of, problem)
+
+
+def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, frozenset[Path]]:
+    """Return what a plain function of a design gives, and the user's files that it has read. InputError where
+    it refuses the design, which is its right; FaultyProblem where it is at fault."""
+    try:
+        with _files_read() as read:
+            value = of(*arguments)
+    except InputError:
+        raise
+    except Exception as error:
+        rule = f"function {function_name(of)} must return numbers, or raise InputError to refuse a design"
+        raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
+    return value, frozenset(read)
+
+
+def function_name(of: Callable[..., Any]) -> str:
+    """Return the name of a function, of that within a partial, or of the class of an object."""
+    while isinstance(of, functools.partial):
+        of = of.func
+    return getattr(of, "__name__", type(of).__name__).strip("<>")
+
+
+def _number(what: str, of: Callable[[Any], Any], argument: Any, problem: Problem) -> float:
+    """Return the number that a function of the problem gives of a result or a design."""
+    rule = f"{what} must return a number"
     known = {Path(file).resolve() for file in problem.files}
     try:
         with _files_read() as read:
-            value: Any = objective.of(result)
+            value: Any = of(argument)
+    except FaultyProblem:
+        raise
     except Exception as error:
-        raise FaultyProblem(f"{rule}; received {_told(error)}") from error
-    if unknown := sorted(str(path) for path in read - known):
+        raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
+    # A plain function has read its files when it was called.
+    if unknown := sorted(str(path) for path in (read | getattr(argument, "files_read", read)) - known):
         raise FaultyProblem(
-            f"objective {objective.name} must read no file but those in Problem(files=[...]), as its values "
+            f"{what} must read no file but those in Problem(files=[...]), as its values "
             f"are used again while these are the same; received {printable(unknown[0])}"
         )
     if isinstance(value, np.ndarray) and value.shape == () and not np.ma.is_masked(value):
@@ -74,7 +120,7 @@ class FaultyProblem(InputError):
     """A function of a problem is at fault: the search ends, and what it has found so far stays."""
 
 
-def _told(error: Exception) -> str:
+def error_told(error: Exception) -> str:
     """Return an error of a function of the user in a line, with its place in the user's file."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [one for one in frames if _is_of_user(Path(one.filename))]

@@ -1,92 +1,141 @@
-"""Named genes with units and ranges, the unit cube the search works in, and the search box inside it."""
+"""The genes of a problem, the unit cube that the search works in, and the search box inside it."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tisim.errors import is_number, must
+from optimize.problem.gene_values import Value
+from optimize.problem.genes import Gene, Searched
+from optimize.problem.given_genes import DependentGene, FixedGene
+from tisim.errors import InputError, abbreviated, must
 
-
-@dataclass(frozen=True)
-class Gene:
-    """One design variable.
-
-    name : the key of the design; unit : for people, "" if it has none.
-    low, high : the full search range in that unit, low < high.
-    scale : "linear", or "log" when the range spans decades (low > 0); the search is uniform on this scale.
-    Raises InputError for an empty name, a range that is not finite and increasing, or an unknown scale.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    scale: Literal["linear", "log"] = "linear"
-
-    def __post_init__(self) -> None:
-        must(bool(self.name.strip()), "gene name", "a non-empty string", self.name)
-        for which in ("low", "high"):
-            value = getattr(self, which)
-            must(is_number(value), f"{which} of gene {self.name}", "a number", value)
-            # In 8 bits a range of 200 is below 0.
-            object.__setattr__(self, which, float(value))
-        finite = math.isfinite(self.low) and math.isfinite(self.high)
-        must(
-            finite and self.low < self.high,
-            f"range of gene {self.name}",
-            "finite with low < high",
-            (self.low, self.high),
-        )
-        must(self.scale in ("linear", "log"), f"scale of gene {self.name}", "'linear' or 'log'", self.scale)
-        must(
-            self.scale == "linear" or self.low > 0, f"low of gene {self.name} on a log scale", "> 0", self.low
-        )
-
-    @property
-    def label(self) -> str:
-        """The name and the unit, as a table heading."""
-        return f"{self.name} ({self.unit})" if self.unit else self.name
-
-    def decode(self, u: float) -> float:
-        """Return the physical value at u in 0..1; exactly low at 0 and high at 1."""
-        if self.scale == "log":
-            value = self.low * (self.high / self.low) ** u
-        else:
-            value = self.low + u * (self.high - self.low)
-        return float(min(max(value, self.low), self.high))
+__all__ = ["Gene", "Genome", "SearchBox"]
+AnyGene = Searched | FixedGene | DependentGene
 
 
 @dataclass(frozen=True)
 class Genome:
-    """The genetic string: an ordered tuple of genes with different names (Z04 Eq. 7.3)."""
+    """The genetic string: an ordered tuple of genes with different names (Z04 Eq. 7.3).
 
-    genes: tuple[Gene, ...]
+    The search works in the unit cube of the searched genes, in their order, ``len(genome)`` of them; a design
+    has the values of all genes by name, in the order of the genome. InputError without a searched gene.
+    """
+
+    genes: tuple[AnyGene, ...]
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "genes", tuple(self.genes))
+        for gene in self.genes:
+            must(isinstance(gene, AnyGene), "gene", "a Gene, Choice, FixedGene or DependentGene", gene)
         names = [gene.name for gene in self.genes]
-        must(len(names) > 0, "genome", "one gene or more", self.genes)
+        must(len(self.searched) > 0, "genome", "one gene or more that is searched", self.genes)
         must(len(set(names)) == len(names), "gene names", "all different", names)
 
     def __len__(self) -> int:
-        return len(self.genes)
+        return len(self.searched)
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The names of all genes."""
         return tuple(gene.name for gene in self.genes)
 
-    def decode(self, u: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
-        """Return the design in physical units of a point u, shape (genes,), of the unit cube. InputError
-        outside it."""
+    @cached_property
+    def searched(self) -> tuple[Searched, ...]:
+        """The genes that the search changes, one coordinate of the unit cube each."""
+        return tuple(gene for gene in self.genes if isinstance(gene, Searched))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What each coordinate is: "real", "integer", "ordered" or "category"."""
+        return tuple(gene.kind for gene in self.searched)
+
+    def decode(self, u: Sequence[float] | NDArray[np.float64]) -> dict[str, Any]:
+        """Return the design in physical units of a point u, shape (searched genes,), of the unit cube.
+        InputError outside it."""
         point = np.asarray(u, dtype=float)
         must(point.shape == (len(self),), "unit-cube point", f"of shape ({len(self)},)", point.shape)
         must(bool(np.all((point >= 0) & (point <= 1))), "unit-cube point", "within 0..1", point.tolist())
-        return {gene.name: gene.decode(float(x)) for gene, x in zip(self.genes, point, strict=True)}
+        return self.complete(
+            {gene.name: gene.decode(float(x)) for gene, x in zip(self.searched, point, strict=True)}
+        )
+
+    def encode(self, design: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Return a point of the unit cube that decodes to a design, one that was decoded to its last bit.
+
+        Dependent genes are not looked at. InputError for a gene that is missing, unknown or out of its range,
+        and for a fixed one of another value.
+        """
+        whole = self.complete(design)
+        for gene in self.genes:
+            if isinstance(gene, FixedGene) and gene.name in design:
+                must(design[gene.name] == gene.value, f"gene {gene.name}", gene.described, design[gene.name])
+        return np.array([gene.encode(whole[gene.name]) for gene in self.searched])
+
+    def complete(self, design: Mapping[str, Any], what: str = "design") -> dict[str, Any]:
+        """Return a design with its fixed and dependent values, in the order of the genome. InputError, naming
+        it as ``what``, where a searched gene is missing, or one is unknown."""
+        searched = [gene.name for gene in self.searched]
+        right = set(searched) <= set(design) <= set(self.names)
+        must(right, what, f"of the genes {', '.join(searched)}", [*design])
+        values = {gene.name: design[gene.name] for gene in self.searched}
+        values |= {gene.name: gene.value for gene in self.genes if isinstance(gene, FixedGene)}
+        for gene in self.genes:
+            if isinstance(gene, DependentGene):
+                values[gene.name] = gene.value(values)
+        return {name: values[name] for name in self.names}
+
+    def parse(self, row: Mapping[str, str]) -> dict[str, Any]:
+        """Return the design in a row of a CSV file, texts by heading: names of genes, or their labels as in
+        best.csv. Other columns are not looked at. InputError for a searched gene without one."""
+        design = {}
+        for gene in self.searched:
+            heading = gene.label if gene.label in row else gene.name
+            must(heading in row, "columns", f"of all genes, {gene.label} among them", [*row])
+            design[gene.name] = gene.parse(row[heading])
+        return self.complete(design)
+
+    def fix(self, **values: Value) -> Genome:
+        """Return the genome with these genes fixed, each within its range. InputError for others."""
+        genes = {gene.name: gene for gene in self.genes}
+        for name, value in values.items():
+            gene = genes.get(name)
+            if isinstance(gene, Searched):
+                genes[name] = FixedGene(name, gene.decode(gene.encode(value)), gene.unit)
+                continue
+            free = ", ".join(gene.name for gene in self.searched)
+            raise InputError(f"gene to fix must be one of {free}; received {abbreviated(name)}")
+        return Genome(tuple(genes.values()))
+
+    def canonical(self, u: ArrayLike) -> NDArray[np.float64]:
+        """Return the point that stands for all that decode to the same design: in the middle of the cells of
+        whole numbers and choices. u : shape (..., searched genes)."""
+        points = np.array(u, dtype=float)
+        for k, gene in enumerate(self.searched):
+            points[..., k] = gene.snap(points[..., k])
+        return points
+
+    def features(self, u: ArrayLike) -> NDArray[np.float64]:
+        """Return the columns by which a surrogate knows designs, shape (points, columns): the same for all
+        points of one design. Numbers have their place in 0..1, whole ones the middle of their cell; a choice
+        has a column for each of its values, any two of them at distance 1.
+
+        E. C. Garrido-Merchan and D. Hernandez-Lobato, Neurocomputing 380 (2020) 20-35: a Gaussian process of
+        points that are rounded before its kernel sees them. u : shape (points, searched genes).
+        """
+        points = np.atleast_2d(np.asarray(u, dtype=float))
+        return np.hstack([gene.features(points[:, k]) for k, gene in enumerate(self.searched)])
+
+    @property
+    def feature_genes(self) -> NDArray[np.intp]:
+        """For each column of ``features`` which coordinate it is of, so that those of a choice can have one
+        length scale."""
+        return np.repeat(np.arange(len(self)), [gene.width for gene in self.searched])
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 from tisim.errors import must
-
-if TYPE_CHECKING:
-    from tisim import Result
 
 
 @dataclass(frozen=True)
@@ -17,12 +14,13 @@ class Objective:
     """A quantity that is to be made small, or large.
 
     name : heading in tables and plots; unit : of the values, "" if they have none.
-    of : Result -> value in that unit. Called for runs that ended well only; NaN and inf never win.
+    of : Result -> value in that unit, of a plain function FunctionResult -> value. Called for runs that ended
+        well only; NaN and inf never win.
     Raises InputError for an empty name.
     """
 
     name: str
-    of: Callable[[Result], float]
+    of: Callable[[Any], float]
     unit: str = ""
     maximise: bool = False
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from optimize.problem.calls import function_name
+from optimize.problem.constraint import DesignConstraint, InequalityConstraint, ResultConstraint
 from optimize.problem.fingerprint import fingerprint
-from optimize.problem.genome import Genome
+from optimize.problem.function import PlainFunction, ValueOf
+from optimize.problem.gene_values import Value
+from optimize.problem.genome import AnyGene, Genome
+from optimize.problem.given_genes import DependentGene
 from optimize.problem.objective import Objective
 from tisim.errors import InputError, must
 from tisim.files import python_file, regular_file
@@ -28,7 +33,8 @@ class Problem:
     name : short, part of the cache key; title, description : for people.
     genome : the genes, their units and ranges.
     scene : (design in physical units, start seed) -> Scene. Cheap and declarative; an InputError raised
-        here marks the design as infeasible, it does not stop the search.
+        here marks the design as infeasible, it does not stop the search. A PlainFunction in its place is
+        called instead of a simulation; see ``of_function``.
     objective : Result -> fitness, minimised. Called for runs that ended well only; NaN and inf never win.
         Or any number of Objectives: a search for two or more finds the front of designs that no other
         design beats in one without losing in another.
@@ -40,6 +46,7 @@ class Problem:
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
     met_at : the fitness at which a design meets all that is asked, and so does any better one; the report
         then has how far each gene spreads over those that the search has seen. For one objective only.
+    constraints : what a design must keep to beside: any number of ResultConstraints and DesignConstraints.
     code : a text that tells it from another problem of this name and version, in place of the checksums of
         scene and objectives, of their files and of all that they are bound to (see fingerprint.py).
     files : data files that scene or objectives read when they are called; a checksum of their content is part
@@ -49,7 +56,7 @@ class Problem:
 
     name: str
     genome: Genome
-    scene: Callable[[Mapping[str, float], int], Scene]
+    scene: Callable[[Mapping[str, Any], int], Any]
     objective: Callable[[Result], float] | Sequence[Objective]
     title: str = ""
     description: str = ""
@@ -58,10 +65,11 @@ class Problem:
     derived: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
     meanings: Mapping[str, str] = field(default_factory=dict)
     picture: Callable[[Scene, Result], Figure] | None = None
-    details: Callable[[Mapping[str, float], Result], Mapping[str, float]] | None = None
+    details: Callable[[Mapping[str, Any], Result], Mapping[str, float]] | None = None
     met_at: float | None = None
     code: str = ""
     files: Sequence[str | Path] = ()
+    constraints: Sequence[InequalityConstraint] = ()
 
     def __post_init__(self) -> None:
         must(
@@ -76,6 +84,62 @@ class Problem:
         must(not isinstance(self.files, str | Path), "files", "a list of paths", self.files)
         one = len(names) == 1 or self.met_at is None
         must(one, "met_at", "left out for several objectives", self.met_at)
+        for constraint in self.constraints:
+            able = isinstance(constraint, ResultConstraint | DesignConstraint)
+            must(able, "constraint", "a ResultConstraint or a DesignConstraint", constraint)
+        headings = [*self.genome.names, *names, *(constraint.name for constraint in self.constraints)]
+        twice = sorted({name for name in headings[len(self.genome.names) :] if headings.count(name) > 1})
+        must(not twice or not self.constraints, "names of constraints",
+             "other than each other's, and than those of genes and objectives", twice)  # fmt: skip
+
+    @classmethod
+    def of_function(
+        cls,
+        function: Callable[..., Any],
+        genes: Genome | Sequence[AnyGene],
+        objectives: Sequence[str | Objective] = ("value",),
+        name: str = "",
+        **fields: Any,
+    ) -> Problem:
+        """Return the problem of a plain function of a design, in which nothing is simulated.
+
+        function : f(design) or f(design, seed) -> a number; for several objectives as many in their order, or
+        a dictionary by their names; see PlainFunction. objectives : a name is one that is minimised and that
+        the function gives; an Objective reads its own of a FunctionResult, ``lambda result: -result.value``.
+        name : the function's where it is left out. fields : other fields of a Problem.
+        """
+        must(not isinstance(objectives, str), "objectives", "a list of names or Objectives", objectives)
+        plain, called = PlainFunction(function), function_name(function).replace("/", " ")
+        names = tuple(one if isinstance(one, str) else one.name for one in objectives)
+        of_names = tuple(
+            Objective(one, ValueOf(called, names, one)) if isinstance(one, str) else one for one in objectives
+        )
+        genome = genes if isinstance(genes, Genome) else Genome(tuple(genes))
+        return cls(name or called, genome, plain, of_names, **fields)
+
+    def fix(self, **values: Value) -> Problem:
+        """Return the problem with these genes fixed at values within their ranges."""
+        return replace(self, genome=self.genome.fix(**values))
+
+    @property
+    def function(self) -> PlainFunction | None:
+        """The plain function that is called instead of a simulation, if there is one."""
+        return self.scene if isinstance(self.scene, PlainFunction) else None
+
+    @property
+    def deterministic(self) -> bool:
+        """Whether it is known that all starts of a design give the same: one is enough then."""
+        return self.function is not None and not self.function.takes_seed
+
+    @property
+    def design_constraints(self) -> tuple[InequalityConstraint, ...]:
+        """The constraints that are known before anything runs."""
+        return tuple(one for one in self.constraints if isinstance(one, DesignConstraint))
+
+    @property
+    def result_constraints(self) -> tuple[InequalityConstraint, ...]:
+        """The constraints of a quantity of a run."""
+        return tuple(one for one in self.constraints if isinstance(one, ResultConstraint))
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -86,15 +150,32 @@ class Problem:
 
     @property
     def identity(self) -> str:
-        """A checksum of scene and objectives and what they are bound to, as it is now; see ``code``."""
+        """A checksum of scene, objectives and the functions of genes and constraints, and what they are bound
+        to, as it is now; see ``code``."""
         # A value has the digest of its scene in its key, whatever made the scene.
-        return f"{self.code or checksum_of(self.scene)}-{self.objective_identity}"
+        return f"{self.code or '-'.join(self._design_checksums())}-{self.objective_identity}"
+
+    def _design_checksums(self) -> list[str]:
+        """Return checksums of the functions that decide what is run of a design."""
+        functions = {
+            f"gene {gene.name}": gene.of for gene in self.genome.genes if isinstance(gene, DependentGene)
+        }
+        functions |= {f"constraint {one.name}": one.of for one in self.design_constraints}
+        return [checksum_of(self.scene), *(checksum_of(of, what) for what, of in functions.items())]
 
     @property
     def objective_identity(self) -> str:
-        """A checksum of the objectives and the data files. Together with a scene they decide a value."""
-        functions = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
-        return _checksum([self.code or functions, [sha256(read(file)) for file in self.files]])
+        """A checksum of objectives, constraints of a run and data files, and of a plain function. Together
+        with a scene they decide a value."""
+        return _checksum([self.code or self._run_checksums(), [sha256(read(file)) for file in self.files]])
+
+    def _run_checksums(self) -> dict[str, str]:
+        """Return checksums of the functions that decide what a run is worth, by name."""
+        checksums = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
+        functions = {f"constraint {one.name}": one.of for one in self.result_constraints}
+        if self.function is not None:
+            functions[f"function {function_name(self.function.of)}"] = self.function.of
+        return checksums | {what: checksum_of(of, what) for what, of in functions.items()}
 
     @property
     def several(self) -> bool:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import TracebackType
 
 from rich.console import Console
 
 from optimize.outcome import Progress
+from optimize.problem.gene_values import Value, brief
 from optimize.problem.problem import Problem
 from tisim.console import progress_bar
 
@@ -19,7 +21,7 @@ class Display:
 
     def __init__(self, problem: Problem, generations: int, console: Console) -> None:
         self.problem, self.console = problem, console
-        self.best: dict[str, float] | None = None
+        self.best: Mapping[str, Value] | None = None
         self.bar = progress_bar(
             "generation {task.fields[generation]} of {task.fields[last]}", "{task.fields[best]}", console
         )
@@ -63,6 +65,6 @@ class Display:
         derived = "".join(f"  {name} {of(fitness):.4g}" for name, of in self.problem.derived.items())
         return f"best {objective.name} {fitness:.4g} {objective.unit}".rstrip() + derived
 
-    def _design(self, design: dict[str, float]) -> str:
+    def _design(self, design: Mapping[str, Value]) -> str:
         units = {gene.name: gene.unit for gene in self.problem.genome.genes}
-        return ", ".join(f"{name} {value:.4g} {units[name]}".rstrip() for name, value in design.items())
+        return ", ".join(f"{name} {brief(value)} {units[name]}".rstrip() for name, value in design.items())

@@ -81,8 +81,13 @@ def met_table(outcome: Outcome) -> RenderableType:
     table.add_column("over these", no_wrap=True)
     for heading in ("lowest", "highest", "part of its range"):
         table.add_column(heading, justify="right", no_wrap=True)
-    for gene, values in zip(problem.genome.genes, zip(*strings, strict=True), strict=True):
-        ends = min(values), max(values)
+    points = problem.genome.canonical(strings)
+    for gene, values in zip(problem.genome.searched, points.T, strict=True):
+        if gene.kind == "category":
+            met = {_text(gene.decode(u)) for u in values}
+            table.add_row(Text(gene.label), Text(", ".join(sorted(met))), "", f"{len(met)} of {gene.width}")
+            continue
+        ends = float(values.min()), float(values.max())
         low, high = (_text(gene.decode(end)) for end in ends)
         table.add_row(Text(gene.label), low, high, f"{100 * (ends[1] - ends[0]):.0f} %")
     return Group("", title, table)
@@ -175,7 +180,8 @@ def _front(outcome: Outcome) -> Figure:
 
 
 def _text(value: Any) -> str:
-    """Return a number with four digits, as 1.5e8 and not 1.5e+08, which is two columns more."""
+    """Return a number with four digits, as 1.5e8 and not 1.5e+08, which is two columns more; a text as it
+    is."""
     if not isinstance(value, float):
         return str(value)
     digits, power, exponent = f"{value:.4g}".partition("e")

@@ -40,7 +40,7 @@ class Record:
     key : see evaluation_key; problem : its name.
     fitness : the first objective, NaN if the evaluation failed; others : the other ones, where there are
     several. ok, reason : how it ended.
-    seed : of the start; design : gene -> value in its unit; work : counts of the run.
+    seed : of the start; design : gene -> value in its unit, or a text or flag; work : counts of the run.
     wall_s : seconds it took; created : seconds since 1970 (UTC).
     """
 
@@ -97,7 +97,7 @@ class _Form(BaseModel):
     ok: bool
     reason: str
     seed: Annotated[int, Field(ge=-(2**63), lt=2**63)]
-    design: dict[str, float]
+    design: dict[str, bool | int | float | str]
     work: dict[str, Any]
     wall_s: float
     created: float

@@ -176,6 +176,15 @@ def test_what_cannot_be_compared_is_refused():
     assert fingerprint(of_closure(lock)) == fingerprint(of_closure(threading.Lock()))
 
 
+def test_a_code_stands_for_what_cannot_be_compared():
+    """As the message recommends."""
+    made = replace(problem("default", ""), objective=of_closure(threading.Lock()))
+    with pytest.raises(InputError, match="Or give Problem"):
+        _ = made.objective_identity
+    assert replace(made, code="1").objective_identity == replace(made, code="1").objective_identity
+    assert replace(made, code="1").identity != replace(made, code="2").identity
+
+
 SCRIPT = """
 from tests.optimize import test_fingerprint as t
 print(*(t.fingerprint(make(0.5), name) for name, make in t.MAKERS.items()))

@@ -49,12 +49,15 @@ def checkpoint_seconds() -> float:
     return seconds
 
 
-def assignments(changes: Sequence[str]) -> dict[str, Any]:
-    """Return ``key=value`` texts as a mapping. A value is read as TOML; what is not TOML is text."""
+def assignments(changes: Sequence[str], option: str = "--set") -> dict[str, Any]:
+    """Return ``key=value`` texts as a mapping. A value is read as TOML; what is not TOML is text.
+
+    option : that they were given with, for messages.
+    """
     result = {}
     for change in changes:
         key, equals, text = change.partition("=")
-        must(bool(key.strip() and equals), "--set", "key=value", change)
+        must(bool(key.strip() and equals), option, "key=value", change)
         result[key.strip()] = _parse_value(key, text)
     return result
 

@@ -49,6 +49,10 @@ SearchChanges = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
 ]
+FixedGenes = Annotated[
+    list[str] | None,
+    typer.Option("--fix", metavar="GENE=VALUE", help="Keep a gene at a value of its range. Repeatable."),
+]
 
 
 def optimize(
@@ -69,6 +73,7 @@ def optimize(
     budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
     budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
     measured: Measurements = None,
+    fixed: FixedGenes = None,
     changes: SearchChanges = None,
     fresh: Fresh = None,
     overwrite: Overwrite = False,
@@ -83,12 +88,13 @@ def optimize(
 
     All goes to search.h5. The same command, given again, goes on where it was stopped.
     """
-    from optimize.evaluation.executors import evaluator_named
+    from optimize.evaluation.executors import evaluator_for
     from optimize.search_folder import SEARCH_FILE, resume_or_clear
     from optimize.session import session
     from optimize.settings import Settings, fit, proposed, without_dependent_options
 
     problem, defaults = targets.inverse_problem(case, size, variant, measured)
+    problem = problem.fix(**scene_arguments.assignments(fixed or (), "--fix"))
     options = {
         "seed": seed,
         "generations": generations,
@@ -106,7 +112,7 @@ def optimize(
     )
     fit(problem, settings)
     out_folder = folder or Path("out") / problem.name
-    with closing(evaluator_named(executor, device, precision, threads, arithmetic)) as evaluator:
+    with closing(evaluator_for(problem, executor, device, precision, threads, arithmetic)) as evaluator:
         resume_or_clear(out_folder, fresh, overwrite)
         outcome = session(problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite)
     if outcome.interrupted:
@@ -133,6 +139,7 @@ def compare(
     folder: Out = None,
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
     measured: Measurements = None,
+    fixed: FixedGenes = None,
     changes: SearchChanges = None,
     fresh: Fresh = None,
     overwrite: Overwrite = False,
@@ -147,12 +154,13 @@ def compare(
 
     The same command, given again, goes on where it was stopped; other methods and numbers take in its runs.
     """
-    from optimize.evaluation.executors import evaluator_named
+    from optimize.evaluation.executors import evaluator_for
     from optimize.report import comparison
     from optimize.settings import without_dependent_options
     from optimize.storage.cache import Cache
 
     problem, defaults = targets.inverse_problem(case, size, variant, measured)
+    problem = problem.fix(**scene_arguments.assignments(fixed or (), "--fix"))
     changed = scene_arguments.table_changes("search", scene_arguments.assignments(changes or ()))
     base = scene_arguments.with_changes(without_dependent_options(defaults, changed), changed)
     names = [name.strip() for name in methods.split(",") if name.strip()]
@@ -161,7 +169,7 @@ def compare(
     results = []
     with (
         # What cannot be is refused before anything in the folder is removed.
-        closing(evaluator_named(executor, device, precision, threads, arithmetic)) as evaluator,
+        closing(evaluator_for(problem, executor, device, precision, threads, arithmetic)) as evaluator,
         comparison.claim(out_folder, fresh, overwrite) as resume,
         Cache(out_folder / comparison.COMPARISON_FILE) as run_cache,
         Interrupt(print_stopping) as ctrl_c,

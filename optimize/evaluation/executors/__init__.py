@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 from optimize.evaluation.evaluator import BatchEvaluator
+from optimize.evaluation.function_evaluator import FunctionEvaluator
 from optimize.evaluation.runs import Evaluator
+from optimize.problem.problem import Problem
 from tisim.backend import runtime
 from tisim.errors import must
 
 RULE = "batch, processes:N or dask://HOST:PORT"
 """What the name of an executor must be, as error messages say it."""
+
+
+def evaluator_for(
+    problem: Problem, name: str, device: str = "cpu", precision: str = "f64", threads: int = 0,
+    arithmetic: str = "strict",
+) -> Evaluator:  # fmt: skip
+    """Return the evaluator of that name for what the problem makes of designs, scenes or calls of a plain
+    function; the others as for ``evaluator_named``."""
+    if problem.function is None:
+        return evaluator_named(name, device, precision, threads, arithmetic)
+    if name == "batch":
+        return FunctionEvaluator()
+    evaluator = evaluator_named(name, device, precision, threads, arithmetic)
+    evaluator.settings = FunctionEvaluator().settings
+    return evaluator
 
 
 def evaluator_named(

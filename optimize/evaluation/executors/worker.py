@@ -10,10 +10,13 @@ import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
+from typing import Any
 
 from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.evaluation.executors import handshake
-from tisim import InputError, Result, RunError, Scene
+from optimize.evaluation.function_evaluator import FunctionEvaluator
+from optimize.problem.function import FunctionCall
+from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
 from tisim.files import python_file
 from tisim.files.python_file import PythonFile
@@ -62,7 +65,7 @@ class Answer:
     """The results of the scenes, in order, or the error instead; what they were made by, and where."""
 
     made_by: dict[str, str]
-    results: list[Result]
+    results: list[Any]
     error: BaseException | None = None
     worker: str = field(default_factory=_name)
 
@@ -78,9 +81,9 @@ def pack_scenes(scenes: Sequence[Scene]) -> bytes:
     try:
         return pickle.dumps(scenes)
     except (pickle.PicklingError, AttributeError) as error:
-        raise InputError(
-            f"scene must be made of classes that a worker can import; received {error}"
-        ) from None
+        called = isinstance(scenes[0], FunctionCall)
+        rule = "function must be one" if called else "scene must be made of classes"
+        raise InputError(f"{rule} that a worker can import; received {error}") from None
 
 
 def run(scenes: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
@@ -114,8 +117,10 @@ def _run_pickled(question: bytes, share: int) -> Answer:
 
 def _run(pickled: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
     scenes = _unpack_scenes(pickled, worker_settings)
-    before = runtime.generation()
     ask = worker_settings
+    if scenes and isinstance(scenes[0], FunctionCall):
+        return Answer(ask.made_by, [result for _, result in FunctionEvaluator().evaluate(scenes)])
+    before = runtime.generation()
     runtime.init(ask.device, ask.precision, ask.threads or share, ask.arithmetic)
     if not _evaluator or runtime.generation() != before:
         _evaluator[:] = [BatchEvaluator()]
@@ -124,12 +129,12 @@ def _run(pickled: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
     return Answer(made_by, [results[index] for index in range(len(scenes))])
 
 
-def _unpack_scenes(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[Scene]:
+def _unpack_scenes(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[Any]:
     """InputError, in a line, when what they are made of cannot be imported here."""
     try:
         for file in worker_settings.files:
             python_file.install(file)
-        scenes: Sequence[Scene] = pickle.loads(pickled)
+        scenes: Sequence[Any] = pickle.loads(pickled)
     except InputError as error:
         raise InputError(f"{_name()}: {error}") from None
     except (ImportError, AttributeError) as error:

@@ -1,0 +1,74 @@
+"""Genes that are in a design and are not searched: fixed values, and those that follow from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from optimize.problem.calls import FaultyProblem, error_told
+from optimize.problem.gene_values import Named, Value, check_name, plain_value
+from tisim.errors import InputError, abbreviated, must
+
+
+@dataclass(frozen=True)
+class FixedGene(Named):
+    """A value that every design has: it is in tables and reports, and the search does not change it."""
+
+    name: str
+    value: Value
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        object.__setattr__(self, "value", plain_value(self.value, f"fixed gene {self.name}"))
+
+    @property
+    def kind(self) -> str:
+        """ "fixed"."""
+        return "fixed"
+
+    @property
+    def described(self) -> str:
+        """All that decides what it stands for, in words; part of the identity of a search."""
+        return f"{self.value!r} {self.unit}".rstrip() + ", fixed"
+
+
+@dataclass(frozen=True)
+class DependentGene(Named):
+    """A value that follows from the others of a design: it is in tables and reports, and not searched.
+
+    of : function of the design, which has all genes but the dependent ones, and of these those that stand
+    before it. It gives a value for every design; which of them are allowed is what constraints say.
+    """
+
+    name: str
+    unit: str
+    of: Callable[[Mapping[str, Any]], Value]
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        must(callable(self.of), f"of of dependent gene {self.name}", "a function of the design", self.of)
+
+    @property
+    def kind(self) -> str:
+        """ "dependent"."""
+        return "dependent"
+
+    @property
+    def described(self) -> str:
+        """What it is, in words; its function is in the checksum of the problem's code."""
+        return f"computed {self.unit}".rstrip()
+
+    def value(self, design: Mapping[str, Any]) -> Value:
+        """Return its value in a design. FaultyProblem where the function fails or gives none."""
+        rule = f"dependent gene {self.name} must return a finite number, a text or a flag"
+        try:
+            value = self.of(MappingProxyType(dict(design)))
+        except Exception as error:
+            raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
+        try:
+            return plain_value(value, self.name)
+        except InputError:
+            raise FaultyProblem(f"{rule}; received {abbreviated(value)}") from None
