@@ -69,7 +69,7 @@ class _Search:
             problem, evaluator, cache, settings.ensemble, settings.seed, settings.max_evaluations
         )
         self.method = find(settings.method)(
-            len(problem.genome), len(problem.objectives), settings.options, settings.seed
+            problem.genome, len(problem.objectives), settings.options, settings.seed
         )
         self.hall = Hall(settings.hall_of_fame)
         self.ranked: list[Individual] = []

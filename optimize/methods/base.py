@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from optimize import methods
 from optimize.methods.individual import Individual
+from optimize.problem.genome import Genome
 from tisim.components.component import Checked
 from tisim.errors import must
 
@@ -26,6 +27,8 @@ class SearchMethod(ABC):
        and of what it was told: to resume a search is to run it again from the start with the same cache.
 
     name : as in ``--method NAME``; several : whether it can search for several objectives at once.
+    own_starts : whether it works best where each design has random starts of its own, and not the same as all
+    others: a method that fits a function through noisy means is led astray by noise that they share.
     Options : its settings, as in ``--set search.options.KEY=VALUE``. dependent_options : by option, those
     whose defaults depend on it: a case's own values of those go with its own value of this one.
     width : mean width of the part of the unit cube that it draws from now. moved : the last ``tell`` has put
@@ -34,14 +37,15 @@ class SearchMethod(ABC):
 
     name: ClassVar[str]
     several: ClassVar[bool] = False
+    own_starts: ClassVar[bool] = False
     Options: ClassVar[type[Checked]]
     dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     width: float = 1.0
     moved: bool = False
 
     @abstractmethod
-    def __init__(self, genes: int, objectives: int, options: Any, seed: int) -> None:
-        """Raise InputError for options that cannot work on a genome of so many genes."""
+    def __init__(self, genome: Genome, objectives: int, options: Any, seed: int) -> None:
+        """Raise InputError for options that cannot work on the genome."""
 
     @abstractmethod
     def ask(self) -> list[Individual]:

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from optimize.methods.base import SearchMethod
 from optimize.methods.individual import Individual
+from optimize.problem.genome import Genome
 from tisim.components.component import Checked
 
 
@@ -43,11 +44,11 @@ class CmaEs(SearchMethod):
     name = "cma-es"
     Options = CmaOptions
 
-    def __init__(self, genes: int, objectives: int, options: CmaOptions, seed: int) -> None:
+    def __init__(self, genome: Genome, objectives: int, options: CmaOptions, seed: int) -> None:
         self.options = options
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
         sizes = {} if options.population is None else {"lambda_": options.population}
-        self.strategy = cma.Strategy(np.full(genes, 0.5), options.sigma, **sizes)
+        self.strategy = cma.Strategy(np.full(len(genome), 0.5), options.sigma, **sizes)
 
     @property
     def width(self) -> float:  # type: ignore[override]

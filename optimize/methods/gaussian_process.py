@@ -1,4 +1,4 @@
-"""Bayesian optimisation: the designs that are run next are those that a Gaussian process expects most from."""
+"""Bayesian optimisation: a Gaussian process of the designs that were run tells which to run next."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy.stats import qmc
 
 from optimize.methods.base import SearchMethod
 from optimize.methods.individual import Individual
+from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
@@ -55,11 +56,12 @@ class GaussianProcessSearch(SearchMethod):
     own_starts = True
     Options = GaussianProcessOptions
 
-    def __init__(self, genes: int, objectives: int, options: GaussianProcessOptions, seed: int) -> None:
-        self.options, self.genes, self.objectives = options, genes, objectives
+    def __init__(self, genome: Genome, objectives: int, options: GaussianProcessOptions, seed: int) -> None:
+        self.options, self.genome, self.objectives = options, genome, objectives
+        self.genes = len(genome)
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 5]))
-        self.belief = Belief()
-        self.region = TrustRegion(genes)
+        self.belief = Belief(genome.features)
+        self.region = TrustRegion(genome)
         self.strings: list[Individual] = []
         self.local = 0
 
@@ -67,8 +69,8 @@ class GaussianProcessSearch(SearchMethod):
         known = [string for string in self.strings if not string.failed]
         if len(known) < 2:
             count = self.options.first or max(10, 2 * self.genes)
-            points = qmc.Sobol(self.genes, rng=self.rng).random(count)
-            return [Individual(point, self.objectives) for point in points]
+            points = _sobol(self.genes, count, self.rng)
+            return [Individual(point, self.objectives) for point in self.genome.canonical(points)]
         count = max(self.options.population, len(self.strings) // _GROWTH)
         self.belief.learn(self.strings)
         local = np.empty((0, self.genes))
@@ -87,8 +89,9 @@ class GaussianProcessSearch(SearchMethod):
 
     def _candidates(self, worth: Worth) -> Array:
         """Return designs all over the range and around the best, and around those of them worth most."""
-        points = self.belief.points[self.belief.chosen]
-        best = points[np.argsort(self.belief.means[:, 0])[:5]] if self.objectives == 1 else self.belief.points[worth.on_front]
+        belief = self.belief
+        order = belief.chosen[np.argsort(belief.means[:, 0], kind="stable")]
+        best = belief.points[order[:5] if self.objectives == 1 else worth.on_front]
         drawn = [self.rng.random((3 * _DRAWN, self.genes)), changed(best, _WIDE, 2 * _DRAWN, self.rng)]
         values = [worth.of(points) for points in drawn]
         for turn in range(_ROUNDS):
@@ -96,7 +99,16 @@ class GaussianProcessSearch(SearchMethod):
             points = changed(np.vstack(drawn)[order], 0.6**turn * _WIDE, _DRAWN, self.rng)
             drawn.append(points)
             values.append(worth.of(points))
-        return np.vstack(drawn)
+        points = self.genome.canonical(np.vstack(drawn))
+        known = {tuple(string) for string in self.strings}
+        new = [i for i, point in enumerate(points) if tuple(point) not in known]
+        return points[new]
+
+
+def _sobol(genes: int, count: int, rng: np.random.Generator) -> Array:
+    """Return the first points of a scrambled Sobol' sequence, (count, genes)."""
+    whole = qmc.Sobol(genes, rng=rng).random_base2(max(count - 1, 1).bit_length())
+    return np.asarray(whole[:count])
 
 
 def changed(points: Array, widest: float, count: int, rng: np.random.Generator) -> Array:

@@ -9,6 +9,7 @@ from optimize.methods.base import SearchMethod
 from optimize.methods.breeding import Breeder
 from optimize.methods.breeding_settings import Breeding
 from optimize.methods.individual import Individual
+from optimize.problem.genome import Genome
 
 
 class Genetic(SearchMethod):
@@ -20,8 +21,8 @@ class Genetic(SearchMethod):
         "population": ("parents", "offspring"), "parents": ("offspring",), "offspring": ("parents",),
     }  # fmt: skip
 
-    def __init__(self, genes: int, objectives: int, options: Breeding, seed: int) -> None:
-        self.options, self.breeder = options, Breeder(genes, options, seed)
+    def __init__(self, genome: Genome, objectives: int, options: Breeding, seed: int) -> None:
+        self.options, self.breeder = options, Breeder(len(genome), options, seed)
         self.generation = 0
         self.next_strings: list[Individual] = []
 

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from optimize.methods.base import SearchMethod
 from optimize.methods.individual import Individual
 from optimize.methods.random_state import OwnRandom
+from optimize.problem.genome import Genome
 from tisim.components.component import Checked
 from tisim.errors import must
 
@@ -48,8 +49,8 @@ class Nsga2(SearchMethod):
     several = True
     Options = Nsga2Options
 
-    def __init__(self, genes: int, objectives: int, options: Nsga2Options, seed: int) -> None:
-        self.options, self.genes, self.objectives = options, genes, objectives
+    def __init__(self, genome: Genome, objectives: int, options: Nsga2Options, seed: int) -> None:
+        self.options, self.genes, self.objectives = options, len(genome), objectives
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
         self.random = OwnRandom(seed)
         self.parents: list[Individual] = []

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from optimize.methods.base import SearchMethod
 from optimize.methods.individual import Individual
+from optimize.problem.genome import Genome
 from tisim.components.component import Checked
 
 
@@ -30,8 +31,8 @@ class RandomSearch(SearchMethod):
     several = True
     Options = RandomSearchOptions
 
-    def __init__(self, genes: int, objectives: int, options: RandomSearchOptions, seed: int) -> None:
-        self.shape, self.objectives = (options.population, genes), objectives
+    def __init__(self, genome: Genome, objectives: int, options: RandomSearchOptions, seed: int) -> None:
+        self.shape, self.objectives = (options.population, len(genome)), objectives
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
 
     def ask(self) -> list[Individual]:

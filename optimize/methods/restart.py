@@ -9,7 +9,7 @@ from pydantic import Field
 from optimize.methods.breeding_settings import Breeding
 from optimize.methods.genetic import Genetic
 from optimize.methods.individual import Individual
-from optimize.problem.genome import SearchBox
+from optimize.problem.genome import Genome, SearchBox
 
 
 class RestartOptions(Breeding):
@@ -36,8 +36,8 @@ class Restart(Genetic):
     Options = RestartOptions
     options: RestartOptions
 
-    def __init__(self, genes: int, objectives: int, options: RestartOptions, seed: int) -> None:
-        super().__init__(genes, objectives, options, seed)
+    def __init__(self, genome: Genome, objectives: int, options: RestartOptions, seed: int) -> None:
+        super().__init__(genome, objectives, options, seed)
         self.best: tuple[float, ...] = ()
         self.stagnation = 0
 

@@ -21,9 +21,9 @@ from optimize.surrogate.gaussian_process import Array
 
 _CONFIDENCE = 1.0
 """Standard deviations between the mean and the bound that several costs are judged by."""
-_MONTE_CARLO = 2000
+_MONTE_CARLO = 4000
 """Points by which a hypervolume of three costs or more is measured."""
-_MOST_RANKED = 400
+_MOST_RANKED = 1500
 """Designs of which a batch is chosen; of more, those that are worth most alone."""
 _APART = 1e-6
 """Designs of a batch differ by this in a gene at least, in widths of its range."""
@@ -73,7 +73,9 @@ class Worth:
             chosen.append(pick)
             barred |= np.abs(points - points[pick]).max(axis=1) < apart
             for k, model in enumerate(belief.models):
-                left = model.covariance(at, at[pick : pick + 1])[:, 0] - explained[k].T @ explained[k][:, pick]
+                left = (
+                    model.covariance(at, at[pick : pick + 1])[:, 0] - explained[k].T @ explained[k][:, pick]
+                )
                 left = left - sum((row * row[pick] for row in rows[k]), np.zeros(len(points)))
                 noise = belief.one_start[k] / belief.starts / model.scale**2 + model.nugget
                 row = left / np.sqrt(max(left[pick], 1e-12) + noise)
@@ -92,7 +94,9 @@ def log_expected_improvement(mean: Array, deviation: Array, best: float) -> Arra
     with np.errstate(over="ignore"):
         ratio = np.exp(np.minimum(log_ndtr(z) - norm.logpdf(z), 700.0))
     far = z < -30.0
-    tail = np.where(far, np.maximum(z * z, 1.0) ** -1.0, np.maximum(1.0 + np.where(far, 0.0, z) * ratio, 1e-300))
+    tail = np.where(
+        far, np.maximum(z * z, 1.0) ** -1.0, np.maximum(1.0 + np.where(far, 0.0, z) * ratio, 1e-300)
+    )
     return norm.logpdf(z) + np.log(tail) + np.log(deviation)
 
 

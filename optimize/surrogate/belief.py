@@ -13,7 +13,7 @@ from optimize.methods.individual import Individual
 from optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
 
 MOST_LEARNED = 500
-"""Designs from which a process is made. Of more, half of this number are the best, the rest is drawn evenly."""
+"""Designs from which a process is made; of more, half are the best, and others are drawn evenly."""
 _PRIOR_STARTS = 8
 """Starts that the noise of all designs together counts for beside the starts of the design itself."""
 _SKEWED = 0.5
@@ -25,8 +25,8 @@ class Belief:
     """A belief holds a Gaussian process for each cost, in units that ``transformed`` gives.
 
     features : of points of the unit cube, (n, genes) -> (n, features).
-    The noise of the mean of n starts is the variance of those starts over n; variances of single designs, from
-    two starts or so, are drawn towards that of all designs. A failed design has the worst cost that is known.
+    The noise of the mean of n starts is the variance of those starts over n. The variance of a single design,
+    known from two starts or so, is drawn towards that of all designs. A failed design has the worst cost.
     """
 
     def __init__(self, features: Callable[[Array], Array] = np.asarray) -> None:
@@ -112,13 +112,15 @@ def _transformed(costs: Array) -> tuple[Array, Array]:
         if np.mean(z**3) < _SKEWED:
             continue
         new[:, k], power = yeojohnson(z)
-        slopes[:, k] = np.where(z < 0, (1 - np.minimum(z, 0)) ** (1 - power), (1 + np.maximum(z, 0)) ** (power - 1))
+        slopes[:, k] = np.where(
+            z < 0, (1 - np.minimum(z, 0)) ** (1 - power), (1 + np.maximum(z, 0)) ** (power - 1)
+        )
         slopes[:, k] /= deviation
     return new, slopes
 
 
-def _representative(costs: Array, most: int) -> Array:
-    """Return the indices of at most that number of designs: the best, and others drawn evenly from the rest."""
+def _representative(costs: Array, most: int) -> NDArray[np.intp]:
+    """Return the indices of at most that number of designs: the best, and others drawn evenly."""
     if len(costs) <= most:
         return np.arange(len(costs))
     order = np.lexsort([costs[:, 0], beaten_by(costs)])

@@ -143,7 +143,7 @@ class GaussianProcess:
 
 
 class _Likelihood:
-    """Minus the logarithm of the posterior density of the parameters, and its gradient (GPML Eq. 5.8, 5.9)."""
+    """Minus the log posterior density of the parameters, and its gradient (GPML Eq. 5.8, 5.9)."""
 
     def __init__(self, points: Array, values: Array, noise: Array, prior: Parameters, exact: bool) -> None:
         self.values, self.noise, self.exact = values, noise, exact

@@ -1,5 +1,7 @@
-"""A region around the best design with a Gaussian process of its own: it converges where one of the whole range,
-which must be true everywhere, does not."""
+"""A region around the best design with a Gaussian process of its own.
+
+It converges where the process of the whole range, which must be true everywhere, does not.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from optimize.methods.individual import Individual
+from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
@@ -25,13 +28,13 @@ class TrustRegion:
     centre : the best design outside regions that have converged. half_width : of the region around it.
     """
 
-    def __init__(self, genes: int) -> None:
-        self.genes = genes
+    def __init__(self, genome: Genome) -> None:
+        self.genome, self.genes = genome, len(genome)
         self.half_width = _FIRST
         self.converged: list[Array] = []
-        self.centre = np.full(genes, 0.5)
+        self.centre = np.full(self.genes, 0.5)
         self.cost = np.inf
-        self.belief = Belief()
+        self.belief = Belief(self._within)
 
     def propose(self, belief: Belief, count: int, rng: np.random.Generator) -> Array:
         """Return the designs in the region that are worth a run, (count, genes), by all that is known."""
@@ -46,7 +49,6 @@ class TrustRegion:
         # As many as a quadratic function has coefficients, and some more.
         enough = max(40, min(200, (self.genes + 1) * (self.genes + 2)))
         nearest = np.argsort(((belief.points - self.centre) ** 2).sum(axis=1), kind="stable")[:enough]
-        self.belief.features = self._within
         self.belief.learn([belief.strings[i] for i in nearest])
         worth = Worth(self.belief, rng)
         low = np.maximum(self.centre - self.half_width, 0.0)
@@ -77,4 +79,4 @@ class TrustRegion:
             self.half_width = _FIRST
 
     def _within(self, points: Array) -> Array:
-        return (np.atleast_2d(points) - self.centre) / self.half_width
+        return (self.genome.features(points) - self.genome.features(self.centre)) / self.half_width

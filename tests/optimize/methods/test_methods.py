@@ -35,7 +35,7 @@ def rosenbrock(design, seed):
 
 def method_named(name, genes=5, seed=3, **options):
     kind = find(name)
-    return kind(genes, 1, kind.Options(**options), seed)
+    return kind(fake_problem(genes).genome, 1, kind.Options(**options), seed)
 
 
 def worth(strings, function=quiet):
@@ -48,7 +48,7 @@ def worth(strings, function=quiet):
 
 
 def test_methods_are_found_in_their_package():
-    assert METHODS == ["cma-es", "genetic", "nsga2", "random", "restart"]
+    assert METHODS == ["cma-es", "gaussian-process", "genetic", "nsga2", "random", "restart"]
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -30,7 +30,7 @@ USUAL = {
 
 def generations(settings):
     """How many strings the first two generations have, and how many of the second are new."""
-    method = find(settings.method)(GENES, 1, settings.options, seed=1)
+    method = find(settings.method)(fake_problem(GENES).genome, 1, settings.options, seed=1)
     first = method.ask()
     for rank, string in enumerate(first):
         string.fitness.values = (float(rank),)
