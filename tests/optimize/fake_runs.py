@@ -69,14 +69,15 @@ def fake_record(number, fitness=None, ok=True, pad=""):
     return Record(
         key=evaluation_key(f"scene {number}", {"precision": "f64"}, "bowl", 1),
         problem="bowl",
-        fitness=number / 7 if fitness is None else fitness,
+        values={"fitness": number / 7 if fitness is None else fitness},
         ok=ok,
         reason="" if ok else "went wrong",
         seed=number,
-        design={"x": number / 3, "pad" + pad: 1.0},
-        work={"steps": number},
+        design={"x": number / 3, "y": 1.0},
+        work={"steps": number, "pad": pad},
         wall_s=0.5,
         created=1e9 + number,
+        start=number % 4,
     )
 
 
