@@ -128,7 +128,9 @@ class Cache:
             f"non-empty and not below {hdf5_store.EVALUATIONS!r}",
             name,
         )
-        table = Hdf5Table(dict(columns), dict(attrs or {}), dict(about or {}))
+        # The lists are the caller's, who may add to them.
+        own = {heading: list(column) for heading, column in columns.items()}
+        table = Hdf5Table(own, dict(attrs or {}), dict(about or {}))
         with locked(self._lock, exclusive=True) as lock:
             self._refresh()
             rows = TableRows.between(name, self._tables.get(name), table)

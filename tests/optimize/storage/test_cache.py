@@ -83,6 +83,7 @@ def test_tables_survive_other_writers_and_folds(path):
 
 def test_journal_folds_itself_when_large(path, monkeypatch):
     monkeypatch.setattr(cache_module, "FOLD_BYTES", 2000)
+    monkeypatch.setattr(cache_module, "FOLD_SHARE", 0.0)
     cache = Cache(path)
     for number in range(20):
         cache.put(fake_record(number))
