@@ -61,7 +61,7 @@ Runs of a search for good designs, written by tisim (optimize.read reads it; so 
 Columns have the attribute unit where they have one. In names "/" is written as U+2215. The attribute written
 is when this file was, in nanoseconds since 1970 (UTC).
 While a search goes on, its newest runs are in the file .journal beside this one, and come into this one when
-they have become a fifth of all, and at the end.
+they have become 64 KiB and a quarter of what is here, and at the end. optimize.read has them, too.
 """
 _MEANINGS: Mapping[str, Mapping[str, str]] = {
     "key": {"description": "SHA-256 of all that decides the values"},
@@ -192,11 +192,14 @@ def _write_runs(group: h5py.Group, part: RunsTable, about: Mapping[str, Mapping[
     columns: dict[str, NDArray[Any]] = {**part.facts, "crc": part.checksums()}
     for name, column in columns.items():
         write_column(group, name, column).attrs.update(_MEANINGS[name])
-    for kind, described, parts in (("genes", GENES_TABLE, part.genes), ("values", OBJECTIVES_TABLE, part.values)):
+    for kind, table, parts in (
+        ("genes", GENES_TABLE, part.genes),
+        ("values", OBJECTIVES_TABLE, part.values),
+    ):
         below, names = group.create_group(kind), dataset_names(parts)
         group.attrs[kind] = json.dumps(list(parts))
         for name, column in parts.items():
-            write_column(below, names[name], column).attrs.update(about.get(f"{described}/{name}", {}))
+            write_column(below, names[name], column).attrs.update(about.get(f"{table}/{name}", {}))
 
 
 def read_runs(group: h5py.Group) -> tuple[RunsTable, list[str]]:

@@ -96,7 +96,7 @@ class FakeCache:
     def put(self, record):
         return self.records_by_key.setdefault(record.key, record)
 
-    def put_table(self, name, columns, attrs=None):
+    def put_table(self, name, columns, attrs=None, about=None):
         pass
 
     def fold(self):
