@@ -171,6 +171,7 @@ class Cache:
         with locked(self._lock, exclusive=True):
             self._refresh()
             self._tables = {name: table for name, table in self._tables.items() if table.intact}
+            self._runs = [part.different() for part in self._runs]
             self._fold()
 
     def close(self) -> None:

@@ -61,6 +61,10 @@ class RunsTable:
         """The row of each key, the first that has it."""
         return dict(zip(reversed(self.keys), range(len(self) - 1, -1, -1), strict=True))
 
+    def different(self) -> RunsTable:
+        """Return the table with one row for each key, the first that has it."""
+        return self.chosen(np.isin(np.arange(len(self)), list(self.rows.values())))
+
     def record(self, row: int) -> Record:
         """Return the evaluation in a row. ValueError where its text is none."""
         facts = {name: _plain(column[row]) for name, column in self.facts.items()}

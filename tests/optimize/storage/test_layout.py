@@ -306,3 +306,30 @@ def test_rows_of_a_table_that_are_cut_off_or_damaged_are_reported(path):
     assert cache.tables() == []
     cache.put_table("log", log)
     assert cache.table("log").columns == log
+
+
+def test_what_follows_rows_that_were_lost_is_left_out(path):
+    cache, log, ends = Cache(path), {"g": []}, []
+    for number in range(5):
+        log["g"].append(number)
+        cache.put_table("log", log)
+        ends.append(journal_of(path).stat().st_size)
+    hit = bytearray(journal_of(path).read_bytes())
+    hit[ends[2] - 1] ^= 1
+    journal_of(path).write_bytes(hit)
+    with pytest.warns(RuntimeWarning, match="1 damaged"):
+        cache = Cache(path)
+    assert cache.table("log").columns == {"g": [0, 1]}
+    cache.put_table("log", log)
+    assert cache.table("log").columns == log
+
+
+def test_a_run_that_is_there_twice_counts_once(path):
+    records = [run_of(0), run_of(1), run_of(0, values={"mass": 9.0}), run_of(2)]
+    path.write_bytes(hdf5_store.build_image(tabulated([], records), {}))
+    report = verify(path)
+    assert (report.rows, report.duplicates, report.conflicts) == (4, 1, ["mixed 0"])
+    assert Cache(path).get("mixed 0").values["mass"] == 0.0
+    assert compact(path) == 3
+    assert [record.seed for record in Cache(path).records()] == [0, 1, 2]
+    assert verify(path).ok
