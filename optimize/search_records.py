@@ -47,9 +47,9 @@ def store(cache: Cache, outcome: Outcome) -> None:
 
 
 def genes(problem: Problem) -> dict[str, list[Any]]:
-    """Return the columns of a table with a row for each gene: all that is declared of it."""
+    """Return the columns of a table with a row for each gene: all that is declared of it but functions."""
     rows = [{one.name: getattr(gene, one.name) for one in fields(gene)} for gene in problem.genome.genes]
-    return _columns(rows)
+    return _columns([{n: value for n, value in row.items() if not callable(value)} for row in rows])
 
 
 def objectives(problem: Problem) -> dict[str, list[Any]]:

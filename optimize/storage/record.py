@@ -20,6 +20,7 @@ UNKNOWN_START = -1
 
 Gene = float | int | str | bool
 """The value of a gene in a design."""
+_PLAIN = frozenset((float, int, str, bool))
 
 
 def canonical(value: Any) -> bytes:
@@ -30,7 +31,7 @@ def canonical(value: Any) -> bytes:
 
 def plain(value: Any) -> Any:
     """Return a NumPy scalar as a number of Python, and anything else as it is."""
-    return getattr(value, "item", lambda: value)()
+    return value if type(value) in _PLAIN else getattr(value, "item", lambda: value)()
 
 
 def evaluation_key(
@@ -78,10 +79,10 @@ class Record:
         object.__setattr__(self, "design", {name: plain(value) for name, value in self.design.items()})
         object.__setattr__(self, "work", dict(self.work))
         for name, value in self.design.items():
-            if isinstance(value, int):
-                must(-(2**63) <= value < 2**63, f"gene {name}", "an integer of 64 bits", value)
-            elif isinstance(value, str):
-                must("\0" not in value, f"gene {name}", "a text without a NUL", value)
+            if isinstance(value, str):
+                must("\0" not in value, "gene", "a text without a NUL", f"{name}: {value}")
+            elif isinstance(value, int):
+                must(-(2**63) <= value < 2**63, "gene", "an integer of 64 bits", f"{name}: {value}")
 
     def payload(self) -> bytes:
         """Return the record as ASCII JSON, its fields in their order; NaN is written as null, which every
@@ -92,12 +93,9 @@ class Record:
     @classmethod
     def parse(cls, payload: bytes) -> Record:
         """Return the record that ``payload`` has written. ValueError if it is none."""
-        _Form.model_validate_json(payload)
-        fields = json.loads(payload)
-        fields["values"] = {
-            name: math.nan if value is None else float(value) for name, value in fields["values"].items()
-        }
-        return cls(**fields)
+        fields = dict(vars(_Form.model_validate_json(payload)))
+        values = {name: math.nan if v is None else float(v) for name, v in fields.pop("values").items()}
+        return cls(**fields, values=values)
 
 
 def _number(value: float) -> float | str | None:

@@ -26,7 +26,8 @@ KINDS: Mapping[str, Any] = {
 }  # fmt: skip
 """The columns that all evaluations have, beside genes and values."""
 Layout = tuple[str, frozenset[tuple[str, str]]]
-"""The problem's name, and each gene with the kind of its values: what evaluations of one table share."""
+"""The problem's name, and each gene with the kind of its values (numbers "f", flags "b", text "S"): what
+evaluations of one table share. Whole numbers beside others are kept as these."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ class RunsTable:
     @property
     def layout(self) -> Layout:
         """Return what tells it from tables that cannot be joined to it."""
-        kinds = {name: column.dtype for name, column in self.genes.items()}
-        return self.problem, frozenset((name, "S" if k.kind == "S" else k.str) for name, k in kinds.items())
+        kinds = {name: column.dtype.kind for name, column in self.genes.items()}
+        return self.problem, frozenset((name, kind.replace("i", "f")) for name, kind in kinds.items())
 
     @cached_property
     def keys(self) -> list[str]:
@@ -145,15 +146,12 @@ def _plain(cell: Any) -> Any:
 
 
 def _gene_column(cells: Sequence[Gene]) -> Column:
-    kind = _dtype(cells[0])
-    return text_column([str(cell) for cell in cells]) if kind == "S" else np.array(cells, dtype=kind)
-
-
-def _dtype(value: Gene) -> str:
-    if isinstance(value, str):
-        return "S"
-    return "|b1" if isinstance(value, bool) else "<i8" if isinstance(value, int) else "<f8"
+    if isinstance(cells[0], str):
+        return text_column([str(cell) for cell in cells])
+    kinds = {type(cell) for cell in cells}
+    return np.array(cells, dtype=np.bool_ if kinds == {bool} else np.int64 if kinds == {int} else np.float64)
 
 
 def _layout(record: Record) -> Layout:
-    return record.problem, frozenset((name, _dtype(value)) for name, value in record.design.items())
+    kinds = {str: "S", bool: "b"}
+    return record.problem, frozenset((n, kinds.get(type(value), "f")) for n, value in record.design.items())

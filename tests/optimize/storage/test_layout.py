@@ -148,6 +148,18 @@ def test_integers_texts_and_flags_are_genes(path):
             run_of(0, **bad)
 
 
+def test_whole_numbers_beside_others_are_kept_as_these(path):
+    with Cache(path) as cache:
+        cache.put(run_of(0, n=3))
+        cache.fold()
+        cache.put(run_of(1, n=2.5))
+        cache.put(run_of(2, n=7))
+    assert [record.design["n"] for record in Cache(path).records()] == [3.0, 2.5, 7.0]
+    with h5py.File(path) as file:
+        assert list(file["evaluations"]) == ["mixed"]
+    assert verify(path).ok
+
+
 def test_quantities_that_come_later_are_columns_of_the_same_table(path):
     with Cache(path) as cache:
         cache.put(run_of(0, values={"mass": 1.0}))
