@@ -27,5 +27,7 @@ from .problem.given_genes import (
 )
 from .problem.objective import Objective as Objective
 from .problem.problem import Problem as Problem
+from .search_file import SearchFile as SearchFile
+from .search_file import read as read
 from .session import run as run
 from .settings import Settings as Settings

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from deap import tools
 
 from optimize.evaluation.estimate import FitnessEstimate
+from optimize.frames import data_frame
 from optimize.hall_of_fame import compromise
 from optimize.methods.individual import Individual
 from optimize.problem.gene_values import Value
 from optimize.problem.problem import Problem
 from optimize.settings import Settings, search_name
-from optimize.tables import best_columns, logbook_columns
-from tisim import InputError
+from optimize.tables import best_columns, design_columns, half_width_of, logbook_columns, units
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -68,7 +68,8 @@ class Outcome:
 
     hall : the best different designs, best first (by fresh starts once they are confirmed; empty if none
     succeeded); of several objectives the front. Failed designs never enter. estimates : those
-    of each design that succeeded, by its string, in the order they were first estimated.
+    of each design that succeeded, by its string, in the order they were first estimated. failures : those of
+    each design that failed, with the reason.
     logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations requested),
     failed, box (mean width of the search box it drew from), recentred (box moved after it), best (so far;
     infinitely bad if there is none), and for one objective mean and std of the successful designs in the
@@ -82,6 +83,7 @@ class Outcome:
     identity: Mapping[str, Any]
     hall: list[Individual] = field(default_factory=list)
     estimates: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
+    failures: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0
     hits: int = 0
@@ -123,30 +125,37 @@ class Outcome:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, such as json writes: units, designs, logbook by column, counts and settings."""
-        units = {gene.name: gene.unit for gene in self.problem.genome.genes}
-        units |= {objective.name: objective.unit for objective in self.problem.objectives}
         return {
             "problem": self.problem.name,
             "stopped": self.stopped,
             "evaluations": self.evaluations,
             "hits": self.hits,
             "elapsed_s": self.elapsed_s,
-            "units": units,
+            "units": self._units,
             "designs": [vars(design) for design in self.designs],
             "logbook": logbook_columns(self.problem, self.logbook),
             "settings": self.settings.model_dump(mode="json"),
         }
 
-    def to_frame(self) -> DataFrame:
-        """Return the hall of fame as a pandas data frame: a row for each design, the columns of best.csv.
+    @property
+    def _units(self) -> dict[str, str]:
+        """The unit of each gene and objective by name, "" where it has none."""
+        genes = {gene.name: gene.unit for gene in self.problem.genome.genes}
+        return genes | {objective.name: objective.unit for objective in self.problem.objectives}
 
-        InputError where pandas is not installed.
+    def to_frame(self, *, hall: bool = False) -> DataFrame:
+        """Return all designs of the search as a pandas data frame, a row for each: its genes by name, the
+        mean of each objective over random starts, half of its 95 % confidence interval, how many starts there
+        were, whether the mean converged, and why the design failed ("" if it did not).
+
+        hall : the hall of fame instead, with the columns of best.csv. ``frame.attrs["units"]`` has the unit
+        of each column that has one. InputError where pandas is not installed.
         """
-        try:
-            from pandas import DataFrame
-        except ImportError as missing:
-            raise InputError(f"pandas must be installed for a data frame; received {missing}") from None
-        return DataFrame(best_columns(self.problem, self.hall))
+        if hall:
+            return data_frame(best_columns(self.problem, self.hall), units(self.problem))
+        intervals = {half_width_of(one.name): one.unit for one in self.problem.objectives}
+        columns = design_columns(self.problem, {**self.estimates, **self.failures})
+        return data_frame(columns, self._units | intervals)
 
     @property
     def interrupted(self) -> bool:

@@ -146,8 +146,8 @@ class _Search:
         for string, estimates in zip(fresh, new_estimates, strict=True):
             if estimates is not None:
                 string.know(estimates)
-                if not string.failed:
-                    self.outcome.estimates[tuple(string)] = estimates
+                known = self.outcome.failures if string.failed else self.outcome.estimates
+                known[tuple(string)] = estimates
         return sum(string.fitness.valid for string in fresh)
 
     def _race(self, population: list[Individual], generation: int) -> None:

@@ -3,30 +3,83 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import deap
 
 from optimize.outcome import Outcome
+from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
+from optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE
 from optimize.storage.record import canonical
-from optimize.tables import best_columns, logbook_columns
+from optimize.tables import best_columns, logbook_columns, units
 from tisim.io.run_folder import versions
 
 
 def store(cache: Cache, outcome: Outcome) -> None:
-    """Put the tables of a search into the file; on return they are on the disk."""
+    """Put the tables of a search into the file; on return they are on the disk.
+
+    What is new of them is written to its journal; as the search begins and as it ends, all to the HDF5 file.
+    """
+    problem, name = outcome.problem, outcome.name
     attributes = {
+        "problem": problem.name,
+        "title": problem.title,
         "identity": canonical(outcome.identity).decode(),
         "settings": outcome.settings.model_dump_json(),
         "versions": json.dumps({**versions(), "deap": deap.__version__}),
         "stopped": outcome.stopped,
     }
-    cache.put_table(outcome.name, {}, attributes)
-    cache.put_table(f"{outcome.name}/hall_of_fame", best_columns(outcome.problem, outcome.hall))
-    cache.put_table(f"{outcome.name}/logbook", logbook_columns(outcome.problem, outcome.logbook))
-    cache.fold()
+    cache.put_table(name, {}, attributes)
+    cache.put_table(f"{name}/{GENES_TABLE}", genes(problem))
+    cache.put_table(f"{name}/{OBJECTIVES_TABLE}", objectives(problem))
+    for below, columns in (
+        ("hall_of_fame", best_columns(problem, outcome.hall)),
+        ("logbook", logbook_columns(problem, outcome.logbook)),
+    ):
+        about = {heading: {"unit": unit} for heading, unit in units(problem).items() if heading in columns}
+        cache.put_table(f"{name}/{below}", columns, about=about)
+    if outcome.stopped or not outcome.logbook:
+        cache.fold()
+
+
+def genes(problem: Problem) -> dict[str, list[Any]]:
+    """Return the columns of a table with a row for each gene: all that is declared of it but functions."""
+    rows = [{one.name: getattr(gene, one.name) for one in fields(gene)} for gene in problem.genome.genes]
+    return _columns([{n: value for n, value in row.items() if not callable(value)} for row in rows])
+
+
+def objectives(problem: Problem) -> dict[str, list[Any]]:
+    """Return the columns of a table with a row for each objective: name, unit, direction, meaning."""
+    rows = [
+        {
+            "name": objective.name,
+            "unit": objective.unit,
+            "direction": "largest" if objective.maximise else "smallest",
+            "description": problem.meanings.get(objective.name, ""),
+        }
+        for objective in problem.objectives
+    ]
+    return _columns(rows)
+
+
+def _columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Return rows as columns of numbers or of text; NaN or "" where a row has nothing."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: [_cell(row.get(name)) for row in rows] for name in names}
+    return {name: _filled(column) for name, column in columns.items()}
+
+
+def _cell(value: Any) -> float | str | None:
+    return value if value is None or isinstance(value, int | float | str) else json.dumps(value, default=str)
+
+
+def _filled(column: list[Any]) -> list[Any]:
+    nothing = "" if any(isinstance(cell, str) for cell in column) else math.nan
+    return [nothing if cell is None else cell for cell in column]
 
 
 def searches(cache: Cache) -> dict[str, Mapping[str, Any]]:

@@ -3,6 +3,7 @@ cache file keeps."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,9 @@ from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.problem.calls import constraint_value
 from optimize.problem.problem import Problem
+
+Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
+"""What is known of designs, by their strings."""
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
@@ -45,15 +49,47 @@ def _objectives(
     for k, objective in enumerate(problem.objectives):
         means = [objective.sign * of_all[k].mean for of_all in estimates]
         columns[f"{objective.label}{after}"] = means
-        interval = f"{objective.name} 95 % +-" if problem.several else "95 % +-"
+        interval = half_width_of(objective.name) if problem.several else "95 % +-"
         columns[f"{interval}{after}"] = [of_all[k].half_width for of_all in estimates]
         for heading, function in problem.derived.items():
             columns[f"{heading}{after}"] = [float(function(mean)) for mean in means]
     return columns
 
 
-Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
-"""What is known of designs, by their strings."""
+def units(problem: Problem) -> dict[str, str]:
+    """Return the unit of each column of these tables that has one."""
+    found = {gene.label: gene.unit for gene in problem.genome.genes}
+    for objective in problem.objectives:
+        interval = half_width_of(objective.name) if problem.several else "95 % +-"
+        progress = (f"best {objective.label}",) if problem.several else ("best", "mean", "std")
+        for heading in (objective.label, interval):
+            found |= dict.fromkeys((heading, f"{heading}, fresh starts"), objective.unit)
+        found |= dict.fromkeys(progress, objective.unit)
+    return {heading: unit for heading, unit in found.items() if unit}
+
+
+def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
+    """Return the columns of designs by the names of genes and objectives: every gene, the mean of each
+    objective and the half-width of its 95 % confidence interval (NaN where the design failed), starts,
+    converged, and why it failed."""
+    designs = [problem.genome.decode(string) for string in estimates]
+    columns: dict[str, list[Any]] = {
+        gene.name: [design[gene.name] for design in designs] for gene in problem.genome.genes
+    }
+    for k, objective in enumerate(problem.objectives):
+        mine = [of_all[k] for of_all in estimates.values()]
+        columns[objective.name] = [objective.sign * e.mean if e.ok else math.nan for e in mine]
+        columns[half_width_of(objective.name)] = [e.half_width for e in mine]
+    first = [of_all[0] for of_all in estimates.values()]
+    columns["starts"] = [e.starts for e in first]
+    columns["converged"] = [e.converged for e in first]
+    columns["failed"] = [e.reason for e in first]
+    return columns
+
+
+def half_width_of(name: str) -> str:
+    """Return the heading of half of the 95 % confidence interval of a mean."""
+    return f"{name} 95 % +-"
 
 
 def met_strings(problem: Problem, estimates: Estimates) -> list[tuple[float, ...]]:

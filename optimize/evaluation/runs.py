@@ -99,7 +99,7 @@ class Runs:
         """
         self.cache.refresh()
         requested: list[tuple[Sample, int, int, str]] = []
-        missing: dict[str, tuple[Scene, Sample, int]] = {}
+        missing: dict[str, tuple[Scene, Sample, int, int]] = {}
         for sample, starts in additions:
             for start in starts:
                 seed = start_seed(self.seed, start, None if self.common else sample.design)
@@ -114,7 +114,7 @@ class Runs:
                 key = evaluation_key(scene.digest(), self.evaluator.settings, *objective)
                 requested.append((sample, start, seed, key))
                 if self.cache.get(key) is None:
-                    missing.setdefault(key, (scene, sample, seed))
+                    missing.setdefault(key, (scene, sample, start, seed))
                 elif key not in self._requested:
                     self.hits += 1
                 self._requested.add(key)
@@ -129,20 +129,23 @@ class Runs:
             if not record.ok and not sample.reason:
                 sample.reason = f"start {start} (seed {seed}): {record.reason}"
             if record.ok:
-                sample.costs.append(self.problem.costs(record.values))
+                values = [record.values[objective.name] for objective in self.problem.objectives]
+                sample.costs.append(self.problem.costs(values))
 
-    def _run(self, missing: Mapping[str, tuple[Scene, Sample, int]], report: Callable[[float], None]) -> None:
+    def _run(
+        self, missing: Mapping[str, tuple[Scene, Sample, int, int]], report: Callable[[float], None]
+    ) -> None:
         if not missing:
             return
         keys = list(missing)
         results = self.evaluator.evaluate([missing[key][0] for key in keys], report)
         for finished, (index, result) in enumerate(results, start=1):
-            _, sample, seed = missing[keys[index]]
-            self.cache.put(self._record(keys[index], sample, seed, result))
+            _, sample, start, seed = missing[keys[index]]
+            self.cache.put(self._record(keys[index], sample, start, seed, result))
             self.evaluations += 1
             report(finished / len(keys))
 
-    def _record(self, key: str, sample: Sample, seed: int, result: Result) -> Record:
+    def _record(self, key: str, sample: Sample, start: int, seed: int, result: Result) -> Record:
         ok, reason = result.status.ok, result.status.reason or "failed without a reason"
         values = (math.nan,) * len(self.problem.objectives)
         if ok:
@@ -153,11 +156,11 @@ class Runs:
                         False,
                         f"{objective.name if self.problem.several else 'objective'} is {value}",
                     )
-        first, *others = values if ok else (math.nan,) * len(values)
+        names = [objective.name for objective in self.problem.objectives]
         return Record(
             key=key,
             problem=self.problem.name,
-            fitness=first,
+            values=dict(zip(names, values if ok else (math.nan,) * len(names), strict=True)),
             ok=ok,
             reason="" if ok else reason,
             seed=seed,
@@ -165,5 +168,5 @@ class Runs:
             work=dict(result.work),
             wall_s=float(result.wall_s),
             created=time.time(),
-            others=tuple(others),
+            start=start,
         )

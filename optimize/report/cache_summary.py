@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from optimize.search_records import searches
 from optimize.storage.cache import existing
-from optimize.storage.record import Record
+from optimize.storage.runs_table import RunsTable
 from tisim.console import plain_table
 
 MAX_REASONS = 5
@@ -24,7 +27,7 @@ def summary(path: str | Path) -> RenderableType:
     InputError if there is no such file.
     """
     cache = existing(path)
-    records = cache.records()
+    runs = cache.runs()
     table = plain_table("search", "generations", "best", "ended by")
     for name, about in searches(cache).items():
         log = cache.table(f"{name}/logbook").columns
@@ -33,26 +36,28 @@ def summary(path: str | Path) -> RenderableType:
         table.add_row(
             name, str(max(0, len(log.get("gen", [])) - 1)), last, str(about["stopped"]) or "not ended"
         )
-    return Group(_evaluations(records), "", table, *_failures(records))
+    return Group(_evaluations(runs), "", table, *_failures(runs))
 
 
-def _evaluations(records: Sequence[Record]) -> Table:
+def _evaluations(runs: Sequence[RunsTable]) -> Table:
     table = plain_table("problem", "evaluations", "failed", "lowest .. highest", "run time")
-    for problem in dict.fromkeys(record.problem for record in records):
-        mine = [record for record in records if record.problem == problem]
-        good = [record.values for record in mine if record.ok]
-        ranges = ", ".join(f"{min(v):.6g} .. {max(v):.6g}" for v in zip(*good, strict=True))
-        seconds = sum(record.wall_s for record in mine)
-        table.add_row(
-            problem, str(len(mine)), str(len(mine) - len(good)), ranges or "none", f"{seconds:.1f} s"
-        )
+    for part in runs:
+        good = part.facts["ok"] == 1
+        ranges = [_range(column[good]) for column in part.values.values()]
+        failed, seconds = len(part) - int(good.sum()), float(part.facts["wall_s"].sum())
+        text = ", ".join(filter(None, ranges)) or "none"
+        table.add_row(part.problem, str(len(part)), str(failed), text, f"{seconds:.1f} s")
     return table
 
 
-def _failures(records: Sequence[Record]) -> list[RenderableType]:
-    failed = [record for record in records if not record.ok]
-    lines: list[RenderableType] = [
-        Text(f"seed {record.seed}: {record.reason}") for record in failed[:MAX_REASONS]
-    ]
+def _range(values: NDArray[Any]) -> str:
+    known = values[~np.isnan(values)]
+    return f"{known.min():.6g} .. {known.max():.6g}" if len(known) else ""
+
+
+def _failures(runs: Sequence[RunsTable]) -> list[RenderableType]:
+    failed = [(part, row) for part in runs for row in np.flatnonzero(part.facts["ok"] == 0)]
+    records = [part.record(int(row)) for part, row in failed[:MAX_REASONS]]
+    lines: list[RenderableType] = [Text(f"seed {record.seed}: {record.reason}") for record in records]
     more = [f"and {len(failed) - MAX_REASONS} more"] if len(failed) > MAX_REASONS else []
     return ["", "failed:", *lines, *more] if failed else []

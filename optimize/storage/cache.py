@@ -1,11 +1,12 @@
 """The cache keeps every finished evaluation on the disk at once, shared by processes, never lost to a kill.
 
-FILE          HDF5: one row per evaluation, and tables (settings, logbooks, reports). Whole at every instant,
-              because it is only ever replaced by a complete new one.
-FILE.journal  evaluations finished since; folded into FILE at the end of a generation and when it grows large.
+FILE          HDF5: evaluations as columns, and tables (settings, logbooks, best designs). Whole at every
+              instant, because it is only ever replaced by a complete new one.
+FILE.journal  evaluations and rows of tables since; folded into FILE when it has grown to a share of it.
 FILE.lock     held by whoever reads or writes either; says how far the journal had been written.
 
-A kill between replacing FILE and emptying the journal leaves evaluations in both: they count once, by key.
+So what is stored costs as much as it is long, and not as all that there is. A kill between replacing FILE and
+emptying the journal leaves evaluations in both: they count once, by key.
 """
 
 from __future__ import annotations
@@ -18,17 +19,21 @@ from pathlib import Path
 from typing import Any
 
 from optimize.storage import hdf5_store
-from optimize.storage.hdf5_store import Hdf5Table
-from optimize.storage.journal import Journal, Mark
+from optimize.storage.hdf5_store import Content
+from optimize.storage.journal import Journal, Mark, TableRows
 from optimize.storage.record import Record
-from tisim.errors import must
+from optimize.storage.runs_table import RunsTable, tabulated
+from optimize.storage.table import Hdf5Table
+from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
-from tisim.files.framing import Scan
 from tisim.files.ownership import ensure_writable
 from tisim.files.regular_file import file_status, is_folder, open_descriptor
 
-FOLD_BYTES = 8 << 20
-"""Length of a journal, bytes, above which replaying it costs more than rewriting the HDF5 file."""
+FOLD_BYTES = 64 << 10
+"""A journal is folded when it is longer than this, bytes, ..."""
+FOLD_SHARE = 0.25
+"""... and than this share of the HDF5 file: a byte that is stored is written some five times in all, however
+large the file, and the file is never far behind."""
 TAIL = 4096
 """At the end of a file, within so many bytes, is its checksum."""
 
@@ -45,18 +50,20 @@ class Cache:
     def __init__(self, path: str | Path) -> None:
         self.path, journal, self._lock = cache_files(path)
         self._journal = Journal(journal)
-        self._records: dict[str, Record] = {}
-        self._pending: dict[str, Hdf5Table] = {}
+        self._runs: list[RunsTable] = []
+        self._newer: dict[str, Record] = {}
+        self._tables: dict[str, Hdf5Table] = {}
         self._version: tuple[int, ...] | None = None
         self._content: tuple[int, ...] | None = None
         self._end = self._frames = 0
-        if file_status(self.path) is not None:
+        first = None
+        if (version := file_version(self.path)) is not None:
             # A file that is no cache's is refused before a lock file is left beside it.
-            with hdf5_store.open_evaluations(self.path):
-                pass
+            first = version, hdf5_store.read(self.path)
         if not is_folder(self.path.parent):
             ensure_writable(self.path.parent)
-        self.refresh()
+        with locked(self._lock, exclusive=False):
+            self._refresh(first)
 
     def __enter__(self) -> Cache:
         return self
@@ -65,15 +72,22 @@ class Cache:
         self.close()
 
     def __len__(self) -> int:
-        return len(self._records)
+        return sum(map(len, self._runs)) + len(self._newer)
+
+    def runs(self) -> list[RunsTable]:
+        """Return all evaluations in the file as columns, a table for each problem."""
+        return tabulated(self._runs, self._newer.values())
 
     def records(self) -> list[Record]:
-        """Return all evaluations in the file, oldest first."""
-        return list(self._records.values())
+        """Return all evaluations in the file, those of one problem oldest first."""
+        return [*(record for part in self._runs for record in part.records()), *self._newer.values()]
 
     def get(self, key: str) -> Record | None:
         """Return the evaluation of that key, as of the last refresh, put or fold; None if there is none."""
-        return self._records.get(key)
+        if key in self._newer:
+            return self._newer[key]
+        part = next((part for part in self._runs if key in part.rows), None)
+        return None if part is None else part.record(part.rows[key])
 
     def refresh(self) -> None:
         """Take in what other processes have stored since."""
@@ -87,21 +101,25 @@ class Cache:
         """
         with locked(self._lock, exclusive=True) as lock:
             self._refresh()
-            if record.key not in self._records:
-                self._end = self._journal.append(self._end, record.payload())
-                self._frames += 1
-                Mark(self._content, self._end, self._frames).write(lock)
-                self._records[record.key] = record
-                if self._end > FOLD_BYTES:
-                    self._fold()
-            return self._records[record.key]
+            known = self.get(record.key)
+            if known is None:
+                self._append(lock, record.payload(), evaluations=1)
+                self._newer[record.key] = record
+                self._fold_if_long()
+            return known or record
 
     def put_table(
-        self, name: str, columns: Mapping[str, Sequence[Any]], attrs: Mapping[str, Any] | None = None
+        self,
+        name: str,
+        columns: Mapping[str, Sequence[Any]],
+        attrs: Mapping[str, Any] | None = None,
+        about: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> None:
-        """Store a table at the next fold, in place of one of the same name; "a/b" nests.
+        """Store a table, which on return is on the disk, in place of one of the same name; "a/b" nests. Only
+        rows that are new are written.
 
-        InputError if the columns differ in length.
+        about : attributes of columns, such as their unit. InputError if the columns differ in length,
+        RunError if the disk is full; everything stored before is then intact.
         """
         first = name.split("/")[0]
         must(
@@ -110,77 +128,99 @@ class Cache:
             f"non-empty and not below {hdf5_store.EVALUATIONS!r}",
             name,
         )
-        self._pending[name] = Hdf5Table(dict(columns), dict(attrs or {}))
+        # The lists are the caller's, who may add to them.
+        own = {heading: list(column) for heading, column in columns.items()}
+        table = Hdf5Table(own, dict(attrs or {}), dict(about or {}))
+        with locked(self._lock, exclusive=True) as lock:
+            self._refresh()
+            rows = TableRows.between(name, self._tables.get(name), table)
+            if rows is not None:
+                self._append(lock, rows.payload(), evaluations=0)
+                self._tables[name] = table
+                self._fold_if_long()
 
     def table(self, name: str) -> Hdf5Table:
-        """Return a table, stored or waiting for the next fold. InputError if there is none of that name."""
-        if name in self._pending:
-            return self._pending[name]
-        must(name in self.tables(), "table name", f"one of {self.tables()}", name)
-        with locked(self._lock, exclusive=False), hdf5_store.open_evaluations(self.path) as file:
-            return hdf5_store.read_table(file, name)
+        """Return a table. InputError if there is none of that name, or it is damaged."""
+        self.refresh()
+        must(name in self._tables, "table name", f"one of {sorted(self._tables)}", name)
+        rule = "whole ('tisim cache --compact' drops it)"
+        must(self._tables[name].intact, f"table {name}", rule, Words("damage"))
+        return self._tables[name]
 
     def attributes(self) -> dict[str, Mapping[str, Any]]:
-        """Return the attributes of all tables by name, stored or waiting for the next fold."""
-        attributes: dict[str, Mapping[str, Any]] = {}
-        with locked(self._lock, exclusive=False):
-            if file_status(self.path) is not None:
-                with hdf5_store.open_evaluations(self.path) as file:
-                    attributes = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
-        return attributes | {name: table.attrs for name, table in self._pending.items()}
+        """Return the attributes of all tables by name."""
+        self.refresh()
+        return {name: self._tables[name].attrs for name in sorted(self._tables)}
 
     def tables(self) -> list[str]:
-        """Return the names of all tables, stored or waiting for the next fold."""
-        return sorted(self.attributes())
+        """Return the names of all tables."""
+        return list(self.attributes())
 
     def fold(self) -> None:
-        """Write journal and waiting tables into the HDF5 file.
+        """Write what is in the journal into the HDF5 file.
 
         RunError if the disk is full; everything stored before is then intact.
         """
         with locked(self._lock, exclusive=True):
             self._refresh()
-            if self._journal.size() or self._pending:
+            if self._journal.size():
                 self._fold()
 
     def compact(self) -> None:
         """Fold, and leave out what is damaged or double."""
         with locked(self._lock, exclusive=True):
             self._refresh()
-            self._fold(damaged=False)
+            self._tables = {name: table for name, table in self._tables.items() if table.intact}
+            self._runs = [part.different() for part in self._runs]
+            self._fold()
 
     def close(self) -> None:
         """Fold what is waiting into the HDF5 file."""
         self.fold()
 
-    def _fold(self, *, damaged: bool = True) -> None:
-        old = None if file_status(self.path) is None else self.path
-        replace_file(self.path, hdf5_store.build_image(old, self.records(), self._pending, damaged))
+    def _append(self, lock: int, payload: bytes, evaluations: int) -> None:
+        self._end = self._journal.append(self._end, payload)
+        self._frames += evaluations
+        Mark(self._content, self._end, self._frames).write(lock)
+
+    def _fold_if_long(self) -> None:
+        size = 0 if self._version is None else self._version[-1]
+        if self._end > max(FOLD_BYTES, FOLD_SHARE * size):
+            self._fold()
+
+    def _fold(self) -> None:
+        runs = self.runs()
+        replace_file(self.path, hdf5_store.build_image(runs, self._tables))
         self._journal.clear()
-        self._pending, self._end, self._frames = {}, 0, 0
+        self._runs, self._newer, self._end, self._frames = runs, {}, 0, 0
         self._version, self._content = file_version(self.path), file_content(self.path)
 
-    def _refresh(self) -> None:
+    def _refresh(self, read: tuple[tuple[int, ...], Content] | None = None) -> None:
+        """Take in what is new; read : the file as it has been read, and its version then."""
         version = file_version(self.path)
         if version != self._version or self._journal.size() < self._end:
-            self._records, self._end, self._frames = {}, 0, 0
+            self._newer, self._end, self._frames = {}, 0, 0
             self._version, self._content = version, file_content(self.path)
+            found = Content()
             if version is not None:
-                with hdf5_store.open_evaluations(self.path) as file:
-                    self._take(*hdf5_store.read_rows(file))
+                found = read[1] if read is not None and read[0] == version else hdf5_store.read(self.path)
+            self._runs, self._tables = found.runs, found.tables
+            self._warn(found.damaged)
         first = self._end == 0
-        scanned = self._journal.read(self._end)
-        self._take(*journal_records(scanned))
-        self._end, self._frames = scanned.end, self._frames + len(scanned.payloads)
+        entries = self._journal.read(self._tables, self._end)
+        for record in entries.records:
+            if self.get(record.key) is None:
+                self._newer[record.key] = record
+        self._tables = entries.tables
+        self._warn(entries.damaged)
+        self._end, self._frames = entries.end, self._frames + len(entries.records)
         mark = Mark.read(self._lock) if first else None
-        if mark is not None and (loss := mark.loss(self._content, scanned)):
+        if mark is not None and (loss := mark.loss(self._content, entries)):
             warnings.warn(
-                f"{self.path}: {loss}; what is lost will be run again", RuntimeWarning, stacklevel=4
+                f"{self.path}: {loss}; what is lost will be run again", RuntimeWarning, stacklevel=3
             )
 
-    def _take(self, records: Sequence[Record], damaged: Sequence[str]) -> None:
-        for record in records:
-            self._records.setdefault(record.key, record)
+    def _warn(self, damaged: Sequence[str]) -> None:
         if damaged:
             text = f"{self.path}: {len(damaged)} damaged evaluation(s) are ignored and will be run again"
             warnings.warn(text, RuntimeWarning, stacklevel=4)
@@ -208,18 +248,6 @@ def file_content(path: Path) -> tuple[int, ...] | None:
     with os.fdopen(open_descriptor(path, os.O_RDONLY), "rb") as file:
         file.seek(max(0, status.st_size - TAIL))
         return zlib.crc32(file.read()), status.st_size
-
-
-def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
-    """Return the evaluations in a part of a journal, and a description of each thing in it that is none."""
-    records = []
-    damaged = [f"journal, byte {offset}: not a whole record" for offset in scanned.damaged]
-    for number, payload in enumerate(scanned.payloads):
-        try:
-            records.append(Record.parse(payload))
-        except ValueError:
-            damaged.append(f"journal, frame {number}: no evaluation")
-    return records, damaged
 
 
 def existing_files(path: str | Path) -> tuple[Path, Path, Path]:

@@ -1,8 +1,7 @@
-"""The HDF5 file of a cache has one row per evaluation in /evaluations, and any number of named tables.
+"""The HDF5 file of a cache: evaluations as columns, a group for each problem, and any number of named tables.
 
 The file is always built whole, in memory, and then written by ordinary system calls: a full disk is met by
-write(), not inside the HDF5 library. Strings have one fixed length per column, so damage to a byte is damage
-to a row and not to the column.
+write(), not inside the HDF5 library. It explains itself to a reader who has h5py and nothing of this package.
 """
 
 from __future__ import annotations
@@ -10,47 +9,86 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import math
-import zlib
+import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
-from optimize.storage.record import Record, canonical
+from optimize.storage import older
+from optimize.storage.runs_table import KINDS, RunsTable, tabulated
+from optimize.storage.table import (
+    Hdf5Table,
+    dataset_names,
+    read_tables,
+    write_column,
+    write_table,
+)
 from tisim import InputError
-from tisim.errors import Words, must
+from tisim.errors import must
 from tisim.files import regular_file
 from tisim.files.checksum import verified, with_checksum
 from tisim.files.superblock import SIGNATURE
 
-EVALUATIONS_FORMAT = "tisim evaluations 1"
+EVALUATIONS_FORMAT = "tisim evaluations 2"
 EVALUATIONS = "evaluations"
+README = """\
+Runs of a search for good designs, written by tisim (optimize.read reads it; so does any program for HDF5).
 
-_COLUMNS: dict[str, Any] = {
-    "key": bytes, "problem": bytes, "fitness": np.float64, "ok": np.uint8, "reason": bytes, "seed": np.int64,
-    "design": bytes, "work": bytes, "wall_s": np.float64, "created": np.float64, "crc": np.uint32,
-}  # fmt: skip
-_OTHER_OBJECTIVES = "others"
-"""Column with the further objectives as JSON; absent in files in which all evaluations have one."""
+/evaluations/<problem>   a row for each run of a design from one random start, in columns of equal length:
+    genes/<name>         the design; attributes unit, low, high, scale (on which the search is uniform)
+    values/<name>        what the run gave; attribute unit. Objectives have the attribute direction, which
+                         says what is wanted: "smallest" or "largest". NaN where the run failed.
+    start, seed          number of the random start (-1: not known) and the seed that it was made from
+    ok, reason           1 for a run that ended well, 0 for one that failed, and why
+    wall_s, created      seconds that it took; when it was stored, in seconds since 1970 (UTC)
+    work                 counts of the run, as JSON
+    key                  SHA-256 of all that decides the values: scene, seed, precision and objectives
+    crc                  CRC-32 of the cells of the row, by which damage is found
+    The attributes genes and values have the names in order, as JSON. Rows are in the order of their storage.
+
+/searches/<name>         a search. Attributes: problem; settings, identity (all that decides its course) and
+                         versions, as JSON; stopped, the rule that ended it (empty while it goes on)
+    genes, objectives    what it varies and what it wants: names, units, ranges, directions
+    logbook              a row for each generation
+    hall_of_fame         the best designs, the best first; of several objectives the front. Each objective is
+                         the mean over the starts; "95 % +-" is half of its confidence interval
+
+Columns have the attribute unit where they have one. In names "/" is written as U+2215. The attribute written
+is when this file was, in nanoseconds since 1970 (UTC).
+While a search goes on, its newest runs are in the file .journal beside this one, and come into this one when
+they have become 64 KiB and a quarter of what is here, and at the end. optimize.read has them, too.
+"""
+_MEANINGS: Mapping[str, Mapping[str, str]] = {
+    "key": {"description": "SHA-256 of all that decides the values"},
+    "start": {"description": "number of the random start, -1 where it is not known"},
+    "seed": {"description": "seed of the random start"},
+    "ok": {"description": "1: ended well, 0: failed"},
+    "reason": {"description": "why it failed"},
+    "wall_s": {"unit": "s", "description": "time that the run took"},
+    "created": {"unit": "s", "description": "when it was stored, since 1970-01-01 (UTC)"},
+    "work": {"description": "counts of the run, as JSON"},
+    "crc": {"description": "CRC-32 of the cells of the row"},
+}
+GENES_TABLE, OBJECTIVES_TABLE = "genes", "objectives"
+"""Names of the tables below that of a search that say what its problem's columns are."""
 
 
 @dataclass(frozen=True)
-class Hdf5Table:
-    """Named columns of equal length (numbers or strings) and attributes (numbers or strings).
+class Content:
+    """All that is in the file of a cache.
 
-    Raises InputError if the columns differ in length.
+    runs : whole evaluations. tables : by name, also those that are not intact. damaged : a description of
+    each row whose checksum fails.
     """
 
-    columns: Mapping[str, Sequence[Any]]
-    attrs: Mapping[str, Any]
-
-    def __post_init__(self) -> None:
-        lengths = {name: len(column) for name, column in self.columns.items()}
-        must(len(set(lengths.values())) <= 1, "table columns", "all of one length", lengths)
+    runs: list[RunsTable] = field(default_factory=list)
+    tables: dict[str, Hdf5Table] = field(default_factory=dict)
+    damaged: list[str] = field(default_factory=list)
 
 
 @contextlib.contextmanager
@@ -73,7 +111,7 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
             "('tisim cache --compact' keeps what can be read)"
         )
     with h5py.File(io.BytesIO(image), "r") as file:
-        if file.attrs.get("format") != EVALUATIONS_FORMAT or EVALUATIONS not in file:
+        if not by_cache(file):
             raise InputError(f"{rule} one with {', '.join(file) or 'nothing in it'}")
         try:
             yield file
@@ -83,24 +121,41 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} must be undamaged; received {error}") from error
 
 
-def build_image(
-    old: Path | None, records: Sequence[Record], tables: Mapping[str, Hdf5Table], damaged: bool = True
-) -> bytes:
-    """Return the bytes of a new file with these records, the tables of the file old, and tables (which win).
+def by_cache(file: h5py.File) -> bool:
+    """Return whether a cache has written the file, of this version or one before."""
+    kind = file.attrs.get("format")
+    known = isinstance(kind, str) and kind in (EVALUATIONS_FORMAT, older.FORMAT)
+    return known and EVALUATIONS in file
 
-    damaged : whether to take over tables whose checksum fails.
-    """
+
+def read(path: Path) -> Content:
+    """Return all that is in the file. InputError, naming it, unless it is whole and written by a cache."""
+    with open_evaluations(path) as file:
+        return read_content(file)
+
+
+def read_content(file: h5py.File) -> Content:
+    """Return what is in an open file."""
+    found = read_tables(file)
+    if file.attrs["format"] == older.FORMAT:
+        records, damaged = older.read_rows(file[EVALUATIONS], found)
+        return Content(tabulated([], records), found, damaged)
+    parts = [read_runs(group) for group in file[EVALUATIONS].values()]
+    return Content([runs for runs, _ in parts], found, [text for _, damaged in parts for text in damaged])
+
+
+def build_image(runs: Sequence[RunsTable], tables: Mapping[str, Hdf5Table]) -> bytes:
+    """Return the bytes of a new file with these evaluations and tables."""
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
-        file.attrs["format"] = EVALUATIONS_FORMAT
-        if old is not None:
-            with open_evaluations(old) as old_file:
-                for name in set(old_file) - {EVALUATIONS}:
-                    old_file.copy(old_file[name], file, name)
-        for name in [] if damaged else damaged_tables(file):
-            _clear_table(file[name])
+        file.attrs["format"], file.attrs["README"] = EVALUATIONS_FORMAT, README
+        # No two files have the same checksum of the structure: by it a journal knows the file it belongs to.
+        file.attrs["written"] = time.time_ns()
+        group, about = file.create_group(EVALUATIONS), descriptions(tables)
+        names = dataset_names(_numbered([part.problem for part in runs]))
+        for part, name in zip(runs, names.values(), strict=True):
+            _write_runs(group.create_group(name), part, about.get(part.problem, {}))
         for name, table in tables.items():
-            _write_table(file.require_group(name), table)
-        _write_rows(file.create_group(EVALUATIONS), records)
+            write_table(file.require_group(name), table)
         file.flush()
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if isinstance(item, h5py.Dataset) else None)
@@ -108,143 +163,64 @@ def build_image(
         return with_checksum(bytes(file.id.get_file_image()), data)
 
 
-def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
-    """Return the whole evaluations in order, and a description of each row whose checksum fails."""
-    columns = {name: file[EVALUATIONS][name][...] for name in _COLUMNS}
-    if _OTHER_OBJECTIVES in file[EVALUATIONS]:
-        columns[_OTHER_OBJECTIVES] = file[EVALUATIONS][_OTHER_OBJECTIVES][...]
+def _numbered(problems: Sequence[str]) -> list[str]:
+    """Return a name for each table of evaluations; a second one of the same problem, with other genes, has a
+    number."""
+    before = [problems[:k].count(problem) for k, problem in enumerate(problems)]
+    return [name if not n else f"{name} ({n + 1})" for name, n in zip(problems, before, strict=True)]
+
+
+def descriptions(tables: Mapping[str, Hdf5Table]) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return what searches say of the genes and objectives of their problems: problem, name, attributes. NaN
+    and "" stand for what a gene does not have."""
+    about: dict[str, dict[str, dict[str, Any]]] = {}
+    for name, search in tables.items():
+        for kind in (GENES_TABLE, OBJECTIVES_TABLE):
+            table = tables.get(f"{name}/{kind}")
+            if table is None or not table.intact or "problem" not in search.attrs:
+                continue
+            for cells in zip(*table.columns.values(), strict=True):
+                fields = dict(zip(table.columns, cells, strict=True))
+                known = about.setdefault(str(search.attrs["problem"]), {})
+                key = f"{kind}/{fields.pop('name', '')}"
+                known[key] = {k: v for k, v in fields.items() if v == v and v != ""}
+    return about
+
+
+def _write_runs(group: h5py.Group, part: RunsTable, about: Mapping[str, Mapping[str, Any]]) -> None:
+    group.attrs["problem"] = part.problem
+    columns: dict[str, NDArray[Any]] = {**part.facts, "crc": part.checksums()}
+    for name, column in columns.items():
+        write_column(group, name, column).attrs.update(_MEANINGS[name])
+    for kind, table, parts in (
+        ("genes", GENES_TABLE, part.genes),
+        ("values", OBJECTIVES_TABLE, part.values),
+    ):
+        below, names = group.create_group(kind), dataset_names(parts)
+        group.attrs[kind] = json.dumps(list(parts))
+        for name, column in parts.items():
+            write_column(below, names[name], column).attrs.update(about.get(f"{table}/{name}", {}))
+
+
+def read_runs(group: h5py.Group) -> tuple[RunsTable, list[str]]:
+    """Return the whole evaluations of a problem, and a description of each row whose checksum fails."""
+    facts = {name: group[name][...] for name in KINDS}
+    parts = {}
+    for kind in ("genes", "values"):
+        names = dataset_names(json.loads(group.attrs[kind]))
+        parts[kind] = {head: group[kind][name][...] for head, name in names.items()}
+    crc = group["crc"][...]
+    columns = {**facts, **parts["genes"], **parts["values"], "crc": crc}
     lengths = {name: len(column) for name, column in columns.items()}
-    must(len(set(lengths.values())) == 1, f"columns of {file.filename}", "all of one length", lengths)
-    records, damaged = [], []
-    for row in range(lengths["key"]):
-        cells = {name: column[row] for name, column in columns.items()}
-        crc = int(cells.pop("crc"))
-        try:
-            record = _record(cells)
-            intact = zlib.crc32(record.payload()) == crc
-        except (ValueError, TypeError, ArithmeticError):
-            intact = False
-        if intact:
-            records.append(record)
-        else:
-            damaged.append(f"row {row}: its checksum does not fit")
-    return records, damaged
-
-
-def read_table(file: h5py.File, name: str) -> Hdf5Table:
-    """Return one table. InputError if there is none of that name, or it is damaged."""
-    must(name in tables(file), "table name", f"one of {tables(file)}", name)
-    must(
-        name not in damaged_tables(file),
-        f"table {name}",
-        "whole ('tisim cache --compact' drops it)",
-        Words("damage"),
-    )
-    return _read_table(file[name])
-
-
-def tables(file: h5py.File) -> list[str]:
-    """Return the names of the tables in the file."""
-    names: list[str] = []
-    file.visititems(lambda name, item: names.append(name) if "crc32" in item.attrs else None)
-    return names
-
-
-def attributes(group: h5py.Group) -> dict[str, Any]:
-    """Return the attributes of a table: numbers and strings."""
-    values = {
-        name: getattr(value, "tolist", lambda value=value: value)() for name, value in group.attrs.items()
-    }
-    return {name: value for name, value in values.items() if name not in ("columns", "crc32")}
-
-
-def damaged_tables(file: h5py.File) -> list[str]:
-    """Return the names of the tables whose checksum fails."""
-    damaged = []
-    for name in tables(file):
-        try:
-            intact = _table_checksum(_read_table(file[name])) == int(file[name].attrs["crc32"])
-        except (OSError, KeyError, RuntimeError, ValueError, TypeError):
-            intact = False
-        if not intact:
-            damaged.append(name)
-    return damaged
-
-
-def _record(cells: Mapping[str, Any]) -> Record:
-    text = {name: bytes(cell).decode() for name, cell in cells.items() if _COLUMNS.get(name) is bytes}
-    return Record(
-        key=text["key"],
-        problem=text["problem"],
-        fitness=float(cells["fitness"]),
-        ok=bool(cells["ok"]),
-        reason=text["reason"],
-        seed=int(cells["seed"]),
-        design=json.loads(text["design"]),
-        work=json.loads(text["work"]),
-        wall_s=float(cells["wall_s"]),
-        created=float(cells["created"]),
-        others=tuple(math.nan if v is None else v for v in json.loads(cells.get(_OTHER_OBJECTIVES, b"[]"))),
-    )
-
-
-def _write_rows(group: h5py.Group, records: Sequence[Record]) -> None:
-    for name, kind in _COLUMNS.items():
-        if name == "crc":
-            group[name] = np.array([zlib.crc32(record.payload()) for record in records], dtype=kind)
-        elif name in ("design", "work"):
-            group[name] = _strings([canonical(dict(getattr(record, name))) for record in records])
-        elif kind is bytes:
-            group[name] = _strings([getattr(record, name).encode() for record in records])
-        else:
-            group[name] = np.array([getattr(record, name) for record in records], dtype=kind)
-    if any(record.others for record in records):
-        finite = [[v if math.isfinite(v) else None for v in record.others] for record in records]
-        group[_OTHER_OBJECTIVES] = _strings([canonical(others) for others in finite])
-
-
-def _strings(values: Sequence[bytes]) -> np.ndarray:
-    longest = max([1, *map(len, values)])
-    return np.array(values, dtype=h5py.string_dtype("utf-8", longest))
-
-
-def _clear_table(group: h5py.Group) -> None:
-    """Remove a table; those below it stay."""
-    for name in [name for name, item in group.items() if isinstance(item, h5py.Dataset)]:
-        del group[name]
-    for name in list(group.attrs):
-        del group.attrs[name]
-
-
-def _write_table(group: h5py.Group, table: Hdf5Table) -> None:
-    _clear_table(group)
-    for name, column in table.columns.items():
-        text = any(isinstance(value, str) for value in column)
-        data = _strings([str(value).encode() for value in column]) if text else np.asarray(column)
-        group[_dataset_name(name)] = data
-    for name, value in table.attrs.items():
-        group.attrs[name] = value
-    group.attrs["columns"] = json.dumps(list(table.columns))
-    group.attrs["crc32"] = _table_checksum(_read_table(group))
-
-
-def _read_table(group: h5py.Group) -> Hdf5Table:
-    columns = {}
-    for name in json.loads(group.attrs["columns"]):
-        values = group[_dataset_name(name)][...].tolist()
-        columns[name] = [value.decode() if isinstance(value, bytes) else value for value in values]
-    return Hdf5Table(columns, attributes(group))
+    must(len(set(lengths.values())) == 1, f"columns of {group.name}", "all of one length", lengths)
+    runs = RunsTable(str(group.attrs["problem"]), facts, parts["genes"], parts["values"])
+    intact = runs.checksums() == crc
+    if np.all(intact):
+        return runs, []
+    rows = np.flatnonzero(~intact)
+    return runs.chosen(intact), [f"{runs.problem}, row {row}: its checksum does not fit" for row in rows]
 
 
 def _extent(dataset: h5py.Dataset) -> tuple[int, int]:
     """Return offset and size in bytes of a dataset's raw data; those of an empty one are 0."""
     return dataset.id.get_offset() or 0, dataset.id.get_storage_size()
-
-
-def _dataset_name(heading: str) -> str:
-    """Return the name of a column's dataset: HDF5 takes "/" for a path, so a unit like m/s gets U+2215."""
-    return heading.replace("/", "\u2215")
-
-
-def _table_checksum(table: Hdf5Table) -> int:
-    return zlib.crc32(canonical([list(table.columns), dict(table.columns), dict(table.attrs)]))

@@ -1,5 +1,7 @@
 """The write-ahead journal is a file of framed, checksummed payloads (see tisim/files/framing.py).
 
+They are evaluations, and rows of tables.
+
 The lock file beside it says how far it had been written: what is missing of that was cut off.
 """
 
@@ -8,9 +10,16 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from dataclasses import astuple, dataclass
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
+from typing import Any
 
+from pydantic import BaseModel, ConfigDict, Field
+
+from optimize.storage import older
+from optimize.storage.record import Record, plain
+from optimize.storage.table import Hdf5Table
 from tisim.files.atomic import append_at
 from tisim.files.framing import Scan, frame, scan
 from tisim.files.regular_file import content, file_status, open_descriptor
@@ -21,7 +30,7 @@ class Mark:
     """A mark says how far a journal had been written.
 
     base : numbers of the content of the file that it belongs to; None where there is no such file.
-    end : length, bytes. frames : their number within this length.
+    end : length, bytes. frames : number of evaluations within this length.
     """
 
     base: tuple[int, ...] | None
@@ -42,14 +51,78 @@ class Mark:
         except (IndexError, ValueError, TypeError):
             return None
 
-    def loss(self, base: tuple[int, ...] | None, journal: Scan) -> str | None:
+    def loss(self, base: tuple[int, ...] | None, found: Entries) -> str | None:
         """Return a description of what a journal, read from its beginning, has lost; None for a whole one."""
-        if self.base != base or journal.end >= self.end:
+        if self.base != base or found.end >= self.end:
             return None
-        lost_count = max(1, self.frames - len(journal.payloads) - len(journal.damaged))
-        return (
-            f"journal, byte {journal.end}: {lost_count} evaluation(s) cut off, {self.end - journal.end} bytes"
-        )
+        count = self.frames - len(found.records) - len(found.damaged)
+        what = f"{count} evaluation(s)" if count > 0 else "rows of a table"
+        return f"journal, byte {found.end}: {what} cut off, {self.end - found.end} bytes"
+
+
+@dataclass(frozen=True)
+class TableRows:
+    """Rows that were put into a table: behind the first ``kept`` ones; attrs, about : None for those it had.
+
+    So the logbook of a search costs a row a generation, not all rows.
+    """
+
+    table: str
+    kept: int
+    columns: Mapping[str, list[Any]]
+    attrs: Mapping[str, Any] | None = None
+    about: Mapping[str, Mapping[str, Any]] | None = None
+
+    @classmethod
+    def between(cls, name: str, old: Hdf5Table | None, new: Hdf5Table) -> TableRows | None:
+        """Return what makes the old table (None: there is none) the new one; None where they are the same."""
+        kept = None if old is None else old.rows_kept_in(new)
+        if kept is None:
+            return cls(name, 0, {head: list(c) for head, c in new.columns.items()}, new.attrs, new.about)
+        if kept == len(new):
+            return None
+        return cls(name, kept, {head: list(column[kept:]) for head, column in new.columns.items()})
+
+    def added_to(self, old: Hdf5Table | None) -> Hdf5Table | None:
+        """Return the new table; the old one where it has too few rows, as a later one of a fold has."""
+        if self.attrs is not None:
+            return Hdf5Table(self.columns, self.attrs, self.about or {})
+        if old is None or len(old) < self.kept:
+            return old
+        return old.continued(self.kept, self.columns)
+
+    def payload(self) -> bytes:
+        """Return it as ASCII JSON."""
+        return json.dumps(vars(self), separators=(",", ":"), default=plain).encode("ascii")
+
+    @classmethod
+    def parse(cls, payload: bytes) -> TableRows:
+        """Return what ``payload`` has written. ValueError if that is none."""
+        _RowsForm.model_validate_json(payload)
+        return cls(**json.loads(payload))
+
+
+class _RowsForm(BaseModel):
+    """The form holds rows of a table as their payload has them."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+    table: str
+    kept: int = Field(ge=0)
+    columns: dict[str, list[Any]]
+    attrs: dict[str, Any] | None
+    about: dict[str, dict[str, Any]] | None
+
+
+@dataclass(frozen=True)
+class Entries:
+    """What is in a part of a journal. tables : as they are with it. damaged : a description of each thing in
+    it that is neither; end, torn : see Scan."""
+
+    records: list[Record] = field(default_factory=list)
+    tables: dict[str, Hdf5Table] = field(default_factory=dict)
+    damaged: list[str] = field(default_factory=list)
+    end: int = 0
+    torn: int = 0
 
 
 class Journal:
@@ -63,13 +136,16 @@ class Journal:
         info = file_status(self.path)
         return 0 if info is None else info.st_size
 
-    def read(self, offset: int = 0) -> Scan:
-        """Return the frames from byte offset on, which must be 0 or the end of an earlier scan."""
+    def read(self, tables: Mapping[str, Hdf5Table], offset: int = 0) -> Entries:
+        """Return what there is from byte offset on, which must be 0 or the end of an earlier reading.
+
+        tables : as they are without it.
+        """
         if self.size() <= offset:
-            return Scan([], offset, [], 0)
+            return Entries(tables=dict(tables), end=offset)
         with os.fdopen(open_descriptor(self.path, os.O_RDONLY), "rb") as file:
             file.seek(offset)
-            return scan(file.read(), offset)
+            return entries(scan(file.read(), offset), tables)
 
     def append(self, end: int, payload: bytes) -> int:
         """Write one frame at the end of the last whole one, cutting off a torn tail; return the new end.
@@ -82,3 +158,22 @@ class Journal:
         """Empty the file."""
         if self.size():
             append_at(self.path, 0, b"")
+
+
+def entries(scanned: Scan, tables: Mapping[str, Hdf5Table]) -> Entries:
+    """Return what the frames hold; tables : as they are without them."""
+    damaged = [f"journal, byte {offset}: not a whole record" for offset in scanned.damaged]
+    found = Entries([], dict(tables), damaged, scanned.end, scanned.torn)
+    for number, payload in enumerate(scanned.payloads):
+        try:
+            if payload.startswith(b'{"table":'):
+                rows = TableRows.parse(payload)
+                table = rows.added_to(found.tables.get(rows.table))
+                if table is not None:
+                    found.tables[rows.table] = table
+            else:
+                newer = payload.startswith(b'{"key":')
+                found.records.append(Record.parse(payload) if newer else older.parse(payload, found.tables))
+        except ValueError:
+            damaged.append(f"journal, frame {number}: no evaluation")
+    return found

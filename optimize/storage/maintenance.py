@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 from optimize.storage import hdf5_store, salvage
-from optimize.storage.cache import Cache, existing_files, file_content, journal_records
+from optimize.storage.cache import Cache, existing_files, file_content
+from optimize.storage.hdf5_store import Content
 from optimize.storage.journal import Journal, Mark
 from optimize.storage.record import Record
 from tisim.files.atomic import locked
@@ -43,30 +45,37 @@ def verify(path: str | Path) -> VerifyReport:
     """
     path, journal, lock = existing_files(path)
     with locked(lock, exclusive=False):
-        rows: list[Record] = []
-        damaged: list[str] = []
-        content = file_content(path)
-        if content is not None:
-            with hdf5_store.open_evaluations(path) as file:
-                rows, damaged = hdf5_store.read_rows(file)
-                names = hdf5_store.damaged_tables(file)
-                damaged += [f"table {name}: its checksum does not fit" for name in names]
-        scanned, mark = Journal(journal).read(), Mark.read(lock)
-    frames, not_records = journal_records(scanned)
-    loss = None if mark is None else mark.loss(content, scanned)
-    damaged += [*not_records, *([loss] if loss else [])]
-    by_key: dict[str, Record] = {}
-    for record in (*rows, *frames):
-        by_key.setdefault(record.key, record)
-    conflicts = {r.key for r in (*rows, *frames) if repr(r.values) != repr(by_key[r.key].values)}
+        base = file_content(path)
+        stored = Content() if base is None else hdf5_store.read(path)
+        found, mark = Journal(journal).read(stored.tables), Mark.read(lock)
+    loss = None if mark is None else mark.loss(base, found)
+    spoilt = [name for name, table in stored.tables.items() if not table.intact]
+    tables = [f"table {name}: its checksum does not fit" for name in spoilt]
+    rows, conflicts = sum(map(len, stored.runs)), set[str]()
+    first: dict[str, Record] = {}
+    for part in stored.runs:
+        for row, key in enumerate(part.keys):
+            if part.rows[key] != row and not _same(part.record(row), part.record(part.rows[key])):
+                conflicts.add(key)
+    for record in found.records:
+        known = (part.record(part.rows[record.key]) for part in stored.runs if record.key in part.rows)
+        if not _same(record, first.setdefault(record.key, next(known, record))):
+            conflicts.add(record.key)
+    different = set(first).union(*(part.rows for part in stored.runs))
     return VerifyReport(
-        rows=len(rows),
-        journal=len(frames),
-        damaged=damaged,
-        torn=scanned.torn,
-        duplicates=len(rows) + len(frames) - len(by_key),
+        rows=rows,
+        journal=len(found.records),
+        damaged=[*stored.damaged, *tables, *found.damaged, *([loss] if loss else [])],
+        torn=found.torn,
+        duplicates=rows + len(found.records) - len(different),
         conflicts=sorted(conflicts),
     )
+
+
+def _same(one: Record, other: Record) -> bool:
+    """Return whether two evaluations have found the same; a value that there is not is as good as NaN."""
+    values = [{name: v for name, v in r.values.items() if not math.isnan(v)} for r in (one, other)]
+    return one.ok == other.ok and values[0] == values[1]
 
 
 def compact(path: str | Path) -> int:

@@ -7,18 +7,31 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from tisim.errors import must
+
 REASON_LENGTH = 500
 """Largest number of characters of a reason. A column has one length: a stack trace would widen all rows."""
+UNKNOWN_START = -1
+"""The number of a start that is not known, as in files of before it was kept."""
+
+Gene = float | int | str | bool
+"""The value of a gene in a design."""
+_PLAIN = frozenset((float, int, str, bool))
 
 
 def canonical(value: Any) -> bytes:
     """Return ASCII JSON with sorted keys: equal values, equal bytes. NumPy scalars become Python numbers."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=lambda scalar: scalar.item())
     return text.encode("ascii")
+
+
+def plain(value: Any) -> Any:
+    """Return a NumPy scalar as a number of Python, and anything else as it is."""
+    return value if type(value) in _PLAIN else getattr(value, "item", lambda: value)()
 
 
 def evaluation_key(
@@ -38,53 +51,61 @@ class Record:
     """A record is the evaluation of one design from one random start.
 
     key : see evaluation_key; problem : its name.
-    fitness : the first objective, NaN if the evaluation failed; others : the other ones, where there are
-    several. ok, reason : how it ended.
-    seed : of the start; design : gene -> value in its unit, or a text or flag; work : counts of the run.
+    values : what was found, name -> value: each objective, and other quantities of the run where the problem
+    keeps some; in order. NaN, or missing, where the evaluation failed.
+    ok, reason : how it ended.
+    seed : of the start; start : its number in the search that made it, from 0.
+    design : gene -> value in its unit, in order; work : counts of the run.
     wall_s : seconds it took; created : seconds since 1970 (UTC).
+    Raises InputError for a gene that no column can hold: an integer beyond 64 bits, a text with a NUL.
     """
 
     key: str
     problem: str
-    fitness: float
+    values: Mapping[str, float]
     ok: bool
     reason: str
     seed: int
-    design: Mapping[str, float]
+    design: Mapping[str, Gene]
     work: Mapping[str, Any]
     wall_s: float
     created: float
-    others: tuple[float, ...] = ()
+    start: int = UNKNOWN_START
 
     def __post_init__(self) -> None:
-        plain = self.reason.encode("ascii", "backslashreplace").decode().replace("\0", " ")
-        object.__setattr__(self, "reason", plain[:REASON_LENGTH])
-        object.__setattr__(self, "design", dict(self.design))
+        text = self.reason.encode("ascii", "backslashreplace").decode().replace("\0", " ")
+        object.__setattr__(self, "reason", text[:REASON_LENGTH])
+        object.__setattr__(self, "values", {name: float(value) for name, value in self.values.items()})
+        object.__setattr__(self, "design", {name: plain(value) for name, value in self.design.items()})
         object.__setattr__(self, "work", dict(self.work))
-        object.__setattr__(self, "others", tuple(self.others))
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Return the values of all objectives, as they are (not with the sign of a cost)."""
-        return (self.fitness, *self.others)
+        for name, value in self.design.items():
+            if isinstance(value, str):
+                must("\0" not in value, "gene", "a text without a NUL", f"{name}: {value}")
+            elif isinstance(value, int):
+                must(-(2**63) <= value < 2**63, "gene", "an integer of 64 bits", f"{name}: {value}")
 
     def payload(self) -> bytes:
-        """Return the record as canonical JSON; NaN is written as null, which every JSON reader knows."""
-        fields = dict(vars(self))
-        fields["fitness"] = self.fitness if math.isfinite(self.fitness) else None
-        if not fields.pop("others"):
-            return canonical(fields)  # as it was before there could be others: old checksums stay true
-        return canonical(fields | {"others": [v if math.isfinite(v) else None for v in self.others]})
+        """Return the record as ASCII JSON, its fields in their order; NaN is written as null, which every
+        JSON reader knows."""
+        fields = {**vars(self), "values": {name: _number(value) for name, value in self.values.items()}}
+        return json.dumps(fields, separators=(",", ":"), default=plain).encode("ascii")
 
     @classmethod
     def parse(cls, payload: bytes) -> Record:
         """Return the record that ``payload`` has written. ValueError if it is none."""
-        _Form.model_validate_json(payload)
-        fields = json.loads(payload)
-        if fields["fitness"] is None:
-            fields["fitness"] = math.nan
-        others = fields.pop("others", ())
-        return cls(**fields, others=tuple(math.nan if value is None else value for value in others))
+        fields = dict(vars(_Form.model_validate_json(payload)))
+        values = {name: math.nan if v is None else float(v) for name, v in fields.pop("values").items()}
+        return cls(**fields, values=values)
+
+
+def _number(value: float) -> float | str | None:
+    """Return a value as JSON can have it."""
+    if math.isfinite(value):
+        return value
+    return None if math.isnan(value) else str(value)
+
+
+Integer64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 
 
 class _Form(BaseModel):
@@ -93,12 +114,12 @@ class _Form(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
     key: str
     problem: str
-    fitness: float | None
+    values: dict[str, float | Literal["inf", "-inf"] | None]
     ok: bool
     reason: str
-    seed: Annotated[int, Field(ge=-(2**63), lt=2**63)]
-    design: dict[str, bool | int | float | str]
+    seed: Integer64
+    design: dict[str, bool | Integer64 | float | str]
     work: dict[str, Any]
     wall_s: float
     created: float
-    others: list[float | None] = []
+    start: Integer64

@@ -6,14 +6,18 @@ and tables count when their own checksums fit.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
 
-from optimize.storage import hdf5_store
+from optimize.storage import hdf5_store, older
+from optimize.storage.runs_table import RunsTable, tabulated
+from optimize.storage.table import Hdf5Table, read_tables
 from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.checksum import verified
@@ -54,16 +58,25 @@ def _salvage(old: bytes) -> bytes | None:
 def _rebuild(old: bytes) -> bytes:
     """Return a cache file of what is whole in a damaged one; any error when nothing can be read."""
     with h5py.File(io.BytesIO(old), "r") as file:
-        by_cache = file.attrs.get("format") == hdf5_store.EVALUATIONS_FORMAT
-        must(by_cache, "file", "written by a cache", Words("another"))
-        records, _ = hdf5_store.read_rows(file)
+        must(hdf5_store.by_cache(file), "file", "written by a cache", Words("another"))
         try:
-            damaged = hdf5_store.damaged_tables(file)
-            whole = [name for name in hdf5_store.tables(file) if name not in damaged]
-            tables = {name: hdf5_store.read_table(file, name) for name in whole}
+            tables = {name: table for name, table in read_tables(file).items() if table.intact}
         except (OSError, KeyError, RuntimeError, ValueError):
             tables = {}  # evaluations cost hours, tables nothing
-    return hdf5_store.build_image(None, records, tables)
+        return hdf5_store.build_image(_runs(file, tables), tables)
+
+
+def _runs(file: h5py.File, tables: Mapping[str, Hdf5Table]) -> list[RunsTable]:
+    """Return the evaluations that can be read, of each problem on its own."""
+    group = file[hdf5_store.EVALUATIONS]
+    if file.attrs["format"] == older.FORMAT:
+        return tabulated([], older.read_rows(group, tables)[0])
+    found = []
+    for name in group:
+        with contextlib.suppress(OSError, KeyError, RuntimeError, ValueError, TypeError):
+            found.append(hdf5_store.read_runs(group[name])[0])
+    must(bool(found) or not len(group), "evaluations", "readable", Words("none"))
+    return found
 
 
 if __name__ == "__main__":

@@ -63,6 +63,6 @@ def test_a_search_runs_it_in_worker_processes(tisim, own_file):
     assert tisim(*search, "--out", "s", "--executor", "processes:2")[0] == 0
     assert tisim(*search, "--out", "t")[0] == 0
     there, here = (
-        {record.key: record.fitness for record in Cache(f"{folder}/search.h5").records()} for folder in "st"
+        {record.key: record.values for record in Cache(f"{folder}/search.h5").records()} for folder in "st"
     )
     assert there == here

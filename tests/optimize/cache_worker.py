@@ -55,6 +55,8 @@ def stepwise(folder):
             for number in (1, 2):
                 cache.put(fake_record(number))
                 os.write(1, f"{kill_at} {number}\n".encode())
+                cache.put_table("log", {"n": list(range(number))})
+                os.write(1, f"{kill_at} {100 + number}\n".encode())
             cache.fold()
             os._exit(0)
         if os.waitpid(child, 0)[1] == 0:

@@ -69,14 +69,15 @@ def fake_record(number, fitness=None, ok=True, pad=""):
     return Record(
         key=evaluation_key(f"scene {number}", {"precision": "f64"}, "bowl", 1),
         problem="bowl",
-        fitness=number / 7 if fitness is None else fitness,
+        values={"fitness": number / 7 if fitness is None else fitness},
         ok=ok,
         reason="" if ok else "went wrong",
         seed=number,
-        design={"x": number / 3, "pad" + pad: 1.0},
-        work={"steps": number},
+        design={"x": number / 3, "y": 1.0},
+        work={"steps": number, "pad": pad},
         wall_s=0.5,
         created=1e9 + number,
+        start=number % 4,
     )
 
 
@@ -95,7 +96,7 @@ class FakeCache:
     def put(self, record):
         return self.records_by_key.setdefault(record.key, record)
 
-    def put_table(self, name, columns, attrs=None):
+    def put_table(self, name, columns, attrs=None, about=None):
         pass
 
     def fold(self):

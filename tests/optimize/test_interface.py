@@ -49,7 +49,7 @@ def test_plain_data_go_through_json(drift):
 @pytest.mark.long
 def test_a_frame_has_the_columns_of_the_table(drift):
     pytest.importorskip("pandas")
-    frame = drift.to_frame()
+    frame = drift.to_frame(hall=True)
     assert list(frame["rank"]) == list(range(1, len(drift.designs) + 1))
     assert frame["speed (m/s)"][0] == drift.designs[0].genes["speed"]
 

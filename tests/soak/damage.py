@@ -144,7 +144,8 @@ def _rows(path: Path) -> list[str]:
 def _record(k: int):
     from optimize.storage.record import Record
 
-    return Record(f"{k:064x}", "soak", 1 / (k + 3), True, "", k, {"x": k / 7}, {"steps": k}, 0.1, 1e9 + k)
+    values = {"fitness": 1 / (k + 3)}
+    return Record(f"{k:064x}", "soak", values, True, "", k, {"x": k / 7}, {"steps": k}, 0.1, 1e9 + k)
 
 
 def _journal(folder: Path) -> Path:

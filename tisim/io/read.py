@@ -23,8 +23,8 @@ READABLE = (
     "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
 )
 """These are the files that ``read`` reads, as messages list them."""
-SEARCH_FORMAT = "tisim evaluations 1"
-"""This is the format of a search.h5, which a room above defines; a test holds them together."""
+SEARCH_FORMAT = "tisim evaluations"
+"""The format of a search.h5 begins with this, which a room above defines; a test holds them together."""
 
 
 def read(path: str | Path) -> Any:
@@ -61,8 +61,8 @@ def _read_hdf5(path: Path) -> Any:
 
     with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", READABLE)), "r") as file:
         kind = str(file.attrs.get("format", "none"))
-    rule = f"{READABLE}; what is in a search is listed by `tisim cache`"
-    must(kind != SEARCH_FORMAT, "file to read", rule, Words(f"{path}, of a search"))
+    rule = f"{READABLE}; a search is read by `optimize.read`, and listed by `tisim cache`"
+    must(not kind.startswith(SEARCH_FORMAT), "file to read", rule, Words(f"{path}, of a search"))
     readers: dict[str, Callable[[Path], Any]] = {
         RESULT: run_folder.read_result,
         checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot,

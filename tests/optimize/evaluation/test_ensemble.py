@@ -106,7 +106,7 @@ def test_a_failed_start_never_wins_and_is_recorded(tmp_path, bad, reason):
     assert not failed.ok
     assert failed.reason == f"start 2 (seed {third}): {reason}"
     failures = [record for record in run.runs.cache.records() if not record.ok]
-    assert [(record.reason, record.seed, math.isnan(record.fitness)) for record in failures] == [
+    assert [(record.reason, record.seed, math.isnan(record.values["fitness"])) for record in failures] == [
         (reason, third, True)
     ]
     again = FakeEvaluator(function)

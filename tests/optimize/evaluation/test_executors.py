@@ -173,7 +173,7 @@ def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
     def records_of(path, runner, on_progress=None):
         with Cache(path) as cache:
             outcome = search(problem("default", ""), runner, cache, settings, on_progress=on_progress)
-        records = {record.key: (record.fitness, record.seed) for record in Cache(path).records()}
+        records = {record.key: (record.values, record.seed) for record in Cache(path).records()}
         return outcome, records
 
     def kill(where):

@@ -52,7 +52,7 @@ def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
     by_design = {}
     for record in cache.records_by_key.values():
         if record.seed in fresh:
-            by_design.setdefault(tuple(record.design.values()), []).append(record.fitness)
+            by_design.setdefault(tuple(record.design.values()), []).append(record.values["fitness"])
     assert sorted(np.mean(values) for values in by_design.values()) == pytest.approx(
         sorted(f.fresh.mean for f in results), rel=1e-12
     )

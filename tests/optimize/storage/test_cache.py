@@ -31,9 +31,9 @@ def test_round_trip_through_journal_and_hdf5(path):
 
 def test_first_record_of_a_key_counts(path):
     with Cache(path) as cache:
-        assert cache.put(fake_record(1)).fitness == 1 / 7
-        assert cache.put(fake_record(1, fitness=9.0)).fitness == 1 / 7
-    assert [record.fitness for record in existing(path).records()] == [1 / 7]
+        assert cache.put(fake_record(1)).values == {"fitness": 1 / 7}
+        assert cache.put(fake_record(1, fitness=9.0)).values == {"fitness": 1 / 7}
+    assert [record.values for record in existing(path).records()] == [{"fitness": 1 / 7}]
 
 
 def test_other_process_records_appear(path):
@@ -83,6 +83,7 @@ def test_tables_survive_other_writers_and_folds(path):
 
 def test_journal_folds_itself_when_large(path, monkeypatch):
     monkeypatch.setattr(cache_module, "FOLD_BYTES", 2000)
+    monkeypatch.setattr(cache_module, "FOLD_SHARE", 0.0)
     cache = Cache(path)
     for number in range(20):
         cache.put(fake_record(number))

@@ -8,6 +8,7 @@ import pytest
 from optimize.storage.cache import Cache
 from optimize.storage.hdf5_store import build_image
 from optimize.storage.maintenance import verify
+from optimize.storage.runs_table import tabulated
 from tests.optimize.cache_files import journal_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import RunError
@@ -79,9 +80,9 @@ def test_killed_fold_leaves_no_trace(path):
 def test_replace_file_is_all_or_nothing(tmp_path):
     target = tmp_path / "file"
     replace_file(target, b"old")
-    replace_file(target, build_image(None, [fake_record(1)], {}))
+    replace_file(target, build_image(tabulated([], [fake_record(1)]), {}))
     with h5py.File(target) as file:
-        assert len(file["evaluations/key"]) == 1
+        assert len(file["evaluations/bowl/key"]) == 1
 
 
 def test_writers_without_a_lock_of_their_own_take_turns(tmp_path):
