@@ -37,9 +37,22 @@ class Hall:
         return bool(self.strings) and (not leader or self.strings[0].fitness.values < leader)
 
 
+def reported(string: Individual) -> tuple[float, ...]:
+    """Return the costs by which a design is reported: from fresh starts, where it has any."""
+    return tuple(one.mean for one in string.confirmed) or tuple(string.fitness.values)
+
+
+def not_dominated(front: list[Individual]) -> list[Individual]:
+    """Return those of a front that no other dominates by the costs that are reported, in their order."""
+    costs = np.array([reported(string) for string in front])
+    no_better = np.all(costs[:, None] >= costs[None], axis=2)
+    worse = np.any(costs[:, None] > costs[None], axis=2)
+    return [string for string, out in zip(front, (no_better & worse).any(axis=1), strict=True) if not out]
+
+
 def compromise(front: list[Individual]) -> Individual:
     """Return the design of a front nearest to the best of each objective, the front's ranges taken as 1."""
-    costs = np.array([string.fitness.values for string in front])
+    costs = np.array([reported(string) for string in front])
     span = np.ptp(costs, axis=0)
     distance = np.linalg.norm((costs - costs.min(axis=0)) / np.where(span > 0, span, 1.0), axis=1)
     return front[int(np.argmin(distance))]

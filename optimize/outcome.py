@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,7 +16,7 @@ from optimize.methods.individual import Individual
 from optimize.problem.gene_values import Value
 from optimize.problem.problem import Problem
 from optimize.settings import Settings, search_name
-from optimize.tables import best_columns, design_columns, half_width_of, logbook_columns, units
+from optimize.tables import best_columns, design_columns, error_of, interval_of_value, logbook_columns, units
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -51,13 +52,14 @@ class Design:
 
     genes : the value of each gene, by name, in its unit: a number, a text or a flag. values : of each
     objective, by name, in its unit: the mean over random starts, the fresh ones where there are any.
-    intervals : half-widths of their 95 % confidence intervals. starts : how many there were. converged :
-    whether the last of them changed the mean by less than the tolerance that was asked for.
+    intervals : the ends of their 95 % confidence intervals, of fresh starts; NaN where there are none, as the
+    starts that a design was chosen by flatter it. starts : how many there were. converged : whether the last
+    of them changed the mean by less than the tolerance that was asked for.
     """
 
     genes: dict[str, Any]
     values: dict[str, float]
-    intervals: dict[str, float]
+    intervals: dict[str, tuple[float, float]]
     starts: int
     converged: bool
 
@@ -66,10 +68,10 @@ class Design:
 class Outcome:
     """An outcome holds what a search has found.
 
-    hall : the best different designs, best first (by fresh starts once they are confirmed; empty if none
-    succeeded); of several objectives the front. Failed designs never enter. estimates : those
-    of each design that succeeded, by its string, in the order they were first estimated. failures : those of
-    each design that failed, with the reason.
+    hall : the best different designs, best first, by all that the search knows of them (see
+    optimize.conclusion; empty if none succeeded); of several objectives the front. Failed designs never
+    enter. estimates : those of each design that succeeded, by its string, in the order they were first
+    estimated. failures : those of each design that failed, with the reason.
     logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations requested),
     failed, box (mean width of the search box it drew from), recentred (box moved after it), best (so far;
     infinitely bad if there is none), and for one objective mean and std of the successful designs in the
@@ -115,10 +117,15 @@ class Outcome:
         estimates = string.confirmed or string.estimates
         names = [objective.name for objective in self.problem.objectives]
         means = self.problem.costs([estimate.mean for estimate in estimates])
+        sure = bool(string.confirmed) or all(estimate.std == 0 for estimate in estimates)
+        intervals = {
+            one.name: interval_of_value(estimate, one) if sure else (math.nan, math.nan)
+            for one, estimate in zip(self.problem.objectives, estimates, strict=True)
+        }
         return Design(
             genes=self.problem.genome.decode(string),
             values=dict(zip(names, means, strict=True)),
-            intervals={name: e.half_width for name, e in zip(names, estimates, strict=True)},
+            intervals=intervals,
             starts=estimates[0].starts,
             converged=estimates[0].converged,
         )
@@ -145,7 +152,7 @@ class Outcome:
 
     def to_frame(self, *, hall: bool = False) -> DataFrame:
         """Return all designs of the search as a pandas data frame, a row for each: its genes by name, the
-        mean of each objective over random starts, half of its 95 % confidence interval, how many starts there
+        mean of each objective over random starts, its standard error, how many starts there
         were, whether the mean converged, and why the design failed ("" if it did not).
 
         hall : the hall of fame instead, with the columns of best.csv. ``frame.attrs["units"]`` has the unit
@@ -153,7 +160,7 @@ class Outcome:
         """
         if hall:
             return data_frame(best_columns(self.problem, self.hall), units(self.problem))
-        intervals = {half_width_of(one.name): one.unit for one in self.problem.objectives}
+        intervals = {error_of(one.name): one.unit for one in self.problem.objectives}
         columns = design_columns(self.problem, {**self.estimates, **self.failures})
         return data_frame(columns, self._units | intervals)
 

@@ -6,10 +6,12 @@ on the same cache file: every finished evaluation comes from there, the rest fol
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from optimize.conclusion import concluded, proven, reserve
 from optimize.evaluation.ensemble import Ensemble
 from optimize.evaluation.runs import Evaluator
 from optimize.generation_log import statistics
@@ -65,14 +67,14 @@ class _Search:
         fit(problem, settings)
         self.problem, self.cache, self.settings = problem, cache, settings
         self.on_generation, self.on_progress = on_generation, on_progress
-        self.ensemble = Ensemble(
-            problem, evaluator, cache, settings.ensemble, settings.seed, settings.max_evaluations
-        )
+        self.ensemble = Ensemble(problem, evaluator, cache, settings.ensemble, settings.seed)
         self.method = find(settings.method)(
             problem.genome, len(problem.objectives), settings.options, settings.seed
         )
         self.hall = Hall(settings.hall_of_fame)
+        self.known: dict[tuple[float, ...], Individual] = {}
         self.ranked: list[Individual] = []
+        self.tried: set[tuple[float, ...]] = set()  # designs that did not meet the target for sure
         self.stagnation = self.refused = 0
         self.outcome = Outcome(problem, settings, identity(problem, settings, evaluator.settings))
         self.began = time.monotonic()
@@ -82,7 +84,7 @@ class _Search:
             self._store()  # from now on the file is known to be of this search
         try:
             self._generations()
-            self._confirm()
+            self._conclude()
         except KeyboardInterrupt:
             self.outcome.stopped = "interrupted"
         except _OutOfTime:
@@ -90,20 +92,29 @@ class _Search:
         self._store()
         return self.outcome
 
-    def _confirm(self) -> None:
-        """Run the best designs again from fresh starts, and rank them by their means over those."""
-        if not self.settings.ensemble.confirm or not self.hall.strings or self._out_of_time():
+    def _conclude(self) -> None:
+        """Choose the best designs from all that are known, and report them from fresh starts."""
+        if not self.hall.strings or self._out_of_time():
             return
+        self.ensemble.budget = self._budget
         last = len(self.outcome.logbook) - 1
-        designs = [self.problem.genome.decode(string) for string in self.hall.strings]
-        confirmed = self.ensemble.confirm(designs, lambda fraction: self._report(last, 1.0))
-        for string, estimates in zip(self.hall.strings, confirmed, strict=True):
-            string.confirmed = estimates
-        self.ranked = sorted(self.hall.strings, key=lambda s: [estimate.mean for estimate in s.confirmed])
+        ranked = concluded(
+            self.problem, self.settings, self.ensemble, list(self.known.values()),
+            lambda fraction: self._report(last, 1.0),
+        )  # fmt: skip
+        if self.outcome.stopped == "target":
+            ranked = [self.hall.strings[0], *(one for one in ranked if one is not self.hall.strings[0])]
+        self.ranked = ranked
+
+    @property
+    def _budget(self) -> float:
+        most = self.settings.max_evaluations
+        return math.inf if most is None else most
 
     def _generations(self) -> None:
         for generation in range(self.settings.generations + 1):
             width = self.method.width
+            self.ensemble.budget = self._budget - reserve(self.problem, self.settings, self.ensemble)
             requested_before = self.ensemble.requested
             population = self.method.ask()
             fresh = self._estimate(population, generation)
@@ -148,6 +159,7 @@ class _Search:
                 string.know(estimates)
                 known = self.outcome.failures if string.failed else self.outcome.estimates
                 known[tuple(string)] = estimates
+                self.known.setdefault(tuple(string), string)
         return sum(string.fitness.valid for string in fresh)
 
     def _race(self, population: list[Individual], generation: int) -> None:
@@ -159,7 +171,8 @@ class _Search:
         raced = self.ensemble.race(designs, lambda fraction: self._report(generation, 1.0))
         by_string = {tuple(string): estimates for string, estimates in zip(racing, raced, strict=True)}
         self.outcome.estimates |= by_string
-        for string in (*racing, *population):
+        known = [self.known[string] for string in by_string if string in self.known]
+        for string in (*racing, *population, *known):
             if tuple(string) in by_string:
                 string.know(by_string[tuple(string)])
         self.hall.update(population)
@@ -174,8 +187,12 @@ class _Search:
         settings = self.settings
         if settings.target is not None and self.hall.strings:
             (goal,) = self.problem.costs([settings.target])
-            if self.hall.strings[0].fitness.values[0] <= goal:
-                return "target"
+            leader = self.hall.strings[0]
+            if leader.fitness.values[0] <= goal and tuple(leader) not in self.tried:
+                self.tried.add(tuple(leader))
+                self.ensemble.budget = self._budget
+                if proven(self.problem, leader, self.ensemble, goal):
+                    return "target"
         if settings.patience is not None and self.stagnation >= settings.patience:
             return "patience"
         if self.ensemble.exhausted or self.ensemble.requested >= self.ensemble.budget:

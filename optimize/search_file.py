@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from optimize.frames import data_frame
 from optimize.search_folder import SEARCH_FILE
@@ -17,10 +16,9 @@ from optimize.search_records import searches
 from optimize.storage.cache import Cache, existing
 from optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE, descriptions
 from optimize.storage.runs_table import RunsTable, packed
-from optimize.tables import half_width_of
+from optimize.tables import error_of
 from tisim.errors import must
 from tisim.files.regular_file import is_folder
-from tisim.numerics.statistics import CONFIDENCE
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -73,7 +71,7 @@ class SearchFile:
 
     def designs(self, problem: str | None = None) -> DataFrame:
         """Return every design of a problem, a row for each: genes, the mean of each value over all runs of it
-        that ended well, half of its 95 % confidence interval, their number, and why the first one that failed
+        that ended well, its standard error, their number, and why the first one that failed
         did ("" where none has)."""
         return self._frame(problem, _designs)
 
@@ -107,7 +105,7 @@ class SearchFile:
     def _frame(self, problem: str | None, columns: Callable[[RunsTable], Mapping[str, Any]]) -> DataFrame:
         name = _one(problem, self.problems, "problem")
         named = self._units.get(name, {})
-        intervals = {half_width_of(head): unit for head, unit in named.items()}
+        intervals = {error_of(head): unit for head, unit in named.items()}
         units = {**named, **intervals, "wall_s": "s", "created": "s"}
         frames = [data_frame(columns(part), units) for part in self._runs if part.problem == name]
         if len(frames) == 1:
@@ -137,7 +135,7 @@ def _designs(part: RunsTable) -> dict[str, NDArray[Any]]:
     columns = {name: _text(column[first]) for name, column in part.genes.items()}
     for name, values in part.values.items():
         known = ok & ~np.isnan(values)
-        columns[name], columns[half_width_of(name)] = _means(values[known], design[known], len(first))
+        columns[name], columns[error_of(name)] = _means(values[known], design[known], len(first))
     columns["starts"] = np.bincount(design[ok], minlength=len(first))
     reasons = np.full(len(first), "", dtype=object)
     failed = np.flatnonzero(~ok)[::-1]  # the first of a design is written last
@@ -157,15 +155,13 @@ def _different(part: RunsTable) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _means(values: NDArray[Any], design: NDArray[Any], designs: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the mean of each design, and half of its 95 % confidence interval by Student's t; NaN for fewer
-    than two values."""
+    """Return the mean of each design, and its standard error; NaN for fewer than two values."""
     count = np.bincount(design, minlength=designs)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(design, values, designs) / count
         variance = np.bincount(design, (values - mean[design]) ** 2, designs) / (count - 1)
-        quantile = student.ppf(0.5 + CONFIDENCE / 2, np.maximum(count - 1, 1))
-        half = quantile * np.sqrt(variance / count)
-    return mean, np.where(count < 2, np.nan, half)
+        error = np.sqrt(variance / count)
+    return mean, np.where(count < 2, np.nan, error)
 
 
 def _one(name: str | None, known: Sequence[str], what: str) -> str:

@@ -9,13 +9,15 @@ from typing import Any
 from pydantic import Field, SerializeAsAny, model_validator
 
 from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.methods.base import every, find
+from optimize.methods.base import SearchMethod, every, find
 from optimize.problem.problem import Problem
 from optimize.storage.record import canonical
 from tisim.components.component import Checked
 from tisim.errors import must
 
-IDENTITY_FORMAT = 3
+METHOD = "gaussian-process"
+"""The method of a search for which none is given."""
+IDENTITY_FORMAT = 4
 """The version of the identity below; it is raised when a search of before cannot be resumed any more."""
 
 
@@ -33,7 +35,7 @@ class Settings(Checked):
     """
 
     seed: int = Field(0, ge=0)
-    method: str = "genetic"
+    method: str = "gaussian-process"
     options: SerializeAsAny[Checked] = Checked()
     generations: int = Field(25, ge=0)
     ensemble: EnsembleSettings = EnsembleSettings()
@@ -51,17 +53,29 @@ class Settings(Checked):
     @model_validator(mode="before")
     @classmethod
     def _options_of_the_method(cls, data: dict[str, Any]) -> dict[str, Any]:
-        kind = find(data.get("method", "genetic")).Options
+        method = find(data.get("method", METHOD))
+        kind = method.Options
         options = data.get("options", {})
         if not isinstance(options, kind):
             named = isinstance(options, Mapping) and all(isinstance(name, str) for name in options)
             must(named, "search.options", "settings of the method, by name", options)
             options = kind(**options)
-        return {**data, "options": options}
+        return {**data, "options": options, "ensemble": _ensemble(method, data.get("ensemble", {}))}
+
+
+def _ensemble(method: type[SearchMethod], given: Any) -> Any:
+    """Return the settings of the ensemble: those that are given, else those that suit the method."""
+    if not isinstance(given, Mapping):
+        return (
+            given
+            if given.common_starts is not None
+            else given.model_copy(update={"common_starts": not method.own_starts})
+        )
+    return {"common_starts": not method.own_starts, **method.ensemble, **given}
 
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
-_AFTERWARDS = {"confirm"}
+_AFTERWARDS = {"select", "confirm"}
 
 
 def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any]) -> dict[str, Any]:
@@ -103,7 +117,7 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
     Where a case has 24 strings and 8 parents, 12 strings shall have as many parents as go with 12.
     usual : settings of the case. changes : settings in place of them, by dotted name.
     """
-    method = find(changes.get("method", usual.get("method", "genetic")))
+    method = find(changes.get("method", usual.get("method", METHOD)))
     dropped = {
         name
         for option, names in method.dependent_options.items()
@@ -128,9 +142,9 @@ def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> d
 
     base : of the case. method : by name; None for the case's, or what its objectives need.
     """
-    usual = base.get("method", "genetic")
+    usual = base.get("method", METHOD)
     if method is None and problem.several and not find(usual).several:
-        method = "nsga2"
+        method = METHOD
     if method is None or issubclass(find(method).Options, find(usual).Options):
         return {**base, "method": method or usual}
     return {**{key: value for key, value in base.items() if key != "options"}, "method": method}

@@ -12,18 +12,22 @@ from deap import tools
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.problem.calls import constraint_value
+from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
 
+FRESH_STARTS = ", fresh starts"
+ERROR, LOW, HIGH = "std. error", "95 % low", "95 % high"
+"""Headings, or ends of headings."""
 Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
 """What is known of designs, by their strings."""
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
     """Return the columns of Z04's tables 1 to 3 in one: rank, every gene in its unit, each constraint of the
-    design, each objective with the half-width of its 95 % confidence interval, the derived columns of the
-    problem, starts, whether their mean converged; the same from fresh starts where the designs have been
-    confirmed. Heading -> values, best first; of several objectives the front along the first, the best of
-    that first.
+    design, each objective as the search knows it with its standard error, the derived columns of the problem,
+    starts, whether their mean converged (where that was asked of any); and from fresh starts, where the
+    designs have had some, each objective with the ends of its 95 % confidence interval. Heading -> values,
+    best first; of several objectives the front along the first, the best of that first.
     """
     estimates = [string.estimates for string in hall]
     number = "front" if problem.several else "rank"
@@ -35,10 +39,12 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
         columns[constraint.label] = [constraint_value(constraint, one, problem) for one in designs]
     columns |= _objectives(problem, estimates, "")
     columns["starts"] = [of_all[0].starts for of_all in estimates]
-    columns["converged"] = ["yes" if of_all[0].converged else "no" for of_all in estimates]
+    if any(of_all[0].converged for of_all in estimates):
+        columns["converged"] = ["yes" if of_all[0].converged else "no" for of_all in estimates]
     confirmed = [string.confirmed for string in hall if string.confirmed]
-    if confirmed:
-        columns |= _objectives(problem, confirmed, ", fresh starts")
+    if confirmed and len(confirmed) == len(hall):
+        columns |= _objectives(problem, confirmed, FRESH_STARTS)
+        columns[f"starts{FRESH_STARTS}"] = [of_all[0].starts for of_all in confirmed]
     return columns
 
 
@@ -47,31 +53,42 @@ def _objectives(
 ) -> Mapping[str, list[Any]]:
     columns: dict[str, list[Any]] = {}
     for k, objective in enumerate(problem.objectives):
-        means = [objective.sign * of_all[k].mean for of_all in estimates]
+        mine = [of_all[k] for of_all in estimates]
+        means = [objective.sign * one.mean for one in mine]
         columns[f"{objective.label}{after}"] = means
-        interval = half_width_of(objective.name) if problem.several else "95 % +-"
-        columns[f"{interval}{after}"] = [of_all[k].half_width for of_all in estimates]
+        name = f"{objective.name} " if problem.several else ""
+        if after:
+            ends = [interval_of_value(one, objective) for one in mine]
+            columns[f"{name}{LOW}{after}"] = [low for low, _ in ends]
+            columns[f"{name}{HIGH}{after}"] = [high for _, high in ends]
+        elif any(one.std for one in mine):
+            columns[f"{name}{ERROR}"] = [one.standard_error for one in mine]
         for heading, function in problem.derived.items():
             columns[f"{heading}{after}"] = [float(function(mean)) for mean in means]
     return columns
+
+
+def interval_of_value(estimate: FitnessEstimate, objective: Objective) -> tuple[float, float]:
+    """Return the ends of the interval of an objective's value, of that of its cost."""
+    low, high = sorted((objective.sign * estimate.low, objective.sign * estimate.high))
+    return low, high
 
 
 def units(problem: Problem) -> dict[str, str]:
     """Return the unit of each column of these tables that has one."""
     found = {gene.label: gene.unit for gene in problem.genome.genes}
     for objective in problem.objectives:
-        interval = half_width_of(objective.name) if problem.several else "95 % +-"
+        name = f"{objective.name} " if problem.several else ""
         progress = (f"best {objective.label}",) if problem.several else ("best", "mean", "std")
-        for heading in (objective.label, interval):
-            found |= dict.fromkeys((heading, f"{heading}, fresh starts"), objective.unit)
-        found |= dict.fromkeys(progress, objective.unit)
+        fresh = (objective.label, f"{name}{LOW}", f"{name}{HIGH}")
+        headings = (objective.label, f"{name}{ERROR}", *progress, *(f"{one}{FRESH_STARTS}" for one in fresh))
+        found |= dict.fromkeys(headings, objective.unit)
     return {heading: unit for heading, unit in found.items() if unit}
 
 
 def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
     """Return the columns of designs by the names of genes and objectives: every gene, the mean of each
-    objective and the half-width of its 95 % confidence interval (NaN where the design failed), starts,
-    converged, and why it failed."""
+    objective and its standard error (NaN where the design failed), starts, converged, and why it failed."""
     designs = [problem.genome.decode(string) for string in estimates]
     columns: dict[str, list[Any]] = {
         gene.name: [design[gene.name] for design in designs] for gene in problem.genome.genes
@@ -79,7 +96,7 @@ def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any
     for k, objective in enumerate(problem.objectives):
         mine = [of_all[k] for of_all in estimates.values()]
         columns[objective.name] = [objective.sign * e.mean if e.ok else math.nan for e in mine]
-        columns[half_width_of(objective.name)] = [e.half_width for e in mine]
+        columns[error_of(objective.name)] = [e.standard_error for e in mine]
     first = [of_all[0] for of_all in estimates.values()]
     columns["starts"] = [e.starts for e in first]
     columns["converged"] = [e.converged for e in first]
@@ -87,9 +104,9 @@ def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any
     return columns
 
 
-def half_width_of(name: str) -> str:
-    """Return the heading of half of the 95 % confidence interval of a mean."""
-    return f"{name} 95 % +-"
+def error_of(name: str) -> str:
+    """Return the heading of the standard error of a mean over starts."""
+    return f"{name} {ERROR}"
 
 
 def met_strings(problem: Problem, estimates: Estimates) -> list[tuple[float, ...]]:

@@ -1,12 +1,10 @@
-"""Fitness of designs averaged over random starts until the running mean converges (Z04 Eq. 8.1).
-
-Designs that compete for the first place can be given more starts.
-"""
+"""Fitness of designs averaged over random starts: few for each, more for those that compete to be best."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -20,36 +18,40 @@ from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.numerics.statistics import half_width
 
-Design = Mapping[str, float]
+Design = Mapping[str, Any]
 Report = Callable[[float], None]
+LOOKED_AT = 2
+"""Designs that are run from two starts, to see whether these differ."""
+FRESH = 10**6
+"""The number of the first start that only reports use. None of a search is as large."""
 
 
 class EnsembleSettings(Checked):
     """How many random starts a fitness is averaged over.
 
-    tolerance : TOL of Z04 Eq. 8.1. block : starts per evaluator call (the first block has min_starts if
-    that is more). min_starts, max_starts : bounds of the number of starts. common_starts : start k is the
-    same for every design, so that designs are compared on equal terms; False draws each design's own.
-    race : starts that a generation spends, beyond Eq. 8.1, on telling the best designs apart (0: none).
-    confirm : fresh starts from which the best designs are run again once the search has ended (0: not).
+    min_starts : starts of every design. tolerance : TOL of Z04 Eq. 8.1: starts are added, ``block`` in each
+    call of the evaluator, until the mean changes by less than this part of it, max_starts at most. None: no
+    more are added. common_starts : start k is the same for every design, so that designs are compared on
+    equal terms; False: each design has starts of its own; None: what is best for the method.
+    race : starts that a generation spends on telling the best designs apart (0: none).
+    select : starts that each of the best designs gets once the search has ended, before the best is chosen.
+    confirm : fresh starts of each of the best designs after that, from which they are reported; fewer where
+    they would take more than a quarter of the budget. (0: none, and no intervals.)
     """
 
-    tolerance: float = Field(5e-4, gt=0, lt=1)
-    block: int = Field(6, ge=1)
-    min_starts: int = Field(4, ge=1)
+    min_starts: int = Field(2, ge=1)
     max_starts: int = Field(48, ge=1)
-    common_starts: bool = True
+    tolerance: float | None = Field(None, gt=0, lt=1)
+    block: int = Field(2, ge=1)
+    common_starts: bool | None = None
     race: int = Field(0, ge=0)
-    confirm: int = Field(0, ge=0)
+    select: int = Field(4, ge=0)
+    confirm: int = Field(16, ge=0)
 
     @classmethod
     def kind(cls) -> str:
         """Return the name of these settings in messages, as in ``--set search.ensemble.block=2``."""
         return "search.ensemble"
-
-    def once(self) -> EnsembleSettings:
-        """Return the settings for a problem of which all starts of a design give the same."""
-        return self.model_copy(update={"min_starts": 1, "max_starts": 1, "block": 1})
 
     @model_validator(mode="after")
     def _ordered(self) -> EnsembleSettings:
@@ -65,9 +67,10 @@ class EnsembleSettings(Checked):
 class Ensemble:
     """Estimates the objectives of designs; each design is known once it has been estimated.
 
-    budget : most runs that estimates and races may ask for (None: no end); exhausted : it has cut one short.
-    runs : counts them. An estimate is a tuple, one FitnessEstimate of the cost for each
-    objective.
+    budget : most runs that may be asked for (inf: no end); exhausted : it has cut an estimate short.
+    repeatable : whether all starts of a design give the same run, so that one is enough; found out by looking
+    at the first designs, None before. runs : counts them. An estimate is a tuple, one FitnessEstimate of the
+    cost for each objective.
     """
 
     def __init__(
@@ -77,13 +80,12 @@ class Ensemble:
         cache: Cache,
         settings: EnsembleSettings,
         seed: int,
-        budget: int | None = None,
     ) -> None:
-        self.settings = settings.once() if problem.deterministic else settings
-        self.objectives = len(problem.objectives)
-        self.runs = Runs(problem, evaluator, cache, seed, settings.common_starts)
-        self.budget = math.inf if budget is None else budget
+        self.settings, self.objectives = settings, len(problem.objectives)
+        self.runs = Runs(problem, evaluator, cache, seed, settings.common_starts is not False)
+        self.budget = math.inf
         self.exhausted = False
+        self.repeatable: bool | None = True if problem.deterministic else None
         self._known: dict[bytes, Sample] = {}
 
     @property
@@ -103,40 +105,54 @@ class Ensemble:
         settings = self.settings
         samples = [self._sample(design) for design in designs]
         different = list(dict.fromkeys(samples))
-        size = max(settings.block, settings.min_starts)
-        first, largest_fraction = 0, 0.0
+        if self.repeatable is None and settings.min_starts > 1:
+            self._look(different[:LOOKED_AT])
+        least = 1 if self.repeatable else settings.min_starts
+        most = settings.max_starts if settings.tolerance and not self.repeatable else least
+        largest_fraction = 0.0
         while running := [sample for sample in different if sample.open]:
-            last = min(first + size, settings.max_starts)
-            afforded = self._afforded(running, last - first)
-            finished_designs = sum(
-                1.0 if not sample.open else first / settings.max_starts for sample in different
-            )
-            share = len(afforded) * (last - first) / settings.max_starts
+            goals = {s: len(s.costs) + settings.block if len(s.costs) >= least else least for s in running}
+            goals = {s: min(max(goal, len(s.costs)), most) for s, goal in goals.items()}
+            afforded = self._afforded(running, goals)
+            finished = sum(1.0 if not s.open else len(s.costs) / most for s in different)
+            share = sum(goals[s] - len(s.costs) for s in afforded) / most
 
-            def report(
-                fraction: float, finished_designs: float = finished_designs, share: float = share
-            ) -> None:
+            def report(fraction: float, finished: float = finished, share: float = share) -> None:
                 nonlocal largest_fraction
-                largest_fraction = max(
-                    largest_fraction, (finished_designs + share * fraction) / len(different)
-                )
+                largest_fraction = max(largest_fraction, (finished + share * fraction) / len(different))
                 if progress is not None:
                     progress(largest_fraction)
 
             for sample in running[len(afforded) :]:
                 sample.open = False
-            self.runs.add([(sample, range(first, last)) for sample in afforded], report)
+            self.runs.add([(s, range(len(s.costs), goals[s])) for s in afforded], report)
             for sample in afforded:
-                if sample.reason:
-                    sample.open = False
-                    continue
-                converged = converged_after(sample.costs, settings.tolerance, settings.min_starts)
-                sample.used, sample.converged = converged or len(sample.costs), converged is not None
-                sample.open = converged is None and last < settings.max_starts
-            first, size = last, settings.block
+                self._judge(sample, most)
         if progress is not None:
             progress(1.0)
         return [self._summary(sample) if sample.used or sample.reason else None for sample in samples]
+
+    def _judge(self, sample: Sample, most: int) -> None:
+        """Say whether a sample has all the starts that it is to have."""
+        if sample.reason:
+            sample.open = False
+            return
+        tolerance, least = self.settings.tolerance, self.settings.min_starts
+        converged = converged_after(sample.costs, tolerance, least) if tolerance else None
+        sample.used = converged or len(sample.costs)
+        sample.converged = converged is not None or bool(self.repeatable)
+        sample.open = converged is None and len(sample.costs) < most
+
+    def _look(self, samples: Sequence[Sample]) -> None:
+        """Run the first designs from two starts each, and see whether these end in the same state, to the
+        last bit, after the same work."""
+        looked = [sample for sample in samples if sample.open and not sample.costs]
+        if 2 * len(looked) > self.budget - self.requested:
+            return
+        self.runs.add([(sample, range(2)) for sample in looked])
+        ended = [sample for sample in looked if not sample.reason]
+        if ended:
+            self.repeatable = all(None not in s.ends and len(set(s.ends)) == 1 for s in ended)
 
     def race(
         self, designs: Sequence[Design], progress: Report | None = None
@@ -168,30 +184,47 @@ class Ensemble:
             racing = self._unbeaten(racing)
         return [self._summary(sample) for sample in samples]
 
-    def confirm(
-        self, designs: Sequence[Design], progress: Report | None = None
+    def more(
+        self, designs: Sequence[Design], starts: int, progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Return the estimates of each design from `confirm` starts that no other has used; the budget is not
-        asked.
+        """Give each of these designs that number of starts more; their estimates afterwards."""
+        samples = [self._sample(design) for design in designs]
+        additions = [(s, range(len(s.costs), len(s.costs) + starts)) for s in dict.fromkeys(samples)]
+        self.runs.add(additions, progress or (lambda fraction: None))
+        for sample, _ in additions:
+            sample.used = len(sample.costs)
+        return [self._summary(sample) for sample in samples]
+
+    def fresh(
+        self,
+        designs: Sequence[Design],
+        starts: int,
+        first: int = FRESH,
+        progress: Report | None = None,
+    ) -> list[tuple[FitnessEstimate, ...]]:
+        """Return the estimates of each design from that number of starts that nothing else has used; first :
+        the number of the first of these.
 
         A winner has won by being good and by being lucky in its starts; this is without the luck.
         """
         samples = [Sample(design) for design in designs]
-        first = self.settings.max_starts
-        starts = range(first, first + self.settings.confirm)
-        self.runs.add([(sample, starts) for sample in samples], progress or (lambda fraction: None))
+        additions = [(sample, range(first, first + starts)) for sample in samples]
+        self.runs.add(additions, progress or (lambda fraction: None))
         for sample in samples:
-            sample.used, sample.converged = len(sample.costs), True
+            sample.used, sample.converged = len(sample.costs), bool(self.repeatable)
         return [self._summary(sample) for sample in samples]
 
     def _sample(self, design: Design) -> Sample:
         return self._known.setdefault(canonical(dict(design)), Sample(design))
 
-    def _afforded(self, running: list[Sample], starts: int) -> list[Sample]:
-        room = (self.budget - self.requested) // starts
-        if room < len(running):
-            self.exhausted = True
-            return running[: int(room)]
+    def _afforded(self, running: list[Sample], goals: Mapping[Sample, int]) -> list[Sample]:
+        """Return those of the samples, from the first, whose starts the budget can pay."""
+        left = self.budget - self.requested
+        for count, sample in enumerate(running):
+            left -= goals[sample] - len(sample.costs)
+            if left < 0:
+                self.exhausted = True
+                return running[:count]
         return running
 
     def _unbeaten(self, samples: Sequence[Sample]) -> list[Sample]:
@@ -200,10 +233,15 @@ class Ensemble:
 
     def _summary(self, sample: Sample) -> tuple[FitnessEstimate, ...]:
         if sample.reason:
-            failed = FitnessEstimate(math.inf, math.nan, math.nan, len(sample.costs), False, sample.reason)
-            return (failed,) * self.objectives
-        columns = zip(*sample.costs[: sample.used], strict=True)
-        return tuple(FitnessEstimate.of(column, sample.converged) for column in columns)
+            return (FitnessEstimate.failed(len(sample.costs), sample.reason),) * self.objectives
+        columns = list(zip(*sample.costs[: sample.used], strict=True))
+        if self.repeatable:
+            return tuple(FitnessEstimate.certain(column[0]) for column in columns)
+        seen = self.runs.seen
+        return tuple(
+            FitnessEstimate.of(column, sample.converged, sorted(values))
+            for column, values in zip(columns, seen, strict=True)
+        )
 
 
 def _beats(one: Sample, other: Sample) -> bool:

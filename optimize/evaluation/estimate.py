@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tisim.numerics.statistics import half_width
+from tisim.numerics.skewed import interval
 
 
 @dataclass(frozen=True)
@@ -17,14 +17,15 @@ class FitnessEstimate:
     """Fitness of one design.
 
     mean : of the first `starts` starts, +inf if the design failed. std : sample standard deviation.
-    half_width : of the 95 % confidence interval of the mean (Student t; the stopping rule's own effect on
-    coverage is not corrected for). converged : Eq. 8.1 was met. reason : "" or why the design failed.
-    std and half_width are NaN for fewer than two starts and for failed designs.
+    low, high : ends of the 95 % confidence interval of the mean (tisim.numerics.skewed). It holds for starts
+    that have not had a part in choosing the design. converged : Eq. 8.1 was met. reason : "" or why the
+    design failed. std, low and high are NaN where they are not known, and for failed designs.
     """
 
     mean: float
     std: float
-    half_width: float
+    low: float
+    high: float
     starts: int
     converged: bool
     reason: str = ""
@@ -33,14 +34,36 @@ class FitnessEstimate:
     def ok(self) -> bool:
         return not self.reason
 
+    @property
+    def half_width(self) -> float:
+        """Half of the width of the interval."""
+        return (self.high - self.low) / 2
+
+    @property
+    def standard_error(self) -> float:
+        """The standard error of the mean; NaN for one start."""
+        return self.std / math.sqrt(self.starts) if self.starts else math.nan
+
     @classmethod
-    def of(cls, values: Sequence[float], converged: bool) -> FitnessEstimate:
-        """Return the estimate from the fitness of each start; at least one."""
+    def of(cls, values: Sequence[float], converged: bool, seen: Sequence[float] = ()) -> FitnessEstimate:
+        """Return the estimate from the fitness of each start; at least one.
+
+        seen : values that other designs have had: starts that are all equal do not exclude these.
+        """
         n = len(values)
         mean = float(np.cumsum(values)[-1] / n)  # summed as in converged_after, to the last bit
         std = float(np.std(values, ddof=1)) if n > 1 else math.nan
-        unsure = float(half_width(values)) if n > 1 else math.nan
-        return cls(mean, std, unsure, n, converged)
+        return cls(mean, std, *interval(values, seen), n, converged)
+
+    @classmethod
+    def certain(cls, value: float) -> FitnessEstimate:
+        """Return the estimate of a design all of whose starts are the same."""
+        return cls(value, 0.0, value, value, 1, True)
+
+    @classmethod
+    def failed(cls, starts: int, reason: str) -> FitnessEstimate:
+        """Return the estimate of a design of which a run failed, or could not be made."""
+        return cls(math.inf, math.nan, math.nan, math.nan, starts, False, reason)
 
 
 def converged_after(values: ArrayLike, tolerance: float, min_starts: int) -> int | None:

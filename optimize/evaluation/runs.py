@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import time
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
@@ -19,6 +20,10 @@ from tisim import InputError, RunError
 
 if TYPE_CHECKING:
     from tisim import Result, Scene
+
+
+END = "end"
+"""The name of the checksum of the last state of a run among its counts."""
 
 
 class Evaluator(Protocol):
@@ -52,17 +57,37 @@ def start_seed(seed: int, start: int, design: Mapping[str, float] | None = None)
     return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0] >> 1)
 
 
+def work_of(result: Any) -> dict[str, Any]:
+    """Return the counts of a run and, under END, a checksum of its last state, where it has one."""
+    work, state = dict(result.work), getattr(result, "state", None)
+    if result.status.ok and state:
+        end = zlib.crc32(repr(sorted(work.items())).encode())
+        for name in sorted(state):
+            end = zlib.crc32(np.ascontiguousarray(state[name]).tobytes(), end)
+        work[END] = end
+    return work
+
+
+def _widen(seen: list[float], value: float) -> None:
+    """Take a value into the least, the largest and one other of those seen."""
+    if value not in seen:
+        seen.append(value)
+        if len(seen) > 3:
+            seen[:] = [min(seen), sorted(seen)[1], max(seen)]
+
+
 @dataclass(eq=False)
 class Sample:
     """The starts of one design so far.
 
     costs : of each start, (starts, objectives). used : how many of them, from the first, its estimate
-    stands on. converged : see FitnessEstimate. reason : "" or why the design failed. open : whether more
-    starts are to come.
+    stands on. ends : of each start, what tells its run from another (see ``end_of``). converged : see
+    FitnessEstimate. reason : "" or why the design failed. open : whether more starts are to come.
     """
 
     design: Mapping[str, float]
     costs: list[tuple[float, ...]] = field(default_factory=list)
+    ends: list[int | None] = field(default_factory=list)
     used: int = 0
     converged: bool = False
     reason: str = ""
@@ -72,7 +97,8 @@ class Sample:
 class Runs:
     """Runs what is requested and not known. evaluations, hits : runs made, and found in the cache instead;
     together they are the different runs that were requested, the same for a search that was resumed.
-    requested : all of them, those that were asked for twice too.
+    requested : all of them, those that were asked for twice too. seen : for each objective the least and the
+    largest cost so far, and one between.
 
     common : start k is the same for every design.
     """
@@ -85,6 +111,7 @@ class Runs:
         self.evaluations = 0
         self.hits = 0
         self.requested = 0
+        self.seen: list[list[float]] = [[] for _ in problem.objectives]
         self._requested: set[str] = set()
 
     def add(
@@ -131,6 +158,9 @@ class Runs:
             if record.ok:
                 values = [record.values[objective.name] for objective in self.problem.objectives]
                 sample.costs.append(self.problem.costs(values))
+                sample.ends.append(record.work.get(END))
+                for seen, cost in zip(self.seen, sample.costs[-1], strict=True):
+                    _widen(seen, cost)
 
     def _run(
         self, missing: Mapping[str, tuple[Scene, Sample, int, int]], report: Callable[[float], None]
@@ -165,7 +195,7 @@ class Runs:
             reason="" if ok else reason,
             seed=seed,
             design=dict(sample.design),
-            work=dict(result.work),
+            work=work_of(result),
             wall_s=float(result.wall_s),
             created=time.time(),
             start=start,

@@ -29,6 +29,7 @@ class SearchMethod(ABC):
     name : as in ``--method NAME``; several : whether it can search for several objectives at once.
     own_starts : whether it works best where each design has random starts of its own, and not the same as all
     others: a method that fits a function through noisy means is led astray by noise that they share.
+    ensemble : settings of the ensemble that are its own.
     Options : its settings, as in ``--set search.options.KEY=VALUE``. dependent_options : by option, those
     whose defaults depend on it: a case's own values of those go with its own value of this one.
     width : mean width of the part of the unit cube that it draws from now. moved : the last ``tell`` has put
@@ -38,6 +39,7 @@ class SearchMethod(ABC):
     name: ClassVar[str]
     several: ClassVar[bool] = False
     own_starts: ClassVar[bool] = False
+    ensemble: ClassVar[Mapping[str, Any]] = {}
     Options: ClassVar[type[Checked]]
     dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     width: float = 1.0

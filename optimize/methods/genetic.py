@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from optimize.methods.base import SearchMethod
 from optimize.methods.breeding import Breeder
@@ -17,6 +17,7 @@ class Genetic(SearchMethod):
 
     name = "genetic"
     Options = Breeding
+    ensemble: ClassVar[Mapping[str, Any]] = {"tolerance": 5e-4, "min_starts": 4, "block": 6}
     dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "population": ("parents", "offspring"), "parents": ("offspring",), "offspring": ("parents",),
     }  # fmt: skip

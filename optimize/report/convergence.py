@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from optimize.generation_log import best_of
 from optimize.outcome import Outcome
-from optimize.tables import logbook_columns
+from optimize.tables import interval_of_value, logbook_columns
 from tisim.plotting.style import empty, legend_above, letters, symbols
 
 _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
@@ -44,13 +44,14 @@ def convergence_figure(outcome: Outcome) -> Figure:
         if outcome.best is not None and outcome.best.confirmed:
             (sure,) = outcome.best.confirmed
             (mean_again,) = problem.costs([sure.mean])
+            ends = np.nan_to_num(interval_of_value(sure, problem.objectives[0]), nan=mean_again)
             axes[0].errorbar(
-                generation[-1] + 0.4, mean_again, sure.half_width, color=_SURE, marker="s", ms=3.5, lw=1.2,
-                capsize=2, ls="none", label="best, fresh starts, 95 % interval",
+                generation[-1] + 0.4, mean_again, np.abs(ends - mean_again)[:, None], color=_SURE,
+                marker="s", ms=3.5, lw=1.2, capsize=2, ls="none", label="best, fresh starts, 95 % interval",
             )  # fmt: skip
             if derived:
                 of = problem.derived[derived]
-                ends = [of(mean_again + side * np.nan_to_num(sure.half_width)) for side in (-1, 1)]
+                ends = np.array([of(end) for end in ends])
                 value = of(mean_again)
                 axes[1].errorbar(
                     generation[-1] + 0.4, value, [[value - min(ends)], [max(ends) - value]], color=_SURE,

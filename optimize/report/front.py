@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.outcome import Outcome
+from optimize.tables import interval_of_value
 from tisim.plotting.style import empty, letters, plain, scale_of, superscripts
 
 _FRONT_COLOUR, _MANY_STARTS_COLOUR, _FEW_STARTS_COLOUR, _CHOSEN_COLOUR = (
@@ -90,7 +91,7 @@ def _bars(
     means, widths = _values(outcome, estimates)
     unsure = bool(widths.any())
     axis.errorbar(
-        means[:, of[0]], means[:, of[1]], xerr=widths[:, of[0]], yerr=widths[:, of[1]], fmt="o",
+        means[:, of[0]], means[:, of[1]], xerr=widths[:, :, of[0]], yerr=widths[:, :, of[1]], fmt="o",
         color=colour, ms=4 if colour == _FRONT_COLOUR else 2.5, lw=0.8 if colour == _FRONT_COLOUR else 0.4,
         zorder=4 if colour == _FRONT_COLOUR else 2,
         label=label + ", 95 % intervals" * unsure,
@@ -98,12 +99,18 @@ def _bars(
 
 
 def _values(outcome: Outcome, estimates: Sequence[Estimates]) -> tuple[np.ndarray, np.ndarray]:
-    """Return means of the objectives and half-widths of their intervals, 0 where unknown; each of shape
-    (designs, objectives)."""
-    many = len(outcome.problem.objectives)
+    """Return means of the objectives, (designs, objectives), and how far their intervals reach below and
+    above, (2, designs, objectives), 0 where unknown."""
+    objectives = outcome.problem.objectives
+    many = len(objectives)
     means = [outcome.problem.costs([e.mean for e in of_all]) for of_all in estimates]
-    widths = [[e.half_width for e in of_all] for of_all in estimates]
-    return np.reshape(means, (-1, many)), np.nan_to_num(np.reshape(np.array(widths, float), (-1, many)))
+    ends = [
+        [interval_of_value(e, one) for e, one in zip(of_all, objectives, strict=True)]
+        for of_all in estimates
+    ]  # fmt: skip
+    centres = np.reshape(np.array(means, float), (-1, many))
+    reach = np.abs(np.reshape(np.array(ends, float), (-1, many, 2)) - centres[:, :, None])
+    return centres, np.nan_to_num(np.moveaxis(reach, 2, 0))
 
 
 def _starts(estimates: Iterable[Estimates]) -> str:

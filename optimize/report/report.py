@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from optimize.outcome import Outcome
-from optimize.tables import best_columns, met_columns, met_strings
+from optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_strings
 from tisim.console import TERMINAL_WIDTH
 from tisim.files import pictures
 from tisim.files.atomic import replace_file
@@ -28,9 +28,9 @@ SHARP = 200
 
 
 def best_table(outcome: Outcome) -> RenderableType:
-    """Return the best designs for the terminal: a column per design, genes in their units, fitness with its
-    95 % interval, derived values. In several tables where they would not fit on TERMINAL_WIDTH columns side
-    by side. Of a front as many as the hall of fame has places, spread along it.
+    """Return the best designs for the terminal: a column per design, genes in their units, fitness from
+    fresh starts with its 95 % interval, derived values. In several tables where they would not fit on
+    TERMINAL_WIDTH columns side by side. Of a front as many as the hall of fame has places, spread along it.
     """
     columns = best_columns(outcome.problem, outcome.hall)
     places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
@@ -58,13 +58,21 @@ def notes(outcome: Outcome) -> RenderableType:
     problem, ensemble = outcome.problem, outcome.settings.ensemble
     if not outcome.hall:
         return Group()
-    common = {
-        "95 % +-": "half of the 95 % confidence interval of the mean",
+    first = outcome.hall[0]
+    words = {
         "starts": "random starts that the mean is over",
-        "converged": f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it",
+        ERROR: "standard error of that mean. It does not count that the design was chosen for its luck, too",
     }
-    fresh = {"fresh starts": f"the mean over {ensemble.confirm} starts that the search has not seen"}
-    meanings = {**problem.meanings, **common, **(fresh if outcome.hall[0].confirmed else {})}
+    if all(estimate.std == 0 for estimate in first.estimates):
+        words = {"starts": "one: all random starts of a design give the same run"}
+    if any(string.estimates[0].converged for string in outcome.hall) and ensemble.tolerance:
+        words["converged"] = (
+            f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it"
+        )
+    if first.confirmed:
+        words["fresh starts"] = "starts that have had no part in choosing the designs"
+        words[f"{LOW}, {HIGH}"] = "ends of the 95 % confidence interval of the mean"
+    meanings = {**problem.meanings, **words}
     return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in meanings.items()))
 
 

@@ -16,9 +16,9 @@ MOST_LEARNED = 500
 """Designs from which a process is made; of more, half are the best, and others are drawn evenly."""
 _PRIOR_STARTS = 8
 """Starts that the noise of all designs together counts for beside the starts of the design itself."""
-_SKEWED = 0.5
-"""Skewness of the costs above which they are transformed: a few large ones would hide all differences
-between small ones."""
+_SKEWED, _SKEWED_NOISE = 0.5, 2.0
+"""Skewness of costs above which they are transformed, without and with noise: a few large ones would hide all
+differences between small ones. But the mean of noisy costs is not that of transformed ones."""
 
 
 class Belief:
@@ -42,7 +42,7 @@ class Belief:
         costs, self.noise = costs_and_noise(strings)
         self.exact = not np.any(self.noise)
         self.starts = int(np.median([string.estimates[0].starts for string in strings])) or 1
-        self.costs, slopes = _transformed(costs)
+        self.costs, slopes = _transformed(costs, _SKEWED if self.exact else _SKEWED_NOISE)
         chosen = _representative(costs, MOST_LEARNED)
         self.chosen = chosen
         variances = self.noise * slopes**2
@@ -100,8 +100,8 @@ def _pooled(strings: Sequence[Individual], objective: int) -> float:
     return squares / freedom if freedom else 0.0
 
 
-def _transformed(costs: Array) -> tuple[Array, Array]:
-    """Return costs in units in which they are not skewed to large values, and the slope of the new unit.
+def _transformed(costs: Array, skewed: float) -> tuple[Array, Array]:
+    """Return costs in units in which they are less skewed to large values than that, and the unit's slope.
 
     I.-K. Yeo and R. A. Johnson, Biometrika 87 (2000) 954-959. Other columns are returned as they are.
     """
@@ -109,7 +109,7 @@ def _transformed(costs: Array) -> tuple[Array, Array]:
     for k, column in enumerate(costs.T):
         deviation = column.std()
         z = (column - column.mean()) / (deviation or 1.0)
-        if np.mean(z**3) < _SKEWED:
+        if np.mean(z**3) < skewed:
             continue
         new[:, k], power = yeojohnson(z)
         slopes[:, k] = np.where(

@@ -1,0 +1,107 @@
+"""How a search ends: the best designs are chosen from all it knows, and reported from starts that are new.
+
+The best of many noisy means is good by luck, too, so that what chooses a design flatters it. Three things are
+kept apart. The search has few starts of many designs. Those of them that are best by posterior mean are given
+some starts more, and ranked again. Values and intervals that are reported are of fresh starts, which have had
+no part in either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from optimize.evaluation.ensemble import Ensemble
+from optimize.hall_of_fame import not_dominated
+from optimize.methods.individual import Individual
+from optimize.problem.problem import Problem
+from optimize.settings import Settings
+from optimize.surrogate.ranking import best
+
+FEWEST_FRESH = 4
+"""Fresh starts of each design of a front, where the budget does not pay for more."""
+_PROOF = 2 * 10**6
+"""The number of the first start that is used to see whether a design meets a target."""
+_STARTS_OF_PROOF = 16
+Report = Callable[[float], None]
+
+
+def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
+    """Return the number of runs that are kept back for the end: an eighth of the budget for one objective, a
+    quarter for a front; none where all starts of a design are the same."""
+    asked = settings.ensemble.select or settings.ensemble.confirm
+    if settings.max_evaluations is None or ensemble.repeatable or not asked:
+        return 0
+    return settings.max_evaluations // (4 if problem.several else 8)
+
+
+def concluded(
+    problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual], report: Report
+) -> list[Individual]:
+    """Return the designs that a search reports, best first, and give these their fresh starts.
+
+    known : all designs that have run, of which those that have not failed are chosen from. The budget of the
+    ensemble is not exceeded.
+    """
+    if problem.several:
+        return _front(problem, settings, ensemble, known, report)
+    asked = settings.ensemble
+    count = settings.hall_of_fame
+    if ensemble.repeatable:
+        return best(problem.genome, known, count)
+    candidates = best(problem.genome, known, count)
+    if 3 * asked.select * len(candidates) <= _left(ensemble):
+        _know(problem, candidates, ensemble, asked.select)
+    if asked.confirm:
+        count = int(max(1, min(count, _left(ensemble) // asked.confirm)))
+    chosen = best(problem.genome, known, count)
+    _confirm(problem, chosen, ensemble, asked.confirm, report)
+    return chosen
+
+
+def _front(
+    problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual], report: Report
+) -> list[Individual]:
+    """Return the front, of which no design is dominated by the fresh means of another."""
+    front = best(problem.genome, known, len(known))
+    confirm = settings.ensemble.confirm
+    if ensemble.repeatable or not confirm or not front:
+        return front
+    left = _left(ensemble)
+    if not math.isinf(left):
+        confirm = max(min(confirm, int(left) // len(front)), min(confirm, FEWEST_FRESH))
+        front = best(problem.genome, known, max(1, int(left) // confirm))
+    _confirm(problem, front, ensemble, confirm, report)
+    return not_dominated(front) if front[0].confirmed else front
+
+
+def proven(problem: Problem, leader: Individual, ensemble: Ensemble, goal: float) -> bool:
+    """Return whether a design is as good as a goal, a cost, with the confidence of an interval: whether its
+    upper end over starts of its own is no higher."""
+    if ensemble.repeatable:
+        return leader.fitness.values[0] <= goal
+    if _left(ensemble) < _STARTS_OF_PROOF:
+        return False
+    design = problem.genome.decode(leader)
+    ((estimate,),) = ensemble.fresh([design], _STARTS_OF_PROOF, first=_PROOF)
+    return estimate.high <= goal
+
+
+def _confirm(
+    problem: Problem, chosen: Sequence[Individual], ensemble: Ensemble, starts: int, report: Report
+) -> None:
+    if not starts or starts * len(chosen) > _left(ensemble):
+        return
+    designs = [problem.genome.decode(string) for string in chosen]
+    for string, estimates in zip(chosen, ensemble.fresh(designs, starts, progress=report), strict=True):
+        string.confirmed = estimates
+
+
+def _know(problem: Problem, candidates: Sequence[Individual], ensemble: Ensemble, starts: int) -> None:
+    designs = [problem.genome.decode(string) for string in candidates]
+    for string, estimates in zip(candidates, ensemble.more(designs, starts), strict=True):
+        string.know(estimates)
+
+
+def _left(ensemble: Ensemble) -> float:
+    return ensemble.budget - ensemble.requested
