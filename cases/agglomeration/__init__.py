@@ -15,5 +15,5 @@ CASE = Case(
     check=Late("cases.agglomeration.checks", "check"),
     quantities=quantities,
     problem=Late("cases.agglomeration.problem", "problem"),
-    variants=("paper", "fragmenting"),
+    variants=("paper", "fragmenting", "fields"),
 )
