@@ -106,7 +106,7 @@ def closed_forms() -> Iterator[Check]:
     time = fall_time(MASS, CHARGE, APART, 2 * RADIUS)
     for name, stepper, bound in (
         (f"{STEPS} steps", Verlet(control=FixedStep(dt=time / STEPS)), FORM_BOUND),
-        ("the steps of the case", fields.STEPPER, OWN_STEPPER_BOUND),
+        ("the steps of the case", fields.stepper(RADIUS), OWN_STEPPER_BOUND),
     ):
         yield Check(f"opposite charges meet, in {name} (s)", meeting(stepper, time), time, bound * time)
 

@@ -23,7 +23,7 @@ from optimize.problem.genome import Gene
 from tisim.effects import CARBONYL_IRON, DipoleDipole, Effect, FroehlichMoment, Lorentz, NearField
 from tisim.packing import EqualSizes, GrainClass
 from tisim.sources import ElectricField, MagneticField
-from tisim.steppers import ApproachTime, Verlet
+from tisim.steppers import ApproachTime, Stepper, Verlet
 
 CHARGE_GENES = (
     # Its field, 4.5e8 V/m at most, is half of what pulls electrons out of a metal in vacuum; air withstands
@@ -50,8 +50,9 @@ NO_FIELDS: Mapping[str, float] = {gene.name: max(gene.low, 0.0) for gene in FIEL
 """The values of these genes at which grains feel nothing of each other but impacts."""
 
 COULOMB = NearField(alpha2=1 / (4 * math.pi * epsilon_0), beta2=2, strength="charge")
-LONGEST_STEP = 1e-5
-"""Steps are at most as long as this, s, as forces act between impacts too (docs/agglomeration.md)."""
+LONGEST_STEP = 5e-3
+"""Steps are at most as long as this, s, times the radius, m: forces act between impacts too, and the time of
+an oscillation that they can cause goes with the radius (docs/agglomeration.md)."""
 
 
 def has_fields(design: Mapping[str, float]) -> bool:
@@ -90,4 +91,6 @@ def forces(design: Mapping[str, float]) -> tuple[Effect, ...]:
     )
 
 
-STEPPER = Verlet(control=ApproachTime(longest=LONGEST_STEP))
+def stepper(radius: float) -> Stepper:
+    """Return the stepper of grains of a radius (m) in fields."""
+    return Verlet(control=ApproachTime(longest=LONGEST_STEP * radius))
