@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cases.agglomeration.accuracy import quantities
-from cases.agglomeration.scene import SIZES, TITLE, scene_for
+from cases.agglomeration.scene import SIZES, TITLE, fields_scene_for, scene_for
 from cases.case import Case, Late
 
 CASE = Case(
@@ -16,4 +16,5 @@ CASE = Case(
     quantities=quantities,
     problem=Late("cases.agglomeration.problem", "problem"),
     variants=("paper", "fragmenting", "fields"),
+    scenes={"fields": fields_scene_for},
 )

@@ -48,6 +48,12 @@ FIELD_GENES = (*CHARGE_GENES, *ELECTRIC_GENES, *MAGNETIC_GENES)
 """From half an oscillation to ten in a flow, and from nothing of each to where it outdoes the flow."""
 NO_FIELDS: Mapping[str, float] = {gene.name: max(gene.low, 0.0) for gene in FIELD_GENES}
 """The values of these genes at which grains feel nothing of each other but impacts."""
+SHOWN: Mapping[str, float] = {
+    "surface_charge": 3e-3, "charge_ratio": -0.8,
+    "electric_field": 5e6, "electric_amplitude": 5e6, "electric_frequency": 100.0,
+    "magnetic_field": 0.5, "magnetic_amplitude": 0.3, "magnetic_frequency": 100.0,
+}  # fmt: skip
+"""Charges and fields that are felt, of the flow that is shown with them."""
 
 COULOMB = NearField(alpha2=1 / (4 * math.pi * epsilon_0), beta2=2, strength="charge")
 LONGEST_STEP = 5e-3

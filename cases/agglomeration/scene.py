@@ -92,3 +92,8 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
 def scene_for(size: str, seed: int) -> Scene:
     """Return the flow of the paper's best string."""
     return scene(BEST, seed, **size_named(size, SIZES).scene)
+
+
+def fields_scene_for(size: str, seed: int) -> Scene:
+    """Return the same flow with charges and fields."""
+    return scene({**BEST, **fields.SHOWN}, seed, **size_named(size, SIZES).scene)

@@ -37,6 +37,8 @@ WRONG = [
     (["explain", "nosuch"], "case must be one of"),
     (["check", "nosuch"], f"case must be one of {CASES}, or your own NAME.py with a CASE; received 'nosuch'"),
     (["optimize", "agglomeration", "--population", "1"], "options.population must be at least 2; received 1"),
+    (["run", "agglomeration", "--variant", "x"], "variant must be one of fields; received 'x'"),
+    (["explain", "capture", "--variant", "hard"], "variant must be left out, as capture has one scene"),
     (["optimize", "agglomeration", "--variant", "x"], "one of paper, fragmenting, fields; received"),
     (["optimize", "agglomeration", "--set", "block=2"], "--set must be of the form search.KEY=VALUE"),
     (["optimize", "agglomeration", "--set", "search.blok=2"], "search.blok must be a known key: "),
