@@ -29,9 +29,9 @@ from tisim import Particles, Scene
 from tisim.effects import CARBONYL_IRON, Agglomeration, Impact
 from tisim.steppers import FixedStep, Stepper, Verlet
 
-RADIUS, DENSITY, APART = 1e-3, 5e3, 8e-3
+RADIUS, GRAIN_DENSITY, START_DISTANCE = 1e-3, 5e3, 8e-3
 """The two grains of the checks: radius b (m), density (kg/m^3), distance d_0 of their centres (m)."""
-MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
+MASS = GRAIN_DENSITY * 4 / 3 * np.pi * RADIUS**3
 CHARGED: Mapping[str, float] = {**fields.NO_FIELDS, "surface_charge": 2e-3}
 CHARGE = 4 * np.pi * RADIUS**2 * CHARGED["surface_charge"]
 STEPS = 4000
@@ -78,10 +78,10 @@ def pair(
     return Scene(
         name="pair",
         particles=Particles(
-            position=((-APART / 2, 0, 0), (APART / 2, 0, 0)),
+            position=((-START_DISTANCE / 2, 0, 0), (START_DISTANCE / 2, 0, 0)),
             velocity=np.zeros((2, 3)),
             radius=RADIUS,
-            density=DENSITY,
+            density=GRAIN_DENSITY,
             quantities={"charge": np.array(charges)},
         ),
         effects=(Impact(hardness=1.0), Agglomeration(), *fields.forces(design)),
@@ -103,7 +103,7 @@ def meeting(stepper: Stepper, expected: float) -> float:
 
 def closed_forms() -> Iterator[Check]:
     """Two charges fall together, two magnetised grains too, and fields move one charge."""
-    time = fall_time(MASS, CHARGE, APART, 2 * RADIUS)
+    time = fall_time(MASS, CHARGE, START_DISTANCE, 2 * RADIUS)
     for name, stepper, bound in (
         (f"{STEPS} steps", Verlet(control=FixedStep(dt=time / STEPS)), FORM_BOUND),
         ("the steps of the case", fields.stepper(RADIUS), OWN_STEPPER_BOUND),
@@ -115,9 +115,12 @@ def closed_forms() -> Iterator[Check]:
     stepper = Verlet(control=FixedStep(dt=duration / STEPS))
     (end,) = tisim.run([pair(magnetic, duration, stepper, (0.0, 0.0))])
     (x, _, _), (v, _, _) = (end.state[name][1] - end.state[name][0] for name in ("position", "velocity"))
-    speed = dipole_speed(MASS, iron_moment(flux), APART, x)
+    speed = dipole_speed(MASS, iron_moment(flux), START_DISTANCE, x)
     yield Check(
-        f"magnetised grains close in from {APART / x:.3g} times as far (m/s)", -v, speed, FORM_BOUND * speed
+        f"magnetised grains close in from {START_DISTANCE / x:.3g} times as far (m/s)",
+        -v,
+        speed,
+        FORM_BOUND * speed,
     )
 
     electric = {**CHARGED, "electric_field": 2e6, "electric_amplitude": 5e6, "electric_frequency": 300.0}

@@ -2,11 +2,15 @@
 
     python -m cases.agglomeration.what_fields_add [--size small] [--runs 400] [--searches 5] [--method NAME]
         [--starts N] [--fresh 64] [--out what_fields_add.png]
+    python -m cases.agglomeration.what_fields_add --one-flow [--size small] [--fresh 256]
 
 Each kind is searched several times, from other seeds; genes that are left out are those of no charge and no
 field. The best design of each search is then run from fresh starts that no search has seen, the same for
 all. The table has the mean of that over searches, with its 95 % confidence interval, and the mean of what the
 searches themselves say of their best designs.
+
+With ``--one-flow`` nothing is searched: the flow that Z04 finds best, as soft as the ranges allow, is run
+with one kind of field after another, each from the same starts.
 """
 
 from __future__ import annotations
@@ -27,14 +31,14 @@ import optimize
 import tisim
 from cases.agglomeration import fields
 from cases.agglomeration.problem import GENES, UNBREAKABLE, cost, problem
-from cases.agglomeration.scene import SIZES, scene
+from cases.agglomeration.scene import BEST, SIZES, scene
 from cases.case import size_named
 from cases.runs import OTHER_STARTS, sound
 from optimize import Gene, Genome, Problem
 from tisim import Scene
 from tisim.analysis import Mean
 from tisim.numerics.statistics import CONFIDENCE
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, legend_above, plain
 
 KINDS: Mapping[str, tuple[Gene, ...]] = {
     "the flow alone": (),
@@ -44,6 +48,18 @@ KINDS: Mapping[str, tuple[Gene, ...]] = {
     "all": fields.FIELD_GENES,
 }
 """The genes that each kind of search has besides those of Z04."""
+
+CHARGED = {"surface_charge": 4e-3, "charge_ratio": -1.0}
+FELT: Mapping[str, Mapping[str, float]] = {
+    "nothing": {},
+    "opposite charges": CHARGED,
+    "charges of one sign": {**CHARGED, "charge_ratio": 1.0},
+    "opposite charges, constant E": {**CHARGED, "electric_field": 1e7},
+    "opposite charges, E of 100 Hz": {**CHARGED, "electric_amplitude": 1e7, "electric_frequency": 100.0},
+    "constant B": {"magnetic_field": 1.0},
+    "B of 100 Hz": {"magnetic_amplitude": 1.0, "magnetic_frequency": 100.0},
+}
+"""What the grains of one flow feel, each at its most."""
 
 
 @dataclass(frozen=True)
@@ -100,22 +116,44 @@ def table(found: Mapping[str, Sequence[Found]]) -> str:
     return "\n".join(lines)
 
 
+def one_flow(grains: int, starts: int) -> str:
+    """Return a table of what fields do to one flow: Pi, and by how much it is less than from the same starts
+    without any."""
+    soft = {**BEST, "hardness": 1e5}
+    values = {
+        name: np.array(
+            [
+                cost(end)
+                for end in sound(
+                    tisim.run([without_the_rest({**soft, **felt}, k, grains) for k in range(starts)])
+                )
+            ]
+        )
+        for name, felt in FELT.items()
+    }
+    lines = ["| grains feel | Pi | less than nothing felt by |", "|---|---|---|"]
+    for name, ones in values.items():
+        gain = Mean.of(values["nothing"] - ones)
+        lines.append(f"| {name} | {Mean.of(ones)} | {'' if name == 'nothing' else gain} |")
+    return "\n".join(lines)
+
+
 def picture(found: Mapping[str, Sequence[Found]], title: str) -> Figure:
     """Return a figure of what the searches of each kind have found, and the means with their intervals."""
-    figure = empty(6.8, 0.5 * len(found) + 1.3)
+    figure = empty(6.8, 0.5 * len(found) + 1.5)
     axis = figure.subplots()
-    for row, ones in enumerate(found.values()):
-        true = [one.true for one in ones]
-        average = Mean.of(true)
-        axis.plot(true, np.full(len(true), row), "o", ms=5, mfc="none", color="#4477aa")
-        axis.errorbar(average.value, row, xerr=average.half, fmt="s", ms=5, capsize=4, color="#cc6677")
-    axis.set_yticks(range(len(found)), list(found))
-    axis.invert_yaxis()
+    rows = range(len(found))
+    for row, ones in zip(rows, found.values(), strict=True):
+        (dots,) = axis.plot([one.true for one in ones], [row] * len(ones), "o", mfc="none", color="#4477aa")
+        average = Mean.of([one.true for one in ones])
+        bar = axis.errorbar(average.value, row, xerr=average.half, fmt="s", capsize=4, color="#cc6677")
+        if row == 0:
+            dots.set_label("a search")
+            bar.set_label(f"mean, {CONFIDENCE:.0%} interval")
+    axis.set_yticks(rows, list(found))
     axis.set_ylim(len(found) - 0.5, -0.5)
-    axis.set_xlabel(
-        "Pi of the best design from fresh starts, and 95 % interval of the mean; 0: all grains are one"
-    )
-    axis.set_title(title, loc="left", fontsize=10)
+    axis.set_xlabel(f"Pi of the best design, from fresh starts\n{title}")
+    legend_above(axis)
     plain(axis)
     return figure
 
@@ -129,8 +167,12 @@ def main() -> None:
     parser.add_argument("--method", help="by name; unless given, that of optimize.run")
     parser.add_argument("--starts", type=int, help="of each design; unless given, as optimize.run does")
     parser.add_argument("--fresh", type=int, default=64, help="starts from which best designs are run again")
+    parser.add_argument("--one-flow", action="store_true", help="fields in one flow, without a search")
     parser.add_argument("--out", type=Path, help="file of the picture")
     options = parser.parse_args()
+    if options.one_flow:
+        print(one_flow(size_named(options.size, SIZES).scene["grains"], options.fresh))
+        return
     settings: dict[str, Any] = {"max_evaluations": options.runs, "generations": options.runs}
     if options.method is not None:
         settings["method"] = options.method

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from cases.agglomeration import CASE, field_checks, fields
 from cases.agglomeration.problem import problem
 from cases.agglomeration.scene import BEST, HALF_SIDE, scene
-from cases.agglomeration.what_fields_add import KINDS, Found, picture, problem_of, table
+from cases.agglomeration.what_fields_add import FELT, KINDS, Found, one_flow, picture, problem_of, table
 from tests.effects.contact.loads import loads
 from tests.scenes import fixed, simulate
 from tisim.effects import CARBONYL_IRON
@@ -134,7 +134,7 @@ def test_closed_forms_are_those_of_the_equations_of_motion():
 @pytest.mark.long
 def test_two_charges_meet_when_the_closed_form_says_and_are_one_without_charge():
     time = field_checks.fall_time(
-        field_checks.MASS, field_checks.CHARGE, field_checks.APART, 2 * field_checks.RADIUS
+        field_checks.MASS, field_checks.CHARGE, field_checks.START_DISTANCE, 2 * field_checks.RADIUS
     )
     charges = (field_checks.CHARGE, -field_checks.CHARGE)
     steps = fields.stepper(field_checks.RADIUS)
@@ -190,3 +190,14 @@ def test_the_table_and_the_picture_of_what_fields_add():
     assert "| all | 18 | 0.300 ± 0.248 | 0.400 |" in text
     (axis,) = picture(found, "three").axes
     assert [label.get_text() for label in axis.get_yticklabels()] == list(KINDS)
+
+
+@pytest.mark.slow
+def test_what_fields_do_to_one_flow_is_beside_the_same_starts():
+    head, _, *rows = one_flow(60, 48).splitlines()
+    assert head.split("|")[1].strip() == "grains feel"
+    cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
+    assert [row[0] for row in cells] == list(FELT)
+    assert cells[0][2] == ""
+    gain, half = (float(part) for part in cells[-2][2].split(" ± "))
+    assert gain - half > 0.02
