@@ -49,13 +49,17 @@ KINDS: Mapping[str, tuple[Gene, ...]] = {
 }
 """The genes that each kind of search has besides those of Z04."""
 
-CHARGED = {"surface_charge": 4e-3, "charge_ratio": -1.0}
+OPPOSITE_CHARGES = {"surface_charge": 4e-3, "charge_ratio": -1.0}
 FELT: Mapping[str, Mapping[str, float]] = {
     "nothing": {},
-    "opposite charges": CHARGED,
-    "charges of one sign": {**CHARGED, "charge_ratio": 1.0},
-    "opposite charges, constant E": {**CHARGED, "electric_field": 1e7},
-    "opposite charges, E of 100 Hz": {**CHARGED, "electric_amplitude": 1e7, "electric_frequency": 100.0},
+    "opposite charges": OPPOSITE_CHARGES,
+    "charges of one sign": {**OPPOSITE_CHARGES, "charge_ratio": 1.0},
+    "opposite charges, constant E": {**OPPOSITE_CHARGES, "electric_field": 1e7},
+    "opposite charges, E of 100 Hz": {
+        **OPPOSITE_CHARGES,
+        "electric_amplitude": 1e7,
+        "electric_frequency": 100.0,
+    },
     "constant B": {"magnetic_field": 1.0},
     "B of 100 Hz": {"magnetic_amplitude": 1.0, "magnetic_frequency": 100.0},
 }
