@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,6 +100,7 @@ class Case:
     problem : (size, variant) -> Problem; variants : its names, the first the default.
     calibration : (size, variant, file) -> Problem, the same for measurements that a file has.
     pictures : what the case is about, drawn from a run's trajectory; by name of file.
+    scenes : (size, seed) -> Scene of those variants that are not about ``scene``, by name.
     figures : (size, progress) -> what takes many runs: figures, and tables as text; by name of file.
     """
 
@@ -116,10 +117,25 @@ class Case:
     pictures: Callable[[Frames], Mapping[str, Figure]] | None = None
     figures: Callable[[str, Progress], Mapping[str, Figure | str]] | None = None
     calibration: Callable[[str, str, Path], Problem] | None = None
+    scenes: Mapping[str, Callable[[str, int], Scene]] = field(default_factory=dict)
 
     def size(self, name: str) -> Size:
         """Return a size by name; InputError when there is none of that name."""
         return size_named(name, self.sizes)
+
+    def scene_of(self, size: str, seed: int, variant: str | None = None) -> Scene:
+        """Return the scene of a size and a seed; of a variant, where one is given.
+
+        InputError when there is no size of that name, or no scene of that variant.
+        """
+        self.size(size)
+        if variant is None:
+            return self.scene(size, seed)
+        rule = (
+            f"one of {', '.join(self.scenes)}" if self.scenes else f"left out, as {self.name} has one scene"
+        )
+        must(variant in self.scenes, "variant", rule, variant)
+        return self.scenes[variant](size, seed)
 
     def inverse(
         self, size: str, variant: str | None, measured: Path | None = None

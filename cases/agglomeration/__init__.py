@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cases.agglomeration.accuracy import quantities
-from cases.agglomeration.scene import SIZES, TITLE, scene_for
+from cases.agglomeration.scene import SIZES, TITLE, fields_scene_for, scene_for
 from cases.case import Case, Late
 
 CASE = Case(
@@ -15,5 +15,6 @@ CASE = Case(
     check=Late("cases.agglomeration.checks", "check"),
     quantities=quantities,
     problem=Late("cases.agglomeration.problem", "problem"),
-    variants=("paper", "fragmenting"),
+    variants=("paper", "fragmenting", "fields"),
+    scenes={"fields": fields_scene_for},
 )

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 import tisim
+from cases.agglomeration import field_checks
 from cases.agglomeration import scene as agglomeration
 from cases.case import Check
 from tisim import Particles, Result, Scene
@@ -168,6 +169,8 @@ def conservation() -> Iterator[Check]:
 
 
 def check() -> Iterator[Check]:
-    """Yield the closed forms, then the conservation laws."""
+    """Yield the closed forms, then the conservation laws, without charges and with them."""
     yield from closed_forms()
     yield from conservation()
+    yield from field_checks.closed_forms()
+    yield from field_checks.conservation()

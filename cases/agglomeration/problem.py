@@ -1,9 +1,11 @@
-"""The inverse problem of agglomeration: the flow that grows the largest grains (Z04 section 7)."""
+"""The inverse problem of agglomeration: the flow that grows the largest grains (Z04 section 7), by itself or
+with charges and fields."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from cases.agglomeration.fields import FIELD_GENES
 from cases.agglomeration.scene import SIZES, TITLE, scene
 from cases.case import size_named
 from optimize.problem.genome import Gene, Genome
@@ -26,14 +28,17 @@ GENES = (
 )
 """Z04 section 8: the search ranges."""
 
-SURFACE_ENERGY = {
-    # As printed. Nothing breaks anywhere in it.
-    "paper": Gene("surface_energy", "J/m^2", 1e6, 1e16, "log"),
+# As printed. Nothing breaks anywhere in it.
+UNBREAKABLE = Gene("surface_energy", "J/m^2", 1e6, 1e16, "log")
+VARIANTS = {
+    "paper": (UNBREAKABLE,),
     # From where nearly every hard impact breaks an agglomerate to where none does. Measured with the best
     # string and 1000 grains: breakages per grain 1.4 at 1e2, 0.1 at 1e4, 1e-4 at 1e5; Pi 0.90, 0.79, 0.76.
-    "fragmenting": Gene("surface_energy", "J/m^2", 1e2, 1e5, "log"),
+    "fragmenting": (Gene("surface_energy", "J/m^2", 1e2, 1e5, "log"),),
+    "fields": (UNBREAKABLE, *FIELD_GENES),
 }
-"""Variants of the inverse problem, by what the surface energy may be."""
+"""Variants of the inverse problem, by the genes that they have besides: what the surface energy may be, and
+charges and fields."""
 
 MEANINGS = {
     "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 where all grains are one",
@@ -50,14 +55,17 @@ def cost(result: Result) -> float:
 
 def problem(size: str = "default", variant: str = "paper") -> Problem:
     """Return the inverse problem of Z04 section 7: the flow whose grains grow the most."""
-    must(variant in SURFACE_ENERGY, "variant", f"one of {', '.join(SURFACE_ENERGY)}", variant)
+    must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     settings = size_named(size, SIZES).scene
-    edge, energy = settings["grains"] ** (1 / 3), SURFACE_ENERGY[variant]
+    energy, *fields = VARIANTS[variant]
+    edge = settings["grains"] ** (1 / 3)
+    searched = f"surface energy {energy.low:g} to {energy.high:g} {energy.unit}"
+    searched += f"; {len(fields)} genes of charges and fields" if fields else ""
     return Problem(
         name=f"agglomeration-{size}" if variant == "paper" else f"agglomeration-{variant}-{size}",
         title=f"{TITLE}: the largest grains, {settings['grains']} at the start",
-        description=f"the largest grains; surface energy {energy.low:g} to {energy.high:g} {energy.unit}",
-        genome=Genome((*GENES, energy)),
+        description=f"the largest grains; {searched}",
+        genome=Genome((*GENES, energy, *fields)),
         scene=lambda design, seed: scene(design, seed, **settings),
         objective=cost,
         symbol="Pi",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from cases.agglomeration import fields
 from cases.agglomeration.published_strings import designs
 from cases.case import Size, size_named
 from tisim import Box, Cloud, Scene
@@ -52,14 +53,22 @@ SIZES = {
 
 
 def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: float = DURATION) -> Scene:
-    """Return the flow of a design from one random start."""
+    """Return the flow of a design from one random start; with charges and fields where the design says what
+    they are.
+
+    In fields grains also see each other across the faces: where they attract each other, it must not matter
+    that the mean velocity carries all of them through the faces again and again.
+    """
     radius = design["length_ratio"] * HALF_SIDE / grains ** (1 / 3)
     v = design["relative_velocity"]
+    charged = fields.has_fields(design)
+    spheres = {"radius": radius, "density": design["density"]}
     return Scene(
         name="agglomeration",
         particles=Cloud(
-            number=grains, radius=radius, density=design["density"], mean_velocity=MEAN_VELOCITY,
-            deviation=(v, 0.1 * v, 0.1 * v), temperature=design["temperature"],
+            number=grains, mean_velocity=MEAN_VELOCITY, deviation=(v, 0.1 * v, 0.1 * v),
+            temperature=design["temperature"],
+            **({"grains": fields.charged_classes(design, radius)} if charged else spheres),
         ),
         effects=(
             Impact(hardness=design["hardness"]),
@@ -71,9 +80,10 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
             Fragmentation(surface_energy=design["surface_energy"]),
             Agglomeration(),
             Cooling(),
+            *(fields.forces(design) if charged else ()),
         ),
-        domain=Box(low=(-HALF_SIDE,) * 3, high=(HALF_SIDE,) * 3, images=False),
-        stepper=Verlet(control=ApproachTime()),
+        domain=Box(low=(-HALF_SIDE,) * 3, high=(HALF_SIDE,) * 3, images=charged),
+        stepper=fields.stepper(radius) if charged else Verlet(control=ApproachTime()),
         duration=duration,
         seed=seed,
     )  # fmt: skip
@@ -82,3 +92,8 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
 def scene_for(size: str, seed: int) -> Scene:
     """Return the flow of the paper's best string."""
     return scene(BEST, seed, **size_named(size, SIZES).scene)
+
+
+def fields_scene_for(size: str, seed: int) -> Scene:
+    """Return the same flow with charges and fields."""
+    return scene({**BEST, **fields.SHOWN}, seed, **size_named(size, SIZES).scene)

@@ -20,6 +20,20 @@ def test_variants_are_those_of_the_inverse_problem(name):
     assert len({problem.name for problem in problems}) == len(problems)
 
 
+def test_a_case_has_a_scene_of_its_own_for_some_variants():
+    flow, capture = every()["agglomeration"], every()["capture"]
+    assert flow.scene_of("small", 2) == flow.scene("small", 2)
+    charged = flow.scene_of("small", 2, "fields")
+    assert {"near_field", "lorentz", "dipole_dipole"} <= {effect.label for effect in charged.effects}
+    assert charged.seed == 2
+    for case, variant, rule in (
+        (flow, "paper", "one of fields; received 'paper'"),
+        (capture, "hard", "left out, as capture has one scene; received 'hard'"),
+    ):
+        with pytest.raises(InputError, match=f"variant must be {rule}"):
+            case.scene_of("default", 0, variant)
+
+
 ARGUMENTS = {"check": (), "problem": ("default", ""), "quantities": (None,), "pictures": (None,),
              "figures": ("default", None), "calibration": ("default", "", None)}  # fmt: skip
 
@@ -37,10 +51,11 @@ def test_every_scene_of_a_moderate_size_may_begin(name):
     """Its effects take its start; nothing is compiled."""
     case, begun = every()[name], 0
     for size in case.sizes:
-        scene = case.scene(size, 1)
-        if scene.capacity() < 5000:
-            start = scene.start()
-            for effect in scene.acting():
-                effect.suits_start(start, scene)
-            begun += 1
+        for variant in (None, *case.scenes):
+            scene = case.scene_of(size, 1, variant)
+            if scene.capacity() < 5000:
+                start = scene.start()
+                for effect in scene.acting():
+                    effect.suits_start(start, scene)
+                begun += 1
     assert begun > 0

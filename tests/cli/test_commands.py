@@ -14,6 +14,10 @@ def test_cases_explain_and_version(tisim):
     assert code == 0
     assert "60 particles" in out
     assert "hardness = 265480 Pa" in out
+    code, out, _ = tisim("explain", "agglomeration", "--size", "small", "--variant", "fields")
+    assert code == 0
+    assert "near_field" in out
+    assert "constant = (0.5, 0, 0) T" in out
     assert tisim("--version")[1].startswith("tisim 0.")
 
 

@@ -62,6 +62,18 @@ def test_lorentz_force(kinds, rng):
         close(state["force"], lorentz_twin(one, state))
 
 
+def test_charges_that_a_magnetic_field_does_not_turn_feel_the_electric_field_alone(rng):
+    electric, magnetic = (oscillating(kind, rng) for kind in (ElectricField, MagneticField))
+    law = Lorentz(magnetic=False)
+    setup = cloud(rng, (electric, magnetic, law), quantities={"charge": rng.normal(size=12)})
+    (state,) = loads([setup])
+    close(state["force"], state["charge"][:, None] * waves(electric, 0.0))
+    assert setup.stepper.kind() == "verlet"
+    assert not law.gyrates(setup.effects)
+    assert law.critical_step(state, 1.0, setup.effects) == np.inf
+    assert Lorentz().gyrates(setup.effects)
+
+
 def test_fields_oscillate_in_time(rng):
     """Heavy charges keep their velocity: the force after steps is that of the field then."""
     scenes = [

@@ -17,6 +17,7 @@ from tisim.cli.options import (
     Device,
     Plugins,
     Precision,
+    SceneVariant,
     Seed,
     Size,
     Target,
@@ -54,13 +55,13 @@ def cases() -> None:
 def explain(
     target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
     size: Size = None, device: Device = "cpu", precision: Precision = "f64", plugins: Plugins = None,
-    everything: Everything = False,
+    everything: Everything = False, variant: SceneVariant = None,
 ) -> None:  # fmt: skip
     """Describe a scene: its effects, materials, stepper and critical time steps, and the size of the rest."""
     from tisim.engine.explain import brief, explain, render
 
     runtime.init(device, precision)
-    _, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
+    _, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or (), variant)
     with err().status("compiling"):
         explanation = explain(scene)
     out().print(render(explanation) if everything else brief(explanation))

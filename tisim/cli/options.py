@@ -59,6 +59,9 @@ Changes = Annotated[
         "--set", metavar="KEY=VALUE", help="Change a setting: effects.impact.hardness=3e5. Repeatable."
     ),
 ]
+SceneVariant = Annotated[
+    str | None, typer.Option("--variant", help="Which scene of the case, where it has one for a variant.")
+]
 Out = Annotated[
     Path | None,
     typer.Option(

@@ -23,6 +23,7 @@ from tisim.cli.options import (
     Overwrite,
     Plugins,
     Precision,
+    SceneVariant,
     Seed,
     Size,
     Target,
@@ -43,6 +44,7 @@ def run(
     seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
     arithmetic: Arithmetic = "strict", threads: Threads = 0, fresh: Fresh = None,
     overwrite: Overwrite = False, frames: Frames = None, every: Every = None, plugins: Plugins = None,
+    variant: SceneVariant = None,
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
@@ -50,7 +52,7 @@ def run(
 
     scene_arguments.checkpoint_seconds()
     runtime.init(device, precision, threads, arithmetic)
-    name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
+    name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or (), variant)
     out_folder = run_folder.RunFolder(folder or Path("out") / name)
     resume = out_folder.check(scene, fresh, overwrite)
     recording = recording_from_options(out_folder.trajectory, frames, every, resume)

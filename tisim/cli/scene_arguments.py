@@ -21,20 +21,23 @@ def load_scene(
     seed: int | None = None,
     absent: Sequence[str] = (),
     changes: Sequence[str] = (),
+    variant: str | None = None,
 ) -> tuple[str, Scene]:
     """Return name and scene of a case, or of a file that ends in .toml or .py; InputError when there is none.
 
-    absent : effects to leave out. changes : key=value texts, of what is then there.
+    absent : effects to leave out. changes : key=value texts, of what is then there. variant : of a case that
+    has scenes of its own for some.
     """
     if target.endswith(".toml"):
         must(size is None, "--size", "given for a case only", size)
+        must(variant is None, "--variant", "given for a case only", variant)
         name, scene = Path(target).stem, Scene.from_toml(target)
         if seed is not None:
             scene = scene.replace({"seed": seed})
     else:
         case = targets.case(target, targets.SCENE_FILE)
-        case.size(size or "default")
-        name, scene = case.name, case.scene(size or "default", seed or 0)
+        name = case.name if variant is None else f"{case.name}-{variant}"
+        scene = case.scene_of(size or "default", seed or 0, variant)
     return name, scene.without(*absent).replace(assignments(changes))
 
 

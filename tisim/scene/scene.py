@@ -26,7 +26,7 @@ from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
 from tisim.steppers.choice import ACCURACY, StepperChoice, choose, critical_steps
 
-PHYSICS_VERSION = 11
+PHYSICS_VERSION = 12
 """This number is raised whenever a change of code changes the result of a scene; it is part of its digest."""
 
 __all__ = ["Box", "Open", "Scene", "ShearedBox"]

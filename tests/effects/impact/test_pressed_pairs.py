@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from tests.scenes import HEAT_CAPACITY, energy, fixed, momentum, scene, simulate
+from tisim import Box
+from tisim.analysis import largest_overlap
 from tisim.effects import Friction, Heating, Impact, NearField, Reaction
 from tisim.steppers import ApproachTime, Collocation, IterationControl, StageControl, Trapezoid, Verlet
 
@@ -121,3 +123,48 @@ def test_so_it_is_with_other_steppers(stepper):
         assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
         assert result.work["contacts"] >= 90
         assert heat(result) == pytest.approx(1, rel=1e-13)
+
+
+def cluster(steps, domain=None, low=-np.inf, side=np.inf):
+    """A disturbed cube of 27 hard grains, nearly touching, that attract each other; in a box from ``low`` on
+    where there is one."""
+    disturbance = np.random.default_rng(0).normal(size=(27, 3))
+    sites = np.stack(np.meshgrid(*3 * [np.arange(-1.0, 2.0)]), axis=-1).reshape(-1, 3)
+    position = RADIUS * (2.2 * sites + 0.02 * disturbance)
+    return scene(
+        position if domain is None else low + np.mod(position - low, side),
+        np.zeros((27, 3)),
+        (Impact(hardness=1e9), Friction(coefficient=FRICTION), NearField(alpha1=1e-2)),
+        radius=RADIUS,
+        mass=MASS,
+        stepper=fixed(2e-3 / steps),
+        duration=2e-3,
+        **({} if domain is None else {"domain": domain}),
+    )
+
+
+@pytest.mark.long
+def test_a_cluster_does_not_sink_into_itself_and_the_less_so_the_shorter_the_steps():
+    deepest = []
+    for steps in (500, 2000):
+        (result,) = simulate([cluster(steps)], capacity=32)
+        assert result.status.ok, result.status.reason
+        assert result.work["contacts"] > 5 * steps
+        assert np.abs(momentum(result.state)).max() <= 1e-11 * MASS
+        moved = result.state["position"].mean(axis=0) - result.start["position"].mean(axis=0)
+        assert np.abs(moved).max() < 1e-9 * RADIUS
+        deepest.append(largest_overlap(result.state["position"], result.state["radius"]) / RADIUS)
+    assert deepest[0] < 0.3
+    assert deepest[1] < 0.3 * deepest[0]
+
+
+@pytest.mark.slow
+def test_grains_put_apart_across_a_face_stay_in_the_box():
+    side, low = 16 * RADIUS, np.array([0.0, -8 * RADIUS, -8 * RADIUS])
+    box = Box(low=low, high=low + side)
+    (result,) = simulate([cluster(500, box, low, side)], capacity=32)
+    assert result.status.ok, result.status.reason
+    assert result.work["contacts"] > 2500
+    assert (result.state["position"] >= low).all()
+    assert (result.state["position"] < low + side).all()
+    assert largest_overlap(result.state["position"], result.state["radius"], (side,) * 3) < 0.3 * RADIUS

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, Force
+from tisim.effects.base import Effect, Force, option
 from tisim.sources.base import Source, sources
 from tisim.worlds.bound import Peers
 
@@ -21,7 +21,9 @@ class Lorentz(Force):
 
     E and B are the sums of all sources of each. The charges, a field of the particles (C), do not act on each
     other here: that is ``near_field``. Fields that moving particles make are left out (Z16 section 7.7: far
-    below the speed of light).
+    below the speed of light). Without ``magnetic`` only the electric force is left, as for a charge at rest:
+    in a scene whose magnetic field is there for other effects, and turns no velocity in the time of a run
+    (q B t/m << 1).
 
     Source: Z13 Eqs (1)-(5).
     """
@@ -30,9 +32,13 @@ class Lorentz(Force):
     fields = ("charge", "velocity")
     requires_source = ("electric_field", "magnetic_flux_density")
 
+    magnetic: bool = option("whether a magnetic field acts on the charges too", True)
+
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
+        if not self.magnetic:
+            return math.inf
         fields = [one for one in effects if isinstance(one, Source)]
         bounds = [one.strongest() for one in fields if one.quantity == "magnetic_flux_density"]
         if None in bounds:
@@ -47,13 +53,16 @@ class Lorentz(Force):
 
     def gyrates(self, effects: Sequence[Effect]) -> bool:
         sources = [one for one in effects if isinstance(one, Source)]
-        return any(one.quantity == "magnetic_flux_density" and one.strongest() != 0 for one in sources)
+        return self.magnetic and any(
+            one.quantity == "magnetic_flux_density" and one.strongest() != 0 for one in sources
+        )
 
     @ti.func
     def flux_density(self, s, w, i, t):
         b = 0.0 * s.velocity[w, i]
-        for source in ti.static(self.magnetic_flux_density):
-            b += source.value(w, s.position[w, i], t)
+        if ti.static(self.magnetic):
+            for source in ti.static(self.magnetic_flux_density):
+                b += source.value(w, s.position[w, i], t)
         return b
 
     @ti.func

@@ -12,6 +12,11 @@ The forces are those of contacts too, once these are known: what presses a grain
 is above 1 since forces change within a step, and since contacts are resolved one after another: the later
 ones leave some approach to the earlier ones, that many times dt a in a row of some four grains. Whatever it
 is, a pair that meets in this step collides, and what SHARE takes for rest goes to zero with dt.
+
+In clusters that forces press together the approach that is left over lets grains sink into each other, step
+by step; forces that grow as grains come nearer would then soon be too steep for any step. So what has sunk is
+put apart again (U. M. Ascher, H. Chin, S. Reich, Numer. Math. 67 (1994) 131: the drift off a constraint is
+taken back by projection).
 """
 
 from tisim.backend.taichi import ti
@@ -22,6 +27,8 @@ ROUNDOFF = {ti.f64: 2.0**-53, ti.f32: 2.0**-24}
 SHARE = 16.0
 """A pair in contact may approach this many times as fast as forces make it in a step, and still not
 collide."""
+SUNK = 1e-2
+"""Grains in contact may overlap by this part of the smaller radius, as they do after a slow impact."""
 
 
 @ti.func
@@ -54,9 +61,22 @@ def press(s, w, i, impulse):
 
 
 @ti.func
+def part(s, w, i, j, n, distance):
+    """Put two grains in contact apart along n, about their common centre of mass, if they have sunk into each
+    other."""
+    smaller = ti.min(s.radius[w, i], s.radius[w, j])
+    deep = s.radius[w, i] + s.radius[w, j] - distance - SUNK * smaller
+    if deep > 0.0:
+        share = s.mass[w, j] / (s.mass[w, i] + s.mass[w, j])
+        s.position[w, i] = s.position[w, i] - share * deep * n
+        s.position[w, j] = s.position[w, j] + (1.0 - share) * deep * n
+        s.invalidate_lists(w)
+
+
+@ti.func
 def support(impact: ti.template(), s, w, i, j, separation):  # type: ignore[valid-type]
     """Hold together what forces press together, which slides as friction lets it; what that takes of its
-    kinetic energy is heat, and nothing else happens."""
+    kinetic energy is heat. Grains that have sunk into each other are put apart; nothing else happens."""
     m_i, m_j = s.mass[w, i], s.mass[w, j]
     reduced = m_i * m_j / (m_i + m_j)
     n = separation.normalized()
@@ -74,6 +94,7 @@ def support(impact: ti.template(), s, w, i, j, separation):  # type: ignore[vali
         slid -= stopped
     press(s, w, i, -impulse)
     press(s, w, j, impulse)
+    part(s, w, i, j, n, separation.norm())
     loss = 0.5 * reduced * (v_n * v_n + v_t * v_t - slid * slid)
     for law in ti.static(impact.temperature):
         s.temperature[w, i] = law.temperature(s, w, i, loss * m_j / (m_i + m_j))

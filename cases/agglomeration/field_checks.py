@@ -1,0 +1,153 @@
+"""Closed forms of two charged or magnetised grains, and what merging conserves of charged ones.
+
+Two grains of mass m and charges q and -q are at rest, their centres d_0 apart. In the distance d they move as
+one particle of the reduced mass mu = m/2, and with k = q^2 / (4 pi epsilon_0), from mu d'' = -k/d^2,
+
+    t(d) = sqrt(mu d_0^3 / (2 k)) (arccos sqrt(u) + sqrt(u (1 - u))),    u = d/d_0
+
+as in the fall of two masses; they meet at d = 2 b. Two moments M in line attract each other with 3 mu_0 M^2 /
+(2 pi d^4) (L21 Eqs 4.8, 4.9), so they close in at the speed
+
+    v(d) = sqrt(mu_0 M^2 / (pi mu) (1/d^3 - 1/d_0^3)).
+
+One charge in E_0 + E_1 sin(omega t) goes (q/m) (E_0 t^2/2 + E_1 (omega t - sin omega t) / omega^2) (Z13 Eq.
+16).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from scipy.constants import epsilon_0, mu_0
+
+import tisim
+from cases.agglomeration import fields
+from cases.agglomeration import scene as agglomeration
+from cases.case import Check
+from tisim import Particles, Scene
+from tisim.effects import CARBONYL_IRON, Agglomeration, Impact
+from tisim.steppers import FixedStep, Stepper, Verlet
+
+RADIUS, GRAIN_DENSITY, START_DISTANCE = 1e-3, 5e3, 8e-3
+"""The two grains of the checks: radius b (m), density (kg/m^3), distance d_0 of their centres (m)."""
+MASS = GRAIN_DENSITY * 4 / 3 * np.pi * RADIUS**3
+CHARGED: Mapping[str, float] = {**fields.NO_FIELDS, "surface_charge": 2e-3}
+CHARGE = 4 * np.pi * RADIUS**2 * CHARGED["surface_charge"]
+STEPS = 4000
+"""Two grains fall in so many steps; the error goes with the square of their length."""
+FORM_BOUND = 1e-7
+"""Runs in such steps may differ from a closed form by this part of it."""
+OWN_STEPPER_BOUND = 1e-3
+"""So may a fall in the steps of the case."""
+CONSERVATION_BOUND = 1e-12
+"""A conserved sum of hundreds of terms may change by this part of it, by rounding."""
+
+
+def fall_time(mass: float, charge: float, apart: float, distance: float) -> float:
+    """Return the time (s) in which two grains of a mass (kg), of charges +- ``charge`` (C), fall from rest
+    ``apart`` (m) to a distance (m)."""
+    u = distance / apart
+    attraction = charge**2 / (4 * np.pi * epsilon_0)
+    scale = np.sqrt(0.5 * mass * apart**3 / (2 * attraction))
+    return float(scale * (np.arccos(np.sqrt(u)) + np.sqrt(u * (1 - u))))
+
+
+def dipole_speed(mass: float, moment: float, apart: float, distance: float) -> float:
+    """Return the speed (m/s) at which two grains of a mass (kg) and a moment (A m^2), in line, close in at a
+    distance (m), from rest ``apart`` (m)."""
+    return float(np.sqrt(2 * mu_0 * moment**2 / (np.pi * mass) * (distance**-3 - apart**-3)))
+
+
+def iron_moment(flux: float) -> float:
+    """Return the moment (A m^2) of a sphere of iron of RADIUS in a field (T): the root of Froehlich's law for
+    its magnetisation M, with H = B/mu_0 - M/3 inside."""
+    chi, saturation = CARBONYL_IRON.parameters().values()
+    field = flux / mu_0
+    # chi H (M_s - M) = M_s M, a quadratic in M.
+    b = saturation + chi * (field + saturation / 3)
+    c = chi * field * saturation
+    magnetisation = (2 * c) / (b + np.sqrt(b * b - 4 * chi / 3 * c))
+    return float(4 / 3 * np.pi * RADIUS**3 * magnetisation)
+
+
+def pair(
+    design: Mapping[str, float], duration: float, stepper: Stepper, charges: tuple[float, float]
+) -> Scene:
+    """Return two grains at rest along x, which bond when they meet."""
+    return Scene(
+        name="pair",
+        particles=Particles(
+            position=((-START_DISTANCE / 2, 0, 0), (START_DISTANCE / 2, 0, 0)),
+            velocity=np.zeros((2, 3)),
+            radius=RADIUS,
+            density=GRAIN_DENSITY,
+            quantities={"charge": np.array(charges)},
+        ),
+        effects=(Impact(hardness=1.0), Agglomeration(), *fields.forces(design)),
+        stepper=stepper,
+        duration=duration,
+    )
+
+
+def meeting(stepper: Stepper, expected: float) -> float:
+    """Return when two opposite charges meet (s), to 1e-9 of it: the shortest run in which they become one."""
+    low, high = 0.9 * expected, 1.1 * expected
+    while high - low > 1e-9 * expected:
+        times = np.linspace(low, high, 32)
+        ends = tisim.run([pair(CHARGED, t, stepper, (CHARGE, -CHARGE)) for t in times])
+        first = int(np.argmax([end.work["merges"] > 0 for end in ends]))
+        low, high = times[max(first - 1, 0)], times[first]
+    return 0.5 * (low + high)
+
+
+def closed_forms() -> Iterator[Check]:
+    """Two charges fall together, two magnetised grains too, and fields move one charge."""
+    time = fall_time(MASS, CHARGE, START_DISTANCE, 2 * RADIUS)
+    for name, stepper, bound in (
+        (f"{STEPS} steps", Verlet(control=FixedStep(dt=time / STEPS)), FORM_BOUND),
+        ("the steps of the case", fields.stepper(RADIUS), OWN_STEPPER_BOUND),
+    ):
+        yield Check(f"opposite charges meet, in {name} (s)", meeting(stepper, time), time, bound * time)
+
+    flux, duration = 0.8, 2e-3
+    magnetic = {**fields.NO_FIELDS, "magnetic_field": flux}
+    stepper = Verlet(control=FixedStep(dt=duration / STEPS))
+    (end,) = tisim.run([pair(magnetic, duration, stepper, (0.0, 0.0))])
+    (x, _, _), (v, _, _) = (end.state[name][1] - end.state[name][0] for name in ("position", "velocity"))
+    speed = dipole_speed(MASS, iron_moment(flux), START_DISTANCE, x)
+    yield Check(
+        f"magnetised grains close in from {START_DISTANCE / x:.3g} times as far (m/s)",
+        -v,
+        speed,
+        FORM_BOUND * speed,
+    )
+
+    electric = {**CHARGED, "electric_field": 2e6, "electric_amplitude": 5e6, "electric_frequency": 300.0}
+    (end,) = tisim.run([pair(electric, duration, stepper, (CHARGE, 0.0))])
+    turn = 2 * np.pi * electric["electric_frequency"]
+    way = electric["electric_field"] * duration**2 / 2
+    way += electric["electric_amplitude"] * (turn * duration - np.sin(turn * duration)) / turn**2
+    way *= CHARGE / MASS
+    yield Check(
+        "a charge in an oscillating field goes (m)", end.state["position"][0, 1], way, FORM_BOUND * way
+    )
+
+
+def conservation() -> Iterator[Check]:
+    """Charge, mass and momentum of a flow of charged grains that merge, in no field."""
+    soft = {**agglomeration.BEST, "hardness": 1e5, **CHARGED, "charge_ratio": -0.5}
+    result = tisim.run(agglomeration.scene(soft, seed=1, grains=250))
+    before, after = result.start, result.state
+    yield Check("the charged flow reaches its end (1 = yes)", float(result.status.ok), 1.0, 0.0)
+    yield Check(
+        "grains less mergers, at the end", 250.0 - result.work["merges"], float(len(after["mass"])), 0.0
+    )
+    for name, unit in (("charge", "C"), ("mass", "kg")):
+        bound = CONSERVATION_BOUND * np.abs(before[name]).sum()
+        yield Check(f"{name} of the charged flow ({unit})", after[name].sum(), before[name].sum(), bound)
+    momentum = [(s["mass"][:, None] * s["velocity"]).sum(axis=0) for s in (before, after)]
+    bound = CONSERVATION_BOUND * (before["mass"] * np.linalg.norm(before["velocity"], axis=1)).sum()
+    for axis in range(3):
+        what = f"its momentum along {'xyz'[axis]} (kg m/s)"
+        yield Check(what, momentum[1][axis], momentum[0][axis], bound)

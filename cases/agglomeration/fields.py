@@ -1,0 +1,102 @@
+"""Charges and fields in the flow of Z04: the near field of its remark 4.2, which it leaves to others.
+
+Grains are of two classes, half of them each, equal but for their charge. They attract and repel each other
+by Coulomb's law (Z13 Eq. 22, the near field of Eq. 24), an electric field across the flow pushes them (Z13
+Eq. 3), and a magnetic field along it magnetises them as iron, so that they act on each other as dipoles (L21
+Eqs 4.8, 4.9). Each field has a constant and an oscillating part (Z13 Eq. 16).
+
+The charge of a grain is given over its surface, and its magnetic moment is its magnetisation times its
+volume. So the speed that attraction gives two grains before they meet does not depend on their size, nor does
+that from which on they bond (Z04 4.15), and the genes mean the same in all sizes of the case. A magnetic
+field also turns the velocities of charges, by q B t/m, which is below 3e-4 in a whole flow for grains of 1 mm
+and more: that is left out, so that a leapfrog, which keeps pressed grains at rest, can step all forces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from scipy.constants import epsilon_0
+
+from optimize.problem.genome import Gene
+from tisim.effects import CARBONYL_IRON, DipoleDipole, Effect, FroehlichMoment, Lorentz, NearField
+from tisim.packing import EqualSizes, GrainClass
+from tisim.sources import ElectricField, MagneticField
+from tisim.steppers import ApproachTime, Stepper, Verlet
+
+CHARGE_GENES = (
+    # Its field, 4.5e8 V/m at most, is half of what pulls electrons out of a metal in vacuum; air withstands
+    # less than a hundredth of it.
+    Gene("surface_charge", "C/m^2", 0.0, 4e-3),
+    Gene("charge_ratio", "", -1.0, 1.0),
+)
+"""The charge of the first class over its surface, and that of the second over that of the first."""
+ELECTRIC_GENES = (
+    # Vacuum between electrodes withstands some 1e7 V/m.
+    Gene("electric_field", "V/m", 0.0, 1e7),
+    Gene("electric_amplitude", "V/m", 0.0, 1e7),
+    Gene("electric_frequency", "Hz", 50.0, 1e3, "log"),
+)
+MAGNETIC_GENES = (
+    # Iron spheres saturate at 0.7 T.
+    Gene("magnetic_field", "T", 0.0, 1.0),
+    Gene("magnetic_amplitude", "T", 0.0, 1.0),
+    Gene("magnetic_frequency", "Hz", 50.0, 1e3, "log"),
+)
+FIELD_GENES = (*CHARGE_GENES, *ELECTRIC_GENES, *MAGNETIC_GENES)
+"""From half an oscillation to ten in a flow, and from nothing of each to where it outdoes the flow."""
+NO_FIELDS: Mapping[str, float] = {gene.name: max(gene.low, 0.0) for gene in FIELD_GENES}
+"""The values of these genes at which grains feel nothing of each other but impacts."""
+SHOWN: Mapping[str, float] = {
+    "surface_charge": 3e-3, "charge_ratio": -0.8,
+    "electric_field": 5e6, "electric_amplitude": 5e6, "electric_frequency": 100.0,
+    "magnetic_field": 0.5, "magnetic_amplitude": 0.3, "magnetic_frequency": 100.0,
+}  # fmt: skip
+"""Charges and fields that are felt, of the flow that is shown with them."""
+
+COULOMB = NearField(alpha2=1 / (4 * math.pi * epsilon_0), beta2=2, strength="charge")
+LONGEST_STEP = 5e-3
+"""Steps are at most as long as this, s, times the radius, m: forces act between impacts too, and the time of
+an oscillation that they can cause goes with the radius (docs/agglomeration.md)."""
+
+
+def has_fields(design: Mapping[str, float]) -> bool:
+    """Return whether a design says something of charges and fields, be it that there are none."""
+    return "surface_charge" in design
+
+
+def charged_classes(design: Mapping[str, float], radius: float) -> tuple[GrainClass, ...]:
+    """Return the two classes of grains of a radius (m), which differ in their charge."""
+    charge = 4 * math.pi * radius**2 * design["surface_charge"]
+    return tuple(
+        GrainClass(sizes=EqualSizes(radius=radius), density=design["density"], quantities={"charge": q})
+        for q in (charge, design["charge_ratio"] * charge)
+    )
+
+
+def forces(design: Mapping[str, float]) -> tuple[Effect, ...]:
+    """Return the forces of charges and fields. They are the same for all designs, so that all of a search run
+    in one batch."""
+    electric, magnetic = (2 * math.pi * design[f"{kind}_frequency"] for kind in ("electric", "magnetic"))
+    return (
+        COULOMB,
+        ElectricField(
+            constant=(0.0, design["electric_field"], 0.0),
+            amplitude=(0.0, design["electric_amplitude"], 0.0),
+            omega=(0.0, electric, 0.0),
+        ),
+        MagneticField(
+            constant=(design["magnetic_field"], 0.0, 0.0),
+            amplitude=(design["magnetic_amplitude"], 0.0, 0.0),
+            omega=(magnetic, 0.0, 0.0),
+        ),
+        Lorentz(magnetic=False),
+        FroehlichMoment(**CARBONYL_IRON.parameters()),
+        DipoleDipole(),
+    )
+
+
+def stepper(radius: float) -> Stepper:
+    """Return the stepper of grains of a radius (m) in fields."""
+    return Verlet(control=ApproachTime(longest=LONGEST_STEP * radius))

@@ -1,0 +1,203 @@
+"""Agglomeration with charges and fields: forces beside a NumPy twin, closed forms, what merging conserves."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.constants import epsilon_0, mu_0
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from cases.agglomeration import CASE, field_checks, fields
+from cases.agglomeration.problem import problem
+from cases.agglomeration.scene import BEST, HALF_SIDE, scene
+from cases.agglomeration.what_fields_add import FELT, KINDS, Found, one_flow, picture, problem_of, table
+from tests.effects.contact.loads import loads
+from tests.scenes import fixed, simulate
+from tisim.effects import CARBONYL_IRON
+
+DESIGN = {
+    **BEST,
+    "surface_charge": 3e-3, "charge_ratio": -0.6,
+    "electric_field": 4e6, "electric_amplitude": 7e6, "electric_frequency": 300.0,
+    "magnetic_field": 0.5, "magnetic_amplitude": 0.3, "magnetic_frequency": 120.0,
+}  # fmt: skip
+GRAINS, CAPACITY = 12, 16
+
+
+def moment(flux, radius):
+    """Moments of spheres of iron in a field along x, by bisection of Froehlich's law."""
+    chi, saturation = CARBONYL_IRON.parameters().values()
+
+    def excess(m):
+        inside = flux / mu_0 - m / 3
+        return chi * inside * (saturation - m) - saturation * m
+
+    return 4 / 3 * np.pi * radius**3 * brentq(excess, 0.0, min(saturation, 3 * flux / mu_0), xtol=1e-6)
+
+
+def forces_twin(design, state, t):
+    """Coulomb's force and that of dipoles, of every pair by its nearest image, and that of the electric
+    field."""
+    wave = np.sin(2 * np.pi * t * np.array([design["electric_frequency"], design["magnetic_frequency"]]))
+    electric = design["electric_field"] + design["electric_amplitude"] * wave[0]
+    flux = design["magnetic_field"] + design["magnetic_amplitude"] * wave[1]
+    force = np.outer(state["charge"], [0.0, electric, 0.0])
+    for i, j in itertools.permutations(range(len(force)), 2):
+        apart = state["position"][j] - state["position"][i]
+        apart -= 2 * HALF_SIDE * np.round(apart / (2 * HALF_SIDE))
+        d = np.linalg.norm(apart)
+        n = apart / d
+        force[i] -= state["charge"][i] * state["charge"][j] / (4 * np.pi * epsilon_0 * d**2) * n
+        a, b = (np.array([moment(flux, state["radius"][k]), 0.0, 0.0]) for k in (i, j))
+        dipoles = (a @ n) * b + (b @ n) * a + (a @ b) * n - 5 * (a @ n) * (b @ n) * n
+        force[i] -= 3 * mu_0 / (4 * np.pi * d**4) * dipoles
+    return force
+
+
+@pytest.mark.long
+def test_the_forces_are_those_of_a_numpy_twin():
+    (state,) = loads([scene(DESIGN, 3, GRAINS)], capacity=CAPACITY)
+    twin = forces_twin(DESIGN, state, 0.0)
+    assert np.abs(state["force"] - twin).max() <= 1e-10 * np.abs(twin).max()
+
+
+@pytest.mark.long
+def test_the_fields_oscillate():
+    """After some steps the force is that of the fields then."""
+    setup = scene({**DESIGN, "relative_velocity": 20.0, "length_ratio": 0.2}, 3, GRAINS, duration=8e-5)
+    (result,) = simulate([setup.model_copy(update={"stepper": fixed(2e-5)})])
+    assert (result.work["steps"], result.work["impacts"]) == (4, 0)
+    twin = forces_twin(DESIGN, result.state, result.time)
+    still = forces_twin(DESIGN, result.state, 0.0)
+    assert np.abs(result.state["force"] - twin).max() <= 1e-9 * np.abs(twin).max()
+    assert np.abs(still - twin).max() > 1e-2 * np.abs(twin).max()
+
+
+def test_grains_are_of_two_classes_that_differ_in_charge_alone():
+    for grains in (60, 250):
+        setup = scene(DESIGN, 1, grains)
+        start = setup.particles.arrays(setup.domain, 1)
+        plain = scene(BEST, 1, grains)
+        without = plain.particles.arrays(plain.domain, 1)
+        for name in ("velocity", "radius", "temperature"):
+            assert (start[name] == without[name]).all()
+        assert start["mass"] == pytest.approx(without["mass"], rel=1e-14)
+        surface = start["charge"] / (4 * np.pi * start["radius"] ** 2)
+        classes, counts = np.unique(surface.round(9), return_counts=True)
+        assert classes == pytest.approx([-0.6 * 3e-3, 3e-3])
+        assert counts.min() > 0.3 * grains
+
+
+@pytest.mark.long
+def test_genes_of_no_charge_and_no_field_change_nothing():
+    """Beside the flow of Z04 in the same box and steps."""
+    with_none = scene({**BEST, **fields.NO_FIELDS}, 2, 60, duration=1e-3)
+    control = {"stepper": with_none.stepper, "domain": with_none.domain}
+    a, b = (
+        simulate([one])[0]
+        for one in (with_none, scene(BEST, 2, 60, duration=1e-3).model_copy(update=control))
+    )
+    assert a.work["merges"] == b.work["merges"] > 5
+    order = [np.argsort(one.state["id"]) for one in (a, b)]
+    for name in ("position", "velocity", "radius", "temperature"):
+        u, v = a.state[name][order[0]], b.state[name][order[1]]
+        assert np.abs(u - v).max() <= 1e-12 * np.abs(v).max()
+
+
+def integrated(acceleration, apart, distance):
+    """Time (s) and speed (m/s) of a fall from rest, by integrating d'' = acceleration(d)."""
+
+    def reached(t, y):
+        return y[0] - distance
+
+    reached.terminal = True
+    end = solve_ivp(
+        lambda t, y: (y[1], acceleration(y[0])), (0.0, 1.0), (apart, 0.0),
+        events=reached, rtol=1e-11, atol=1e-15,
+    )  # fmt: skip
+    return end.t[-1], -end.y[1, -1]
+
+
+def test_closed_forms_are_those_of_the_equations_of_motion():
+    mass, charge, magnet, apart, distance = 2e-5, 3e-8, 5e-3, 5e-3, 2e-3
+    coulomb = charge**2 / (4 * np.pi * epsilon_0) / (mass / 2)
+    time, _ = integrated(lambda d: -coulomb / d**2, apart, distance)
+    assert field_checks.fall_time(mass, charge, apart, distance) == pytest.approx(time, rel=1e-8)
+    dipoles = 3 * mu_0 * magnet**2 / (2 * np.pi) / (mass / 2)
+    _, speed = integrated(lambda d: -dipoles / d**4, apart, distance)
+    assert field_checks.dipole_speed(mass, magnet, apart, distance) == pytest.approx(speed, rel=1e-8)
+    for flux in (1e-3, 0.4, 2.0):
+        assert field_checks.iron_moment(flux) == pytest.approx(moment(flux, field_checks.RADIUS), rel=1e-9)
+
+
+@pytest.mark.long
+def test_two_charges_meet_when_the_closed_form_says_and_are_one_without_charge():
+    time = field_checks.fall_time(
+        field_checks.MASS, field_checks.CHARGE, field_checks.START_DISTANCE, 2 * field_checks.RADIUS
+    )
+    charges = (field_checks.CHARGE, -field_checks.CHARGE)
+    steps = fields.stepper(field_checks.RADIUS)
+    early, late = (
+        simulate([field_checks.pair(field_checks.CHARGED, part * time, steps, charges)])[0]
+        for part in (0.999, 1.001)
+    )
+    assert (early.work["merges"], late.work["merges"]) == (0, 1)
+    assert late.state["charge"] == pytest.approx([0.0], abs=1e-14 * field_checks.CHARGE)
+    assert late.state["mass"] == pytest.approx([2 * field_checks.MASS])
+
+
+@pytest.mark.long
+def test_merging_conserves_charge_mass_and_momentum():
+    checks = list(field_checks.conservation())
+    assert all(check.ok for check in checks), checks
+    merged = next(check for check in checks if "mergers" in check.name)
+    assert merged.measured < 50
+
+
+@pytest.mark.slow
+def test_closed_forms():
+    for check in field_checks.closed_forms():
+        assert check.ok, check
+
+
+def test_the_genome_has_velocity_hardness_reaction_charges_and_fields():
+    assert "fields" in CASE.variants
+    for size in CASE.sizes:
+        searched, _ = CASE.inverse(size, "fields")
+        names = set(searched.genome.names)
+        assert {"relative_velocity", "hardness", "reaction", "surface_charge", "charge_ratio"} < names
+        assert {f"{kind}_{what}" for kind in ("electric", "magnetic") for what in
+                ("field", "amplitude", "frequency")} < names  # fmt: skip
+        assert names == {*problem(size).genome.names, *fields.NO_FIELDS}
+        low, high = (searched.scene(searched.genome.decode([u] * len(names)), 0) for u in (0.0, 1.0))
+        assert low.structure() == high.structure()
+        assert low.effects != high.effects
+
+
+def test_a_search_without_genes_of_fields_is_one_of_no_fields():
+    searched = problem_of("and magnetic field", "small")
+    design = searched.genome.decode([0.5] * len(searched.genome))
+    assert "surface_charge" not in design
+    assert searched.scene(design, 4) == scene({**fields.NO_FIELDS, **design}, 4, 60)
+    assert [len(problem_of(kind, "small").genome) for kind in KINDS] == [10, 12, 15, 13, 18]
+
+
+def test_the_table_and_the_picture_of_what_fields_add():
+    found = {kind: [Found({}, 0.1 * k, true) for true in (0.2, 0.3, 0.4)] for k, kind in enumerate(KINDS)}
+    text = table(found)
+    assert text.count("0.300 ± 0.248") == len(KINDS)
+    assert "| all | 18 | 0.300 ± 0.248 | 0.400 |" in text
+    (axis,) = picture(found, "three").axes
+    assert [label.get_text() for label in axis.get_yticklabels()] == list(KINDS)
+
+
+@pytest.mark.slow
+def test_what_fields_do_to_one_flow_is_beside_the_same_starts():
+    head, _, *rows = one_flow(60, 48).splitlines()
+    assert head.split("|")[1].strip() == "grains feel"
+    cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
+    assert [row[0] for row in cells] == list(FELT)
+    assert cells[0][2] == ""
+    gain, half = (float(part) for part in cells[-2][2].split(" ± "))
+    assert gain - half > 0.02
