@@ -19,6 +19,7 @@ from optimize.hall_of_fame import Hall
 from optimize.methods.base import find
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress, Stopped
+from optimize.problem.feasibility import penalised, total_violation
 from optimize.problem.problem import Problem
 from optimize.search_records import searches, store
 from optimize.settings import Settings, fit, identity
@@ -160,7 +161,24 @@ class _Search:
                 known = self.outcome.failures if string.failed else self.outcome.estimates
                 known[tuple(string)] = estimates
                 self.known.setdefault(tuple(string), string)
+        self._constrain(fresh)
         return sum(string.fitness.valid for string in fresh)
+
+    def _constrain(self, fresh: list[Individual]) -> None:
+        """Let designs that do not keep to a constraint of the result come behind all that do, by how far."""
+        constraints = self.problem.result_constraints
+        known = [string for string in self.known.values() if not string.failed]
+        if not constraints or not known:
+            return
+        for string in (*known, *(one for one in fresh if one.fitness.valid and not one.failed)):
+            string.limited = self.ensemble.constraint_means(self.problem.genome.decode(string))
+            parts = [one.violation(mean) for one, mean in zip(constraints, string.limited, strict=True)]
+            string.violation = float(total_violation(parts))
+        costs = [[estimate.mean for estimate in string.estimates] for string in known]
+        ordered = penalised(costs, [string.violation for string in known])
+        by_string = dict(zip(map(tuple, known), ordered.tolist(), strict=True))
+        for string in (*known, *(one for one in fresh if tuple(one) in by_string)):
+            string.fitness.values = tuple(by_string[tuple(string)])
 
     def _race(self, population: list[Individual], generation: int) -> None:
         """Spend more starts on the designs of the hall of fame, and rank it by their new estimates."""

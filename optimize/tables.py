@@ -23,11 +23,12 @@ Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
-    """Return the columns of Z04's tables 1 to 3 in one: rank, every gene in its unit, each constraint of the
-    design, each objective as the search knows it with its standard error, the derived columns of the problem,
-    starts, whether their mean converged (where that was asked of any); and from fresh starts, where the
-    designs have had some, each objective with the ends of its 95 % confidence interval. Heading -> values,
-    best first; of several objectives the front along the first, the best of that first.
+    """Return the columns of Z04's tables 1 to 3 in one.
+
+    Rank, every gene in its unit, each constraint, each objective as the search knows it with its standard
+    error, the derived columns of the problem, starts, whether their mean converged (where that was asked of
+    any). From fresh starts, where the designs have had some, each objective with the ends of its 95 %
+    confidence interval. Heading -> values, best first; of several objectives the front along the first.
     """
     estimates = [string.estimates for string in hall]
     number = "front" if problem.several else "rank"
@@ -37,6 +38,8 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
         columns[gene.label] = [design[gene.name] for design in designs]
     for constraint in problem.design_constraints:
         columns[constraint.label] = [constraint_value(constraint, one, problem) for one in designs]
+    for k, constraint in enumerate(problem.result_constraints):
+        columns[constraint.label] = [one.limited[k] if one.limited else math.nan for one in hall]
     columns |= _objectives(problem, estimates, "")
     columns["starts"] = [of_all[0].starts for of_all in estimates]
     if any(of_all[0].converged for of_all in estimates):

@@ -214,6 +214,11 @@ class Ensemble:
             sample.used, sample.converged = len(sample.costs), bool(self.repeatable)
         return [self._summary(sample) for sample in samples]
 
+    def constraint_means(self, design: Design) -> tuple[float, ...]:
+        """Return the mean of each constraint of the result over the starts of a design that has run."""
+        limited = self._sample(design).limited
+        return tuple(float(np.mean(column)) for column in zip(*limited, strict=True))
+
     def _sample(self, design: Design) -> Sample:
         return self._known.setdefault(canonical(dict(design)), Sample(design))
 

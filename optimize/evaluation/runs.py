@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from optimize.problem.calls import FaultyProblem, make_scene, value_of
+from optimize.problem.calls import FaultyProblem, constraint_value, make_scene, value_of
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
 from optimize.storage.record import Record, canonical, evaluation_key
@@ -80,13 +80,15 @@ def _widen(seen: list[float], value: float) -> None:
 class Sample:
     """The starts of one design so far.
 
-    costs : of each start, (starts, objectives). used : how many of them, from the first, its estimate
-    stands on. ends : of each start, what tells its run from another (see ``end_of``). converged : see
-    FitnessEstimate. reason : "" or why the design failed. open : whether more starts are to come.
+    costs, limited : of each start, those of the objectives and the values of the constraints of the result.
+    ends : of each start, what tells its run from another (see ``work_of``). used : how many of the starts,
+    from the first, its estimate stands on. converged : see FitnessEstimate. reason : "" or why the design
+    failed. open : whether more starts are to come.
     """
 
     design: Mapping[str, float]
     costs: list[tuple[float, ...]] = field(default_factory=list)
+    limited: list[tuple[float, ...]] = field(default_factory=list)
     ends: list[int | None] = field(default_factory=list)
     used: int = 0
     converged: bool = False
@@ -158,6 +160,8 @@ class Runs:
             if record.ok:
                 values = [record.values[objective.name] for objective in self.problem.objectives]
                 sample.costs.append(self.problem.costs(values))
+                limited = self.problem.result_constraints
+                sample.limited.append(tuple(record.values[one.name] for one in limited))
                 sample.ends.append(record.work.get(END))
                 for seen, cost in zip(self.seen, sample.costs[-1], strict=True):
                     _widen(seen, cost)
@@ -176,21 +180,21 @@ class Runs:
             report(finished / len(keys))
 
     def _record(self, key: str, sample: Sample, start: int, seed: int, result: Result) -> Record:
+        problem = self.problem
         ok, reason = result.status.ok, result.status.reason or "failed without a reason"
-        values = (math.nan,) * len(self.problem.objectives)
+        names = [one.name for one in problem.objectives] + [one.name for one in problem.result_constraints]
+        values = dict.fromkeys(names, math.nan)
         if ok:
-            values = tuple(value_of(one, result, self.problem) for one in self.problem.objectives)
-            for objective, value in zip(self.problem.objectives, values, strict=True):
+            values = {one.name: value_of(one, result, problem) for one in problem.objectives}
+            values |= {one.name: constraint_value(one, result, problem) for one in problem.result_constraints}
+            bare = not problem.several and not problem.result_constraints
+            for name, value in values.items():
                 if ok and not math.isfinite(value):
-                    ok, reason = (
-                        False,
-                        f"{objective.name if self.problem.several else 'objective'} is {value}",
-                    )
-        names = [objective.name for objective in self.problem.objectives]
+                    ok, reason = False, f"{'objective' if bare else name} is {value}"
         return Record(
             key=key,
             problem=self.problem.name,
-            values=dict(zip(names, values if ok else (math.nan,) * len(names), strict=True)),
+            values=values if ok else dict.fromkeys(values, math.nan),
             ok=ok,
             reason="" if ok else reason,
             seed=seed,

@@ -20,6 +20,7 @@ class Individual(list[float]):
     """A genetic string: a point of the unit cube, its DEAP fitness (invalid until known) and its estimates.
 
     estimates, confirmed : of the cost of each objective, from the search and from fresh starts; else ().
+    limited : the mean of each constraint of the result. violation : 0 where the design keeps to all of them.
     """
 
     def __init__(self, genes: Iterable[float], objectives: int = 1) -> None:
@@ -27,6 +28,8 @@ class Individual(list[float]):
         self.fitness = minimised(objectives)()
         self.estimates: tuple[FitnessEstimate, ...] = ()
         self.confirmed: tuple[FitnessEstimate, ...] = ()
+        self.limited: tuple[float, ...] = ()
+        self.violation = 0.0
 
     def know(self, estimates: tuple[FitnessEstimate, ...]) -> None:
         """Take these estimates as its fitness."""

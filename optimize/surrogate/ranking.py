@@ -31,7 +31,8 @@ def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np
 def best(genome: Genome, strings: Sequence[Individual], count: int) -> list[Individual]:
     """Return the best designs by posterior mean, best first; of several objectives the front, along the
     first, of which ``count`` are kept where it is larger: the ends, and those farthest from others."""
-    good = [string for string in strings if not string.failed]
+    ran = [string for string in strings if not string.failed]
+    good = [string for string in ran if not string.violation] or ran
     if not good:
         return []
     means = posterior_means(genome, good)
