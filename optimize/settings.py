@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import Field, SerializeAsAny, model_validator
 
 from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.methods.base import every, find
+from optimize.methods.base import code_of, every, find
 from optimize.problem.problem import Problem
 from optimize.storage.record import canonical
 from tisim.components.component import Checked
@@ -33,7 +33,7 @@ class Settings(Checked):
     """
 
     seed: int = Field(0, ge=0)
-    method: str = "genetic"
+    method: str = "zohdi"
     options: SerializeAsAny[Checked] = Checked()
     generations: int = Field(25, ge=0)
     ensemble: EnsembleSettings = EnsembleSettings()
@@ -51,7 +51,7 @@ class Settings(Checked):
     @model_validator(mode="before")
     @classmethod
     def _options_of_the_method(cls, data: dict[str, Any]) -> dict[str, Any]:
-        kind = find(data.get("method", "genetic")).Options
+        kind = find(data.get("method", "zohdi")).Options
         options = data.get("options", {})
         if not isinstance(options, kind):
             named = isinstance(options, Mapping) and all(isinstance(name, str) for name in options)
@@ -70,6 +70,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
     evaluator : the settings of the evaluator.
     """
     left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
+    method_code = code_of(settings.method)
     return {
         "format": IDENTITY_FORMAT,
         "problem": problem.name,
@@ -88,6 +89,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         },
         "objective_order": [one.name for one in problem.objectives],
         "search": settings.model_dump(mode="json", exclude=left_out),
+        **({"method_code": method_code} if method_code else {}),
         "evaluator": dict(evaluator),
     }
 
@@ -103,7 +105,7 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
     Where a case has 24 strings and 8 parents, 12 strings shall have as many parents as go with 12.
     usual : settings of the case. changes : settings in place of them, by dotted name.
     """
-    method = find(changes.get("method", usual.get("method", "genetic")))
+    method = find(changes.get("method", usual.get("method", "zohdi")))
     dropped = {
         name
         for option, names in method.dependent_options.items()
@@ -124,11 +126,11 @@ def fit(problem: Problem, settings: Settings) -> None:
 
 def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:
     """Return the settings of a case with another method, whose options are then its own defaults; a method
-    that takes all options of the case's method, as restart those of genetic, keeps them.
+    that takes all options of the case's method, as restart those of zohdi, keeps them.
 
     base : of the case. method : by name; None for the case's, or what its objectives need.
     """
-    usual = base.get("method", "genetic")
+    usual = base.get("method", "zohdi")
     if method is None and problem.several and not find(usual).several:
         method = "nsga2"
     if method is None or issubclass(find(method).Options, find(usual).Options):
