@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import Field, SerializeAsAny, model_validator
 
 from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.methods.base import SearchMethod, every, find
+from optimize.methods.base import SearchMethod, code_of, every, find
 from optimize.problem.problem import Problem
 from optimize.storage.record import canonical
 from tisim.components.component import Checked
@@ -60,18 +60,17 @@ class Settings(Checked):
             named = isinstance(options, Mapping) and all(isinstance(name, str) for name in options)
             must(named, "search.options", "settings of the method, by name", options)
             options = kind(**options)
-        return {**data, "options": options, "ensemble": _ensemble(method, data.get("ensemble", {}))}
+        return {**data, "options": options, "ensemble": _ensemble(method, options, data.get("ensemble", {}))}
 
 
-def _ensemble(method: type[SearchMethod], given: Any) -> Any:
+def _ensemble(method: type[SearchMethod], options: Any, given: Any) -> Any:
     """Return the settings of the ensemble: those that are given, else those that suit the method."""
+    common = not method.starts_of_its_own(options)
     if not isinstance(given, Mapping):
         return (
-            given
-            if given.common_starts is not None
-            else given.model_copy(update={"common_starts": not method.own_starts})
+            given if given.common_starts is not None else given.model_copy(update={"common_starts": common})
         )
-    return {"common_starts": not method.own_starts, **method.ensemble, **given}
+    return {"common_starts": common, **method.ensemble, **given}
 
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
@@ -84,6 +83,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
     evaluator : the settings of the evaluator.
     """
     left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
+    method_code = code_of(settings.method)
     return {
         "format": IDENTITY_FORMAT,
         "problem": problem.name,
@@ -102,6 +102,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         },
         "objective_order": [one.name for one in problem.objectives],
         "search": settings.model_dump(mode="json", exclude=left_out),
+        **({"method_code": method_code} if method_code else {}),
         "evaluator": dict(evaluator),
     }
 
@@ -138,7 +139,7 @@ def fit(problem: Problem, settings: Settings) -> None:
 
 def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:
     """Return the settings of a case with another method, whose options are then its own defaults; a method
-    that takes all options of the case's method, as restart those of genetic, keeps them.
+    that takes all options of the case's method, as restart those of zohdi, keeps them.
 
     base : of the case. method : by name; None for the case's, or what its objectives need.
     """

@@ -1,16 +1,20 @@
-"""The contract of a search method: a file of optimize/methods. Found by looking; registered nowhere."""
+"""The contract of a search method: a file of optimize/methods, or of the user. It is found by looking and
+registered nowhere."""
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
+import sys
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 from optimize import methods
 from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
+from optimize.problem.problem import checksum_of
 from tisim.components.component import Checked
 from tisim.errors import must
 
@@ -49,6 +53,11 @@ class SearchMethod(ABC):
     def __init__(self, genome: Genome, objectives: int, options: Any, seed: int) -> None:
         """Raise InputError for options that cannot work on the genome."""
 
+    @classmethod
+    def starts_of_its_own(cls, options: Any) -> bool:
+        """Return whether it has own_starts with these options."""
+        return cls.own_starts
+
     @abstractmethod
     def ask(self) -> list[Individual]:
         """Return the strings of the next generation."""
@@ -59,22 +68,47 @@ class SearchMethod(ABC):
 
 
 def every() -> dict[str, type[SearchMethod]]:
-    """Return all search methods by their names."""
-    by_name: dict[str, type[SearchMethod]] = {}
+    """Return all search methods by their names: those of this package, and those of modules of the user that
+    have been imported. InputError where one of these cannot be used."""
     for entry in pkgutil.iter_modules(methods.__path__):
-        module = importlib.import_module(f"{methods.__name__}.{entry.name}")
-        for kind in vars(module).values():
-            if (
-                isinstance(kind, type)
-                and issubclass(kind, SearchMethod)
-                and kind.__module__ == module.__name__ != __name__
-            ):
-                by_name[kind.name] = kind
+        importlib.import_module(f"{methods.__name__}.{entry.name}")
+    kinds = [kind for kind in _made_after(SearchMethod) if not inspect.isabstract(kind)]
+    by_name = {kind.name: kind for kind in kinds if _of_package(kind)}
+    by_name = dict(sorted(by_name.items()))
+    for kind in kinds:
+        # A class that is no longer to be found in its module is of a file that has been loaded anew.
+        if _of_package(kind) or vars(sys.modules.get(kind.__module__, object)).get(kind.__name__) is not kind:
+            continue
+        where = f"{kind.__module__}.{kind.__name__}"
+        name, options = getattr(kind, "name", None), getattr(kind, "Options", None)
+        must(isinstance(name, str) and bool(name), f"name of {where}", "a text", name)
+        must(name not in by_name, f"name of {where}", "one that no other search method has", name)
+        fit = isinstance(options, type) and issubclass(options, Checked)
+        must(fit, f"Options of {where}", "a class made of tisim.components.component.Checked", options)
+        by_name[str(name)] = kind
     return by_name
 
 
 def find(name: str) -> type[SearchMethod]:
     """Return a method by name; InputError naming the known ones when there is none."""
     by_name = every()
-    must(isinstance(name, str) and name in by_name, "method", f"one of {', '.join(by_name)}", name)
+    rule = f"one of {', '.join(by_name)}, or your own (--plugin, import)"
+    must(isinstance(name, str) and name in by_name, "method", rule, name)
     return by_name[name]
+
+
+def code_of(name: str) -> str:
+    """Return a checksum of the code of a method of the user; "" for one of this package, which has a
+    version."""
+    kind = find(name)
+    return "" if _of_package(kind) else checksum_of(kind, f"method {name}")
+
+
+def _of_package(kind: type) -> bool:
+    return kind.__module__.startswith(f"{methods.__name__}.")
+
+
+def _made_after(kind: type[Any]) -> Iterator[type[Any]]:
+    for sub in kind.__subclasses__():
+        yield sub
+        yield from _made_after(sub)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
-from scipy.stats import qmc
 
 from optimize.methods.base import SearchMethod
+from optimize.methods.first_designs import sobol
 from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
@@ -69,7 +69,7 @@ class GaussianProcessSearch(SearchMethod):
         known = [string for string in self.strings if not string.failed]
         if len(known) < 2:
             count = self.options.first or max(10, 2 * self.genes)
-            points = _sobol(self.genes, count, self.rng)
+            points = sobol(self.genes, count, self.rng)
             return [Individual(point, self.objectives) for point in self.genome.canonical(points)]
         count = max(self.options.population, len(self.strings) // _GROWTH)
         self.belief.learn(self.strings)
@@ -103,12 +103,6 @@ class GaussianProcessSearch(SearchMethod):
         known = {tuple(string) for string in self.strings}
         new = [i for i, point in enumerate(points) if tuple(point) not in known]
         return points[new]
-
-
-def _sobol(genes: int, count: int, rng: np.random.Generator) -> Array:
-    """Return the first points of a scrambled Sobol' sequence, (count, genes)."""
-    whole = qmc.Sobol(genes, rng=rng).random_base2(max(count - 1, 1).bit_length())
-    return np.asarray(whole[:count])
 
 
 def changed(points: Array, widest: float, count: int, rng: np.random.Generator) -> Array:

@@ -1,43 +1,207 @@
-"""Z04's genetic algorithm, or one put together from DEAP's operators."""
+"""A genetic algorithm of DEAP's operators: it proposes, a surrogate ranks, and what is worth most is run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from deap import tools
+from pydantic import Field, model_validator
 
 from optimize.methods.base import SearchMethod
-from optimize.methods.breeding import Breeder
-from optimize.methods.breeding_settings import Breeding
+from optimize.methods.first_designs import sobol
 from optimize.methods.individual import Individual
+from optimize.methods.operators import GeneticOperator, Operators
 from optimize.problem.genome import Genome
+from optimize.surrogate.acquisition import Worth
+from optimize.surrogate.belief import Belief
+from optimize.surrogate.gaussian_process import Array
+from optimize.surrogate.trust_region import TrustRegion
+from tisim.components.component import Checked
+from tisim.errors import must
+
+_GROWTH = 20
+"""A generation has at least the number of designs that are known over this, so that making the surrogate anew
+does not cost more and more of the search."""
+_PARENTS = 20
+"""Parents of a generation with a surrogate, for each objective."""
+_TRIES = 10
+"""Times that a generation is bred anew where it has designs that are known already."""
+SELECT = GeneticOperator(name="selTournament", options={"tournsize": 2})
+SELECT_SEVERAL = GeneticOperator(name="selTournamentDCD")
+
+
+class BreedingOptions(Checked):
+    """The settings of a genetic algorithm.
+
+    population : designs per generation (None: 8 with a surrogate; without one 20, and for several objectives
+    40). select, mate, mutate : operators of deap.tools by name, with their options, or functions that are
+    called in the same way. select None: tournaments of two, by rank and crowding for several objectives.
+    crossover_probability : that a pair is mated. mutation_probability : that a string is then mutated.
+    """
+
+    population: int | None = Field(None, ge=1)
+    select: GeneticOperator | None = None
+    mate: GeneticOperator = GeneticOperator(name="cxSimulatedBinaryBounded", options={"eta": 15.0})
+    mutate: GeneticOperator = GeneticOperator(
+        name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.5}
+    )
+    crossover_probability: float = Field(0.9, ge=0, le=1)
+    mutation_probability: float = Field(1.0, ge=0, le=1)
+
+    @classmethod
+    def kind(cls) -> str:
+        """Return the name of these settings in messages, as in ``--set search.options.population=60``."""
+        return "search.options"
+
+
+class GeneticOptions(BreedingOptions):
+    """The settings of a genetic algorithm that a surrogate assists.
+
+    surrogate : whether one does. first : designs of generation 0 (None: twice the genes, 10 at least).
+    proposals : strings bred on the surrogate for each one that is run, in each of ``inner`` generations.
+    """
+
+    surrogate: bool = True
+    first: int | None = Field(None, ge=2)
+    proposals: int = Field(30, ge=1)
+    inner: int = Field(5, ge=1)
+
+    @model_validator(mode="after")
+    def _only_with_a_surrogate(self) -> GeneticOptions:
+        if not self.surrogate:
+            for name in ("first", "proposals", "inner"):
+                value = getattr(self, name)
+                unused = value == type(self).model_fields[name].get_default()
+                must(unused, f"search.options.{name}", "left out where surrogate is false", value)
+        return self
 
 
 class Genetic(SearchMethod):
-    """Z04 sections 7 and 8; see optimize.methods.breeding."""
+    """A genetic algorithm put together from DEAP, for one objective or several.
+
+    Without a surrogate the parents are the best designs so far (selBest), or those that NSGA-II selects, and
+    a generation is their offspring. With one, parents are selected by posterior mean, a population evolves on
+    the surrogate for some generations, and of all strings bred there those are run which are worth most
+    together (Y. Jin, Swarm Evol. Comput. 1 (2011) 61-70, has a review of such algorithms). Half of the
+    designs of one objective without noise come from a trust region, as in gaussian_process.py.
+    """
 
     name = "genetic"
-    Options = Breeding
-    ensemble: ClassVar[Mapping[str, Any]] = {"tolerance": 5e-4, "min_starts": 4, "block": 6}
-    dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "population": ("parents", "offspring"), "parents": ("offspring",), "offspring": ("parents",),
-    }  # fmt: skip
+    several = True
+    Options: ClassVar[type[Checked]] = GeneticOptions
 
-    def __init__(self, genome: Genome, objectives: int, options: Breeding, seed: int) -> None:
-        self.options, self.breeder = options, Breeder(len(genome), options, seed)
-        self.generation = 0
-        self.next_strings: list[Individual] = []
+    def __init__(self, genome: Genome, objectives: int, options: GeneticOptions, seed: int) -> None:
+        self.options, self.genome, self.objectives = options, genome, objectives
+        self.genes = len(genome)
+        self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
+        usual = SELECT if objectives == 1 else SELECT_SEVERAL
+        self.operators = Operators(
+            {"select": options.select or usual, "mate": options.mate, "mutate": options.mutate},
+            self.genes,
+            objectives,
+            (options.crossover_probability, options.mutation_probability),
+            seed,
+        )
+        plain = 20 if objectives == 1 else 40
+        self.population = options.population or (8 if options.surrogate else plain)
+        self.strings: list[Individual] = []
+        self.known: set[tuple[float, ...]] = set()
+        self.parents: list[Individual] = []
+        self.belief, self.region = Belief(genome.features), TrustRegion(genome)
+        self.local: int | None = None
 
-    @property
-    def width(self) -> float:  # type: ignore[override]
-        return float(self.breeder.box.width.mean())
+    @classmethod
+    def starts_of_its_own(cls, options: GeneticOptions) -> bool:
+        return options.surrogate
 
     def ask(self) -> list[Individual]:
-        return self.next_strings or self.breeder.first()
+        if sum(not string.failed for string in self.strings) < 2:
+            points = self._first()
+        elif self.options.surrogate:
+            points = self._worth_most()
+        else:
+            points = self._offspring()
+        return self._strings(points)
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
-        every = self.options.recentre_every
-        self.moved = bool(every and self.generation and self.generation % every == 0 and hall)
-        if self.moved:
-            self.breeder.recentre(hall[0])
-        self.generation += 1
-        self.next_strings = self.breeder.next_generation(population)
+        new = [string for string in population if tuple(string) not in self.known]
+        self.known |= {tuple(string) for string in new}
+        if self.options.surrogate:
+            self.strings += new
+        else:
+            # What is not among the best designs now will never be again.
+            good = [string for string in [*self.strings, *new] if not string.failed]
+            self.strings = self._best(good, self.population)
+        if self.local is not None:
+            self.region.learn(population[: self.local])
+            self.local = None
+
+    def _first(self) -> Array:
+        if self.options.surrogate:
+            points = sobol(self.genes, self.options.first or max(10, 2 * self.genes), self.rng)
+        else:
+            points = self.rng.random((self.population, self.genes))
+        return self.genome.canonical(points)
+
+    def _offspring(self) -> Array:
+        """Return designs that are not known, bred from the best; of few designs those that are left."""
+        bred = np.empty((0, self.genes))
+        for _ in range(_TRIES):
+            more = self.genome.canonical(self.operators.bred(self.strings, self.population))
+            bred = self._new(np.vstack([bred, more]))
+            if len(bred) >= self.population:
+                break
+        return bred[: self.population]
+
+    def _worth_most(self) -> Array:
+        """Return the designs that are worth most together by the surrogate."""
+        count = max(self.population, len(self.strings) // _GROWTH)
+        self.belief.learn(self.strings)
+        local = np.empty((0, self.genes))
+        if self.belief.exact and self.objectives == 1:
+            proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
+            local = self._new(self.genome.canonical(proposed))
+            self.local = len(local)
+        worth = Worth(self.belief, self.rng)
+        evolved = self._new(self._evolved(worth, count * self.options.proposals))
+        return np.vstack([local, worth.batch(evolved, count - len(local))])
+
+    def _evolved(self, worth: Worth, count: int) -> Array:
+        """Return the strings of some generations on the surrogate, ``count`` in each, and as many random ones
+        in the first.
+
+        Their fitness is what a run is worth for one cost, and the posterior means of several.
+        """
+        belief, most = self.belief, _PARENTS * self.objectives
+        parents = self._best(self._strings(belief.points[belief.chosen], belief.means), most)
+        drawn = [self.genome.canonical(self.rng.random((count, self.genes)))]
+        for _ in range(self.options.inner):
+            drawn.append(self.genome.canonical(self.operators.bred(parents, count)))
+            points = drawn[-1] if len(drawn) > 2 else np.vstack(drawn)
+            means, deviations = belief.predict(points)
+            costs = -worth(means, deviations)[:, None] if self.objectives == 1 else means
+            kept = parents if len(drawn) > 2 else []
+            parents = self._best(self._strings(points, costs) + kept, most)
+        return np.vstack(drawn)
+
+    def _best(self, strings: list[Individual], most: int) -> list[Individual]:
+        """Return the strings of so many that are selected as parents."""
+        if not strings:
+            return []
+        if self.objectives == 1:
+            return list(tools.selBest(strings, most))
+        return list(tools.selNSGA2(strings, most, nd="log"))
+
+    def _strings(self, points: Array, costs: Array | None = None) -> list[Individual]:
+        """Return strings, with costs where these are given."""
+        strings = [Individual(point, self.objectives) for point in points]
+        for string, values in zip(strings, () if costs is None else costs, strict=False):
+            string.fitness.values = tuple(map(float, values))
+        return strings
+
+    def _new(self, points: Array) -> Array:
+        """Return those of the points that are not known, each once, in their order."""
+        rows = dict.fromkeys(map(tuple, points.tolist()))
+        return np.array([row for row in rows if row not in self.known]).reshape(-1, self.genes)

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import random
 
+import numpy as np
+
 
 class OwnRandom:
-    """Within ``with``, the random module has this object's state; afterwards the caller's again."""
+    """Within ``with``, the random module and that of NumPy have this object's states; afterwards the caller's
+    again. DEAP uses the first; operators of the user may use the second."""
 
     def __init__(self, seed: int) -> None:
-        self.state = random.Random(seed).getstate()
+        legacy = np.random.RandomState(seed % 2**32)
+        self.state = random.Random(seed).getstate(), legacy.get_state()
 
     def __enter__(self) -> None:
-        self._callers = random.getstate()
-        random.setstate(self.state)
+        self._callers = random.getstate(), np.random.get_state()  # noqa: NPY002
+        self._set(self.state)
 
     def __exit__(self, *error: object) -> None:
-        self.state = random.getstate()
-        random.setstate(self._callers)
+        self.state = random.getstate(), np.random.get_state()  # noqa: NPY002
+        self._set(self._callers)
+
+    @staticmethod
+    def _set(state: tuple[object, object]) -> None:
+        random.setstate(state[0])  # type: ignore[arg-type]
+        np.random.set_state(state[1])  # type: ignore[arg-type]  # noqa: NPY002

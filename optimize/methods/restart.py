@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pydantic import Field
 
 from optimize.methods.breeding_settings import Breeding
-from optimize.methods.genetic import Genetic
 from optimize.methods.individual import Individual
+from optimize.methods.zohdi import Zohdi
 from optimize.problem.genome import Genome, SearchBox
 
 
 class RestartOptions(Breeding):
-    """The settings of ``genetic``, and when to begin again.
+    """The settings of ``zohdi``, and when to begin again.
 
     stalled : generations without a better best, after which the search is taken to have converged.
     smallest : width of the search box below which the next restart is in the whole range.
@@ -25,10 +25,10 @@ class RestartOptions(Breeding):
     smallest: float = Field(0.05, gt=0, le=1)
 
 
-class Restart(Genetic):
+class Restart(Zohdi):
     """Z04 section 7, option: "Rescale and restart the search around best design every few generations".
 
-    Where ``genetic`` only draws its fresh strings from the rescaled box, here the whole population is drawn
+    Where ``zohdi`` only draws its fresh strings from the rescaled box, here the whole population is drawn
     anew from it, but for the best design: the parents, and what they have bred towards, are given up.
     """
 

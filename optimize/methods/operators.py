@@ -1,0 +1,176 @@
+"""Operators of deap.tools by name, or functions of the user, and the toolbox that breeds with them."""
+
+from __future__ import annotations
+
+import inspect
+import random
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from deap import base, tools
+from pydantic import Field, model_validator
+
+from optimize.methods.individual import Individual
+from optimize.methods.random_state import OwnRandom
+from optimize.problem.calls import function_name
+from optimize.problem.problem import checksum_of
+from optimize.surrogate.gaussian_process import Array
+from tisim import InputError
+from tisim.components.component import Checked
+from tisim.errors import must
+
+PREFIXES = {"select": "sel", "mate": "cx", "mutate": "mut"}
+"""The operators of a genetic algorithm, and how their names in deap.tools begin."""
+_ARITY = {"select": 2, "mate": 2, "mutate": 1}
+"""The arguments that DEAP calls them with."""
+_LARGEST = dict.fromkeys(("selRoulette", "selStochasticUniversalSampling"), "favours large fitness values")
+_FRONT = dict.fromkeys(
+    ("selNSGA2", "selNSGA3", "selNSGA3WithMemory", "selSPEA2", "selTournamentDCD"),
+    "is for several objectives",
+)
+_SEVERAL = (
+    "selTournamentDCD", "selRandom", "selLexicase", "selEpsilonLexicase", "selAutomaticEpsilonLexicase",
+)  # fmt: skip
+"""Selections in which all objectives count; others rank by the first, or leave no string out."""
+
+
+class GeneticOperator(Checked):
+    """An operator of deap.tools by name, or a function of the user that is called as those are.
+
+    options : keyword arguments. The bounds ``low`` and ``up`` of the unit cube are filled in where the
+    operator has such arguments and they are not given. checksum : of a function of the user, and of all that
+    it uses; it stands for the function in what is stored of a search.
+    """
+
+    name: str
+    options: dict[str, Any] = Field(default_factory=dict)
+    checksum: str = ""
+    function: Callable[..., Any] | None = Field(None, exclude=True, repr=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _called(cls, given: Any) -> Any:
+        """Return what a function, or a name alone, stands for."""
+        if isinstance(given, str):
+            return {"name": given}
+        if callable(given):
+            name = function_name(given)
+            return {"name": name, "function": given, "checksum": checksum_of(given, f"operator {name}")}
+        return given
+
+    def bound(self, role: str, objectives: int) -> tuple[Callable[..., Any], dict[str, Any]]:
+        """Return the function for a role, ``select``, ``mate`` or ``mutate``, and its keyword arguments.
+        InputError unless name and arguments fit."""
+        function = self.function or self._of_deap(role, objectives)
+        free = _parameters(function)[_ARITY[role] :]
+        given = set(self.options)
+        names = [parameter.name for parameter in free]
+        must(given <= set(names), f"options of {self.name}", f"among {names}", sorted(given))
+        open_ = [parameter.name for parameter in free if parameter.default is inspect.Parameter.empty]
+        bounds = {name: value for name, value in (("low", 0.0), ("up", 1.0)) if name in open_}
+        required = [name for name in open_ if name not in bounds]
+        must(set(required) <= given, f"options of {self.name}", f"complete: {required}", sorted(given))
+        return function, bounds | self.options
+
+    def _of_deap(self, role: str, objectives: int) -> Callable[..., Any]:
+        must(not self.checksum, role, "the function itself, from Python", f"{self.name}, its name")
+        unfit = _LARGEST | _FRONT if objectives == 1 else {}
+        names = [name for name in dir(tools) if name.startswith(PREFIXES[role]) and name not in unfit]
+        if role == "select" and objectives > 1:
+            names = list(_SEVERAL)
+        why = f" ({self.name} {unfit[self.name]})" if self.name in unfit else ""
+        must(self.name in names, "operator name", f"one of {', '.join(names)}{why}", self.name)
+        function: Callable[..., Any] = getattr(tools, self.name)
+        return function
+
+
+def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
+    """Return the parameters that can be given by name; of a function of C that does not tell them none."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except ValueError:
+        return []
+    variable = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    return [parameter for parameter in parameters if parameter.kind not in variable]
+
+
+class Operators:
+    """A toolbox of DEAP: select, mate and mutate. Its random numbers are its own.
+
+    crossover, mutation : probabilities that a pair is mated, and that a string is then mutated.
+    Raises InputError where the operators are not fit for strings of so many real genes: before any run.
+    """
+
+    def __init__(
+        self,
+        operators: Mapping[str, GeneticOperator],
+        genes: int,
+        objectives: int,
+        probabilities: tuple[float, float],
+        seed: int,
+    ) -> None:
+        self.genes, self.objectives = genes, objectives
+        self.crossover, self.mutation = probabilities
+        self.random = OwnRandom(seed)
+        self.toolbox = base.Toolbox()
+        for role, operator in operators.items():
+            function, options = operator.bound(role, objectives)
+            self.toolbox.register(role, function, **options)
+        self._rehearse({role: operator.name for role, operator in operators.items()})
+
+    def bred(self, parents: Sequence[Individual], count: int) -> Array:
+        """Return the strings that parents of known fitness bring forth, (count, genes), in the unit cube."""
+        with self.random:
+            selected = self._selected(list(parents), count + count % 2)
+            children = [Individual(string, self.objectives) for string in selected]
+            for i in range(0, count, 2):
+                if random.random() < self.crossover:
+                    children[i : i + 2] = self.toolbox.mate(children[i], children[i + 1])
+            for i, child in enumerate(children):
+                if random.random() < self.mutation:
+                    (children[i],) = self.toolbox.mutate(child)
+        return np.clip(np.array(children[:count], dtype=float), 0.0, 1.0)
+
+    def _selected(self, parents: list[Individual], count: int) -> list[Individual]:
+        """Return so many of the parents, however few these are."""
+        if self.toolbox.select.func is not tools.selTournamentDCD:
+            return list(self.toolbox.select(parents, count))
+        # It takes fours, each of the parents twice at most.
+        parents = parents * (4 // len(parents) + 1) if len(parents) < 4 else parents
+        fours = len(parents) // 4 * 4
+        chosen: list[Individual] = []
+        while len(chosen) < count:
+            chosen += self.toolbox.select(random.sample(parents, fours), fours)
+        return chosen[:count]
+
+    def _rehearse(self, names: Mapping[str, str]) -> None:
+        """Breed from throwaway strings, one of them failed, twice from the same random numbers."""
+        state = self.random.state
+        try:
+            once = self._trial()
+            self.random.state = state
+            again = self._trial()
+        except Exception as error:
+            raise InputError(
+                f"operators must be fit for real-valued strings; received {dict(names)} ({error!r})"
+            ) from error
+        finally:
+            self.random.state = state
+        good = all(len(string) == self.genes and np.all(np.isfinite(string)) for string in once)
+        must(good, "operators", "fit for real-valued strings", dict(names))
+        must(once == again, "operators", "random by the modules random and numpy.random alone", dict(names))
+
+    def _trial(self) -> list[list[float]]:
+        rng = np.random.default_rng(0)
+        strings = [Individual(rng.random(self.genes), self.objectives) for _ in range(8)]
+        for rank, string in enumerate(strings):
+            cost = float(rank) if rank else float("inf")
+            string.fitness.values = (cost,) * self.objectives
+            string.fitness.crowding_dist = cost
+        trial = self.bred(strings, 12).tolist()
+        with self.random:
+            for string in strings:
+                trial += self.toolbox.mate(Individual(string), Individual(strings[0]))
+                trial += self.toolbox.mutate(Individual(string))
+        return [list(string) for string in trial]

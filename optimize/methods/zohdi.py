@@ -1,0 +1,43 @@
+"""Z04: T. I. Zohdi, Proc. R. Soc. Lond. A 460 (2004) 3421-3445, its genetic algorithm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from optimize.methods.base import SearchMethod
+from optimize.methods.breeding import Breeder
+from optimize.methods.breeding_settings import Breeding
+from optimize.methods.individual import Individual
+from optimize.problem.genome import Genome
+
+
+class Zohdi(SearchMethod):
+    """Z04 sections 7 and 8; see optimize.methods.breeding."""
+
+    name = "zohdi"
+    Options = Breeding
+    ensemble: ClassVar[Mapping[str, Any]] = {"tolerance": 5e-4, "min_starts": 4, "block": 6}
+    dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "population": ("parents", "offspring"), "parents": ("offspring",), "offspring": ("parents",),
+    }  # fmt: skip
+
+    def __init__(self, genome: Genome, objectives: int, options: Breeding, seed: int) -> None:
+        self.options, self.breeder = options, Breeder(len(genome), options, seed)
+        self.generation = 0
+        self.next_strings: list[Individual] = []
+
+    @property
+    def width(self) -> float:  # type: ignore[override]
+        return float(self.breeder.box.width.mean())
+
+    def ask(self) -> list[Individual]:
+        return self.next_strings or self.breeder.first()
+
+    def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
+        every = self.options.recentre_every
+        self.moved = bool(every and self.generation and self.generation % every == 0 and hall)
+        if self.moved:
+            self.breeder.recentre(hall[0])
+        self.generation += 1
+        self.next_strings = self.breeder.next_generation(population)
