@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -52,14 +51,14 @@ class Design:
 
     genes : the value of each gene, by name, in its unit: a number, a text or a flag. values : of each
     objective, by name, in its unit: the mean over random starts, the fresh ones where there are any.
-    intervals : the ends of their 95 % confidence intervals, of fresh starts; NaN where there are none, as the
-    starts that a design was chosen by flatter it. starts : how many there were. converged : whether the last
-    of them changed the mean by less than the tolerance that was asked for.
+    intervals : the ends of their 95 % confidence intervals; None without fresh starts, as the starts that a
+    design was chosen by flatter it. starts : their number. converged : whether the last of them changed the
+    mean by less than the tolerance that was asked for.
     """
 
     genes: dict[str, Any]
     values: dict[str, float]
-    intervals: dict[str, tuple[float, float]]
+    intervals: dict[str, tuple[float, float] | None]
     starts: int
     converged: bool
 
@@ -119,7 +118,7 @@ class Outcome:
         means = self.problem.costs([estimate.mean for estimate in estimates])
         sure = bool(string.confirmed) or all(estimate.std == 0 for estimate in estimates)
         intervals = {
-            one.name: interval_of_value(estimate, one) if sure else (math.nan, math.nan)
+            one.name: interval_of_value(estimate, one) if sure else None
             for one, estimate in zip(self.problem.objectives, estimates, strict=True)
         }
         return Design(

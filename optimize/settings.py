@@ -66,10 +66,12 @@ class Settings(Checked):
 def _ensemble(method: type[SearchMethod], options: Any, given: Any) -> Any:
     """Return the settings of the ensemble: those that are given, else those that suit the method."""
     common = not method.starts_of_its_own(options)
-    if not isinstance(given, Mapping):
+    if isinstance(given, EnsembleSettings):
         return (
             given if given.common_starts is not None else given.model_copy(update={"common_starts": common})
         )
+    if not isinstance(given, Mapping):
+        return given  # which is refused with its name
     return {"common_starts": common, **method.ensemble, **given}
 
 
@@ -141,11 +143,16 @@ def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> d
     """Return the settings of a case with another method, whose options are then its own defaults; a method
     that takes all options of the case's method, as restart those of zohdi, keeps them.
 
-    base : of the case. method : by name; None for the case's, or what its objectives need.
+    base : of the case; under "methods" it may have settings for methods other than its own, by name.
+    method : by name; None for the case's, or what its objectives need.
     """
+    of_methods = base.get("methods", {})
+    base = {key: value for key, value in base.items() if key != "methods"}
     usual = base.get("method", METHOD)
     if method is None and problem.several and not find(usual).several:
         method = METHOD
+    if method in of_methods:
+        return {**of_methods[method], "method": method}
     if method is None or issubclass(find(method).Options, find(usual).Options):
         return {**base, "method": method or usual}
     return {**{key: value for key, value in base.items() if key != "options"}, "method": method}

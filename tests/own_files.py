@@ -39,5 +39,8 @@ def distance(result):
 
 
 PROBLEM = Problem("drift", Genome((Gene("speed", "m/s", 1.0, 20.0),)), scene, distance, symbol="R")
-SEARCH = {"generations": 1, "options": {"population": 6, "parents": 2}, "ensemble": {"max_starts": 4}}
+SEARCH = {
+    "method": "zohdi", "generations": 1, "options": {"population": 6, "parents": 2},
+    "ensemble": {"max_starts": 4},
+}
 """

@@ -37,8 +37,7 @@ L21_CELLS = {
 4.4.1.3). Where the dividing wall stands is not said there; here it is in the middle."""
 
 SEARCH_SETTINGS = {
-    "generations": 6, "options": {"population": 10, "parents": 4},
-    "ensemble": {"tolerance": 0.9, "min_starts": 1, "block": 1, "max_starts": 1, "confirm": 3},
+    "generations": 6, "ensemble": {"min_starts": 1, "select": 0, "confirm": 3},
 }  # fmt: skip
 
 SIZES = {

@@ -47,8 +47,7 @@ NEIGHBOURS = 3 * RADIUS
 """Distance within which the size "clumps" has a near field, m: half a diameter between surfaces."""
 
 SEARCH_SETTINGS = {
-    "generations": 24,
-    "ensemble": {"tolerance": 1e-2, "min_starts": 2, "block": 2, "max_starts": 4, "confirm": 8},
+    "generations": 24, "ensemble": {"confirm": 8},
 }  # fmt: skip
 
 SIZES = {

@@ -42,12 +42,8 @@ LONGEST_MOVE, LONGEST_STEP = 2e-6, 0.05
 
 
 SEARCH_SETTINGS = {
-    "method": "cma-es",
-    "generations": 40,
-    "options": {"population": 16},
-    "ensemble": {"tolerance": 0.02, "min_starts": 2, "block": 2, "max_starts": 8, "race": 24, "confirm": 20},
+    "generations": 60, "max_evaluations": 1600, "ensemble": {"confirm": 20},
 }  # fmt: skip
-"""Starts are few for all, and many for the designs that compete: captured fractions are noisy."""
 
 SIZES = {
     "default": Size("100 particles of 125 nm about a short transverse cylinder, 50 s", {}, SEARCH_SETTINGS),

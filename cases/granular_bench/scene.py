@@ -52,13 +52,13 @@ LAW = Granular(
 
 SEARCH_SETTINGS = {
     "method": "cma-es", "generations": 14, "options": {"population": 8, "sigma": 0.2},
-    "ensemble": {"tolerance": 0.9, "min_starts": 1, "block": 1, "max_starts": 1},
+    "ensemble": {"min_starts": 1, "select": 0, "confirm": 0},
 }  # fmt: skip
 SMALL_SEARCH_SETTINGS = {
     **SEARCH_SETTINGS, "generations": 14,
     # One heap of so few grains tells its angle to 2 degrees only, and what is best by few heaps is best by
     # luck: fresh ones decide.
-    "ensemble": {"tolerance": 0.9, "min_starts": 4, "block": 4, "max_starts": 4, "confirm": 12},
+    "ensemble": {"min_starts": 4, "confirm": 12},
 }  # fmt: skip
 
 BED = "bed"

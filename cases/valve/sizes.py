@@ -30,8 +30,7 @@ GRADIENT = published.PRESSURE / L21_LENGTH
 SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 4e-4}
 """What a search runs of each design: the field is on from the first."""
 SEARCH_SETTINGS = {
-    "method": "nsga2", "generations": 4, "options": {"population": 12},
-    "ensemble": {"min_starts": 4, "block": 4, "max_starts": 4, "confirm": 8},
+    "generations": 6, "options": {"population": 8, "first": 12}, "ensemble": {"min_starts": 4, "confirm": 8},
 }  # fmt: skip
 """From one start some valves jam by luck, and a search would keep those."""
 

@@ -43,9 +43,7 @@ CYCLOTRON = CHARGE * FLUX / MASS
 SPACING = CUBE / (SITES - 1)
 
 SEARCH_SETTINGS = {
-    "generations": 16, "options": {"population": 24, "parents": 8},
-    # Nothing is random: a second start is the first.
-    "ensemble": {"min_starts": 2, "block": 2, "max_starts": 2},
+    "generations": 20, "options": {"population": 8},
 }  # fmt: skip
 
 SIZES = {

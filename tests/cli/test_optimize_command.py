@@ -51,7 +51,11 @@ TOY = Case(
     name="toy",
     title="A toy",
     source="none",
-    sizes={"default": Size("5 grains", {}, {"generations": 2, "options": {"population": 6, "parents": 2}})},
+    sizes={
+        "default": Size(
+            "5 grains", {}, {"method": "zohdi", "generations": 2, "options": {"population": 6, "parents": 2}}
+        )
+    },
     scene=lambda size, seed: None,
     check=lambda: iter(()),
     problem=toy_problem,

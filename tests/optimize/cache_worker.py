@@ -87,7 +87,12 @@ def search(path):
 
     announce()
     with Cache(path) as cache:
-        run(fake_problem(3), FakeEvaluator(), cache, Settings(seed=2, generations=4))
+        run(
+            fake_problem(3),
+            FakeEvaluator(),
+            cache,
+            Settings(seed=2, generations=4, ensemble={"min_starts": 8}),
+        )
 
 
 def announce():

@@ -30,7 +30,11 @@ def problem(size, variant):
     return Problem("drift", genome, scene, distance, symbol="R")
 
 
-SEARCH = {"options": {"population": 8, "parents": 2}, "ensemble": {"max_starts": 6, "confirm": 8}}
+SEARCH = {
+    "method": "zohdi",
+    "options": {"population": 8, "parents": 2},
+    "ensemble": {"max_starts": 6, "confirm": 8},
+}
 CASE = Case(
     "drift", "Free grains", "none", {"default": Size("5 grains", {}, SEARCH)},
     scene=lambda size, seed: None, check=lambda: iter(()), problem=problem, variants=("only",),

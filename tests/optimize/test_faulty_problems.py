@@ -11,7 +11,7 @@ from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError, RunError
 
 SETTINGS = Settings(
-    generations=3, options={"population": 6, "parents": 2},
+    method="zohdi", generations=3, options={"population": 6, "parents": 2},
     ensemble=EnsembleSettings(max_starts=1, min_starts=1, block=1),
 )  # fmt: skip
 

@@ -9,7 +9,7 @@ from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import PIPE, worker
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 
-SETTINGS = Settings(seed=2, generations=4)
+SETTINGS = Settings(seed=2, generations=4, ensemble={"min_starts": 8})
 
 
 def run(path, evaluator):

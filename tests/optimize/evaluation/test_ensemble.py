@@ -10,6 +10,7 @@ from optimize.settings import Settings
 from optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError, RunError
+from tisim.numerics.skewed import interval
 
 DESIGNS = [{"x0": 0.1, "x1": 0.2}, {"x0": 0.9, "x1": 0.2}, {"x0": 0.5, "x1": 0.5}]
 
@@ -53,8 +54,8 @@ def test_estimate_is_the_mean_of_the_starts_up_to_the_converged_one_whatever_the
         assert (estimate.starts, estimate.converged) == (n, True)
         assert estimate.mean == pytest.approx(np.mean(values[:n]), rel=1e-14)
         assert estimate.std == pytest.approx(np.std(values[:n], ddof=1), rel=1e-12)
-        t = {3: 4.302653, 4: 3.182446, 5: 2.776445, 6: 2.570582, 7: 2.446912, 8: 2.364624, 9: 2.306004}[n]
-        assert estimate.half_width == pytest.approx(t * estimate.std / math.sqrt(n), rel=1e-6)
+        assert estimate.standard_error == pytest.approx(estimate.std / math.sqrt(n), rel=1e-12)
+        assert (estimate.low, estimate.high) == interval(values[:n])
 
 
 def test_one_call_for_all_designs_then_only_those_not_converged(tmp_path):
@@ -65,16 +66,21 @@ def test_one_call_for_all_designs_then_only_those_not_converged(tmp_path):
     result = ensemble(tmp_path, evaluator, block=4, min_starts=4, max_starts=10, tolerance=1e-9).estimate(
         DESIGNS
     )
-    assert [len(call) for call in evaluator.calls] == [12, 8, 4]
-    assert {scene.design["x0"] for scene in evaluator.calls[1]} == {0.9, 0.5}
+    look, *calls = evaluator.calls
+    assert {(s.design["x0"], s.seed) for s in look} == {
+        (x, start_seed(4, k)) for x in (0.1, 0.9) for k in (0, 1)
+    }
+    assert [len(call) for call in calls] == [12 - 4, 8, 4]
+    assert {scene.design["x0"] for scene in calls[1]} == {0.9, 0.5}
     assert [(e.starts, e.converged) for (e,) in result] == [(4, True), (10, False), (10, False)]
 
 
 def test_common_random_numbers(tmp_path):
     def seeds(common, file):
         evaluator = FakeEvaluator()
-        ensemble(tmp_path / file, evaluator, common_starts=common, max_starts=6).estimate(DESIGNS)
-        return [{s.seed for s in evaluator.calls[0] if s.design == design} for design in DESIGNS]
+        ensemble(tmp_path / file, evaluator, common_starts=common, min_starts=6).estimate(DESIGNS)
+        scenes = [scene for call in evaluator.calls for scene in call]
+        return [{s.seed for s in scenes if s.design == design} for design in DESIGNS]
 
     common, own = seeds(True, "common"), seeds(False, "own")
     assert common[0] == common[1] == common[2] == {start_seed(4, k) for k in range(6)}
@@ -99,7 +105,7 @@ def test_a_failed_start_never_wins_and_is_recorded(tmp_path, bad, reason):
         return bad if design["x0"] == 0.9 and seed == third else 1.0
 
     evaluator = FakeEvaluator(function)
-    run = ensemble(tmp_path, evaluator, block=6)
+    run = ensemble(tmp_path, evaluator, min_starts=6)
     (good,), (failed,), _ = run.estimate(DESIGNS)
     assert good.mean == 1.0
     assert failed.mean == math.inf
@@ -110,7 +116,7 @@ def test_a_failed_start_never_wins_and_is_recorded(tmp_path, bad, reason):
         (reason, third, True)
     ]
     again = FakeEvaluator(function)
-    assert repr(ensemble(tmp_path, again, block=6).estimate(DESIGNS)[1]) == repr((failed,))
+    assert repr(ensemble(tmp_path, again, min_starts=6).estimate(DESIGNS)[1]) == repr((failed,))
     assert again.digests == []
 
 
@@ -163,7 +169,7 @@ def test_progress_rises_to_one(tmp_path):
 
 
 def test_finished_evaluations_are_stored_before_the_rest_runs(tmp_path):
-    run = ensemble(tmp_path, FakeEvaluator(interrupt_after=7))
+    run = ensemble(tmp_path, FakeEvaluator(interrupt_after=7), min_starts=4)
     with pytest.raises(KeyboardInterrupt):
         run.estimate(DESIGNS)
     assert len(Cache(tmp_path / "cache.h5")) == 7
@@ -180,7 +186,7 @@ def test_evaluator_that_forgets_a_scene_is_caught(tmp_path):
 
 def test_settings_are_checked():
     with pytest.raises(InputError, match="min_starts must be <= max_starts = 3; received 4"):
-        EnsembleSettings(max_starts=3)
+        EnsembleSettings(min_starts=4, max_starts=3)
     with pytest.raises(
         InputError, match=r"search\.ensemble\.tolerance must be greater than 0\.0; received 0"
     ):

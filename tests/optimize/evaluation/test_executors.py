@@ -168,7 +168,7 @@ def test_killed_worker_loses_nothing(away, here):
 @pytest.mark.parametrize("away", ["dask"], indirect=True)
 def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
     evaluator, pids = away
-    settings = Settings(seed=2, generations=2, options={"population": 8, "parents": 2})
+    settings = Settings(seed=2, method="zohdi", generations=2, options={"population": 8, "parents": 2})
 
     def records_of(path, runner, on_progress=None):
         with Cache(path) as cache:

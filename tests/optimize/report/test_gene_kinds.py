@@ -65,7 +65,7 @@ def test_the_spread_of_those_that_meet_has_names_of_choices():
         ({"speed": 9.0, "blades": 5, "wall": "flat", "open": True}, 16.0),
     ):
         string = tuple(PROBLEM.genome.encode(design))
-        outcome.estimates[string] = (FitnessEstimate(cost, 0.0, 0.0, 1, True),)
+        outcome.estimates[string] = (FitnessEstimate.certain(cost),)
     rows = {line[0]: line[1:] for line in printed(report.met_table(outcome)) if line}
     assert rows["speed"] == ["(m/s)", "1", "3", "25", "%"]
     assert rows["blades"] == ["2", "3", "25", "%"]

@@ -29,7 +29,10 @@ def outcome_of(tmp_path, function=bowl, **settings):
     problem = fake_problem(symbol="Pi", title="Bowl", derived=DERIVED)
     with Cache(tmp_path / "cache.h5") as cache:
         return search(
-            problem, FakeEvaluator(function), cache, Settings(**{"generations": 9, "seed": 1, **settings})
+            problem,
+            FakeEvaluator(function),
+            cache,
+            Settings(**{"method": "zohdi", "generations": 9, "seed": 1, **settings}),
         )
 
 
@@ -50,18 +53,27 @@ def test_csv_holds_all_digits(outcome, tmp_path):
             "x2 (m)",
             "x3 (m)",
             "Pi",
-            "95 % +-",
+            "std. error",
             "b_f/b_0",
             "n_f",
             "starts",
             "converged",
+            "Pi, fresh starts",
+            "95 % low, fresh starts",
+            "95 % high, fresh starts",
+            "b_f/b_0, fresh starts",
+            "n_f, fresh starts",
+            "starts, fresh starts",
         ]
     )
     assert [int(row["rank"]) for row in rows] == [1, 2, 3, 4, 5, 6]
     for row, string in zip(rows, outcome.hall, strict=True):
         assert [float(row[f"x{i} (m)"]) for i in range(4)] == list(string)
         assert float(row["Pi"]) == string.estimates[0].mean
-        assert float(row["95 % +-"]) == string.estimates[0].half_width
+        assert float(row["std. error"]) == string.estimates[0].standard_error
+        assert float(row["Pi, fresh starts"]) == string.confirmed[0].mean
+        assert float(row["95 % low, fresh starts"]) == string.confirmed[0].low
+        assert float(row["95 % high, fresh starts"]) == string.confirmed[0].high
         assert float(row["n_f"]) == pytest.approx(float(row["b_f/b_0"]) ** 3)
 
 
@@ -94,7 +106,8 @@ def printed_lines(outcome, width=80):
 def test_terminal_table_shows_the_best_designs(outcome):
     rows = printed_lines(outcome)
     assert [row[:6].split(" ")[0] for row in rows] == [
-        *("rank", "x0", "x1", "x2", "x3", "Pi", "95", "b_f/b_", "n_f", "starts"), "conver",
+        *("rank", "x0", "x1", "x2", "x3", "Pi", "std.", "b_f/b_", "n_f", "starts"), "conver",
+        *("Pi,", "95", "95", "b_f/b_", "n_f,", "starts"),
     ]  # fmt: skip
     assert rows[0].split() == ["rank", *"123456"]
     assert rows[5].split() == ["Pi", *(f"{string.estimates[0].mean:.4g}" for string in outcome.hall)]
@@ -105,7 +118,7 @@ def agglomerations(number):
     outcome = Outcome(agglomeration("paper"), Settings(), {"problem": "agglomeration"})
     for k in range(number):
         string = Individual([0.851234 + k / 200] * 10)
-        string.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0),)
+        string.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.70123, 0.72345, 48, k % 2 == 0),)
         string.confirmed = string.estimates
         outcome.hall.append(string)
     return outcome
@@ -131,15 +144,14 @@ def test_symbols_of_the_table_are_explained_under_it(outcome):
         console.print(report.notes(outcome))
         return [line.split(": ")[0] for line in console.export_text().splitlines() if ": " in line]
 
-    assert headings(outcome) == ["95 % +-", "starts", "converged"]
+    words = ["starts", "std. error", "converged", "fresh starts", "95 % low, 95 % high"]
+    assert headings(outcome) == words
+    words.remove("converged")  # no tolerance was asked for
     assert headings(agglomerations(2)) == [
         "Pi",
         "b_f / b_0",
         "n_f",
-        "95 % +-",
-        "starts",
-        "converged",
-        "fresh starts",
+        *words,
     ]
     assert headings(agglomerations(0)) == []
     headings = best_columns(agglomerations(2).problem, agglomerations(2).hall)

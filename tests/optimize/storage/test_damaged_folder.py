@@ -16,7 +16,8 @@ from tisim.files.lock import LOCK
 from tisim.files.ownership import MARKER
 
 BOWL = Case(
-    "bowl", "A bowl", "none", {"default": Size("", {}, {"options": {"population": 8, "parents": 2}})},
+    "bowl", "A bowl", "none",
+    {"default": Size("", {}, {"method": "zohdi", "options": {"population": 8, "parents": 2}})},
     scene=lambda size, seed: None, check=lambda: iter(()), problem=lambda size, variant: fake_problem(2),
     variants=("only",),
 )  # fmt: skip

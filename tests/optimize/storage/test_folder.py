@@ -16,7 +16,8 @@ from tisim.cli.main import main
 from tisim.files.ownership import MARKER
 
 BOWL = Case(
-    "bowl", "A bowl", "none", {"default": Size("", {}, {"options": {"population": 8, "parents": 2}})},
+    "bowl", "A bowl", "none",
+    {"default": Size("", {}, {"method": "zohdi", "options": {"population": 8, "parents": 2}})},
     scene=lambda size, seed: None, check=lambda: iter(()), problem=lambda size, variant: fake_problem(2),
     variants=("only",),
 )  # fmt: skip
@@ -95,7 +96,7 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
 
 def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path, monkeypatch):
     """On a case that has more parents than this population has strings; and to compare methods, too."""
-    usual = {"options": {"population": 24, "parents": 8}}
+    usual = {"method": "zohdi", "options": {"population": 24, "parents": 8}}
     monkeypatch.setattr(
         catalogue, "every", lambda: {BOWL.name: replace(BOWL, sizes={"default": Size("", {}, usual)})}
     )
