@@ -44,7 +44,7 @@ class BreedingOptions(Checked):
     population: int | None = Field(None, ge=1)
     select: GeneticOperator | None = None
     mate: GeneticOperator = GeneticOperator(name="cxSimulatedBinaryBounded", options={"eta": 15.0})
-    mutate: GeneticOperator = GeneticOperator(name="mutPolynomialBounded", options={"eta": 5.0, "indpb": 0.5})
+    mutate: GeneticOperator = GeneticOperator(name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.5})
     crossover_probability: float = Field(0.9, ge=0, le=1)
     mutation_probability: float = Field(1.0, ge=0, le=1)
 
@@ -64,7 +64,7 @@ class GeneticOptions(BreedingOptions):
     surrogate: bool = True
     first: int | None = Field(None, ge=2)
     proposals: int = Field(30, ge=1)
-    inner: int = Field(6, ge=1)
+    inner: int = Field(5, ge=1)
 
     @model_validator(mode="after")
     def _only_with_a_surrogate(self) -> GeneticOptions:
@@ -168,7 +168,7 @@ class Genetic(SearchMethod):
         """Return the strings of some generations on the surrogate, ``count`` in each, and as many random ones
         in the first.
 
-        Their fitness is what a run is worth for one cost, and for several the lower confidence bounds.
+        Their fitness is what a run is worth for one cost, and the posterior means of several.
         """
         belief, most = self.belief, _PARENTS * self.objectives
         parents = self._best(self._strings(belief.points[belief.chosen], belief.means), most)
@@ -177,7 +177,7 @@ class Genetic(SearchMethod):
             drawn.append(self.genome.canonical(self.operators.bred(parents, count)))
             points = drawn[-1] if len(drawn) > 2 else np.vstack(drawn)
             means, deviations = belief.predict(points)
-            costs = -worth(means, deviations)[:, None] if self.objectives == 1 else means - deviations
+            costs = -worth(means, deviations)[:, None] if self.objectives == 1 else means
             kept = parents if len(drawn) > 2 else []
             parents = self._best(self._strings(points, costs) + kept, most)
         return np.vstack(drawn)
