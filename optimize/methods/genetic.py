@@ -44,7 +44,9 @@ class BreedingOptions(Checked):
     population: int | None = Field(None, ge=1)
     select: GeneticOperator | None = None
     mate: GeneticOperator = GeneticOperator(name="cxSimulatedBinaryBounded", options={"eta": 15.0})
-    mutate: GeneticOperator = GeneticOperator(name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.5})
+    mutate: GeneticOperator = GeneticOperator(
+        name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.5}
+    )
     crossover_probability: float = Field(0.9, ge=0, le=1)
     mutation_probability: float = Field(1.0, ge=0, le=1)
 
