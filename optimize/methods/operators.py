@@ -20,7 +20,7 @@ from tisim import InputError
 from tisim.components.component import Checked
 from tisim.errors import Words, must
 
-PREFIXES = {"select": "sel", "mate": "cx", "mutate": "mut"}
+_PREFIXES = {"select": "sel", "mate": "cx", "mutate": "mut"}
 """The operators of a genetic algorithm, and how their names in deap.tools begin."""
 _ARITY = {"select": 2, "mate": 2, "mutate": 1}
 """The arguments that DEAP calls them with."""
@@ -76,7 +76,7 @@ class GeneticOperator(Checked):
     def _of_deap(self, role: str, objectives: int) -> Callable[..., Any]:
         must(not self.checksum, role, "the function itself, from Python", Words(f"{self.name}, its name"))
         unfit = _LARGEST | _FRONT if objectives == 1 else {}
-        names = [name for name in dir(tools) if name.startswith(PREFIXES[role]) and name not in unfit]
+        names = [name for name in dir(tools) if name.startswith(_PREFIXES[role]) and name not in unfit]
         if role == "select" and objectives > 1:
             names = list(_SEVERAL)
         why = f" ({self.name} {unfit[self.name]})" if self.name in unfit else ""
