@@ -44,3 +44,34 @@ SEARCH = {
     "ensemble": {"max_starts": 4},
 }
 """
+
+METHOD = '''
+"""Steps from the best design so far."""
+import numpy as np
+from optimize.methods.base import SearchMethod
+from optimize.methods.individual import Individual
+from tisim.components.component import Checked
+
+
+class Options(Checked):
+    population: int = 4
+    width: float = 0.1
+
+
+class Steps(SearchMethod):
+    name = "steps"
+    Options = Options
+
+    def __init__(self, genome, objectives, options, seed):
+        self.options, self.rng = options, np.random.default_rng(seed)
+        self.middle = np.full(len(genome), 0.5)
+
+    def ask(self):
+        size = (self.options.population, len(self.middle))
+        steps = self.options.width * self.rng.standard_normal(size)
+        return [Individual(point) for point in np.clip(self.middle + steps, 0.0, 1.0)]
+
+    def tell(self, population, hall):
+        if hall:
+            self.middle = np.array(hall[0])
+'''

@@ -146,14 +146,15 @@ class Genetic(SearchMethod):
         return self.genome.canonical(points)
 
     def _offspring(self) -> Array:
-        """Return designs that are not known, bred from the best; of few designs those that are left."""
+        """Return designs that are not known, bred from the best; where they bring forth none, random ones."""
         bred = np.empty((0, self.genes))
         for _ in range(_TRIES):
             more = self.genome.canonical(self.operators.bred(self.strings, self.population))
             bred = self._new(np.vstack([bred, more]))
             if len(bred) >= self.population:
-                break
-        return bred[: self.population]
+                return bred[: self.population]
+        drawn = self.genome.canonical(self.rng.random((_TRIES * self.population, self.genes)))
+        return self._new(np.vstack([bred, drawn]))[: self.population]
 
     def _worth_most(self) -> Array:
         """Return the designs that are worth most together by the surrogate."""

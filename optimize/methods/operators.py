@@ -18,9 +18,9 @@ from optimize.problem.problem import checksum_of
 from optimize.surrogate.gaussian_process import Array
 from tisim import InputError
 from tisim.components.component import Checked
-from tisim.errors import must
+from tisim.errors import Words, must
 
-PREFIXES = {"select": "sel", "mate": "cx", "mutate": "mut"}
+_PREFIXES = {"select": "sel", "mate": "cx", "mutate": "mut"}
 """The operators of a genetic algorithm, and how their names in deap.tools begin."""
 _ARITY = {"select": 2, "mate": 2, "mutate": 1}
 """The arguments that DEAP calls them with."""
@@ -74,9 +74,9 @@ class GeneticOperator(Checked):
         return function, bounds | self.options
 
     def _of_deap(self, role: str, objectives: int) -> Callable[..., Any]:
-        must(not self.checksum, role, "the function itself, from Python", f"{self.name}, its name")
+        must(not self.checksum, role, "the function itself, from Python", Words(f"{self.name}, its name"))
         unfit = _LARGEST | _FRONT if objectives == 1 else {}
-        names = [name for name in dir(tools) if name.startswith(PREFIXES[role]) and name not in unfit]
+        names = [name for name in dir(tools) if name.startswith(_PREFIXES[role]) and name not in unfit]
         if role == "select" and objectives > 1:
             names = list(_SEVERAL)
         why = f" ({self.name} {unfit[self.name]})" if self.name in unfit else ""
@@ -134,14 +134,18 @@ class Operators:
 
     def _selected(self, parents: list[Individual], count: int) -> list[Individual]:
         """Return so many of the parents, however few these are."""
-        if self.toolbox.select.func is not tools.selTournamentDCD:
-            return list(self.toolbox.select(parents, count))
-        # It takes fours, each of the parents twice at most.
-        parents = parents * (4 // len(parents) + 1) if len(parents) < 4 else parents
-        fours = len(parents) // 4 * 4
+        tournament = self.toolbox.select.func is tools.selTournamentDCD
+        if tournament and len(parents) < 4:
+            parents = parents * (4 // len(parents) + 1)
         chosen: list[Individual] = []
         while len(chosen) < count:
-            chosen += self.toolbox.select(random.sample(parents, fours), fours)
+            if tournament:  # It takes fours, each of the parents twice at most.
+                fours = len(parents) // 4 * 4
+                more = self.toolbox.select(random.sample(parents, fours), fours)
+            else:  # Some return each of the parents once at most.
+                more = self.toolbox.select(parents, count - len(chosen))
+            must(len(more) > 0, "select", "a function that returns strings", more)
+            chosen += more
         return chosen[:count]
 
     def _rehearse(self, names: Mapping[str, str]) -> None:

@@ -10,7 +10,7 @@ from cases.granular_bench import scene as draw_down
 SMALL = {"number": 250, "silo": 4.0, "outlet": 5.0, "disc": 5.0, "drop": 3.0, "duration": 0.6}
 SEARCH = [
     "optimize", "granular_bench", "--variant", "calibrate", "--measured", "mine.csv", "--out", "found",
-    "--method", "genetic", "--generations", "1", "--population", "4", "--set", "search.options.parents=2",
+    "--method", "zohdi", "--generations", "1", "--population", "4", "--set", "search.options.parents=2",
 ]  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from optimize.storage.cache import Cache
-from tests.own_files import LAW, PROBLEM
+from tests.own_files import LAW, METHOD, PROBLEM
 from tisim import Scene
 
 PLUGIN = ["--plugin", "own_laws.py"]
@@ -66,3 +66,20 @@ def test_a_search_runs_it_in_worker_processes(tisim, own_file):
         {record.key: record.values for record in Cache(f"{folder}/search.h5").records()} for folder in "st"
     )
     assert there == here
+
+
+@pytest.mark.long
+def test_a_search_method_of_ones_own(tisim, own_file):
+    own_file("my_drift.py", PROBLEM)
+    own_file("my_steps.py", METHOD)
+    command = ["optimize", "my_drift.py", "--method", "steps", "--out", "s", "--generations", "1"]
+    code, _, err = tisim(*command)
+    assert code == 2
+    assert "or your own (--plugin, import); received 'steps'" in " ".join(err.split())
+    code, _, err = tisim(*command, "--plugin", "my_steps.py", "--set", "search.options.width=0.3")
+    assert code == 0, err
+    cache = Cache("s/search.h5")
+    (name,) = [name for name in cache.tables() if name.startswith("searches/") and name.count("/") == 1]
+    made = json.loads(cache.table(name).attrs["identity"])
+    assert made["search"]["options"] == {"population": 4, "width": 0.3}
+    assert len(made["method_code"]) == 24

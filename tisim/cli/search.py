@@ -63,7 +63,10 @@ def optimize(
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
     method: Annotated[
         str | None,
-        typer.Option(help="genetic, restart, cma-es, nsga2 or random; for several objectives the last two."),
+        typer.Option(
+            help="genetic, gaussian-process, nsga2 or random; zohdi, restart or cma-es for one objective; or "
+            "one of a plugin."
+        ),
     ] = None,
     generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
     population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
@@ -129,9 +132,7 @@ def optimize(
 
 def compare(
     case: Inverse,
-    methods: Annotated[
-        str, typer.Option(help="Names with commas between.")
-    ] = "random,genetic,restart,cma-es",
+    methods: Annotated[str, typer.Option(help="Names with commas between.")] = "random,zohdi,restart,cma-es",
     evaluations: Annotated[int, typer.Option(help="Runs that every search may spend.")] = 400,
     repeats: Annotated[int, typer.Option(help="Searches of each method.")] = 5,
     fresh_starts: Annotated[int, typer.Option(help="Starts from which each best is run again.")] = 24,

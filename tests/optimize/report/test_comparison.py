@@ -38,9 +38,9 @@ def compared(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache
 
 def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
     evaluator, cache = FakeEvaluator(noisy), FakeCache()
-    results = compared(["random", "genetic", "cma-es"], evaluator=evaluator, cache=cache)
+    results = compared(["random", "zohdi", "cma-es"], evaluator=evaluator, cache=cache)
     assert [(f.method, f.repeat) for f in results] == [
-        (method, repeat) for repeat in range(3) for method in ("random", "genetic", "cma-es")
+        (method, repeat) for repeat in range(3) for method in ("random", "zohdi", "cma-es")
     ]
     assert {f.evaluations for f in results} <= {119, 120}
     fresh = [start_seed(FRESH, k) for k in range(8)]
@@ -57,7 +57,7 @@ def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
         sorted(f.fresh.mean for f in results), rel=1e-12
     )
     again = FakeEvaluator(noisy)
-    assert compared(["random", "genetic", "cma-es"], evaluator=again, cache=cache) == results
+    assert compared(["random", "zohdi", "cma-es"], evaluator=again, cache=cache) == results
     assert again.digests == []
 
 
@@ -68,10 +68,10 @@ def rows(problem, results):
 
 
 def test_table_ranks_by_the_median_from_fresh_starts():
-    results = compared(["random", "genetic"], repeats=5)
+    results = compared(["random", "zohdi"], repeats=5)
     lines_of_table = rows(fake_problem(6), results)
     heading = next(line for line in lines_of_table if line[0] == "method")
-    lines = [line for line in lines_of_table if line[0] in ("random", "genetic")]
+    lines = [line for line in lines_of_table if line[0] in ("random", "zohdi")]
     medians = {}
     for name, searches, _, *numbers in lines:
         mine = [f for f in results if f.method == name]
@@ -81,19 +81,19 @@ def test_table_ranks_by_the_median_from_fresh_starts():
         expected = [np.median(values), min(values), max(values), claimed]
         assert [float(number) for number in numbers[:4]] == pytest.approx(expected, rel=1e-3)
         medians[name] = np.median(values)
-    assert medians["genetic"] < medians["random"]
-    assert [line[0] for line in lines] == ["genetic", "random"]
+    assert medians["zohdi"] < medians["random"]
+    assert [line[0] for line in lines] == ["zohdi", "random"]
     assert "median" in heading
     assert lines_of_table[0] == ["fitness"], "the objective, above"
     large = fake_problem(6, objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
-    turned = compared(["random", "genetic"], repeats=5, problem=large)
-    assert [line[0] for line in rows(large, turned) if line[0] in medians] == ["genetic", "random"]
+    turned = compared(["random", "zohdi"], repeats=5, problem=large)
+    assert [line[0] for line in rows(large, turned) if line[0] in medians] == ["zohdi", "random"]
     numbers = list(csv.reader(comparison.as_csv(large, turned).decode().splitlines()))
     assert [float(row[3]) for row in numbers[1:]] == [-f.fresh.mean for f in results]
 
 
 def test_stopping_rules_and_options_of_the_case():
-    settings = settings_of(fake_problem(), BASE, "genetic", 50, 3)
+    settings = settings_of(fake_problem(), BASE, "zohdi", 50, 3)
     assert (settings.target, settings.patience, settings.max_evaluations, settings.seed) == (
         None,
         None,
@@ -107,12 +107,12 @@ def test_stopping_rules_and_options_of_the_case():
 
 def test_what_cannot_be_compared_is_refused():
     for arguments, message in (
-        ({"methods": ["genetic", "genetic"]}, "methods must be one or more, all different"),
+        ({"methods": ["zohdi", "zohdi"]}, "methods must be one or more, all different"),
         ({"methods": []}, "methods must be one or more"),
         ({"repeats": 0}, "repeats must be within"),
         ({"fresh": 1}, "fresh starts must be at least 2; received 1"),
         ({"evaluations": 0}, "evaluations must be at least 1"),
-        ({"methods": ["genetic", "simplex"]}, "method must be one of .*; received 'simplex'"),
+        ({"methods": ["zohdi", "simplex"]}, "method must be one of .*; received 'simplex'"),
         ({"problem": fake_problem(objective=OBJECTIVES)}, "one with one objective"),
     ):
         usual = {"methods": ["random"], "evaluations": 9, "repeats": 1, "fresh": 4, "problem": fake_problem()}

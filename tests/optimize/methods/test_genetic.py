@@ -1,0 +1,252 @@
+"""A genetic algorithm of DEAP's operators, by name or of the user, with a surrogate and without."""
+
+import functools
+import random
+
+import numpy as np
+import pytest
+from deap import base, tools
+
+from optimize.evaluation.ensemble import EnsembleSettings
+from optimize.evaluation.estimate import FitnessEstimate
+from optimize.methods.base import find
+from optimize.methods.individual import Individual
+from optimize.methods.operators import GeneticOperator
+from optimize.problem.genes import Choice
+from optimize.problem.genome import Gene, Genome
+from optimize.search import search
+from optimize.settings import Settings, identity
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+from tisim import InputError
+
+GENES = 5
+ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
+
+
+def method(objectives=1, genome=None, seed=3, **options):
+    kind = find("genetic")
+    genome = genome or fake_problem(GENES).genome
+    return kind(genome, objectives, kind.Options(**options), seed)
+
+
+def told(strings, function):
+    """Tell strings their costs, one number or several."""
+    for string in strings:
+        string.know(
+            tuple(FitnessEstimate(c, 0.0, 0.0, 1, True) for c in np.atleast_1d(function(np.array(string))))
+        )
+    return strings
+
+
+def searched(function, evaluations, **settings):
+    """All designs that a method by itself has asked for."""
+    found, one = [], method(**settings)
+    while len(found) < evaluations:
+        strings = one.ask()
+        one.tell(told(strings, function), [])
+        found += strings
+    return found
+
+
+def valley(x):
+    """Rosenbrock's function, 0 at 1/2; genes depend on each other."""
+    y = 4 * x - 1
+    return float(np.sum(100 * (y[1:] - y[:-1] ** 2) ** 2 + (1 - y[:-1]) ** 2))
+
+
+def two_costs(x):
+    """Two bowls; every design between their middles is on the front."""
+    return np.sum((x - 0.3) ** 2), np.sum((x - 0.7) ** 2)
+
+
+def test_the_surrogate_spends_runs_where_they_decide():
+    """At 60 runs each, three seeds: far below the same algorithm without one."""
+    best = {
+        assisted: [
+            min(s.fitness.values[0] for s in searched(valley, 60, seed=seed, surrogate=assisted))
+            for seed in range(3)
+        ]
+        for assisted in (True, False)
+    }
+    assert np.median(best[True]) < np.median(best[False]) / 3
+
+
+def test_several_objectives_with_a_surrogate_come_nearer_to_the_front():
+    excess = {}
+    for assisted in (True, False):
+        found = searched(
+            two_costs, 56, objectives=2, surrogate=assisted, **({} if assisted else {"population": 8})
+        )
+        costs = np.array([string.fitness.values for string in found[-16:]])
+        # On the line between the middles sqrt(f1) + sqrt(f2) is their distance, elsewhere it is more.
+        excess[assisted] = np.sqrt(costs).sum(axis=1) - 0.4 * np.sqrt(GENES)
+    assert np.median(excess[True]) < np.median(excess[False]) / 3
+    assert np.median(excess[True]) < 0.05
+
+
+def test_each_design_is_asked_for_once_and_few_designs_are_all_found():
+    genome = Genome((Choice("material", ("steel", "glass", "ice")), Choice("wall", ("soft", "hard"))))
+    for options in ({"first": 2, "population": 2}, {"surrogate": False, "population": 2}):
+        one, asked = method(genome=genome, **options), []
+        for _ in range(12):
+            strings = one.ask()
+            one.tell(told(strings, lambda x: float(x.sum())), [])
+            asked += [tuple(genome.decode(string).values()) for string in strings]
+        assert len(set(asked)) == 6
+        # generation 0 may have the same design twice
+        assert len(asked) <= 6 + 2
+
+
+def test_a_search_of_few_designs_ends():
+    genome = Genome((Choice("material", ("steel", "glass")), Choice("wall", ("soft", "hard"))))
+    problem = fake_problem(genome=genome)
+    evaluator = FakeEvaluator(lambda design, seed: 1.0 + (design["wall"] == "hard") - len(design["material"]))
+    for options in ({"first": 2, "population": 2}, {"surrogate": False}):
+        settings = Settings(method="genetic", options=options, generations=8, ensemble=ONE)
+        outcome = search(problem, evaluator, FakeCache(), settings)
+        assert outcome.best.fitness.values == (-4.0,)
+        assert len(outcome.logbook) == 9
+
+
+OPTIONS = {
+    "selDoubleTournament": {"fitness_size": 3, "parsimony_size": 1.2, "fitness_first": True},
+    "selTournament": {"tournsize": 3},
+    "cxBlend": {"alpha": 0.5},
+    "cxSimulatedBinary": {"eta": 10.0},
+    "cxSimulatedBinaryBounded": {"eta": 10.0},
+    "cxUniform": {"indpb": 0.5},
+    "mutGaussian": {"mu": 0.0, "sigma": 0.3, "indpb": 0.5},
+    "mutPolynomialBounded": {"eta": 5.0, "indpb": 0.5},
+    "mutShuffleIndexes": {"indpb": 0.3},
+}
+OPERATORS = {
+    "select": ["selTournament", "selBest", "selRandom", "selWorst", "selLexicase", "selDoubleTournament"],
+    "mate": [
+        "cxBlend", "cxSimulatedBinaryBounded", "cxSimulatedBinary", "cxUniform", "cxOnePoint", "cxTwoPoint",
+    ],
+    "mutate": ["mutGaussian", "mutPolynomialBounded", "mutShuffleIndexes"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("role", "name"), [(role, name) for role, names in OPERATORS.items() for name in names]
+)
+def test_deap_operators_breed_within_the_range(role, name):
+    operator = {role: {"name": name, "options": OPTIONS.get(name, {})}}
+    found = searched(lambda x: bowl(dict(enumerate(x)), 0, noise=0.0), 100, surrogate=False, **operator)
+    assert all(isinstance(string, Individual) and len(string) == GENES for string in found)
+    assert np.all((np.array(found) >= 0) & (np.array(found) <= 1))
+    assert len({tuple(string) for string in found}) > 90
+
+
+def swapped(one, two, share=0.5):
+    """A crossover of the user."""
+    for i in range(len(one)):
+        if random.random() < share:
+            one[i], two[i] = two[i], one[i]
+    return one, two
+
+
+def moved(string, low, up, width=0.1):
+    """A mutation of the user, by random numbers of NumPy."""
+    for i, change in enumerate(np.random.normal(0.0, width, len(string))):  # noqa: NPY002
+        string[i] = min(max(string[i] + change, low), up)
+    return (string,)
+
+
+def test_operators_of_the_user_are_called_and_draw_nothing_global():
+    calls = []
+
+    def counted(string, low, up):
+        calls.append((low, up))
+        return moved(string, low, up)
+
+    def state():
+        return random.getstate(), np.random.get_state()[1].tolist()  # noqa: NPY002
+
+    strings = []
+    for _ in range(2):
+        before = state()
+        one = method(mate=swapped, mutate=counted, surrogate=False)
+        one.tell(told(one.ask(), valley), [])
+        strings.append([list(string) for string in one.ask()])
+        assert state() == before
+        random.random()
+        np.random.random()  # noqa: NPY002
+    assert strings[0] == strings[1]
+    assert set(calls) == {(0.0, 1.0)}
+
+
+def test_operators_of_a_toolbox_of_deap():
+    toolbox = base.Toolbox()
+    toolbox.register("mate", tools.cxBlend, alpha=0.3)
+    toolbox.register("mutate", tools.mutPolynomialBounded, eta=5.0, indpb=0.5)
+    by_toolbox = searched(valley, 60, surrogate=False, mate=toolbox.mate, mutate=toolbox.mutate)
+    by_name = searched(
+        valley, 60, surrogate=False,
+        mate={"name": "cxBlend", "options": {"alpha": 0.3}},
+        mutate={"name": "mutPolynomialBounded", "options": {"eta": 5.0, "indpb": 0.5}},
+    )  # fmt: skip
+    assert by_toolbox == by_name
+
+
+def test_a_search_knows_what_its_operators_are():
+    def made(**options):
+        return identity(fake_problem(GENES), Settings(method="genetic", options=options), {})
+
+    narrow, wide = (functools.partial(moved, width=width) for width in (0.1, 0.2))
+    assert made(mutate=narrow) == made(mutate=functools.partial(moved, width=0.1))
+    assert made(mutate=narrow) != made(mutate=wide) != made()
+    stored = made(mutate=narrow)["search"]["options"]["mutate"]
+    assert stored["name"] == "moved"
+    assert len(stored["checksum"]) == 24
+    settings = Settings(method="genetic", options={"mutate": narrow})
+    again = Settings.model_validate_json(settings.model_dump_json())
+    with pytest.raises(InputError, match="mutate must be the function itself, from Python; received moved"):
+        search(fake_problem(GENES), FakeEvaluator(), FakeCache(), again)
+
+
+@pytest.mark.parametrize(
+    ("options", "objectives", "message"),
+    [
+        ({"select": "selNothing"}, 1, "operator name must be one of .*selTournament.*'selNothing'"),
+        ({"mate": "mutGaussian"}, 1, "operator name must be one of cx"),
+        ({"select": "selRoulette"}, 1, "favours large fitness"),
+        ({"select": "selNSGA2"}, 1, "several objectives"),
+        ({"select": "selBest"}, 2, "operator name must be one of selTournamentDCD, .*; received 'selBest'"),
+        ({"mate": "cxBlend"}, 1, r"options of cxBlend must be complete: \['alpha'\]"),
+        ({"mate": {"name": "cxBlend", "options": {"beta": 2}}}, 1, "options of cxBlend must be among"),
+        ({"mate": "cxOrdered"}, 1, "fit for real-valued strings"),
+        ({"mutate": lambda string: string}, 1, "fit for real-valued strings"),
+        ({"mutate": lambda string: ([np.nan] * len(string),)}, 1, "fit for real-valued strings"),
+        (
+            {"mutate": lambda string: (list(np.random.default_rng().random(len(string))),)}, 1,
+            "operators must be random by the modules random and numpy.random alone",
+        ),
+        ({"surrogate": False, "inner": 3}, 1, "inner must be left out where surrogate is false"),
+        ({"parents": 3}, 1, "search.options.parents must be a known key"),
+    ],
+)  # fmt: skip
+def test_unfit_settings_are_refused_before_anything_runs(options, objectives, message):
+    with pytest.raises(InputError, match=message):
+        method(objectives, **options)
+
+
+def test_an_operator_is_given_by_its_name_alone():
+    assert method(mate="cxOnePoint").options.mate == GeneticOperator(name="cxOnePoint")
+
+
+def test_nsga2_is_it_without_a_surrogate():
+    kind = find("nsga2")
+    costs = {1: lambda x: x, 2: lambda x: np.append(x, 1 - x)}
+    for objectives, population in ((1, 20), (2, 40)):
+        twins = (
+            kind(Genome((Gene("x", "", 0.0, 1.0),)), objectives, kind.Options(), 5),
+            method(objectives, Genome((Gene("x", "", 0.0, 1.0),)), 5, surrogate=False),
+        )
+        for _ in range(3):
+            asked = [one.ask() for one in twins]
+            assert asked[0] == asked[1]
+            assert len(asked[0]) == population
+            for one, strings in zip(twins, asked, strict=True):
+                one.tell(told(strings, costs[objectives]), [])

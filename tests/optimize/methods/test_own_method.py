@@ -1,0 +1,44 @@
+"""A search method of the user's, in a Python file."""
+
+import pytest
+
+from optimize.methods.base import every, find
+from optimize.settings import Settings, identity
+from tests.optimize.fake_runs import fake_problem
+from tests.own_files import METHOD
+from tisim import InputError
+from tisim.scene import plugins
+
+
+def test_it_is_found_by_its_name_and_its_code_is_part_of_the_search(own_file):
+    plugins.load(own_file("my_steps.py", METHOD))
+    kind = find("steps")
+    settings = Settings(method="steps", options={"width": 0.2})
+    assert settings.options.width == 0.2
+    before = identity(fake_problem(), settings, {})
+    plugins.load(
+        own_file("my_steps.py", METHOD.replace("np.full(len(genome), 0.5)", "np.zeros(len(genome))"))
+    )
+    assert find("steps") is not kind
+    assert before != identity(fake_problem(), Settings(method="steps", options={"width": 0.2}), {})
+    assert "method_code" not in identity(fake_problem(), Settings(method="zohdi"), {})
+
+
+def test_it_is_forgotten_with_its_file():
+    assert "steps" not in every()
+    with pytest.raises(InputError, match=r"method must be one of .*, or your own \(--plugin, import\)"):
+        find("steps")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"steps"', '"random"', "name of my_steps.Steps must be one that no other search method has"),
+        ('    name = "steps"\n', "", "name of my_steps.Steps must be a text; received None"),
+        ("    Options = Options\n", "", "Options of my_steps.Steps must be a class made of"),
+    ],
+)
+def test_one_that_cannot_be_used_is_refused(own_file, old, new, message):
+    plugins.load(own_file("my_steps.py", METHOD.replace(old, new)))
+    with pytest.raises(InputError, match=message):
+        find("zohdi")
