@@ -103,6 +103,7 @@ class _Search:
             self.problem, self.settings, self.ensemble, list(self.known.values()),
             lambda fraction: self._report(last, 1.0),
         )  # fmt: skip
+        self.outcome.estimates |= {tuple(string): string.estimates for string in ranked}
         if self.outcome.stopped == "target":
             ranked = [self.hall.strings[0], *(one for one in ranked if one is not self.hall.strings[0])]
         self.ranked = ranked
