@@ -38,15 +38,14 @@ class BreedingOptions(Checked):
     population : designs per generation (None: 8 with a surrogate; without one 20, and for several objectives
     40). select, mate, mutate : operators of deap.tools by name, with their options, or functions that are
     called in the same way. select None: tournaments of two, by rank and crowding for several objectives.
+    mutate None: polynomial, of each gene with probability 1/2 with a surrogate and 1/genes without.
     crossover_probability : that a pair is mated. mutation_probability : that a string is then mutated.
     """
 
     population: int | None = Field(None, ge=1)
     select: GeneticOperator | None = None
     mate: GeneticOperator = GeneticOperator(name="cxSimulatedBinaryBounded", options={"eta": 15.0})
-    mutate: GeneticOperator = GeneticOperator(
-        name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.5}
-    )
+    mutate: GeneticOperator | None = None
     crossover_probability: float = Field(0.9, ge=0, le=1)
     mutation_probability: float = Field(1.0, ge=0, le=1)
 
@@ -97,8 +96,10 @@ class Genetic(SearchMethod):
         self.genes = len(genome)
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
         usual = SELECT if objectives == 1 else SELECT_SEVERAL
+        share = 0.5 if options.surrogate else 1.0 / self.genes
+        mutate = GeneticOperator(name="mutPolynomialBounded", options={"eta": 20.0, "indpb": share})
         self.operators = Operators(
-            {"select": options.select or usual, "mate": options.mate, "mutate": options.mutate},
+            {"select": options.select or usual, "mate": options.mate, "mutate": options.mutate or mutate},
             self.genes,
             objectives,
             (options.crossover_probability, options.mutation_probability),

@@ -71,6 +71,27 @@ def test_the_surrogate_spends_runs_where_they_decide():
     assert np.median(best[True]) < np.median(best[False]) / 3
 
 
+def test_noisy_runs_are_spent_where_they_decide():
+    """With noise there is no trust region: the ranking by the surrogate alone must do it."""
+    noise = np.random.default_rng(0)
+    best = {}
+    for assisted in (True, False):
+        best[assisted] = []
+        for seed in range(3):
+            one, found = method(seed=seed, surrogate=assisted), []
+            while len(found) < 60:
+                strings = one.ask()
+                for string in strings:
+                    cost = float(np.sum((np.array(string) - 0.3) ** 2)) + 0.01 * noise.normal()
+                    string.know((FitnessEstimate(cost, 0.014, 0.01, 2, True),))
+                one.tell(strings, [])
+                found += strings
+            last = np.array(found[-8:])
+            best[assisted].append(np.median(np.sum((last - 0.3) ** 2, axis=1)))
+    assert np.median(best[True]) < 0.02
+    assert np.median(best[True]) < np.median(best[False]) / 3
+
+
 def test_several_objectives_with_a_surrogate_come_nearer_to_the_front():
     excess = {}
     for assisted in (True, False):
