@@ -43,9 +43,11 @@ def concluded(
     known : all designs that have run, of which those that have not failed are chosen from. The budget of the
     ensemble is not exceeded.
     """
+    asked = settings.ensemble
+    if asked.select or asked.confirm:
+        ensemble.look()
     if problem.several:
         return _front(problem, settings, ensemble, known, report)
-    asked = settings.ensemble
     count = settings.hall_of_fame
     if ensemble.repeatable:
         return best(problem.genome, known, count)
@@ -55,7 +57,7 @@ def concluded(
     if asked.confirm:
         count = int(max(1, min(count, _left(ensemble) // asked.confirm)))
     chosen = best(problem.genome, known, count)
-    _confirm(problem, chosen, ensemble, asked.confirm, report)
+    _confirm(problem, chosen, ensemble, int(min(asked.confirm, _left(ensemble))), report)
     return chosen
 
 
@@ -78,6 +80,7 @@ def _front(
 def proven(problem: Problem, leader: Individual, ensemble: Ensemble, goal: float) -> bool:
     """Return whether a design is as good as a goal, a cost, with the confidence of an interval: whether its
     upper end over starts of its own is no higher."""
+    ensemble.look()
     if ensemble.repeatable:
         return leader.fitness.values[0] <= goal
     if _left(ensemble) < _STARTS_OF_PROOF:

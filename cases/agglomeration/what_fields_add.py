@@ -40,7 +40,7 @@ from tisim.analysis import Mean
 from tisim.numerics.statistics import CONFIDENCE
 from tisim.plotting.style import empty, legend_above, plain
 
-KINDS: Mapping[str, tuple[Gene, ...]] = {
+KINDS_OF_GENES: Mapping[str, tuple[Gene, ...]] = {
     "the flow alone": (),
     "and charges": fields.CHARGE_GENES,
     "and charges, electric field": (*fields.CHARGE_GENES, *fields.ELECTRIC_GENES),
@@ -85,7 +85,7 @@ def problem_of(kind: str, size: str) -> Problem:
     return dataclasses.replace(
         problem(size, "fields"),
         name=f"agglomeration-{size}-{kind}",
-        genome=Genome((*GENES, UNBREAKABLE, *KINDS[kind])),
+        genome=Genome((*GENES, UNBREAKABLE, *KINDS_OF_GENES[kind])),
         scene=functools.partial(without_the_rest, grains=size_named(size, SIZES).scene["grains"]),
     )
 
@@ -103,7 +103,7 @@ def search(kind: str, size: str, seed: int, fresh: int, settings: Mapping[str, A
 def searches(size: str, number: int, fresh: int, settings: Mapping[str, Any]) -> Iterator[tuple[str, Found]]:
     """Search each kind a number of times."""
     for seed in range(number):
-        for kind in KINDS:
+        for kind in KINDS_OF_GENES:
             yield kind, search(kind, size, seed, fresh, settings)
 
 
@@ -114,7 +114,7 @@ def table(found: Mapping[str, Sequence[Found]]) -> str:
         "|---|---|---|---|",
     ]
     for kind, ones in found.items():
-        number = len(GENES) + 1 + len(KINDS[kind])
+        number = len(GENES) + 1 + len(KINDS_OF_GENES[kind])
         true, claimed = (Mean.of([getattr(one, name) for one in ones]) for name in ("true", "claimed"))
         lines.append(f"| {kind} | {number} | {true.value:.3f} ± {true.half:.3f} | {claimed.value:.3f} |")
     return "\n".join(lines)
@@ -184,7 +184,7 @@ def main() -> None:
         settings["ensemble"] = dict.fromkeys(("min_starts", "max_starts", "block"), options.starts)
 
     console = Console()
-    found: dict[str, list[Found]] = {kind: [] for kind in KINDS}
+    found: dict[str, list[Found]] = {kind: [] for kind in KINDS_OF_GENES}
     for kind, one in searches(options.size, options.searches, options.fresh, settings):
         found[kind].append(one)
         design = ", ".join(f"{name} {value:.3g}" for name, value in one.design.items())

@@ -20,8 +20,9 @@ from tisim.numerics.statistics import half_width
 
 Design = Mapping[str, Any]
 Report = Callable[[float], None]
-LOOKED_AT = 2
-"""Designs that are run from two starts, to see whether these differ."""
+LOOKED_AT, MOST_LOOKED_AT, LEAST_DIFFERENT = 2, 6, 3
+"""Designs that are run from two starts, to see whether these differ: where runs leave a state, and where they
+leave none. Of the latter so many must have different costs."""
 FRESH = 10**6
 """The number of the first start that only reports use. None of a search is as large."""
 
@@ -106,7 +107,7 @@ class Ensemble:
         samples = [self._sample(design) for design in designs]
         different = list(dict.fromkeys(samples))
         if self.repeatable is None and settings.min_starts > 1:
-            self._look(different[:LOOKED_AT])
+            self._look(different)
         least = 1 if self.repeatable else settings.min_starts
         most = settings.max_starts if settings.tolerance and not self.repeatable else least
         largest_fraction = 0.0
@@ -143,16 +144,29 @@ class Ensemble:
         sample.converged = converged is not None or bool(self.repeatable)
         sample.open = converged is None and len(sample.costs) < most
 
+    def look(self) -> None:
+        """Find out whether all starts of a design give the same run, where that is not known yet."""
+        if self.repeatable is None:
+            self._look([sample for sample in self._known.values() if sample.costs and not sample.reason])
+
     def _look(self, samples: Sequence[Sample]) -> None:
         """Run the first designs from two starts each, and see whether these end in the same state, to the
-        last bit, after the same work."""
-        looked = [sample for sample in samples if sample.open and not sample.costs]
-        if 2 * len(looked) > self.budget - self.requested:
-            return
-        self.runs.add([(sample, range(2)) for sample in looked])
-        ended = [sample for sample in looked if not sample.reason]
-        if ended:
-            self.repeatable = all(None not in s.ends and len(set(s.ends)) == 1 for s in ended)
+        last bit, after the same work. What leaves no state, as a plain function, must give equal costs for
+        more designs, and different ones for different designs: rare outcomes are equal by chance, too."""
+        looked: list[Sample] = []
+        for group in (samples[:LOOKED_AT], samples[LOOKED_AT:MOST_LOOKED_AT]):
+            additions = [(sample, range(len(sample.costs), 2)) for sample in group]
+            if sum(len(starts) for _, starts in additions) > self.budget - self.requested:
+                return
+            self.runs.add(additions)
+            looked += [sample for sample in group if not sample.reason]
+            if any(len(set(sample.costs[:2])) > 1 for sample in looked):
+                self.repeatable = False
+                return
+            if looked and all(None not in sample.ends for sample in looked):
+                self.repeatable = all(len(set(sample.ends[:2])) == 1 for sample in looked)
+                return
+        self.repeatable = len({sample.costs[0] for sample in looked}) >= LEAST_DIFFERENT
 
     def race(
         self, designs: Sequence[Design], progress: Report | None = None

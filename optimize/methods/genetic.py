@@ -114,8 +114,8 @@ class Genetic(SearchMethod):
         self.local: int | None = None
 
     @classmethod
-    def starts_of_its_own(cls, options: GeneticOptions) -> bool:
-        return options.surrogate
+    def starts_of_its_own(cls, options: BreedingOptions) -> bool:
+        return isinstance(options, GeneticOptions) and options.surrogate
 
     def ask(self) -> list[Individual]:
         if sum(not string.failed for string in self.strings) < 2:

@@ -78,7 +78,7 @@ def settings_of(
     search_table = proposed(problem, base, method)
     for rule in ("target", "patience", "wall_clock_s"):
         search_table.pop(rule, None)
-    ensemble = {**search_table.get("ensemble", {}), "confirm": 0}
+    ensemble = {**search_table.get("ensemble", {}), "select": 0, "confirm": 0}
     # every generation asks for a run or more, unless a method has nothing new to propose: then it ends, too
     stop = {"generations": evaluations, "max_evaluations": evaluations}
     settings = Settings(**{**search_table, "ensemble": ensemble, "seed": repeat, **stop})

@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 
-from optimize.evaluation.ensemble import EnsembleSettings
+from optimize.evaluation.ensemble import FRESH, EnsembleSettings
 from optimize.evaluation.runs import start_seed
 from optimize.methods.operators import GeneticOperator
 from optimize.search import search
@@ -17,7 +17,7 @@ from optimize.storage.maintenance import verify
 from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
 from tisim import InputError, RunError
 
-ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)  # a function without noise needs no averaging
+ONE = EnsembleSettings(min_starts=1, select=0, confirm=0)  # a function without noise needs no averaging
 DEAP_OPTIONS = {
     "surrogate": False,
     "mate": GeneticOperator(name="cxSimulatedBinaryBounded", options={"eta": 10.0}),
@@ -32,7 +32,7 @@ def quiet_bowl(design, seed):
 
 def run(path, evaluator=None, genes=4, problem=None, callbacks=None, **settings):
     evaluator = evaluator or FakeEvaluator(quiet_bowl)
-    values = {"seed": 1, "ensemble": ONE, **settings}
+    values = {"seed": 1, "method": "zohdi", "ensemble": ONE, **settings}
     with Cache(path) as cache:
         return search(
             problem or fake_problem(genes), evaluator, cache, Settings(**values), **(callbacks or {})
@@ -206,23 +206,51 @@ def test_file_is_of_the_search_before_anything_has_run(path):
     assert len(searches(Cache(path))) == 2
 
 
-def test_best_designs_are_confirmed_from_starts_that_have_not_been_used(path):
-    settings = EnsembleSettings(max_starts=6, confirm=10)
+def test_best_designs_are_reported_from_starts_that_have_not_been_used(path):
+    """After the search each has some starts more, by which they are chosen, and then fresh ones."""
+    settings = EnsembleSettings(min_starts=3, select=5, confirm=10)
     evaluator = FakeEvaluator(lambda design, seed: bowl(design, seed + int(1e9 * design["x0"]), noise=0.3))
     outcome = run(path, evaluator, generations=3, ensemble=settings)
-    fresh = {start_seed(1, k) for k in range(6, 16)}
-    assert not fresh & {scene.seed for call in evaluator.calls[:-1] for scene in call}
-    assert {scene.seed for scene in evaluator.calls[-1]} == fresh
+    fresh = {start_seed(1, FRESH + k) for k in range(10)}
+    *before, more, last = evaluator.calls
+    assert {scene.seed for call in before for scene in call} == {start_seed(1, k) for k in range(3)}
+    assert {scene.seed for scene in more} == {start_seed(1, k) for k in range(3, 8)}
+    assert {scene.seed for scene in last} == fresh
     for string in outcome.hall:
         values = [evaluator.function(outcome.problem.genome.decode(string), seed) for seed in fresh]
         assert string.confirmed[0].starts == 10
         assert string.confirmed[0].mean == pytest.approx(np.mean(values), rel=1e-12)
-    means = [string.confirmed[0].mean for string in outcome.hall]
-    assert means == sorted(means)
-    estimates = [string.estimates[0].mean for string in outcome.hall]
-    assert estimates != sorted(estimates), "ranked anew"
+        assert string.estimates[0].starts in (3, 8)
     columns = Cache(path).table(f"{outcome.name}/hall_of_fame").columns
-    assert columns["fitness, fresh starts"] == means
+    assert columns["fitness, fresh starts"] == [string.confirmed[0].mean for string in outcome.hall]
+    assert columns["95 % low, fresh starts"] == [string.confirmed[0].low for string in outcome.hall]
+
+
+@pytest.mark.parametrize("budget", [60, 200, 600])
+def test_the_budget_has_fresh_starts_in_it(tmp_path, budget):
+    outcome = run(
+        tmp_path / "b.h5", FakeEvaluator(bowl), generations=1000, max_evaluations=budget, ensemble={}
+    )
+    assert budget - 16 < outcome.evaluations <= budget
+    assert all(string.confirmed for string in outcome.hall)
+
+
+def test_a_search_stops_at_a_target_only_when_it_is_met_for_sure(tmp_path):
+    """Of noise 0.2 many means of two starts are below 0.5, the least that is; none is below 0.5 truly."""
+    evaluator = FakeEvaluator(lambda design, seed: bowl(design, seed + int(1e9 * design["x0"]), noise=0.2))
+    never = run(tmp_path / "a.h5", evaluator, generations=8, target=0.49, ensemble={})
+    assert min(never.logbook.select("best")) < 0.45
+    assert never.stopped == "generations"
+    met = run(tmp_path / "b.h5", evaluator, generations=30, target=0.9, ensemble={})
+    assert met.stopped == "target"
+    assert met.hall[0].confirmed[0].mean < 0.9
+
+
+def test_a_function_without_noise_is_found_out_and_run_once(tmp_path):
+    outcome = run(tmp_path / "a.h5", generations=5, ensemble={})
+    assert {string.estimates[0].starts for string in outcome.hall} == {1}
+    assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 6
+    assert outcome.designs[0].intervals["fitness"] == (outcome.designs[0].values["fitness"],) * 2
 
 
 def test_unfit_operators_stop_it_before_anything_runs(path):

@@ -22,7 +22,7 @@ from optimize.storage.record import Record
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
 
-ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
+ONE = EnsembleSettings(min_starts=1, select=0, confirm=0)
 OBJECTIVES = (
     Objective("gain", lambda r: r.value[0], "1/s", maximise=True),
     Objective("price", lambda r: r.value[1]),
@@ -95,7 +95,7 @@ def test_hall_of_one_objective_keeps_the_best_different_ones():
 
     def string(genes, cost):
         individual = Individual(genes)
-        individual.know((FitnessEstimate(cost, 0.0, 0.0, 4, True, "" if cost < 9 else "failed"),))
+        individual.know((FitnessEstimate(cost, 0.0, cost, cost, 4, True, "" if cost < 9 else "failed"),))
         return individual
 
     assert hall.update([string([0.1], 3.0), string([0.1], 3.0), string([0.2], 2.0), string([0.3], 9.0)])
@@ -132,7 +132,9 @@ def test_designs_of_few_starts_are_distinguished_from_those_that_are_known(outco
 
     def design(gain, starts):
         string = Individual([gain, starts / 10], 2)
-        of_all = tuple(FitnessEstimate(cost, 0.1, 0.05, starts, True) for cost in (-gain, 1.0 - gain))
+        of_all = tuple(
+            FitnessEstimate(cost, 0.1, cost - 0.05, cost + 0.05, starts, True) for cost in (-gain, 1.0 - gain)
+        )
         string.estimates = of_all
         return string
 

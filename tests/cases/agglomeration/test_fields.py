@@ -11,7 +11,15 @@ from scipy.optimize import brentq
 from cases.agglomeration import CASE, field_checks, fields
 from cases.agglomeration.problem import problem
 from cases.agglomeration.scene import BEST, HALF_SIDE, scene
-from cases.agglomeration.what_fields_add import FELT, KINDS, Found, one_flow, picture, problem_of, table
+from cases.agglomeration.what_fields_add import (
+    FELT,
+    KINDS_OF_GENES,
+    Found,
+    one_flow,
+    picture,
+    problem_of,
+    table,
+)
 from tests.effects.contact.loads import loads
 from tests.scenes import fixed, simulate
 from tisim.effects import CARBONYL_IRON
@@ -180,16 +188,18 @@ def test_a_search_without_genes_of_fields_is_one_of_no_fields():
     design = searched.genome.decode([0.5] * len(searched.genome))
     assert "surface_charge" not in design
     assert searched.scene(design, 4) == scene({**fields.NO_FIELDS, **design}, 4, 60)
-    assert [len(problem_of(kind, "small").genome) for kind in KINDS] == [10, 12, 15, 13, 18]
+    assert [len(problem_of(kind, "small").genome) for kind in KINDS_OF_GENES] == [10, 12, 15, 13, 18]
 
 
 def test_the_table_and_the_picture_of_what_fields_add():
-    found = {kind: [Found({}, 0.1 * k, true) for true in (0.2, 0.3, 0.4)] for k, kind in enumerate(KINDS)}
+    found = {
+        kind: [Found({}, 0.1 * k, true) for true in (0.2, 0.3, 0.4)] for k, kind in enumerate(KINDS_OF_GENES)
+    }
     text = table(found)
-    assert text.count("0.300 ± 0.248") == len(KINDS)
+    assert text.count("0.300 ± 0.248") == len(KINDS_OF_GENES)
     assert "| all | 18 | 0.300 ± 0.248 | 0.400 |" in text
     (axis,) = picture(found, "three").axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == list(KINDS)
+    assert [label.get_text() for label in axis.get_yticklabels()] == list(KINDS_OF_GENES)
 
 
 @pytest.mark.slow

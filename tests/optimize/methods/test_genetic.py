@@ -33,7 +33,7 @@ def told(strings, function):
     """Tell strings their costs, one number or several."""
     for string in strings:
         string.know(
-            tuple(FitnessEstimate(c, 0.0, 0.0, 1, True) for c in np.atleast_1d(function(np.array(string))))
+            tuple(FitnessEstimate.certain(float(c)) for c in np.atleast_1d(function(np.array(string))))
         )
     return strings
 
@@ -83,7 +83,7 @@ def test_noisy_runs_are_spent_where_they_decide():
                 strings = one.ask()
                 for string in strings:
                     cost = float(np.sum((np.array(string) - 0.3) ** 2)) + 0.01 * noise.normal()
-                    string.know((FitnessEstimate(cost, 0.014, 0.01, 2, True),))
+                    string.know((FitnessEstimate(cost, 0.014, cost - 0.01, cost + 0.01, 2, True),))
                 one.tell(strings, [])
                 found += strings
             last = np.array(found[-8:])

@@ -14,7 +14,7 @@ from optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
 
-ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
+ONE = EnsembleSettings(min_starts=1, select=0, confirm=0)
 METHODS = sorted(every())
 SURROGATE = ("gaussian-process", "genetic")
 """Methods of which a generation costs 0.05 s and more."""
@@ -45,7 +45,7 @@ def worth(strings, function=quiet):
     for string in strings:
         cost = function(dict(enumerate(string)), 0)
         reason = "" if np.isfinite(cost) else "failed"
-        string.know((FitnessEstimate(cost, 0.0, 0.0, 1, True, reason),))
+        string.know((FitnessEstimate(cost, 0.0, cost, cost, 1, True, reason),))
     return sorted((s for s in strings if not s.failed), key=lambda s: s.fitness.values)
 
 
@@ -187,7 +187,7 @@ def test_restart_draws_anew_around_the_best_when_it_has_stalled():
             best = worth(strings)[0]
         for string in strings:
             if string is not best:
-                string.know((FitnessEstimate(9.0, 0.0, 0.0, 1, True),))  # never better than the first
+                string.know((FitnessEstimate.certain(9.0),))  # never better than the first
         method.tell(strings, [best])
     assert widths == [0.5, 0.25, 1.0, 0.5, 0.25, 1.0]
 

@@ -22,10 +22,10 @@ SURROGATE = ("gaussian-process", "genetic")
 """Methods whose generation 0 has a size of its own, and whose second costs 0.05 s and more."""
 USUAL = {
     "of no case": {},
-    "vibration": {"options": {"population": 24, "parents": 8}},
-    "agglomeration": {"options": {"population": 10, "parents": 4}},
-    "capture": {"method": "cma-es", "options": {"population": 16}},
-    "mrf_shear": {"options": {"population": 12}},
+    "vibration": {"options": {"population": 8}},
+    "agglomeration, as published": {"method": "zohdi", "options": {"population": 10, "parents": 4}},
+    "of 24 and 8": {"method": "zohdi", "options": {"population": 24, "parents": 8}},
+    "mrf_shear": {"options": {"population": 8, "first": 12}},
     "granular_bench": {"method": "cma-es", "options": {"population": 8, "sigma": 0.2}},
 }
 
@@ -35,7 +35,7 @@ def generations(settings):
     method = find(settings.method)(fake_problem(GENES).genome, 1, settings.options, seed=1)
     first = method.ask()
     for rank, string in enumerate(first):
-        string.know((FitnessEstimate(float(rank), 0.0, 0.0, 1, True),))
+        string.know((FitnessEstimate.certain(float(rank)),))
     method.tell(first, first[:1])
     second = method.ask()
     return (len(first), len(second)), sum(not string.fitness.valid for string in second)
@@ -114,7 +114,7 @@ def test_what_is_given_stays_and_the_rest_follows(options, population, parents, 
 
 
 def test_parents_alone_leave_the_population_of_the_case():
-    settings = settings_of(USUAL["vibration"], None, {"parents": 4})
+    settings = settings_of(USUAL["of 24 and 8"], None, {"parents": 4})
     assert (settings.options.population, settings.options.parents) == (24, 4)
 
 

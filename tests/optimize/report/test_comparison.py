@@ -21,7 +21,7 @@ from tisim.cli.main import main
 from tisim.files import ownership
 
 BASE = {
-    "options": {"population": 10, "parents": 4}, "target": 0.1, "patience": 1,
+    "method": "zohdi", "options": {"population": 10, "parents": 4}, "target": 0.1, "patience": 1,
     "ensemble": {"min_starts": 2, "block": 2, "max_starts": 4, "tolerance": 0.05, "confirm": 9},
 }  # fmt: skip
 

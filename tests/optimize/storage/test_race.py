@@ -1,5 +1,7 @@
 """More starts for the designs that compete: fewer are lost to bad luck, and no more is spent than allowed."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -24,7 +26,9 @@ def ensemble(function=noisy, problem=None, budget=None, **settings):
     settings = EnsembleSettings(
         **{"min_starts": 4, "block": 4, "max_starts": 60, "tolerance": 0.9, **settings}
     )
-    return Ensemble(problem or fake_problem(1), FakeEvaluator(function), FakeCache(), settings, 2, budget)
+    made = Ensemble(problem or fake_problem(1), FakeEvaluator(function), FakeCache(), settings, 2)
+    made.budget = math.inf if budget is None else budget
+    return made
 
 
 def twin(first, second):
