@@ -8,6 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from optimize.evaluation.estimate import FitnessEstimate
+from optimize.methods.individual import Individual
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
 from optimize.storage.record import Record, evaluation_key
@@ -104,3 +106,10 @@ class FakeCache:
 
     def attributes(self):
         return {}
+
+
+def string_of(point, *costs, std=0.0, starts=1):
+    """A string of known costs; std : of each of its starts."""
+    string = Individual(point, len(costs))
+    string.know(tuple(FitnessEstimate(float(c), std, float(c), float(c), starts, True) for c in costs))
+    return string

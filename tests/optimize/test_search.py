@@ -194,8 +194,12 @@ def test_longer_search_continues_a_shorter_one(path):
     assert list(longer.logbook)[:4] == list(short.logbook)
     assert longer.evaluations == 3 * 14
     assert run(path, generations=6, seed=2).name != short.name
-    confirmed = ONE.model_copy(update={"confirm": 2})
-    assert run(path, generations=6, ensemble=confirmed).evaluations == 6 * 2
+    noisy = FakeEvaluator(bowl)
+    first = run(path, noisy, generations=6, seed=3)
+    confirmed = run(path, noisy, generations=6, seed=3, ensemble=ONE.model_copy(update={"confirm": 2}))
+    assert (confirmed.name, confirmed.evaluations) == (first.name, 2 + 6 * 2), (
+        "a look at two designs, and fresh"
+    )
 
 
 def test_file_is_of_the_search_before_anything_has_run(path):
