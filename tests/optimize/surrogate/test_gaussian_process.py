@@ -1,4 +1,4 @@
-"""The Gaussian process beside a dense twin; what makes designs worth a run beside integrals and known fronts."""
+"""The Gaussian process beside a dense twin, and the worth of designs beside integrals and known fronts."""
 
 import numpy as np
 import pytest
