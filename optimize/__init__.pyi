@@ -1,3 +1,12 @@
+from .analysis.calibration import (
+    Calibration as Calibration,
+)
+from .analysis.calibration import (
+    GeneEstimate as GeneEstimate,
+)
+from .analysis.calibration import (
+    calibration as calibration,
+)
 from .evaluation.ensemble import EnsembleSettings as EnsembleSettings
 from .fitness_record import FitnessRecord as FitnessRecord
 from .outcome import (

@@ -26,6 +26,7 @@ ROOMS = (
     "optimize.tables", "optimize.settings",
     "optimize.outcome", "optimize.search_records", "optimize.search_folder", "optimize.search_file",
     "optimize.search",
+    "optimize.surrogate", "optimize.analysis",
     "optimize.report", "optimize.session", "optimize",
     "cases", "cases.statistics", "cases.case", "cases.runs", "cases.capture", "cases.*", "tisim.cli",
     "tisim.__main__",
