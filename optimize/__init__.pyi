@@ -7,6 +7,12 @@ from .analysis.calibration import (
 from .analysis.calibration import (
     calibration as calibration,
 )
+from .analysis.sensitivity import (
+    Sensitivity as Sensitivity,
+)
+from .analysis.sensitivity import (
+    sensitivity as sensitivity,
+)
 from .evaluation.ensemble import EnsembleSettings as EnsembleSettings
 from .fitness_record import FitnessRecord as FitnessRecord
 from .outcome import (

@@ -32,8 +32,8 @@ _ALMOST_ALL = 0.95
 """A gene whose interval is more of its range than this is not told."""
 _TOGETHER = 0.9
 """Correlation of two estimates from which on it is said."""
-_PART = 0.3
-"""A gene belongs to a direction in which it has this part of the largest component."""
+_LITTLE = 0.05
+"""A gene whose part of the directions of which nothing is told is less than this does not belong to them."""
 _UNLIKELY = 0.01
 """Probability of so large a chi^2 by chance, below which it is said that the measurements are not met."""
 
@@ -44,7 +44,7 @@ class GeneEstimate:
 
     estimate : where chi^2 is least. low, high : of the 95 % interval. open_low, open_high : whether the
     interval goes on to that end of the gene's range, and maybe beyond, so that it is a bound from one side
-    only. part : of the range that the interval covers, on the gene's scale.
+    only. estimate_part, low_part, high_part : where these are within the range, 0..1, on the gene's scale.
     """
 
     name: str
@@ -54,7 +54,14 @@ class GeneEstimate:
     high: float
     open_low: bool
     open_high: bool
-    part: float
+    estimate_part: float
+    low_part: float
+    high_part: float
+
+    @property
+    def part(self) -> float:
+        """The part of the range that the interval covers, on the gene's scale."""
+        return self.high_part - self.low_part
 
     @property
     def told(self) -> bool:
@@ -77,7 +84,8 @@ class Calibration:
 
     genes : numbers that are searched, in the order of the genome. Empty where too few designs are near the
     least misfit. choices : of genes that are choices, by name, those with which a design has been run whose
-    chi^2 is less than 3.84 above the least. correlation : of the estimates, shape (genes, genes). chi2 : the
+    chi^2 is less than 3.84 above the least. correlation : of the estimates, shape (genes, genes); NaN for a gene of
+    which nothing is told. chi2 : the
     least, of ``measurements`` quantities. designs : how many the estimate stands on. missing : how many more
     designs near the least are needed. wanted : designs that are worth running for that, as many.
     remarks : what cannot be told apart, and what else has to be known, in sentences.
@@ -129,7 +137,7 @@ def calibration(outcome: Outcome) -> Calibration:
     return Calibration(
         genes=estimates,
         choices=choices,
-        correlation=shape.correlation,
+        correlation=_correlation(shape),
         chi2=max(shape.least, 0.0),
         measurements=problem.measurements,
         designs=shape.designs,
@@ -154,8 +162,9 @@ def _evidence(outcome: Outcome) -> tuple[Array, Evidence]:
 def _estimate(gene: Searched, shape: MisfitShape, k: int) -> GeneEstimate:
     low, high = shape.interval(k)
     ends = max(low, 0.0), min(high, 1.0)
-    at, bottom, top = (float(gene.decode(u)) for u in (float(np.clip(shape.best[k], 0, 1)), *ends))
-    return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, ends[1] - ends[0])
+    best = float(np.clip(shape.best[k], 0.0, 1.0))
+    at, bottom, top = (float(gene.decode(u)) for u in (best, *ends))
+    return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, *ends)
 
 
 def _choices(problem: Problem, points: Array, chi2: Array, others: Sequence[int]) -> dict[str, tuple[Value, ...]]:
@@ -190,9 +199,9 @@ def _remarks(
     """Return what cannot be told apart, and what makes the intervals doubtful."""
     remarks = []
     growth, directions = shape.growth()
-    for grown, direction in zip(growth, directions.T, strict=True):
-        if grown < UNTOLD:
-            remarks.append(_untold(grown, direction, genes))
+    free = growth < UNTOLD
+    if np.any(free):
+        remarks += _untold(directions[:, free], float(growth[free].max()), genes)
     known = {one.name for one in estimates if one.told}
     for i, one in enumerate(genes):
         for j, other in enumerate(genes[:i]):
@@ -217,20 +226,36 @@ def _remarks(
     return remarks
 
 
-def _untold(grown: float, direction: Array, genes: Sequence[Searched]) -> str:
-    """Return in words that the measurements tell nothing along a direction of the unit cube."""
-    largest = int(np.argmax(np.abs(direction)))
-    parts = [k for k in range(len(genes)) if abs(direction[k]) > _PART * abs(direction[largest])]
-    change = f"chi^2 changes by {grown:.2g} over its range" if len(parts) == 1 else f"chi^2 changes by {grown:.2g}"
-    if len(parts) == 1:
-        return f"{genes[largest].name} is not told: {change}."
-    up = [genes[k].name for k in parts if direction[k] * direction[largest] > 0]
-    down = [genes[k].name for k in parts if direction[k] * direction[largest] < 0]
-    with_less = f" with less {_listed(down)}" if down else " together"
-    return (
-        f"{_listed([genes[k].name for k in parts])} cannot be told apart: {change} "
-        f"where more {_listed(up)} goes{with_less}."
-    )
+def _correlation(shape: MisfitShape) -> Array:
+    """Return the correlations of the estimates, NaN for a gene that is free by itself: it is as good at any
+    value, and the little that it is tied to others is chance."""
+    growth, directions = shape.growth()
+    alone = (directions[:, growth < UNTOLD] ** 2).sum(axis=1) > 1.0 - _LITTLE
+    correlation = shape.correlation.copy()
+    correlation[alone, :] = correlation[:, alone] = math.nan
+    return correlation
+
+
+def _untold(directions: Array, grown: float, genes: Sequence[Searched]) -> list[str]:
+    """Return in words of which genes, or combinations of them, nothing is told.
+
+    directions : shape (genes, directions), of the unit cube; chi^2 changes by ``grown`` or less along them.
+    """
+    parts = (directions**2).sum(axis=1)
+    change = f"chi^2 changes by {grown:.2g} or less"
+    alone = [gene.name for gene, part in zip(genes, parts, strict=True) if part > 1.0 - _LITTLE]
+    told = [f"Nothing is told of {_listed(alone)}: {change} over the range."] if alone else []
+    mixed = [k for k, part in enumerate(parts) if _LITTLE <= part <= 1.0 - _LITTLE]
+    if len(mixed) < 2:
+        return told
+    names = _listed([genes[k].name for k in mixed])
+    if directions.shape[1] - len(alone) > 1:
+        return [*told, f"{names} cannot be told apart: {change} along several combinations of them."]
+    one = directions[mixed, int(np.argmax((directions[mixed] ** 2).sum(axis=0)))]
+    up = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] > 0]
+    down = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] < 0]
+    goes = f"where more {_listed(up)} goes with less {_listed(down)}" if down else "where all grow together"
+    return [*told, f"{names} cannot be told apart: {change} {goes}."]
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -265,6 +290,8 @@ def summary(result: Calibration) -> str:
 
 
 def shown(one: GeneEstimate) -> tuple[str, str, str]:
-    """Return estimate and ends of the interval of a gene as text, an open end in brackets."""
+    """Return estimate ("-" where it is not told) and ends of the interval of a gene as text, an open end in
+    brackets."""
     low, high = brief(one.low), brief(one.high)
-    return brief(one.estimate), f"[{low}]" if one.open_low else low, f"[{high}]" if one.open_high else high
+    estimate = brief(one.estimate) if one.told else "-"
+    return estimate, f"[{low}]" if one.open_low else low, f"[{high}]" if one.open_high else high
