@@ -109,7 +109,12 @@ def calibration(outcome: Outcome) -> Calibration:
     how many measured quantities its objective is the misfit, and for a search without a design.
     """
     problem = outcome.problem
-    must(problem.measurements is not None, "measurements", "given in a problem that is calibrated", Words("none"))
+    must(
+        problem.measurements is not None,
+        "measurements",
+        "given in a problem that is calibrated",
+        Words("none"),
+    )
     must(outcome.best is not None, "search", "one with a design that has not failed", Words("none"))
     assert problem.measurements is not None
     points, evidence = _evidence(outcome)
@@ -129,7 +134,9 @@ def calibration(outcome: Outcome) -> Calibration:
         missing -= int(np.sum(evidence.chi2[same] < evidence.chi2.min() + 12.0))
     wanted = _wanted(problem, points[same], evidence.chi2[same], numbers, max(missing, 0))
     if shape is None:
-        remarks = [f"Too few designs are near the least misfit: {missing} more are needed."] if numbers else []
+        remarks = (
+            [f"Too few designs are near the least misfit: {missing} more are needed."] if numbers else []
+        )
         return Calibration((), choices, np.empty((0, 0)), float(evidence.chi2.min()),
                            problem.measurements, 0, missing, wanted, tuple(remarks))  # fmt: skip
     searched = [genome.searched[k] for k in numbers]
@@ -167,7 +174,9 @@ def _estimate(gene: Searched, shape: MisfitShape, k: int) -> GeneEstimate:
     return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, *ends)
 
 
-def _choices(problem: Problem, points: Array, chi2: Array, others: Sequence[int]) -> dict[str, tuple[Value, ...]]:
+def _choices(
+    problem: Problem, points: Array, chi2: Array, others: Sequence[int]
+) -> dict[str, tuple[Value, ...]]:
     """Return for each gene that is a choice those that a design of nearly the least chi^2 has."""
     good = points[chi2 < chi2.min() + ONE_GENE_95]
     genes = [(problem.genome.searched[k], k) for k in others]

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import sobol_indices, uniform
+from scipy.spatial import cKDTree
+from scipy.stats import qmc, sobol_indices, uniform
 
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
@@ -77,8 +78,8 @@ class Sensitivity:
     """A sensitivity says what each gene does to one objective.
 
     label : of the objective, with its unit. genes : those that are searched. designs : that the surrogate is
-    made of. q2 : the part of the variance of these that it predicts of each from the others, beyond what
-    random starts leave to chance.
+    made of. q2 : the part of the variance over all ranges that it predicts of each of them from the others,
+    beyond what random starts leave to chance.
     """
 
     objective: str
@@ -114,7 +115,7 @@ def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
     found = []
     for k, objective in enumerate(outcome.problem.objectives):
         model = GaussianProcess(genome.features(points), objective.sign * costs[:, k], noise[:, k])
-        q2 = _predicted(model)
+        q2 = _predicted(model, genome)
         first, total = _indices(model, genome) if q2 >= LEAST_Q2 else ([UNKNOWN] * len(genome),) * 2
         genes = tuple(
             GeneSensitivity(gene.name, gene.unit, gene.decode(float(best[j])), _changes(model, genome, best, j),
@@ -138,14 +139,19 @@ def _known(outcome: Outcome) -> tuple[Array, Array, Array]:
     return points[chosen], costs[chosen], noise[chosen]
 
 
-def _predicted(model: GaussianProcess) -> float:
-    """Return the part of the variance that the process predicts of each design from the others.
+def _predicted(model: GaussianProcess, genome: Genome) -> float:
+    """Return the part of the variance over all ranges that the process predicts of designs left out.
 
-    The noise of the mean that is predicted is nobody's to predict, and is subtracted from both variances.
+    Each design counts for the part of the unit cube to which it is the nearest: most designs of a search lie
+    close together, where each is told by its neighbours. The noise of a mean is nobody's to predict, and is
+    subtracted from both variances.
     """
-    noise = float(np.mean(model.noise))
-    missed = float(np.mean((model.left_out() / model.scale) ** 2)) - noise
-    there = float(np.var(model.values)) - noise
+    drawn = qmc.Sobol(len(genome), rng=np.random.default_rng(3)).random_base2(12)
+    _, nearest = cKDTree(model.points).query(genome.features(drawn))
+    weight = np.bincount(nearest, minlength=len(model.points)) / len(drawn)
+    noise = float(weight @ model.noise)
+    missed = float(weight @ (model.left_out() / model.scale) ** 2) - noise
+    there = float(weight @ (model.values - weight @ model.values) ** 2) - noise
     return 1.0 - max(missed, 0.0) / there if there > 0 else 0.0
 
 

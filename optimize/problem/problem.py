@@ -92,7 +92,9 @@ class Problem:
             whole = isinstance(self.measurements, int) and self.measurements > 0
             must(whole, "measurements", "a whole number above 0", self.measurements)
             misfit = len(names) == 1 and not self.objectives[0].maximise
-            must(misfit, "measurements", "left out but for one objective that is minimised", self.measurements)
+            must(
+                misfit, "measurements", "left out but for one objective that is minimised", self.measurements
+            )
         for constraint in self.constraints:
             able = isinstance(constraint, ResultConstraint | DesignConstraint)
             must(able, "constraint", "a ResultConstraint or a DesignConstraint", constraint)
