@@ -1,9 +1,9 @@
 """How well each gene is known from what was measured, and which genes cannot be told apart.
 
-For a problem whose objective is a misfit (``Problem.measurements``): a quadratic form through the chi^2 of the
-designs that the search has run (optimize.analysis.misfit_shape) gives the estimate of each gene, its 95 %
-interval and the correlations. The interval is one of the likelihood: it holds where the uncertainties of the
-measurements do, and their errors are normal and independent.
+It is for a problem whose objective is a misfit (``Problem.measurements``). A quadratic form through the chi^2
+of the designs that the search has run (optimize.analysis.misfit_shape) gives the estimate of each gene, its
+95 % interval and the correlations. The interval is one of the likelihood: it holds where the uncertainties of
+the measurements do, and their errors are normal and independent.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
-from optimize.analysis.misfit_shape import ONE_GENE_95, Evidence, MisfitShape, coefficients, fit
+from optimize.analysis.misfit_shape import NEAR_CHI2, ONE_GENE_95, Evidence, MisfitShape, coefficients, fit
 from optimize.outcome import Outcome
 from optimize.problem.gene_values import Value, brief
 from optimize.problem.genes import Searched
@@ -84,10 +84,10 @@ class Calibration:
 
     genes : numbers that are searched, in the order of the genome. Empty where too few designs are near the
     least misfit. choices : of genes that are choices, by name, those with which a design has been run whose
-    chi^2 is less than 3.84 above the least. correlation : of the estimates, shape (genes, genes); NaN for a gene of
-    which nothing is told. chi2 : the
-    least, of ``measurements`` quantities. designs : how many the estimate stands on. missing : how many more
-    designs near the least are needed. wanted : designs that are worth running for that, as many.
+    chi^2 is less than 3.84 above the least. correlation : of the estimates, shape (genes, genes); NaN
+    for a gene of which nothing is told. chi2 : the least, of ``measurements`` quantities. designs : how many
+    the estimate stands on. missing : how many more designs near the least are needed. wanted : designs that
+    are worth running for that, as many.
     remarks : what cannot be told apart, and what else has to be known, in sentences.
     """
 
@@ -131,7 +131,7 @@ def calibration(outcome: Outcome) -> Calibration:
     missing = 0
     if numbers and shape is None:
         missing = 2 * coefficients(len(numbers))
-        missing -= int(np.sum(evidence.chi2[same] < evidence.chi2.min() + 12.0))
+        missing -= int(np.sum(evidence.chi2[same] < evidence.chi2.min() + NEAR_CHI2))
     wanted = _wanted(problem, points[same], evidence.chi2[same], numbers, max(missing, 0))
     if shape is None:
         remarks = (

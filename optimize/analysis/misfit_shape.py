@@ -13,19 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import brentq, lsq_linear
 
 Array = NDArray[np.float64]
 
-NEAR = 12.0
+NEAR_CHI2 = 12.0
 """Designs whose chi^2 is less than this above the least are near: 3.5 standard deviations along one gene."""
-FAR = 60.0
+FAR_CHI2 = 60.0
 """What near may be at most, where few designs are."""
 ONE_GENE_95 = 3.841
 """The 0.95 quantile of chi^2 of one degree of freedom."""
 _PER_COEFFICIENT = 2.0
-"""Designs that are wanted for each coefficient of the form; with fewer within NEAR others are taken in."""
+"""Designs that are wanted for each coefficient of the form; with fewer within NEAR_CHI2 others are taken in."""
 _ROUNDS = 6
 """Times that the near designs are chosen by the form and the form is fitted to them."""
 _FLAT = 2e-3
@@ -125,9 +124,15 @@ class MisfitShape:
 
     @property
     def correlation(self) -> Array:
-        """The correlation matrix of the estimates."""
-        deviation = np.sqrt(np.diag(self.covariance))
-        return self.covariance / np.outer(deviation, deviation)
+        """The correlation matrix of the estimates, each known to be within its range.
+
+        Along a direction that is not told, rounding would tie all genes; a range has a variance of 1/12, which
+        ends such a direction.
+        """
+        values, vectors = np.linalg.eigh(self.covariance)
+        covariance = (vectors / (1.0 / np.maximum(values, 1e-12) + 12.0)) @ vectors.T
+        deviation = np.sqrt(np.diag(covariance))
+        return covariance / np.outer(deviation, deviation)
 
     def interval(self, gene: int) -> tuple[float, float]:
         """Return the 95 % interval of a gene, 0..1: where the least chi^2 of all designs with that value is
@@ -202,7 +207,7 @@ def _near(above: Array, count: int) -> float:
     """Return how far above the least chi^2 designs are taken in."""
     enough = math.ceil(_PER_COEFFICIENT * count)
     reached = np.sort(above)[min(enough, len(above)) - 1]
-    return min(max(NEAR, float(reached) * (1 + 1e-12)), FAR)
+    return min(max(NEAR_CHI2, float(reached) * (1 + 1e-12)), FAR_CHI2)
 
 
 def _fitted(

@@ -35,7 +35,7 @@ MOVES = (-0.1, -0.01, 0.01, 0.1)
 LEAST_Q2 = 0.5
 """Indices are given where the surrogate predicts this part of the variance of designs left out, or more."""
 _SAMPLES = 1024
-"""Points of each of the two sets of which indices are had, a power of two."""
+"""Points of each of the two sets of which indices are had, a power of two; half of them for intervals."""
 _DRAWN, _SETS, _RESAMPLED = 4, 3, 8
 """Functions that are drawn from a process, each set of them with points of its own; sets from the process of
 all designs, and from those of designs that are drawn."""
@@ -118,10 +118,16 @@ def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
         q2 = _predicted(model, genome)
         first, total = _indices(model, genome) if q2 >= LEAST_Q2 else ([UNKNOWN] * len(genome),) * 2
         genes = tuple(
-            GeneSensitivity(gene.name, gene.unit, gene.decode(float(best[j])), _changes(model, genome, best, j),
-                            first[j], total[j])
+            GeneSensitivity(
+                name=gene.name,
+                unit=gene.unit,
+                at=gene.decode(float(best[j])),
+                changes=_changes(model, genome, best, j),
+                first=first[j],
+                total=total[j],
+            )
             for j, gene in enumerate(genome.searched)
-        )  # fmt: skip
+        )
         found.append(Sensitivity(objective.name, objective.unit, objective.label, genes, len(points), q2))
     return tuple(found)
 
@@ -182,14 +188,16 @@ def _changes(model: GaussianProcess, genome: Genome, best: Array, j: int) -> dic
 def _indices(model: GaussianProcess, genome: Genome) -> tuple[list[Between], list[Between]]:
     """Return the first-order and total indices of each gene.
 
-    Values are means over functions drawn from the process. The interval is 1.96 times the root of the mean
-    square by which functions are off these that are drawn from processes fitted to other designs: as many
-    drawn with replacement (B. Efron, Ann. Statist. 7 (1979) 1-26). A process that is sure of its length scales
-    is too sure of what is far from all designs.
+    Values are means over functions drawn from the process. For the interval the process is fitted anew to
+    designs that are drawn with replacement (B. Efron, Ann. Statist. 7 (1979) 1-26), as one process takes its
+    length scales for known and is too sure of what is far from all designs. Half of the interval is 1.96
+    times the root of the mean square by which functions of these processes are off the values.
     """
-    whole = np.concatenate([_drawn(model, genome, [k, 0]) for k in range(_SETS)])
+    whole = np.concatenate([_drawn(model, genome, [k, 0], _SAMPLES) for k in range(_SETS)])
     value = whole.mean(axis=0)
-    others = np.concatenate([_drawn(_resampled(model, k), genome, [k, 1]) for k in range(_RESAMPLED)])
+    others = np.concatenate(
+        [_drawn(_resampled(model, k), genome, [k, 1], _SAMPLES // 2) for k in range(_RESAMPLED)]
+    )
     half = _NORMAL_95 * np.sqrt(((others - value) ** 2).mean(axis=0))
     first, total = (
         [Between(float(v), float(v - h), float(v + h)) for v, h in zip(*pair, strict=True)]
@@ -198,12 +206,12 @@ def _indices(model: GaussianProcess, genome: Genome) -> tuple[list[Between], lis
     return first, total
 
 
-def _drawn(model: GaussianProcess, genome: Genome, seed: list[int]) -> Array:
+def _drawn(model: GaussianProcess, genome: Genome, seed: list[int], samples: int) -> Array:
     """Return the indices of functions drawn from a process, shape (functions, 2, genes)."""
     rng = np.random.default_rng([*seed, 7])
     drawn = Draws(model, _DRAWN, rng)
     found = sobol_indices(
-        func=lambda u: drawn(genome.features(u.T)), n=_SAMPLES, dists=[uniform()] * len(genome), rng=rng
+        func=lambda u: drawn(genome.features(u.T)), n=samples, dists=[uniform()] * len(genome), rng=rng
     )
     indices = np.stack([found.first_order, found.total_order], axis=-2)
     return np.asarray(indices.reshape(_DRAWN, 2, len(genome)))

@@ -61,8 +61,8 @@ def _correlations(axis: Axes, found: Calibration) -> None:
         if np.isnan(value):
             continue
         colour = "white" if abs(value) > 0.6 else "black"
-        axis.text(j, i, f"{value + 0.0:.2f}".replace("-0.00", "0.00").replace("-", "\N{MINUS SIGN}"), ha="center", va="center",
-                  fontsize=8, color=colour)  # fmt: skip
+        number = _minus(f"{value:.2f}".replace("-0.00", "0.00"))
+        axis.text(j, i, number, ha="center", va="center", fontsize=8, color=colour)
     axis.set_xticks(range(len(names)), names, rotation=35, ha="right")
     axis.set_yticks(range(len(names)), names)
     axis.tick_params(length=0, labelsize=8)
@@ -92,7 +92,7 @@ def _changes(axis: Axes, one: Sensitivity) -> None:
         values, rows, sides = _bars([gene.changes[move] for gene in one.genes], place)
         axis.errorbar(
             values, rows, xerr=sides, fmt="<" if move < 0 else ">", ms=5, lw=1.0, capsize=0,
-            color=_FAR if abs(move) > 0.05 else _CLOSE, label=f"{100 * move:+g} % of range".replace("-", "\N{MINUS SIGN}"),
+            color=_FAR if abs(move) > 0.05 else _CLOSE, label=_minus(f"{100 * move:+g} % of range"),
         )  # fmt: skip
     axis.set_xlabel(f"change of {superscripts(one.label)}")
     axis.set_title("moved from the best design", fontsize=9)
@@ -105,9 +105,9 @@ def _indices(axis: Axes, one: Sensitivity) -> None:
     axis.set_xlabel(f"Sobol' index of {superscripts(one.objective)}")
     axis.set_xlim(0.0, 1.0)
     if not one.trusted:
-        axis.text(0.5, 0.5, f"not given: the surrogate predicts\n{max(one.q2, 0):.2f} of the variance of designs "
-                  f"left out,\nless than {LEAST_Q2:g}", ha="center", va="center", color="0.4", fontsize=9,
-                  transform=axis.transAxes)  # fmt: skip
+        words = f"{max(one.q2, 0):.2f} of the variance of designs left out,\nless than {LEAST_Q2:g}"
+        axis.text(0.5, 0.5, f"not given: the surrogate predicts\n{words}", ha="center", va="center",
+                  color="0.4", fontsize=9, transform=axis.transAxes)  # fmt: skip
         return
     ends = 1.0
     for what, colour, place, label in (
@@ -127,6 +127,10 @@ def _bars(what: Sequence[Between], place: float) -> tuple[np.ndarray, np.ndarray
     values = np.array([one.value for one in what])
     sides = np.array([[one.value - one.low for one in what], [one.high - one.value for one in what]])
     return values, np.arange(len(what)) + place, np.maximum(sides, 0.0)
+
+
+def _minus(number: str) -> str:
+    return number.replace("-", "\N{MINUS SIGN}")
 
 
 def _label(name: str, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""Functions drawn from what a Gaussian process believes: each passes through its values as their noise allows.
+"""Functions drawn from what a Gaussian process believes: through its values, as near as their noise allows.
 
 A function of the process before any data is a sum of cosines of random frequencies (A. Rahimi and B. Recht,
 NIPS 20 (2007)); those of the Matern 5/2 covariance have Student's distribution of five degrees of freedom

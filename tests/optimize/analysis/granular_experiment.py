@@ -1,7 +1,7 @@
 """A closed-form experiment with grains, of which the right intervals are known, and archives of searches.
 
-Friction tells a sliding angle, restitution a rebound, both frictions a heap and a rate of discharge. The right
-interval is that of the exact derivatives: 1.96 times the root of the diagonal of (J^T J)^-1, J in
+Friction tells a sliding angle, restitution a rebound, both frictions a heap and a rate of discharge. The
+right interval is that of the exact derivatives: 1.96 times the root of the diagonal of (J^T J)^-1, J in
 uncertainties.
 
     PYTHONPATH=. python tests/optimize/analysis/granular_experiment.py METHOD QUANTITIES RUNS DATA_SETS
@@ -97,7 +97,8 @@ def interval_of(seed, number=4, tau=0.0, starts=1, common=True, of_quantities=Fa
 
 def coverage(data_sets, **settings):
     """The part of the intervals of each gene that have the truth, and their mean width over the right one."""
-    truths, intervals, right = map(np.array, zip(*(interval_of(k, **settings) for k in range(data_sets))))
+    found = [interval_of(k, **settings) for k in range(data_sets)]
+    truths, intervals, right = map(np.array, zip(*found, strict=True))
     inside = (intervals[..., 0] <= truths) & (truths <= intervals[..., 1])
     return inside.mean(axis=0), np.ptp(intervals, axis=2).mean(axis=0) / right.mean(axis=0)
 

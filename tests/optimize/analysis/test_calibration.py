@@ -41,7 +41,7 @@ def test_intervals_hold_the_truth_and_have_the_right_width(number):
 )
 def test_noise_of_random_starts_widens_and_does_not_bias(common, of_quantities, grown):
     """Four starts whose spread is the uncertainty: common to all designs they shift all means by a variance
-    of 1/4, so that the interval is sqrt(1.25) = 1.118 times as wide; of each design's own they average out."""
+    of 1/4, so that the interval is sqrt(1.25) = 1.118 times as wide; each design's own average out."""
     settings = {"tau": 1.0, "starts": 4, "common": common, "of_quantities": of_quantities}
     inside, width = coverage(SETS, **settings)
     assert holds(inside)
@@ -95,10 +95,11 @@ def test_what_is_not_told_is_said():
     _, outcome = searched(1, "cma-es", 2, 200)
     found = optimize.calibration(outcome)
     friction, rolling, restitution = found.genes
-    assert friction.told and restitution.told and not rolling.told
+    assert [one.told for one in (friction, rolling, restitution)] == [True, False, True]
     assert (rolling.low, rolling.high) == pytest.approx((0.0, 0.4))
     assert any("Nothing is told of rolling_friction" in remark for remark in found.remarks)
-    assert np.isnan(found.correlation[1]).all() and np.isfinite(found.correlation[0, 2])
+    assert np.isnan(found.correlation[1]).all()
+    assert abs(found.correlation[0, 2]) < 0.1
 
 
 def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
@@ -113,7 +114,7 @@ def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
     (remark,) = found.remarks
     assert remark.startswith("a and b cannot be told apart")
     assert "where more a goes with less b" in remark
-    assert found.correlation[0, 1] < -0.95
+    assert found.correlation[0, 1] < -0.9
 
 
 def test_measurements_that_are_not_met_together_are_told():

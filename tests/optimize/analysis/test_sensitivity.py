@@ -64,7 +64,7 @@ def test_of_a_whole_number_or_a_choice_nothing_between_is_told():
     (found,) = optimize.sensitivity(
         outcome_of(lambda d: d["n"] + (d["law"] == "two") + 0.1 * d["x"], genes, 60)
     )
-    n, law, x = found.genes
+    n, law, _ = found.genes
     assert math.isnan(n.changes[0.01].value)
     assert all(math.isnan(one.value) for one in law.changes.values())
     # n: variance 2/3; a flag: 1/4; x: 0.01 / 12.
@@ -78,7 +78,8 @@ def test_indices_are_refused_where_designs_left_out_are_not_predicted():
         return float(np.random.default_rng(int(1e9 * design["x1"] + 4e9)).normal())
 
     (found,) = optimize.sensitivity(outcome_of(chance, ANGLES, 60))
-    assert found.q2 < 0.5 and not found.trusted
+    assert found.q2 < 0.5
+    assert not found.trusted
     assert all(math.isnan(gene.first.value) for gene in found.genes)
 
 
@@ -98,7 +99,9 @@ def test_noise_is_nobodys_to_predict():
     (found,) = optimize.sensitivity(outcome)
     assert found.q2 > 0.8
     a, b = found.genes
-    assert a.first.low < 1.0 and a.first.value > 0.9 and b.total.value < 0.1
+    assert a.first.low < 1.0
+    assert a.first.value > 0.9
+    assert b.total.value < 0.1
 
 
 def test_several_objectives_have_one_each_and_are_written(tmp_path):
