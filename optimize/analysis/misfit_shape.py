@@ -24,13 +24,11 @@ FAR_CHI2 = 60.0
 ONE_GENE_95 = 3.841
 """The 0.95 quantile of chi^2 of one degree of freedom."""
 _PER_COEFFICIENT = 2.0
-"""Designs that are wanted for each coefficient of the form; with fewer within NEAR_CHI2 others are taken in."""
+"""Designs that are wanted for each coefficient of the form; with fewer within NEAR_CHI2 others are in it."""
 _ROUNDS = 6
 """Times that the near designs are chosen by the form and the form is fitted to them."""
 _FLAT = 2e-3
 """Least second derivative, chi^2 per squared width of a range; with less no range ends anything."""
-_WIDEST = 1e4
-"""Largest variance of an estimate, in squared widths of a range; all beyond is as good as unknown."""
 _MODEL_ERROR = 0.1
 """How far chi^2 is taken to be from its quadratic form at 1 above the minimum; it grows as distance^3."""
 
@@ -126,7 +124,7 @@ class MisfitShape:
     def correlation(self) -> Array:
         """The correlation matrix of the estimates, each known to be within its range.
 
-        Along a direction that is not told, rounding would tie all genes; a range has a variance of 1/12, which
+        Along a direction that is not told rounding would tie all genes; a range has a variance of 1/12, and
         ends such a direction.
         """
         values, vectors = np.linalg.eigh(self.covariance)
@@ -236,30 +234,27 @@ def _fitted(
     inverse = (vectors / values) @ vectors.T
     gradient = solution[1 : 1 + genes] / scale
     middle = centre - inverse @ gradient
-    # The error of the minimum is H^-1 times that of the slope at the minimum.
-    off = (middle - centre) / scale
+    best = _within_cube(middle, curvature)
+    at = (best - centre) / scale
+    least = float(np.concatenate([[1.0], at, at[row] * at[column]]) @ solution)
+    # The error of the minimum is H^-1 times that of the slope there, but for flat directions.
     slope = np.zeros((genes, columns.shape[1]))
     slope[:, 1 : 1 + genes] = np.eye(genes)
     for k, (i, j) in enumerate(zip(row, column, strict=True)):
-        slope[i, 1 + genes + k] += off[j]
-        slope[j, 1 + genes + k] += off[i]
+        slope[i, 1 + genes + k] += at[j]
+        slope[j, 1 + genes + k] += at[i]
     slope /= scale[:, None]
     of_slope = slope @ normal @ slope.T * (max(excess, 1.0) if np.any(noise) else excess)
-    covariance = 2.0 * inverse * (1.0 + evidence.shift) + inverse @ of_slope @ inverse
-    spread, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    covariance = (axes * np.clip(spread, 1e-12, _WIDEST)) @ axes.T
-    shape = MisfitShape(middle, 0.0, curvature, covariance, middle, int(near.sum()), within,
-                        float(np.sqrt(np.mean(residual**2))))  # fmt: skip
-    best = _within_cube(shape)
-    at = (best - centre) / scale
-    least = float(np.concatenate([[1.0], at, at[row] * at[column]]) @ solution)
-    return MisfitShape(middle, least, curvature, covariance, best, shape.designs, within, shape.scatter)
+    steep = (vectors * np.where(values > _FLAT, 1.0 / values, 0.0)) @ vectors.T
+    covariance = 2.0 * inverse * (1.0 + evidence.shift) + steep @ of_slope @ steep
+    covariance = 0.5 * (covariance + covariance.T)
+    scatter = float(np.sqrt(np.mean(residual**2)))
+    return MisfitShape(middle, least, curvature, covariance, best, int(near.sum()), within, scatter)
 
 
-def _within_cube(shape: MisfitShape) -> Array:
-    """Return the point of least chi^2 in the unit cube."""
-    if np.all((shape.centre >= 0) & (shape.centre <= 1)):
-        return shape.centre
-    root = shape._root
-    found = lsq_linear(root, root @ shape.centre, bounds=(0.0, 1.0))
-    return np.clip(found.x, 0.0, 1.0)
+def _within_cube(centre: Array, curvature: Array) -> Array:
+    """Return the point of the unit cube where the form is least."""
+    if np.all((centre >= 0) & (centre <= 1)):
+        return centre
+    root = np.linalg.cholesky(curvature).T
+    return np.clip(lsq_linear(root, root @ centre, bounds=(0.0, 1.0)).x, 0.0, 1.0)

@@ -13,6 +13,7 @@ from tests.optimize.analysis.granular_experiment import (
     GENES,
     coverage,
     interval_of,
+    right_widths,
     searched,
     searched_coverage,
 )
@@ -92,12 +93,14 @@ def outcome_of(function, genes, runs=200, **fields):
 
 
 def test_what_is_not_told_is_said():
-    _, outcome = searched(1, "cma-es", 2, 200)
+    truth, outcome = searched(1, "cma-es", 2, 200)
     found = optimize.calibration(outcome)
     friction, rolling, restitution = found.genes
     assert [one.told for one in (friction, rolling, restitution)] == [True, False, True]
     assert (rolling.low, rolling.high) == pytest.approx((0.0, 0.4))
     assert any("Nothing is told of rolling_friction" in remark for remark in found.remarks)
+    # With four quantities these two are known from the same ones.
+    assert [friction.part, restitution.part] == pytest.approx(right_widths(truth, 4)[[0, 2]], rel=0.06)
     assert np.isnan(found.correlation[1]).all()
     assert abs(found.correlation[0, 2]) < 0.1
 
@@ -114,7 +117,7 @@ def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
     (remark,) = found.remarks
     assert remark.startswith("a and b cannot be told apart")
     assert "where more a goes with less b" in remark
-    assert found.correlation[0, 1] < -0.9
+    assert found.correlation[0, 1] < -0.85
 
 
 def test_measurements_that_are_not_met_together_are_told():
