@@ -23,10 +23,9 @@ SETS = 200
 
 
 def holds(inside, sets=SETS):
-    """Whether 0.95 is within what is seen of three genes, by three deviations of each."""
-    return (
-        np.all(np.abs(inside - 0.95) < 3 * np.sqrt(0.95 * 0.05 / sets)) and abs(inside.mean() - 0.95) < 0.025
-    )
+    """Whether 0.95 is within three deviations of what is seen of each of three genes, and of their mean."""
+    deviation = np.sqrt(0.95 * 0.05 / sets)
+    return np.all(np.abs(inside - 0.95) < 3 * deviation) and abs(inside.mean() - 0.95) < 1.75 * deviation
 
 
 @pytest.mark.parametrize("number", [4, 3])
@@ -174,10 +173,10 @@ def test_table_and_pictures_are_written(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["cma-es", "gaussian-process"])
-def test_intervals_of_searches_hold_the_truth(method):
-    """100 data sets, three genes of nearly independent estimates."""
-    inside, width = searched_coverage(method, 4, 300, 100)
-    print(method, inside, width)
-    assert holds(inside, 100)
+@pytest.mark.parametrize(("method", "sets"), [("cma-es", 100), ("gaussian-process", 30)])
+def test_intervals_of_searches_hold_the_truth(method, sets):
+    """Searches of 300 runs; one with a Gaussian process takes half a minute."""
+    inside, width = searched_coverage(method, 4, 300, sets)
+    print(f"{method}: truth inside {inside}, width over the right one {width}")
+    assert holds(inside, sets)
     assert width == pytest.approx(1.0, abs=0.1)
