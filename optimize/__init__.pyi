@@ -1,3 +1,18 @@
+from .analysis.calibration import (
+    Calibration as Calibration,
+)
+from .analysis.calibration import (
+    GeneEstimate as GeneEstimate,
+)
+from .analysis.calibration import (
+    calibration as calibration,
+)
+from .analysis.sensitivity import (
+    Sensitivity as Sensitivity,
+)
+from .analysis.sensitivity import (
+    sensitivity as sensitivity,
+)
 from .evaluation.ensemble import EnsembleSettings as EnsembleSettings
 from .fitness_record import FitnessRecord as FitnessRecord
 from .outcome import (

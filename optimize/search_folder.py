@@ -3,6 +3,9 @@
 search.h5         every evaluation, the settings, logbooks and best designs; all that is needed to go on
 best.csv          the best designs, all digits
 met.csv           all that meet what is asked, where the problem says which do
+calibration.csv   (and .png, .pdf) each gene with its 95 % interval, where the problem says that its objective
+                  is the misfit of measurements
+sensitivity.csv   (and .png, .pdf) what each gene does to each objective, around the best and over all
 convergence.png   (and .pdf) best and mean fitness by generation; of several objectives the best of each
 front.png         (and .pdf) the front of several objectives
 best_scene.toml   the best design from the first random start, for ``tisim run``; none of a plain function
@@ -34,6 +37,12 @@ SEARCH_FILE = "search.h5"
 RESULT_FILES = (
     "best.csv",
     "met.csv",
+    "calibration.csv",
+    "calibration.png",
+    "calibration.pdf",
+    "sensitivity.csv",
+    "sensitivity.png",
+    "sensitivity.pdf",
     "convergence.png",
     "convergence.pdf",
     "front.png",

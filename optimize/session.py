@@ -16,6 +16,7 @@ from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress
 from optimize.problem.problem import Problem
 from optimize.report import report
+from optimize.report.analysis import Analysis
 from optimize.report.display import Display
 from optimize.search import search
 from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, check
@@ -113,6 +114,10 @@ def session(
             if problem.met_at is not None:
                 say.print(report.met_table(outcome))
             if not outcome.interrupted:
+                analysis = Analysis.of(outcome)
+                paths += analysis.write(folder)
+                for table in analysis.tables():
+                    say.print(table)
                 paths += _show_best(outcome.best, outcome, evaluator, folder, say)
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
     return outcome

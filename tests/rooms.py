@@ -26,7 +26,7 @@ ROOMS = (
     "optimize.fitness_record", "optimize.frames", "optimize.hall_of_fame", "optimize.generation_log",
     "optimize.tables", "optimize.settings",
     "optimize.outcome", "optimize.search_records", "optimize.search_folder", "optimize.search_file",
-    "optimize.conclusion", "optimize.search",
+    "optimize.conclusion", "optimize.search", "optimize.analysis",
     "optimize.report", "optimize.session", "optimize",
     "cases", "cases.statistics", "cases.case", "cases.runs", "cases.capture", "cases.*", "tisim.cli",
     "tisim.__main__",

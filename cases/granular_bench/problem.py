@@ -126,6 +126,7 @@ def calibration_to(measured: Measured, size: str = "default", variant: str = "ca
         picture=lambda scene, result: cloud(result),
         details=details,
         met_at=1.0,
+        measurements=len(measured),
         version=2,
         code=hashlib.sha256(json.dumps(plain).encode()).hexdigest()[:12],
     )

@@ -46,6 +46,9 @@ class Problem:
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
     met_at : the fitness at which a design meets all that is asked, and so does any better one; the report
         then has how far each gene spreads over those that the search has seen. For one objective only.
+    measurements : the objective is the mean over so many measured quantities of the squared distance from
+        what was measured, in its uncertainty: chi^2 over their number. What the search has run then tells how
+        well each gene is known; see optimize.calibration. For one objective only, which is minimised.
     constraints : what a design must keep to beside: any number of ResultConstraints and DesignConstraints.
     code : a text that tells it from another problem of this name and version, in place of the checksums of
         scene and objectives, of their files and of all that they are bound to (see fingerprint.py).
@@ -67,6 +70,7 @@ class Problem:
     picture: Callable[[Scene, Result], Figure] | None = None
     details: Callable[[Mapping[str, Any], Result], Mapping[str, float]] | None = None
     met_at: float | None = None
+    measurements: int | None = None
     code: str = ""
     files: Sequence[str | Path] = ()
     constraints: Sequence[InequalityConstraint] = ()
@@ -84,6 +88,13 @@ class Problem:
         must(not isinstance(self.files, str | Path), "files", "a list of paths", self.files)
         one = len(names) == 1 or self.met_at is None
         must(one, "met_at", "left out for several objectives", self.met_at)
+        if self.measurements is not None:
+            whole = isinstance(self.measurements, int) and self.measurements > 0
+            must(whole, "measurements", "a whole number above 0", self.measurements)
+            misfit = len(names) == 1 and not self.objectives[0].maximise
+            must(
+                misfit, "measurements", "left out but for one objective that is minimised", self.measurements
+            )
         for constraint in self.constraints:
             able = isinstance(constraint, ResultConstraint | DesignConstraint)
             must(able, "constraint", "a ResultConstraint or a DesignConstraint", constraint)

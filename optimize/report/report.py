@@ -35,7 +35,7 @@ def best_table(outcome: Outcome) -> RenderableType:
     columns = best_columns(outcome.problem, outcome.hall)
     places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
     indices = _spread(len(outcome.hall), places)
-    headings, *rows = ((heading, *(_text(values[k]) for k in indices)) for heading, values in columns.items())
+    headings, *rows = ((heading, *(text(values[k]) for k in indices)) for heading, values in columns.items())
     designs = max(1, (TERMINAL_WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
     title = outcome.problem.title or outcome.problem.name
     part = (
@@ -92,11 +92,11 @@ def met_table(outcome: Outcome) -> RenderableType:
     points = problem.genome.canonical(strings)
     for gene, values in zip(problem.genome.searched, points.T, strict=True):
         if gene.kind == "category":
-            met = {_text(gene.decode(u)) for u in values}
+            met = {text(gene.decode(u)) for u in values}
             table.add_row(Text(gene.label), Text(", ".join(sorted(met))), "", f"{len(met)} of {gene.width}")
             continue
         ends = float(values.min()), float(values.max())
-        low, high = (_text(gene.decode(end)) for end in ends)
+        low, high = (text(gene.decode(end)) for end in ends)
         table.add_row(Text(gene.label), low, high, f"{100 * (ends[1] - ends[0]):.0f} %")
     return Group("", title, table)
 
@@ -110,17 +110,13 @@ def details_table(details: Mapping[str, float]) -> RenderableType:
     """Return what the run of the best design shows, for the terminal."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, show_header=False)
     for name, value in details.items():
-        table.add_row(name, _text(value))
+        table.add_row(name, text(value))
     return Group("", Text("the best design, run once more", "italic"), table)
 
 
 def details_csv(details: Mapping[str, float]) -> bytes:
     """Return what the run of the best design shows as CSV, all digits."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(["quantity", "value"])
-    writer.writerows(details.items())
-    return text.getvalue().encode()
+    return columns_csv({"quantity": [*details], "value": [*details.values()]})
 
 
 def _widest(rows: Sequence[Sequence[str]]) -> int:
@@ -129,20 +125,21 @@ def _widest(rows: Sequence[Sequence[str]]) -> int:
 
 def best_csv(outcome: Outcome) -> bytes:
     """Return the best designs as CSV, all digits, one column per heading of best_columns."""
-    return _columns_csv(best_columns(outcome.problem, outcome.hall))
+    return columns_csv(best_columns(outcome.problem, outcome.hall))
 
 
 def met_csv(outcome: Outcome) -> bytes:
     """Return the designs that meet what is asked as CSV, all digits."""
-    return _columns_csv(met_columns(outcome.problem, outcome.estimates))
+    return columns_csv(met_columns(outcome.problem, outcome.estimates))
 
 
-def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> bytes:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
+def columns_csv(columns: Mapping[str, Sequence[Any]]) -> bytes:
+    """Return columns as CSV, all digits: a heading, and a line for each row."""
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream)
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue().encode()
+    return stream.getvalue().encode()
 
 
 def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
@@ -164,13 +161,13 @@ def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
     if outcome.problem.several:
         figures["front"] = _front
     for name, draw in figures.items():
-        paths += _picture(outcome, folder / name, draw)
+        paths += picture(folder / name, functools.partial(draw, outcome))
     return {path.name: path for path in paths}
 
 
-def _picture(outcome: Outcome, path: Path, draw: Callable[[Outcome], Figure]) -> list[Path]:
+def picture(path: Path, draw: Callable[[], Figure]) -> list[Path]:
     """Write a picture as .png and .pdf; return their paths, none where it cannot be drawn."""
-    figure = functools.cache(lambda: draw(outcome))
+    figure = functools.cache(draw)
     written = pictures.write_beside_data(path.with_suffix(".png"), figure, SHARP)
     return written and written + pictures.write_beside_data(path.with_suffix(".pdf"), figure)
 
@@ -187,7 +184,7 @@ def _front(outcome: Outcome) -> Figure:
     return front_figure(outcome)
 
 
-def _text(value: Any) -> str:
+def text(value: Any) -> str:
     """Return a number with four digits, as 1.5e8 and not 1.5e+08, which is two columns more; a text as it
     is."""
     if not isinstance(value, float):

@@ -43,7 +43,7 @@ class Belief:
         self.exact = not np.any(self.noise)
         self.starts = int(np.median([string.estimates[0].starts for string in strings])) or 1
         self.costs, slopes = _transformed(costs, _SKEWED if self.exact else _SKEWED_NOISE)
-        chosen = _representative(costs, MOST_LEARNED)
+        chosen = representative(costs, MOST_LEARNED)
         self.chosen = chosen
         variances = self.noise * slopes**2
         self.one_start = np.array([_pooled(strings, k) for k in range(costs.shape[1])]) * np.mean(
@@ -119,7 +119,7 @@ def _transformed(costs: Array, skewed: float) -> tuple[Array, Array]:
     return new, slopes
 
 
-def _representative(costs: Array, most: int) -> NDArray[np.intp]:
+def representative(costs: Array, most: int) -> NDArray[np.intp]:
     """Return the indices of at most that number of designs: the best, and others drawn evenly."""
     if len(costs) <= most:
         return np.arange(len(costs))

@@ -104,6 +104,22 @@ class GaussianProcess:
         across = _matern(self.points, np.atleast_2d(points), self.parameters)
         return solve_triangular(self._factor[0], across, lower=True, check_finite=False)
 
+    def left_out(self) -> Array:
+        """Return for each value how far it is from what the others predict of it, shape (n,), with the
+        parameters of all (GPML Eq. 5.12)."""
+        inverse = cho_solve(self._factor, np.eye(len(self.points)), check_finite=False)
+        return self.scale * (inverse @ (self.values - self._mean)) / np.diag(inverse)
+
+    def conditioned(self, across: Array, values: Array) -> Array:
+        """Return the means that a process with other values at its points would have, shape (m, draws).
+
+        across : covariance with its points, shape (m, n). values : shape (n, draws), standardised units, as
+        the result. Each column has a constant mean of its own.
+        """
+        solved = cho_solve(self._factor, values, check_finite=False)
+        means = solved.sum(axis=0) / float(self._ones.sum())
+        return means + across @ (solved - np.outer(self._ones, means))
+
     def covariance(self, points: Array, others: Array) -> Array:
         """Return the covariance of the function before any data, shape (m, k), in standardised units."""
         return _matern(points, others, self.parameters)

@@ -81,6 +81,8 @@ def test_optimize_ends_with_all_its_files_and_resumes(tisim, tmp_path, monkeypat
     names = {
         "search.h5",
         "best.csv",
+        "sensitivity.csv",
+        "sensitivity.png",
         "convergence.png",
         "convergence.pdf",
         "best_scene.toml",

@@ -1,0 +1,306 @@
+"""How well each gene is known from what was measured, and which genes cannot be told apart.
+
+It is for a problem whose objective is a misfit (``Problem.measurements``). A quadratic form through the chi^2
+of the designs that the search has run (optimize.analysis.misfit_shape) gives the estimate of each gene, its
+95 % interval and the correlations. The interval is one of the likelihood: it holds where the uncertainties of
+the measurements do, and their errors are normal and independent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from optimize.analysis.misfit_shape import NEAR_CHI2, ONE_GENE_95, Evidence, MisfitShape, coefficients, fit
+from optimize.outcome import Outcome
+from optimize.problem.gene_values import Value, brief
+from optimize.problem.genes import Searched
+from optimize.problem.problem import Problem
+from tisim.errors import Words, must
+
+Array = NDArray[np.float64]
+
+UNTOLD = 1.0
+"""Along a direction in which chi^2 grows less than this over the range of its genes, nothing is told."""
+_ALMOST_ALL = 0.95
+"""A gene whose interval is more of its range than this is not told."""
+_TOGETHER = 0.9
+"""Correlation of two estimates from which on it is said."""
+_LITTLE = 0.05
+"""A gene whose part of the directions of which nothing is told is less than this does not belong to them."""
+_UNLIKELY = 0.01
+"""Probability of so large a chi^2 by chance, below which it is said that the measurements are not met."""
+
+
+@dataclass(frozen=True)
+class GeneEstimate:
+    """What is known of a gene, in its unit.
+
+    estimate : where chi^2 is least. low, high : of the 95 % interval. open_low, open_high : whether the
+    interval goes on to that end of the gene's range, and maybe beyond, so that it is a bound from one side
+    only. estimate_part, low_part, high_part : where these are within the range, 0..1, on the gene's scale.
+    """
+
+    name: str
+    unit: str
+    estimate: float
+    low: float
+    high: float
+    open_low: bool
+    open_high: bool
+    estimate_part: float
+    low_part: float
+    high_part: float
+
+    @property
+    def part(self) -> float:
+        """The part of the range that the interval covers, on the gene's scale."""
+        return self.high_part - self.low_part
+
+    @property
+    def told(self) -> bool:
+        """Whether the interval is less than the range."""
+        return not (self.open_low and self.open_high) and self.part < _ALMOST_ALL
+
+    @property
+    def words(self) -> str:
+        """What kind of interval it is."""
+        if not self.told:
+            return "not told: its whole range"
+        if self.open_low:
+            return "from one side: at most"
+        return "from one side: at least" if self.open_high else ""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration says how well each gene is known.
+
+    genes : numbers that are searched, in the order of the genome. Empty where too few designs are near the
+    least misfit. choices : of genes that are choices, by name, those with which a design has been run whose
+    chi^2 is less than 3.84 above the least. correlation : of the estimates, shape (genes, genes); NaN
+    for a gene of which nothing is told. chi2 : the least, of ``measurements`` quantities. designs : how many
+    the estimate stands on. missing : how many more designs near the least are needed. wanted : designs that
+    are worth running for that, as many.
+    remarks : what cannot be told apart, and what else has to be known, in sentences.
+    """
+
+    genes: tuple[GeneEstimate, ...]
+    choices: dict[str, tuple[Value, ...]]
+    correlation: Array
+    chi2: float
+    measurements: int
+    designs: int
+    missing: int
+    wanted: tuple[dict[str, Any], ...]
+    remarks: tuple[str, ...]
+
+
+def calibration(outcome: Outcome) -> Calibration:
+    """Return how well each gene is known from what was measured, by all designs of a search.
+
+    Genes that are choices are kept at those of the best design. InputError for a problem that does not say of
+    how many measured quantities its objective is the misfit, and for a search without a design.
+    """
+    problem = outcome.problem
+    must(
+        problem.measurements is not None,
+        "measurements",
+        "given in a problem that is calibrated",
+        Words("none"),
+    )
+    must(outcome.best is not None, "search", "one with a design that has not failed", Words("none"))
+    assert problem.measurements is not None
+    points, evidence = _evidence(outcome)
+    genome = problem.genome
+    numbers = [k for k, gene in enumerate(genome.searched) if gene.kind != "category"]
+    others = [k for k in range(len(genome)) if k not in numbers]
+    best = points[int(np.argmin(evidence.chi2))]
+    same = np.all(points[:, others] == best[others], axis=1)
+    choices = _choices(problem, points, evidence.chi2, others)
+    shape = None
+    if numbers:
+        shape = fit(Evidence(points[same][:, numbers], evidence.chi2[same], evidence.noise[same],
+                             evidence.shift, evidence.offset))  # fmt: skip
+    missing = 0
+    if numbers and shape is None:
+        missing = 2 * coefficients(len(numbers))
+        missing -= int(np.sum(evidence.chi2[same] < evidence.chi2.min() + NEAR_CHI2))
+    wanted = _wanted(problem, points[same], evidence.chi2[same], numbers, max(missing, 0))
+    if shape is None:
+        remarks = (
+            [f"Too few designs are near the least misfit: {missing} more are needed."] if numbers else []
+        )
+        return Calibration((), choices, np.empty((0, 0)), float(evidence.chi2.min()),
+                           problem.measurements, 0, missing, wanted, tuple(remarks))  # fmt: skip
+    searched = [genome.searched[k] for k in numbers]
+    estimates = tuple(_estimate(gene, shape, k) for k, gene in enumerate(searched))
+    return Calibration(
+        genes=estimates,
+        choices=choices,
+        correlation=_correlation(shape),
+        chi2=max(shape.least, 0.0),
+        measurements=problem.measurements,
+        designs=shape.designs,
+        missing=0,
+        wanted=(),
+        remarks=tuple(_remarks(problem, shape, searched, estimates, evidence)),
+    )
+
+
+def _evidence(outcome: Outcome) -> tuple[Array, Evidence]:
+    """Return the points of the designs that have not failed, and their chi^2."""
+    measurements = outcome.problem.measurements or 1
+    points = outcome.problem.genome.canonical(list(outcome.estimates))
+    estimates = [of_all[0] for of_all in outcome.estimates.values()]
+    chi2 = measurements * np.array([one.mean for one in estimates])
+    variance = measurements**2 * np.array([one.std for one in estimates]) ** 2
+    starts = np.array([one.starts for one in estimates], dtype=float)
+    common = bool(outcome.settings.ensemble.common_starts)
+    return points, Evidence.of_runs(points, chi2, variance, starts, measurements, common)
+
+
+def _estimate(gene: Searched, shape: MisfitShape, k: int) -> GeneEstimate:
+    low, high = shape.interval(k)
+    ends = max(low, 0.0), min(high, 1.0)
+    best = float(np.clip(shape.best[k], 0.0, 1.0))
+    at, bottom, top = (float(gene.decode(u)) for u in (best, *ends))
+    return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, *ends)
+
+
+def _choices(
+    problem: Problem, points: Array, chi2: Array, others: Sequence[int]
+) -> dict[str, tuple[Value, ...]]:
+    """Return for each gene that is a choice those that a design of nearly the least chi^2 has."""
+    good = points[chi2 < chi2.min() + ONE_GENE_95]
+    genes = [(problem.genome.searched[k], k) for k in others]
+    return {gene.name: tuple(dict.fromkeys(gene.decode(u) for u in good[:, k])) for gene, k in genes}
+
+
+def _wanted(
+    problem: Problem, points: Array, chi2: Array, numbers: Sequence[int], count: int
+) -> tuple[dict[str, Any], ...]:
+    """Return designs around the best, spread as the best of those that were run are."""
+    if not count:
+        return ()
+    least = np.argsort(chi2, kind="stable")
+    best = points[least[: 2 * len(numbers) + 1]]
+    width = np.maximum(best[:, numbers].std(axis=0), 0.02)
+    rng = np.random.default_rng(len(points))
+    drawn = np.tile(best[0], (count, 1))
+    drawn[:, numbers] = np.clip(drawn[:, numbers] + width * rng.standard_normal((count, len(numbers))), 0, 1)
+    return tuple(problem.genome.decode(u) for u in drawn)
+
+
+def _remarks(
+    problem: Problem,
+    shape: MisfitShape,
+    genes: Sequence[Searched],
+    estimates: Sequence[GeneEstimate],
+    evidence: Evidence,
+) -> list[str]:
+    """Return what cannot be told apart, and what makes the intervals doubtful."""
+    remarks = []
+    growth, directions = shape.growth()
+    free = growth < UNTOLD
+    if np.any(free):
+        remarks += _untold(directions[:, free], float(growth[free].max()), genes)
+    known = {one.name for one in estimates if one.told}
+    for i, one in enumerate(genes):
+        for j, other in enumerate(genes[:i]):
+            rho = shape.correlation[i, j]
+            if abs(rho) > _TOGETHER and {one.name, other.name} <= known:
+                more = "less" if rho < 0 else "more"
+                remarks.append(
+                    f"{other.name} and {one.name} are hardly told apart: more of one goes with {more} of "
+                    f"the other (correlation {rho:.2f})."
+                )
+    freedom = max((problem.measurements or 1) - len(genes), 1)
+    if chi2_distribution.sf((shape.least - evidence.offset) / (1.0 + evidence.shift), freedom) < _UNLIKELY:
+        remarks.append(
+            f"The measurements are not met together: the least chi^2 is {shape.least:.3g} of "
+            f"{problem.measurements} quantities. The intervals hold for a model that can meet them."
+        )
+    if not np.any(evidence.noise) and shape.scatter > 1.0:
+        remarks.append(
+            f"chi^2 is off a quadratic form by {shape.scatter:.2g} in the root of the mean square, over "
+            f"designs up to {shape.within:.3g} above the least: the intervals are rough."
+        )
+    return remarks
+
+
+def _correlation(shape: MisfitShape) -> Array:
+    """Return the correlations of the estimates, NaN for a gene that is free by itself: it is as good at any
+    value, and the little that it is tied to others is chance."""
+    growth, directions = shape.growth()
+    alone = (directions[:, growth < UNTOLD] ** 2).sum(axis=1) > 1.0 - _LITTLE
+    correlation = shape.correlation.copy()
+    correlation[alone, :] = correlation[:, alone] = math.nan
+    return correlation
+
+
+def _untold(directions: Array, grown: float, genes: Sequence[Searched]) -> list[str]:
+    """Return in words of which genes, or combinations of them, nothing is told.
+
+    directions : shape (genes, directions), of the unit cube; chi^2 changes by ``grown`` or less along them.
+    """
+    parts = (directions**2).sum(axis=1)
+    change = f"chi^2 changes by {grown:.2g} or less"
+    alone = [gene.name for gene, part in zip(genes, parts, strict=True) if part > 1.0 - _LITTLE]
+    told = [f"Nothing is told of {_listed(alone)}: {change} over the range."] if alone else []
+    mixed = [k for k, part in enumerate(parts) if _LITTLE <= part <= 1.0 - _LITTLE]
+    if len(mixed) < 2:
+        return told
+    names = _listed([genes[k].name for k in mixed])
+    if directions.shape[1] - len(alone) > 1:
+        return [*told, f"{names} cannot be told apart: {change} along several combinations of them."]
+    one = directions[mixed, int(np.argmax((directions[mixed] ** 2).sum(axis=0)))]
+    up = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] > 0]
+    down = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] < 0]
+    goes = f"where more {_listed(up)} goes with less {_listed(down)}" if down else "where all grow together"
+    return [*told, f"{names} cannot be told apart: {change} {goes}."]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def columns(result: Calibration) -> dict[str, list[Any]]:
+    """Return the columns of calibration.csv: a row for each gene, and its correlations with all."""
+    genes = result.genes
+    table: dict[str, list[Any]] = {
+        "gene": [one.name for one in genes],
+        "unit": [one.unit for one in genes],
+        "estimate": [one.estimate for one in genes],
+        "95 % low": [one.low for one in genes],
+        "95 % high": [one.high for one in genes],
+        "part of its range": [one.part for one in genes],
+        "interval": [one.words or "from both sides" for one in genes],
+    }
+    for k, one in enumerate(genes):
+        table[f"correlation with {one.name}"] = [float(row[k]) for row in result.correlation]
+    return table
+
+
+def summary(result: Calibration) -> str:
+    """Return in a line what the estimate stands on."""
+    if not math.isfinite(result.chi2) or not result.designs:
+        return "no intervals"
+    return (
+        f"least chi^2 {result.chi2:.3g} of {result.measurements} measured quantities, by "
+        f"{result.designs} designs near it"
+    )
+
+
+def shown(one: GeneEstimate) -> tuple[str, str, str]:
+    """Return estimate ("-" where it is not told) and ends of the interval of a gene as text, an open end in
+    brackets."""
+    low, high = brief(one.low), brief(one.high)
+    estimate = brief(one.estimate) if one.told else "-"
+    return estimate, f"[{low}]" if one.open_low else low, f"[{high}]" if one.open_high else high

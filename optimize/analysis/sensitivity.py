@@ -1,0 +1,250 @@
+"""Which genes matter: around the best design, and over the whole range.
+
+A Gaussian process (optimize.surrogate) through the designs that a search has run tells both. Around the best
+design one gene moves at a time. Over the whole range the variance of an objective is divided among the genes:
+the first-order index of a gene is the part that it explains alone, the total index the part that would be
+left if all others were known (I. M. Sobol', Math. Comput. Simul. 55 (2001) 271-280; A. Saltelli and others,
+Comput. Phys. Commun. 181 (2010) 259-270). Intervals are those of functions drawn from the process.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.stats import qmc, sobol_indices, uniform
+
+from optimize.methods.individual import Individual
+from optimize.outcome import Outcome
+from optimize.problem.gene_values import Value
+from optimize.problem.genome import Genome
+from optimize.surrogate.belief import MOST_LEARNED, costs_and_noise, representative
+from optimize.surrogate.draws import Draws
+from optimize.surrogate.gaussian_process import GaussianProcess
+from tisim.errors import Words, must
+
+Array = NDArray[np.float64]
+
+MOVES = (-0.1, -0.01, 0.01, 0.1)
+"""Parts of a gene's range by which it is moved from the best design."""
+LEAST_Q2 = 0.5
+"""Indices are given where the surrogate predicts this part of the variance of designs left out, or more."""
+_SAMPLES = 1024
+"""Points of each of the two sets of which indices are had, a power of two; half of them for intervals."""
+_DRAWN, _SETS, _RESAMPLED = 4, 3, 8
+"""Functions that are drawn from a process, each set of them with points of its own; sets from the process of
+all designs, and from those of designs that are drawn."""
+_NORMAL_95 = 1.96
+"""Half of the 95 % interval of a normal number, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Between:
+    """A number and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+UNKNOWN = Between(math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class GeneSensitivity:
+    """What a gene does to an objective.
+
+    at : its value in the best design. changes : of the objective when the gene moves by a part of its range,
+    by that part (-0.1, -0.01, 0.01, 0.1); unknown for a choice, and where its value stays what it is: at an
+    end of its range, or a whole number. first, total : Sobol' indices over the whole range, unknown where the
+    surrogate predicts too little.
+    """
+
+    name: str
+    unit: str
+    at: Value
+    changes: Mapping[float, Between]
+    first: Between
+    total: Between
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """A sensitivity says what each gene does to one objective.
+
+    label : of the objective, with its unit. genes : those that are searched. designs : that the surrogate is
+    made of. q2 : the part of the variance over all ranges that it predicts of each of them from the others,
+    beyond what random starts leave to chance.
+    """
+
+    objective: str
+    unit: str
+    label: str
+    genes: tuple[GeneSensitivity, ...]
+    designs: int
+    q2: float
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the surrogate predicts enough for indices."""
+        return self.q2 >= LEAST_Q2
+
+
+def least_designs(genome: Genome) -> int:
+    """Return the number of designs below which nothing is told."""
+    return max(8, len(genome) + 2)
+
+
+def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
+    """Return what each gene does to each objective, by the designs of a search.
+
+    InputError where fewer designs than two more than genes, or than eight, have not failed.
+    """
+    genome = outcome.problem.genome
+    least = least_designs(genome)
+    must(len(outcome.estimates) >= least, "search", f"of {least} designs or more that have not failed",
+         Words(f"{len(outcome.estimates)}"))  # fmt: skip
+    assert outcome.best is not None
+    best = genome.canonical(list(outcome.best))
+    points, costs, noise = _known(outcome)
+    found = []
+    for k, objective in enumerate(outcome.problem.objectives):
+        model = GaussianProcess(genome.features(points), objective.sign * costs[:, k], noise[:, k])
+        q2 = _predicted(model, genome)
+        first, total = _indices(model, genome) if q2 >= LEAST_Q2 else ([UNKNOWN] * len(genome),) * 2
+        genes = tuple(
+            GeneSensitivity(
+                name=gene.name,
+                unit=gene.unit,
+                at=gene.decode(float(best[j])),
+                changes=_changes(model, genome, best, j),
+                first=first[j],
+                total=total[j],
+            )
+            for j, gene in enumerate(genome.searched)
+        )
+        found.append(Sensitivity(objective.name, objective.unit, objective.label, genes, len(points), q2))
+    return tuple(found)
+
+
+def _known(outcome: Outcome) -> tuple[Array, Array, Array]:
+    """Return points, costs and variances of the costs of the designs that a surrogate is made of."""
+    strings = []
+    for point, estimates in outcome.estimates.items():
+        string = Individual(point, len(estimates))
+        string.know(estimates)
+        strings.append(string)
+    costs, noise = costs_and_noise(strings)
+    chosen = representative(costs, MOST_LEARNED)
+    points = outcome.problem.genome.canonical([list(string) for string in strings])
+    return points[chosen], costs[chosen], noise[chosen]
+
+
+def _predicted(model: GaussianProcess, genome: Genome) -> float:
+    """Return the part of the variance over all ranges that the process predicts of designs left out.
+
+    Each design counts for the part of the unit cube to which it is the nearest: most designs of a search lie
+    close together, where each is told by its neighbours. The noise of a mean is nobody's to predict, and is
+    subtracted from both variances.
+    """
+    drawn = qmc.Sobol(len(genome), rng=np.random.default_rng(3)).random_base2(12)
+    _, nearest = cKDTree(model.points).query(genome.features(drawn))
+    weight = np.bincount(nearest, minlength=len(model.points)) / len(drawn)
+    noise = float(weight @ model.noise)
+    missed = float(weight @ (model.left_out() / model.scale) ** 2) - noise
+    there = float(weight @ (model.values - weight @ model.values) ** 2) - noise
+    return 1.0 - max(missed, 0.0) / there if there > 0 else 0.0
+
+
+def _changes(model: GaussianProcess, genome: Genome, best: Array, j: int) -> dict[float, Between]:
+    """Return the changes of an objective when gene j moves from the best design."""
+    gene = genome.searched[j]
+    moved = np.tile(best, (len(MOVES), 1))
+    moved[:, j] = np.clip(best[j] + np.array(MOVES), 0.0, 1.0)
+    moved = genome.canonical(moved)
+    if gene.kind == "category":
+        return dict.fromkeys(MOVES, UNKNOWN)
+    at = genome.features(np.vstack([best, moved]))
+    means, _ = model.predict(at)
+    explained = model.half_solved(at)
+    joint = model.covariance(at, at) - explained.T @ explained
+    variance = joint[0, 0] + np.diag(joint)[1:] - 2.0 * joint[0, 1:]
+    half = _NORMAL_95 * model.scale * np.sqrt(np.maximum(variance, 0.0))
+    change = means[1:] - means[0]
+    # At the end of a range a move is shorter than its name says.
+    whole = np.abs(np.abs(moved[:, j] - best[j]) - np.abs(MOVES)) < 1e-9
+    whole |= (gene.kind != "real") & (moved[:, j] != best[j])
+    return {
+        move: Between(float(c), float(c - h), float(c + h)) if there else UNKNOWN
+        for move, c, h, there in zip(MOVES, change, half, whole, strict=True)
+    }
+
+
+def _indices(model: GaussianProcess, genome: Genome) -> tuple[list[Between], list[Between]]:
+    """Return the first-order and total indices of each gene.
+
+    Values are means over functions drawn from the process. For the interval the process is fitted anew to
+    designs that are drawn with replacement (B. Efron, Ann. Statist. 7 (1979) 1-26), as one process takes its
+    length scales for known and is too sure of what is far from all designs. Half of the interval is 1.96
+    times the root of the mean square by which functions of these processes are off the values.
+    """
+    whole = np.concatenate([_drawn(model, genome, [k, 0], _SAMPLES) for k in range(_SETS)])
+    value = whole.mean(axis=0)
+    others = np.concatenate(
+        [_drawn(_resampled(model, k), genome, [k, 1], _SAMPLES // 2) for k in range(_RESAMPLED)]
+    )
+    half = _NORMAL_95 * np.sqrt(((others - value) ** 2).mean(axis=0))
+    first, total = (
+        [Between(float(v), float(v - h), float(v + h)) for v, h in zip(*pair, strict=True)]
+        for pair in zip(value, half, strict=True)
+    )
+    return first, total
+
+
+def _drawn(model: GaussianProcess, genome: Genome, seed: list[int], samples: int) -> Array:
+    """Return the indices of functions drawn from a process, shape (functions, 2, genes)."""
+    rng = np.random.default_rng([*seed, 7])
+    drawn = Draws(model, _DRAWN, rng)
+    found = sobol_indices(
+        func=lambda u: drawn(genome.features(u.T)), n=samples, dists=[uniform()] * len(genome), rng=rng
+    )
+    indices = np.stack([found.first_order, found.total_order], axis=-2)
+    return np.asarray(indices.reshape(_DRAWN, 2, len(genome)))
+
+
+def _resampled(model: GaussianProcess, k: int) -> GaussianProcess:
+    """Return the process through as many of its designs, drawn with replacement; each is used once."""
+    count = len(model.points)
+    chosen = np.unique(np.random.default_rng([k, 2]).integers(count, size=count))
+    values = model.centre + model.scale * model.values[chosen]
+    noise = model.scale**2 * model.noise[chosen]
+    return GaussianProcess(model.points[chosen], values, noise, start=model.parameters, iterations=10)
+
+
+def columns(found: tuple[Sensitivity, ...]) -> dict[str, list[Any]]:
+    """Return the columns of sensitivity.csv: a row for each gene and objective."""
+    rows = [(one, gene) for one in found for gene in one.genes]
+    table: dict[str, list[Any]] = {
+        "objective": [one.label for one, _ in rows],
+        "gene": [gene.name for _, gene in rows],
+        "unit": [gene.unit for _, gene in rows],
+        "best": [gene.at for _, gene in rows],
+    }
+    for move in MOVES:
+        _spread(table, f"change at {100 * move:+g} % of the range", [gene.changes[move] for _, gene in rows])
+    _spread(table, "first-order index", [gene.first for _, gene in rows])
+    _spread(table, "total index", [gene.total for _, gene in rows])
+    table["designs"] = [one.designs for one, _ in rows]
+    table["Q2 left out"] = [one.q2 for one, _ in rows]
+    return table
+
+
+def _spread(table: dict[str, list[Any]], heading: str, of: list[Between]) -> None:
+    table[heading] = [one.value for one in of]
+    table[f"{heading}, 95 % low"] = [one.low for one in of]
+    table[f"{heading}, 95 % high"] = [one.high for one in of]

@@ -1,0 +1,135 @@
+"""What a search has learnt beside its best design is told: tables for the terminal, CSV files, pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from optimize.analysis import calibration as calibrating
+from optimize.analysis import sensitivity as sensing
+from optimize.analysis.calibration import Calibration
+from optimize.analysis.sensitivity import LEAST_Q2, Between, Sensitivity
+from optimize.outcome import Outcome
+from optimize.report.report import columns_csv, picture, text
+from tisim.files.atomic import replace_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """An analysis is what there is to tell of a search.
+
+    calibration : None where the problem does not say that its objective is a misfit. sensitivity : of each
+    objective; empty where too few designs are known.
+    """
+
+    calibration: Calibration | None
+    sensitivity: tuple[Sensitivity, ...]
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> Analysis:
+        """Return all that there is to tell of a search that has found a design."""
+        enough = len(outcome.estimates) >= sensing.least_designs(outcome.problem.genome)
+        return cls(
+            calibrating.calibration(outcome) if outcome.problem.measurements else None,
+            sensing.sensitivity(outcome) if enough else (),
+        )
+
+    def tables(self) -> list[RenderableType]:
+        """Return the tables for the terminal."""
+        known = [calibration_table(self.calibration)] if self.calibration else []
+        return [*known, *(sensitivity_table(one) for one in self.sensitivity)]
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write calibration and sensitivity, where there is one, as .csv, .png and .pdf; return the paths. A
+        picture that cannot be drawn is left out, which is said on standard error."""
+        paths: list[Path] = []
+        known, sensitive = self.calibration, self.sensitivity
+        if known is not None:
+            replace_file(folder / "calibration.csv", columns_csv(calibrating.columns(known)))
+            paths.append(folder / "calibration.csv")
+            if known.genes:
+                paths += picture(folder / "calibration", _late("calibration_figure", known))
+        if sensitive:
+            replace_file(folder / "sensitivity.csv", columns_csv(sensing.columns(sensitive)))
+            paths += [folder / "sensitivity.csv"]
+            paths += picture(folder / "sensitivity", _late("sensitivity_figure", sensitive))
+        return paths
+
+
+def _late(name: str, of: Calibration | tuple[Sensitivity, ...]) -> Callable[[], Figure]:
+    """Return what draws a figure, for which matplotlib is loaded only then."""
+
+    def draw() -> Figure:
+        from optimize.report import analysis_figures
+
+        figure: Figure = getattr(analysis_figures, name)(of)
+        return figure
+
+    return draw
+
+
+def calibration_table(found: Calibration) -> RenderableType:
+    """Return how well each gene is known, for the terminal."""
+    title = Text(f"what the measurements tell: {calibrating.summary(found)}", "italic")
+    parts: list[RenderableType] = ["", title]
+    if found.genes:
+        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+        table.add_column("gene")
+        for heading in ("estimate", "95 % from", "to", "of its range"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column("")
+        for one in found.genes:
+            label = f"{one.name} ({one.unit})" if one.unit else one.name
+            estimate, low, high = calibrating.shown(one)
+            table.add_row(Text(label), estimate, Text(low), Text(high), f"{100 * one.part:.0f} %",
+                          one.words.partition(":")[0])  # fmt: skip
+        parts.append(table)
+    if any(one.open_low or one.open_high for one in found.genes):
+        parts.append(Text("[...]: an end of the range that was searched, and not of the interval", "dim"))
+    for name, values in found.choices.items():
+        parts.append(Text(f"{name}: {', '.join(map(str, values))} (designs within the 95 % of one gene)"))
+    return Group(*parts, *(Text(remark) for remark in found.remarks))
+
+
+def sensitivity_table(found: Sensitivity) -> RenderableType:
+    """Return what each gene does to an objective, for the terminal."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("gene")
+    for heading in ("-10 % of range", "+10 % of range", "alone", "in all"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for gene in found.genes:
+        label = f"{gene.name} ({gene.unit})" if gene.unit else gene.name
+        changes = (_signed(gene.changes[move]) for move in (-0.1, 0.1))
+        table.add_row(Text(label), *changes, _index(gene.first), _index(gene.total))
+    predicts = f"predicts {max(found.q2, 0.0):.2f} of the variance of designs left out"
+    words = [
+        f"-10 %, +10 %: change of {found.objective} as the gene alone moves so far from the best design",
+        f"alone, in all: parts of the variance of {found.objective} over all ranges, by the gene alone and "
+        "with the others (Sobol' indices of first order and total)",
+        f"± is half of the 95 % interval. By a Gaussian process through {found.designs} designs, which "
+        f"{predicts}",
+    ]
+    if not found.trusted:
+        words[1] = f"alone, in all: not given, as the Gaussian process predicts less than {LEAST_Q2:g}"
+    title = Text(f"what each gene does to {found.label}", "italic")
+    return Group("", title, table, *(Text(line, "dim") for line in words))
+
+
+def _signed(one: Between) -> str:
+    if not math.isfinite(one.value):
+        return "-"
+    return f"{text(float(f'{one.value:.3g}'))} ± {text(float(f'{(one.high - one.low) / 2:.2g}'))}"
+
+
+def _index(one: Between) -> str:
+    return f"{one.value:.2f} ± {(one.high - one.low) / 2:.2f}" if math.isfinite(one.value) else "-"

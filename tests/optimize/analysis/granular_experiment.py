@@ -1,0 +1,136 @@
+"""A closed-form experiment with grains, of which the right intervals are known, and archives of searches.
+
+Friction tells a sliding angle, restitution a rebound, both frictions a heap and a rate of discharge. The
+right interval is that of the exact derivatives: 1.96 times the root of the diagonal of (J^T J)^-1, J in
+uncertainties.
+
+    PYTHONPATH=. python tests/optimize/analysis/granular_experiment.py METHOD QUANTITIES RUNS DATA_SETS
+"""
+
+import sys
+
+import numpy as np
+
+import optimize
+from optimize import Gene, Problem
+from optimize.analysis.misfit_shape import Evidence, fit
+
+GENES = (
+    Gene("friction", "", 0.05, 1.0),
+    Gene("rolling_friction", "", 0.0, 0.4),
+    Gene("restitution", "", 0.2, 0.9),
+)
+LOW, HIGH = np.array([gene.low for gene in GENES]), np.array([gene.high for gene in GENES])
+UNCERTAINTY = np.array([1.0, 0.02, 2.0, 0.02])
+"""Of the sliding angle (degrees), the rebound, the angle of repose (degrees) and the rate (kg/s)."""
+
+
+def quantities(points, number=4):
+    """The first quantities of points of the unit cube, shape (..., quantities)."""
+    friction, rolling, restitution = np.moveaxis(LOW + np.asarray(points) * (HIGH - LOW), -1, 0)
+    all_four = (
+        np.degrees(np.arctan(friction)),
+        restitution**2,
+        60.0 * rolling + 6.0 * friction,
+        0.33 - 0.4 * rolling - 0.03 * friction,
+    )
+    return np.stack(all_four, axis=-1)[..., :number]
+
+
+def right_widths(truth, number):
+    """The widths of the right 95 % intervals, in ranges; three quantities or more."""
+    steps = 1e-5 * np.eye(3)
+    slopes = (quantities(truth + steps, number) - quantities(truth, number)) / 1e-5 / UNCERTAINTY[:number]
+    return 2 * 1.96 * np.sqrt(np.diag(np.linalg.inv(slopes @ slopes.T)))
+
+
+def synthetic(seed, number=4, inside=(0.2, 0.8)):
+    """A true design, and data measured of it: (truth, data, rng)."""
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(*inside, 3)
+    return truth, quantities(truth, number) + UNCERTAINTY[:number] * rng.normal(size=number), rng
+
+
+def cloud(rng, misfits, runs=300, size=10):
+    """Points as a search by normal clouds draws them, in generations: the cloud follows the better half."""
+    middle, covariance, points, values = np.full(3, 0.5), 0.09 * np.eye(3), [], []
+    for _ in range(runs // size):
+        drawn = np.abs(rng.multivariate_normal(middle, covariance, size))
+        drawn = np.clip(np.where(drawn > 1, 2 - drawn, drawn), 0, 1)
+        points.append(drawn)
+        values.append(misfits(drawn))
+        better = drawn[np.argsort(values[-1])[: size // 2]]
+        off = better - middle
+        middle, covariance = better.mean(axis=0), 0.6 * covariance + 0.4 * (off.T @ off / len(better))
+    return np.vstack(points)
+
+
+def interval_of(seed, number=4, tau=0.0, starts=1, common=True, of_quantities=False, inside=(0.2, 0.8)):
+    """(truth, intervals, right widths) of a data set, by an archive of 300 designs.
+
+    tau : what random starts add to each quantity, in uncertainties.
+    """
+    truth, data, rng = synthetic(seed, number, inside)
+    sigma = UNCERTAINTY[:number]
+    same = tau * rng.normal(size=(starts, number))
+    chi2, variance, values = [], [], []
+
+    def misfits(points):
+        own = same if common else tau * rng.normal(size=(len(points), starts, number))
+        values.append(quantities(points, number)[:, None] + sigma * own)
+        of_runs = (((values[-1] - data) / sigma) ** 2).sum(axis=-1)
+        variance.append(of_runs.var(axis=1, ddof=1) if starts > 1 else np.full(len(points), np.nan))
+        chi2.append(of_runs.mean(axis=1))
+        return chi2[-1]
+
+    points = cloud(rng, misfits)
+    if of_quantities:
+        evidence = Evidence.of_quantities(points, np.concatenate(values), data, sigma, common)
+    else:
+        counts = np.full(len(points), float(starts))
+        evidence = Evidence.of_runs(
+            points, np.concatenate(chi2), np.concatenate(variance), counts, number, common
+        )
+    shape = fit(evidence)
+    return truth, np.array([shape.interval(k) for k in range(3)]), right_widths(truth, number)
+
+
+def coverage(data_sets, **settings):
+    """The part of the intervals of each gene that have the truth, and their mean width over the right one."""
+    found = [interval_of(k, **settings) for k in range(data_sets)]
+    truths, intervals, right = map(np.array, zip(*found, strict=True))
+    inside = (intervals[..., 0] <= truths) & (truths <= intervals[..., 1])
+    return inside.mean(axis=0), np.ptp(intervals, axis=2).mean(axis=0) / right.mean(axis=0)
+
+
+def searched(seed, method, number, runs):
+    """(truth, outcome) of a search for the design that data were measured of."""
+    truth, data, _ = synthetic(seed, number)
+
+    def misfit(design):
+        point = (np.array(list(design.values())) - LOW) / (HIGH - LOW)
+        return float(np.mean(((quantities(point, number) - data) / UNCERTAINTY[:number]) ** 2))
+
+    problem = Problem.of_function(misfit, GENES, ("misfit",), "grains", measurements=number, code=f"{seed}")
+    outcome = optimize.run(problem, method=method, seed=seed, max_evaluations=runs, generations=10**6)
+    return truth, outcome
+
+
+def searched_coverage(method, number, runs, data_sets):
+    """As ``coverage``, by searches."""
+    inside, widths, right = [], [], []
+    for seed in range(data_sets):
+        truth, outcome = searched(seed, method, number, runs)
+        found = optimize.calibration(outcome).genes
+        values = LOW + truth * (HIGH - LOW)
+        inside.append([one.low <= value <= one.high for one, value in zip(found, values, strict=True)])
+        widths.append([one.part for one in found])
+        right.append(right_widths(truth, number))
+    return np.mean(inside, axis=0), np.mean(widths, axis=0) / np.mean(right, axis=0)
+
+
+if __name__ == "__main__":
+    method, *numbers = sys.argv[1:]
+    inside, width = searched_coverage(method, *map(int, numbers))
+    for gene, part, wide in zip(GENES, inside, width, strict=True):
+        print(f"{gene.name:17s} truth inside {part:.3f}, width over the right one {wide:.3f}")
