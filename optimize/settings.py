@@ -15,7 +15,7 @@ from optimize.storage.record import canonical
 from tisim.components.component import Checked
 from tisim.errors import must
 
-METHOD = "gaussian-process"
+METHOD = "genetic"
 """The method of a search for which none is given."""
 IDENTITY_FORMAT = 4
 """The version of the identity below; it is raised when a search of before cannot be resumed any more."""
@@ -35,7 +35,7 @@ class Settings(Checked):
     """
 
     seed: int = Field(0, ge=0)
-    method: str = "gaussian-process"
+    method: str = METHOD
     options: SerializeAsAny[Checked] = Checked()
     generations: int = Field(25, ge=0)
     ensemble: EnsembleSettings = EnsembleSettings()

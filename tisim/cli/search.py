@@ -132,7 +132,7 @@ def optimize(
 
 def compare(
     case: Inverse,
-    methods: Annotated[str, typer.Option(help="Names with commas between.")] = "random,zohdi,restart,cma-es",
+    methods: Annotated[str, typer.Option(help="Names with commas between.")] = "random,zohdi,cma-es,genetic",
     evaluations: Annotated[int, typer.Option(help="Runs that every search may spend.")] = 400,
     repeats: Annotated[int, typer.Option(help="Searches of each method.")] = 5,
     fresh_starts: Annotated[int, typer.Option(help="Starts from which each best is run again.")] = 24,

@@ -86,7 +86,7 @@ def test_h5py_alone_tells_what_every_column_is(path):
         assert text(found["objectives/direction"]) == ["largest", "smallest"]
         hall = found["hall_of_fame"]
         assert hall["z speed (m\u2215s)"].attrs["unit"] == "m/s"
-        assert hall["gain std. error"].attrs["unit"] == "1/s"
+        assert hall["gain (1\u2215s)"].attrs["unit"] == "1/s"
         assert list(hall["front"]) == list(range(1, len(outcome.hall) + 1))
         assert found["logbook/best gain (1\u2215s)"].attrs["unit"] == "1/s"
         assert list(found["logbook/gen"]) == [0, 1, 2]
