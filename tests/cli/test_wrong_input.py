@@ -36,7 +36,7 @@ WRONG = [
     (["run", "agglomeration", "--size", "huge"], "size must be one of small, default, paper; received"),
     (["explain", "nosuch"], "case must be one of"),
     (["check", "nosuch"], f"case must be one of {CASES}, or your own NAME.py with a CASE; received 'nosuch'"),
-    (["optimize", "agglomeration", "--population", "1"], "options.population must be at least 2; received 1"),
+    (["optimize", "agglomeration", "--population", "0"], "options.population must be at least 1; received 0"),
     (["run", "agglomeration", "--variant", "x"], "variant must be one of fields; received 'x'"),
     (["explain", "capture", "--variant", "hard"], "variant must be left out, as capture has one scene"),
     (["optimize", "agglomeration", "--variant", "x"], "one of paper, fragmenting, fields; received"),

@@ -101,7 +101,8 @@ def test_every_variant_is_searched_with_as_few_designs_as_the_case_says(name):
     for variant in case.variants:
         made, search = case.inverse("default", variant)
         settings = Settings(**proposed(made, search, None))
-        assert (settings.options.population, settings.generations) == (12, search["generations"])
+        assert (settings.options.population, settings.options.first) == (8, 12)
+        assert settings.generations == search["generations"]
 
 
 @pytest.mark.slow
