@@ -36,12 +36,13 @@ def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
 
 
 def concluded(
-    problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual], report: Report
-) -> list[Individual]:
+    problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual], report: Report,
+    met: Individual | None = None,
+) -> list[Individual]:  # fmt: skip
     """Return the designs that a search reports, best first, and give these their fresh starts.
 
-    known : all designs that have run, of which those that have not failed are chosen from. The budget of the
-    ensemble is not exceeded.
+    known : all designs that have run; those that have not failed are chosen from. met : the one that has met
+    the target, which is reported first. The budget of the ensemble is not exceeded.
     """
     asked = settings.ensemble
     if asked.select or asked.confirm:
@@ -50,13 +51,13 @@ def concluded(
         return _front(problem, settings, ensemble, known, report)
     count = settings.hall_of_fame
     if ensemble.repeatable:
-        return best(problem.genome, known, count)
+        return _first(met, best(problem.genome, known, count))
     candidates = best(problem.genome, known, count)
     if 3 * asked.select * len(candidates) <= _left(ensemble):
         _know(problem, candidates, ensemble, asked.select)
     if asked.confirm:
         count = int(max(1, min(count, _left(ensemble) // asked.confirm)))
-    chosen = best(problem.genome, known, count)
+    chosen = _first(met, best(problem.genome, known, count))
     _confirm(problem, chosen, ensemble, int(min(asked.confirm, _left(ensemble))), report)
     return chosen
 
@@ -104,6 +105,12 @@ def _know(problem: Problem, candidates: Sequence[Individual], ensemble: Ensemble
     designs = [problem.genome.decode(string) for string in candidates]
     for string, estimates in zip(candidates, ensemble.more(designs, starts), strict=True):
         string.know(estimates)
+        string.limit(problem.result_constraints, ensemble.constraint_means(problem.genome.decode(string)))
+
+
+def _first(met: Individual | None, chosen: list[Individual]) -> list[Individual]:
+    """Return as many designs as these, with the one that has met the target in front."""
+    return chosen if met is None else [met, *(one for one in chosen if one is not met)][: len(chosen)]
 
 
 def _left(ensemble: Ensemble) -> float:

@@ -19,7 +19,7 @@ from optimize.hall_of_fame import Hall
 from optimize.methods.base import find
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress, Stopped
-from optimize.problem.feasibility import penalised, total_violation
+from optimize.problem.feasibility import penalised
 from optimize.problem.problem import Problem
 from optimize.search_records import searches, store
 from optimize.settings import Settings, fit, identity
@@ -99,14 +99,13 @@ class _Search:
             return
         self.ensemble.budget = self._budget
         last = len(self.outcome.logbook) - 1
-        ranked = concluded(
+        met = self.known[tuple(self.hall.strings[0])] if self.outcome.stopped == "target" else None
+        self.ranked = concluded(
             self.problem, self.settings, self.ensemble, list(self.known.values()),
-            lambda fraction: self._report(last, 1.0),
+            lambda fraction: self._report(last, 1.0), met,
         )  # fmt: skip
-        self.outcome.estimates |= {tuple(string): string.estimates for string in ranked}
-        if self.outcome.stopped == "target":
-            ranked = [self.hall.strings[0], *(one for one in ranked if one is not self.hall.strings[0])]
-        self.ranked = ranked
+        self.outcome.estimates |= {tuple(string): string.estimates for string in self.known.values()
+                                   if not string.failed}  # fmt: skip
 
     @property
     def _budget(self) -> float:
@@ -172,9 +171,7 @@ class _Search:
         if not constraints or not known:
             return
         for string in (*known, *(one for one in fresh if one.fitness.valid and not one.failed)):
-            string.limited = self.ensemble.constraint_means(self.problem.genome.decode(string))
-            parts = [one.violation(mean) for one, mean in zip(constraints, string.limited, strict=True)]
-            string.violation = float(total_violation(parts))
+            string.limit(constraints, self.ensemble.constraint_means(self.problem.genome.decode(string)))
         costs = [[estimate.mean for estimate in string.estimates] for string in known]
         ordered = penalised(costs, [string.violation for string in known])
         by_string = dict(zip(map(tuple, known), ordered.tolist(), strict=True))
@@ -194,6 +191,7 @@ class _Search:
         for string in (*racing, *population, *known):
             if tuple(string) in by_string:
                 string.know(by_string[tuple(string)])
+        self._constrain([*racing, *population])
         self.hall.update(population)
 
     def _report(self, generation: int, fraction: float) -> None:

@@ -35,7 +35,7 @@ MASS = GRAIN_DENSITY * 4 / 3 * np.pi * RADIUS**3
 CHARGED: Mapping[str, float] = {**fields.NO_FIELDS, "surface_charge": 2e-3}
 CHARGE = 4 * np.pi * RADIUS**2 * CHARGED["surface_charge"]
 STEPS = 4000
-"""Two grains fall in so many steps; the error goes with the square of their length."""
+"""Number of steps in which two grains fall together; the error goes with the square of the step."""
 FORM_BOUND = 1e-7
 """Runs in such steps may differ from a closed form by this part of it."""
 OWN_STEPPER_BOUND = 1e-3

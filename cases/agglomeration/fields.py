@@ -31,7 +31,7 @@ CHARGE_GENES = (
     Gene("surface_charge", "C/m^2", 0.0, 4e-3),
     Gene("charge_ratio", "", -1.0, 1.0),
 )
-"""The charge of the first class over its surface, and that of the second over that of the first."""
+"""Surface charge density of the first class of grains, and the ratio of the second class's to it."""
 ELECTRIC_GENES = (
     # Vacuum between electrodes withstands some 1e7 V/m.
     Gene("electric_field", "V/m", 0.0, 1e7),

@@ -37,8 +37,7 @@ VARIANTS = {
     "fragmenting": (Gene("surface_energy", "J/m^2", 1e2, 1e5, "log"),),
     "fields": (UNBREAKABLE, *FIELD_GENES),
 }
-"""Variants of the inverse problem, by the genes that they have besides: what the surface energy may be, and
-charges and fields."""
+"""Genes that each variant of the inverse problem has beside ``GENES``: surface energy, and charges and fields."""
 
 MEANINGS = {
     "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 where all grains are one",

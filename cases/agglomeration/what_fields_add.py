@@ -6,8 +6,8 @@
 
 Each kind is searched several times, from other seeds; genes that are left out are those of no charge and no
 field. The best design of each search is then run from fresh starts that no search has seen, the same for
-all. The table has the mean of that over searches, with its 95 % confidence interval, and the mean of what the
-searches themselves say of their best designs.
+all. The table has the mean over searches of these fresh values, with its 95 % confidence interval, and the
+mean of the values that the searches themselves report.
 
 With ``--one-flow`` nothing is searched: the flow that Z04 finds best, as soft as the ranges allow, is run
 with one kind of field after another, each from the same starts.
@@ -143,7 +143,7 @@ def one_flow(grains: int, starts: int) -> str:
 
 
 def picture(found: Mapping[str, Sequence[Found]], title: str) -> Figure:
-    """Return a figure of what the searches of each kind have found, and the means with their intervals."""
+    """Return a figure of the best designs of the searches of each kind, and their means with intervals."""
     figure = empty(6.8, 0.5 * len(found) + 1.5)
     axis = figure.subplots()
     rows = range(len(found))

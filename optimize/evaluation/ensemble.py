@@ -36,8 +36,9 @@ class EnsembleSettings(Checked):
     equal terms; False: each design has starts of its own; None: what is best for the method.
     race : starts that a generation spends on telling the best designs apart (0: none).
     select : starts that each of the best designs gets once the search has ended, before the best is chosen.
-    confirm : fresh starts of each of the best designs after that, from which they are reported; fewer where
-    they would take more than a quarter of the budget. (0: none, and no intervals.)
+    confirm : fresh starts of each of the best designs after that, from which they are reported (0: none, and
+    no intervals). Of max_evaluations an eighth is kept for both, of several objectives a quarter; where that
+    does not suffice, fewer designs are reported.
     """
 
     min_starts: int = Field(2, ge=1)
@@ -166,7 +167,8 @@ class Ensemble:
             if looked and all(None not in sample.ends for sample in looked):
                 self.repeatable = all(len(set(sample.ends[:2])) == 1 for sample in looked)
                 return
-        self.repeatable = len({sample.costs[0] for sample in looked}) >= LEAST_DIFFERENT
+        if looked:
+            self.repeatable = len({sample.costs[0] for sample in looked}) >= LEAST_DIFFERENT
 
     def race(
         self, designs: Sequence[Design], progress: Report | None = None

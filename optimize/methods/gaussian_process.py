@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
+from scipy.stats import qmc
 
 from optimize.methods.base import SearchMethod
-from optimize.methods.first_designs import sobol
 from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
@@ -75,7 +75,8 @@ class GaussianProcessSearch(SearchMethod):
         self.belief.learn(self.strings)
         local = np.empty((0, self.genes))
         if self.belief.exact and self.objectives == 1:
-            local = self.region.propose(self.belief, (count + 1) // 2, self.rng)
+            proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
+            local = self._new(self.genome.canonical(proposed))
         self.local = len(local)
         worth = Worth(self.belief, self.rng)
         everywhere = worth.batch(self._candidates(worth), count - len(local))
@@ -99,10 +100,19 @@ class GaussianProcessSearch(SearchMethod):
             points = changed(np.vstack(drawn)[order], 0.6**turn * _WIDE, _DRAWN, self.rng)
             drawn.append(points)
             values.append(worth.of(points))
-        points = self.genome.canonical(np.vstack(drawn))
+        return self._new(self.genome.canonical(np.vstack(drawn)))
+
+    def _new(self, points: Array) -> Array:
+        """Return those of the points that have not run, each once, in their order."""
         known = {tuple(string) for string in self.strings}
-        new = [i for i, point in enumerate(points) if tuple(point) not in known]
-        return points[new]
+        rows = dict.fromkeys(map(tuple, points.tolist()))
+        return np.array([row for row in rows if row not in known]).reshape(-1, self.genes)
+
+
+def sobol(genes: int, count: int, rng: np.random.Generator) -> Array:
+    """Return the first points of a scrambled Sobol' sequence, (count, genes)."""
+    whole = qmc.Sobol(genes, rng=rng).random_base2(max(count - 1, 1).bit_length())
+    return np.asarray(whole[:count])
 
 
 def changed(points: Array, widest: float, count: int, rng: np.random.Generator) -> Array:

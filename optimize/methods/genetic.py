@@ -10,7 +10,7 @@ from deap import tools
 from pydantic import Field, model_validator
 
 from optimize.methods.base import SearchMethod
-from optimize.methods.first_designs import sobol
+from optimize.methods.gaussian_process import sobol
 from optimize.methods.individual import Individual
 from optimize.methods.operators import GeneticOperator, Operators
 from optimize.problem.genome import Genome

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 
 from deap import base
 
 from optimize.evaluation.estimate import FitnessEstimate
+from optimize.problem.constraint import InequalityConstraint
+from optimize.problem.feasibility import total_violation
 
 
 @cache
@@ -35,6 +37,12 @@ class Individual(list[float]):
         """Take these estimates as its fitness."""
         self.estimates = estimates
         self.fitness.values = tuple(estimate.mean for estimate in estimates)
+
+    def limit(self, constraints: Sequence[InequalityConstraint], means: Sequence[float]) -> None:
+        """Take these means of the constraints of the result, in their order."""
+        self.limited = tuple(means)
+        parts = [one.violation(mean) for one, mean in zip(constraints, means, strict=True)]
+        self.violation = float(total_violation(parts))
 
     @property
     def failed(self) -> bool:

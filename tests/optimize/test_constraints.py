@@ -36,3 +36,14 @@ def test_where_no_design_keeps_to_it_the_one_that_violates_it_least_is_best():
     outcome = optimize.run(problem(at_least=3.0), max_evaluations=80, generations=100)
     assert outcome.hall[0].violation == min(s.violation for s in outcome.hall) > 0
     assert sum(outcome.designs[0].genes.values()) > 1.8
+
+
+def test_a_range_of_few_designs_is_searched_to_its_end():
+    def value(design, seed):
+        return abs(design["n"] - 3) + 0.01 * np.random.default_rng(seed).normal()
+
+    few = Problem.of_function(value, (Gene("n", "", 1, 6, integer=True),))
+    for method in ("genetic", "gaussian-process"):
+        outcome = optimize.run(few, method=method, generations=12)
+        assert outcome.designs[0].genes == {"n": 3}
+        assert len(outcome.estimates) == 6

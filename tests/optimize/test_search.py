@@ -247,6 +247,7 @@ def test_a_search_stops_at_a_target_only_when_it_is_met_for_sure(tmp_path):
     assert never.stopped == "generations"
     met = run(tmp_path / "b.h5", evaluator, generations=30, target=0.9, ensemble={})
     assert met.stopped == "target"
+    assert all(string.confirmed for string in met.hall)
     assert met.hall[0].confirmed[0].mean < 0.9
 
 
