@@ -37,7 +37,7 @@ VARIANTS = {
     "fragmenting": (Gene("surface_energy", "J/m^2", 1e2, 1e5, "log"),),
     "fields": (UNBREAKABLE, *FIELD_GENES),
 }
-"""Genes that each variant of the inverse problem has beside ``GENES``: surface energy, and charges and fields."""
+"""Genes that a variant of the inverse problem has beside GENES: surface energy, and charges and fields."""
 
 MEANINGS = {
     "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 where all grains are one",
