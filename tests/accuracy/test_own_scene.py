@@ -44,7 +44,8 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
     for row in cost_study.rows:
         dt = float(row.setting.removeprefix("dt="))
         assert row.errors[0][0] == pytest.approx(2 * np.pi * (RATE * dt) ** 2 / 24, rel=0.1)
-    assert cost_study.cheapest(1e-4).python == cost_study.rows[1].python
+    # The clock decides which of the finer rows is cheapest, but the coarsest is not accurate enough.
+    assert cost_study.cheapest(1e-4).errors[0][0] <= 1e-4 < cost_study.rows[0].errors[0][0]
     assert "displacement: relative to its largest on the way" in cost_study.table().renderables[0].plain
     cost_study.write(tmp_path)
     again = Study(closed(), **FEW)
