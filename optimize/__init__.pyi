@@ -42,6 +42,18 @@ from .problem.given_genes import (
 )
 from .problem.objective import Objective as Objective
 from .problem.problem import Problem as Problem
+from .problem.statistic import (
+    Mean as Mean,
+)
+from .problem.statistic import (
+    Misfit as Misfit,
+)
+from .problem.statistic import (
+    Quantile as Quantile,
+)
+from .problem.statistic import (
+    WorstOf as WorstOf,
+)
 from .search_file import SearchFile as SearchFile
 from .search_file import read as read
 from .session import run as run

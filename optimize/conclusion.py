@@ -45,29 +45,34 @@ def concluded(
     the target, which is reported first. The budget of the ensemble is not exceeded.
     """
     asked = settings.ensemble
+    fresh = (
+        max(asked.confirm, *(one.statistic.fewest_fresh for one in problem.objectives))
+        if asked.confirm
+        else 0
+    )
     if asked.select or asked.confirm:
         ensemble.look()
     if problem.several:
-        return _front(problem, settings, ensemble, known, report)
+        return _front(problem, ensemble, known, fresh, report)
     count = settings.hall_of_fame
     if ensemble.repeatable:
         return _first(met, best(problem.genome, known, count))
     candidates = best(problem.genome, known, count)
     if 3 * asked.select * len(candidates) <= _left(ensemble):
         _know(problem, candidates, ensemble, asked.select)
-    if asked.confirm:
-        count = int(max(1, min(count, _left(ensemble) // asked.confirm)))
+    if fresh:
+        count = int(max(1, min(count, _left(ensemble) // fresh)))
     chosen = _first(met, best(problem.genome, known, count))
-    _confirm(problem, chosen, ensemble, int(min(asked.confirm, _left(ensemble))), report)
+    _confirm(problem, chosen, ensemble, int(min(fresh, _left(ensemble))), report)
     return chosen
 
 
 def _front(
-    problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual], report: Report
+    problem: Problem, ensemble: Ensemble, known: Sequence[Individual], confirm: int, report: Report
 ) -> list[Individual]:
-    """Return the front, of which no design is dominated by the fresh means of another."""
+    """Return the front, of which no design is dominated by the fresh means of another; confirm : fresh starts
+    of each."""
     front = best(problem.genome, known, len(known))
-    confirm = settings.ensemble.confirm
     if ensemble.repeatable or not confirm or not front:
         return front
     left = _left(ensemble)

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from deap import tools
+from numpy.typing import NDArray
 
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.frames import data_frame
@@ -70,7 +72,8 @@ class Outcome:
     hall : the best different designs, best first, by all that the search knows of them (see
     optimize.conclusion; empty if none succeeded); of several objectives the front. Failed designs never
     enter. estimates : those of each design that succeeded, by its string, in the order they were first
-    estimated. failures : those of each design that failed, with the reason.
+    estimated. quantities : of the runs of each of these, in the order of problem.quantities, shape (starts,
+    quantities). failures : those of each design that failed, with the reason.
     logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations requested),
     failed, box (mean width of the search box it drew from), recentred (box moved after it), best (so far;
     infinitely bad if there is none), and for one objective mean and std of the successful designs in the
@@ -84,6 +87,7 @@ class Outcome:
     identity: Mapping[str, Any]
     hall: list[Individual] = field(default_factory=list)
     estimates: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
+    quantities: dict[tuple[float, ...], NDArray[np.float64]] = field(default_factory=dict)
     failures: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0

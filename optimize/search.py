@@ -90,6 +90,8 @@ class _Search:
             self.outcome.stopped = "interrupted"
         except _OutOfTime:
             self.outcome.stopped = "wall clock"
+        decode = self.problem.genome.decode
+        self.outcome.quantities = {one: self.ensemble.values(decode(one)) for one in self.outcome.estimates}
         self._store()
         return self.outcome
 

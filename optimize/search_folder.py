@@ -3,8 +3,8 @@
 search.h5         every evaluation, the settings, logbooks and best designs; all that is needed to go on
 best.csv          the best designs, all digits
 met.csv           all that meet what is asked, where the problem says which do
-calibration.csv   (and .png, .pdf) each gene with its 95 % interval, where the problem says that its objective
-                  is the misfit of measurements
+calibration.csv   (and .png, .pdf) each gene with its 95 % interval, where the objective is the misfit of what
+                  was measured
 sensitivity.csv   (and .png, .pdf) what each gene does to each objective, around the best and over all
 convergence.png   (and .pdf) best and mean fitness by generation; of several objectives the best of each
 front.png         (and .pdf) the front of several objectives

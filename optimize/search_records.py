@@ -59,6 +59,7 @@ def objectives(problem: Problem) -> dict[str, list[Any]]:
             "name": objective.name,
             "unit": objective.unit,
             "direction": "largest" if objective.maximise else "smallest",
+            "statistic": objective.statistic.described or "mean",
             "description": problem.meanings.get(objective.name, ""),
         }
         for objective in problem.objectives

@@ -99,7 +99,9 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
             else {}
         ),
         "objectives": {
-            one.name: ("largest" if one.maximise else "least") + (f", {one.unit}" if one.unit else "")
+            one.name: ", ".join(
+                filter(None, ("largest" if one.maximise else "least", one.unit, one.statistic.described))
+            )
             for one in problem.objectives
         },
         "objective_order": [one.name for one in problem.objectives],
@@ -132,7 +134,16 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
 
 
 def fit(problem: Problem, settings: Settings) -> None:
-    """Raise InputError when the method, or a stopping rule, cannot be for the problem's objectives."""
+    """Raise InputError when the method, a stopping rule or the number of starts cannot be for the problem's
+    objectives."""
+    for objective in problem.objectives:
+        fewest = objective.statistic.fewest_starts
+        must(
+            problem.deterministic or settings.ensemble.max_starts >= fewest,
+            "search.ensemble.max_starts",
+            f"{fewest} or more for the {objective.statistic.label or 'statistic'} of {objective.name}",
+            settings.ensemble.max_starts,
+        )
     if problem.several:
         able = [name for name, method in every().items() if method.several]
         must(settings.method in able, "method", f"for several objectives: {', '.join(able)}", settings.method)

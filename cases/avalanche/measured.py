@@ -51,15 +51,20 @@ class MeasuredProfile:
         known = bool(np.isfinite(self.uncertainty).all() and (self.uncertainty > 0).all())
         must(known, "uncertainty", "finite and above 0", self.uncertainty.tolist())
 
-    def misfit(self, place: np.ndarray, height: np.ndarray) -> float:
-        """Return the mean of the squared distances from the profile of a simulated one, in uncertainties.
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for each height."""
+        return tuple(f"height at {distance:.10g}" for distance in self.distance)
+
+    def compared(self, place: np.ndarray, height: np.ndarray) -> dict[str, float]:
+        """Return the heights of a simulated profile at the distances of this one, in its unit, by name.
 
         Both are taken in units of the root of the area below them: heaps of any size are compared that have
         run out of columns of the same shape. place, height : of the simulated one, in any unit.
         """
         scale = np.sqrt(area(place, height) / area(self.distance, self.height))
         there = np.interp(self.distance * scale, place, height, right=0.0) / scale
-        return float((((there - self.height) / self.uncertainty) ** 2).mean())
+        return dict(zip(self.names, there.tolist(), strict=True))
 
 
 def area(place: np.ndarray, height: np.ndarray) -> float:

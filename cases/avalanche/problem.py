@@ -24,7 +24,9 @@ from cases.case import searched_size, size_named
 from cases.granular_bench.measured import Measurement
 from cases.runs import OTHER_STARTS
 from optimize.problem.genome import Gene, Genome
+from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
+from optimize.problem.statistic import Misfit
 from tisim import Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud
@@ -44,11 +46,19 @@ and rounded up, which ``tests/benchmarks/known_slope.py`` prints."""
 MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
 
 
-def misfit(result: Result, target: Target) -> float:
-    """Return how far the slope of a result is from a measured one, squared, in uncertainties."""
+def simulated(result: Result, target: Target) -> dict[str, float]:
+    """Return of the slope of a result what was measured."""
     if isinstance(target, MeasuredProfile):
-        return target.misfit(*profile(result.state))
-    return target.misfit(repose(result.state))
+        return target.compared(*profile(result.state))
+    return {"angle of repose": repose(result.state)}
+
+
+def measured(target: Target) -> dict[str, tuple[float, float]]:
+    """Return what was measured with its uncertainties."""
+    if isinstance(target, MeasuredProfile):
+        pairs = zip(target.height.tolist(), target.uncertainty.tolist(), strict=True)
+        return dict(zip(target.names, pairs, strict=True))
+    return {"angle of repose": (target.value, target.uncertainty)}
 
 
 def other_runs(design: Mapping[str, float], size: str, starts: int) -> list[Scene]:
@@ -87,12 +97,13 @@ def _problem(size: str, variant: str, target: Target) -> Problem:
         description=f"friction, rolling friction and cohesion of grains with {wanted}",
         genome=Genome(GENES),
         scene=lambda design, seed: scene(design=design, field=0.0, seed=seed, **settings),
-        objective=lambda result: misfit(result, target),
-        symbol="misfit",
+        objective=(
+            Objective("misfit", lambda result: simulated(result, target), statistic=Misfit(measured(target))),
+        ),
         meanings=MEANINGS,
         picture=lambda scene, result: cloud(result),
         details=details,
         met_at=1.0,
-        measurements=1 if isinstance(target, Measurement) else len(target.height),
+        version=2,
         code=hashlib.sha256(json.dumps(plain).encode()).hexdigest()[:12],
     )

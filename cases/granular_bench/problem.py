@@ -22,7 +22,9 @@ from cases.granular_bench.plate import rebound, scene_with_plate, sliding
 from cases.granular_bench.scene import SIZES, TITLE
 from cases.runs import OTHER_STARTS
 from optimize.problem.genome import Gene, Genome
+from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
+from optimize.problem.statistic import Misfit
 from tisim import Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud
@@ -73,12 +75,6 @@ EXAMPLES: Mapping[str, Measured] = {
 MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
 
 
-def misfit(result: Result, measured: Measured) -> float:
-    """Return the mean over the measured quantities of ((simulated - measured) / uncertainty)^2."""
-    parts = [one.misfit(SIMULATED[name](result)) for name, one in measured.items()]
-    return sum(parts) / len(parts)
-
-
 def other_runs(design: Mapping[str, float], size: str, starts: int) -> list[Scene]:
     """Return runs of a design from so many starts that are others than those of a search."""
     settings = size_named(size, SIZES).scene
@@ -120,13 +116,17 @@ def calibration_to(measured: Measured, size: str = "default", variant: str = "ca
         description=f"friction, rolling friction and restitution of grains by {', '.join(measured)}",
         genome=Genome(GENES),
         scene=lambda design, seed: scene_with_plate(design, seed, **settings),
-        objective=lambda result: misfit(result, measured),
-        symbol="misfit",
+        objective=(
+            Objective(
+                "misfit",
+                lambda result: {name: SIMULATED[name](result) for name in measured},
+                statistic=Misfit({name: (one.value, one.uncertainty) for name, one in measured.items()}),
+            ),
+        ),
         meanings=MEANINGS,
         picture=lambda scene, result: cloud(result),
         details=details,
         met_at=1.0,
-        measurements=len(measured),
-        version=2,
+        version=3,
         code=hashlib.sha256(json.dumps(plain).encode()).hexdigest()[:12],
     )

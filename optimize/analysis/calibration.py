@@ -1,6 +1,6 @@
 """How well each gene is known from what was measured, and which genes cannot be told apart.
 
-It is for a problem whose objective is a misfit (``Problem.measurements``). A quadratic form through the chi^2
+It is for a problem whose objective is the Misfit of measured quantities. A quadratic form through the chi^2
 of the designs that the search has run (optimize.analysis.misfit_shape) gives the estimate of each gene, its
 95 % interval and the correlations. The interval is one of the likelihood: it holds where the uncertainties of
 the measurements do, and their errors are normal and independent.
@@ -22,6 +22,7 @@ from optimize.outcome import Outcome
 from optimize.problem.gene_values import Value, brief
 from optimize.problem.genes import Searched
 from optimize.problem.problem import Problem
+from optimize.problem.statistic import Misfit
 from tisim.errors import Words, must
 
 Array = NDArray[np.float64]
@@ -105,19 +106,17 @@ class Calibration:
 def calibration(outcome: Outcome) -> Calibration:
     """Return how well each gene is known from what was measured, by all designs of a search.
 
-    Genes that are choices are kept at those of the best design. InputError for a problem that does not say of
-    how many measured quantities its objective is the misfit, and for a search without a design.
+    Genes that are choices are kept at those of the best design. InputError for a problem whose objective is
+    no Misfit, and for a search without a design.
     """
     problem = outcome.problem
-    must(
-        problem.measurements is not None,
-        "measurements",
-        "given in a problem that is calibrated",
-        Words("none"),
-    )
+    measured = problem.measured
+    rule = "the Misfit of what was measured in a problem that is calibrated"
+    must(measured is not None, "statistic of the objective", rule, problem.objectives[0].statistic)
     must(outcome.best is not None, "search", "one with a design that has not failed", Words("none"))
-    assert problem.measurements is not None
-    points, evidence = _evidence(outcome)
+    assert measured is not None
+    measurements = len(measured.quantities)
+    points, evidence = _evidence(outcome, measured)
     genome = problem.genome
     numbers = [k for k, gene in enumerate(genome.searched) if gene.kind != "category"]
     others = [k for k in range(len(genome)) if k not in numbers]
@@ -126,8 +125,8 @@ def calibration(outcome: Outcome) -> Calibration:
     choices = _choices(problem, points, evidence.chi2, others)
     shape = None
     if numbers:
-        shape = fit(Evidence(points[same][:, numbers], evidence.chi2[same], evidence.noise[same],
-                             evidence.shift, evidence.offset))  # fmt: skip
+        near = evidence.chi2[same], evidence.noise[same]
+        shape = fit(Evidence(points[same][:, numbers], *near, evidence.shift))
     missing = 0
     if numbers and shape is None:
         missing = 2 * coefficients(len(numbers))
@@ -138,7 +137,7 @@ def calibration(outcome: Outcome) -> Calibration:
             [f"Too few designs are near the least misfit: {missing} more are needed."] if numbers else []
         )
         return Calibration((), choices, np.empty((0, 0)), float(evidence.chi2.min()),
-                           problem.measurements, 0, missing, wanted, tuple(remarks))  # fmt: skip
+                           measurements, 0, missing, wanted, tuple(remarks))  # fmt: skip
     searched = [genome.searched[k] for k in numbers]
     estimates = tuple(_estimate(gene, shape, k) for k, gene in enumerate(searched))
     return Calibration(
@@ -146,24 +145,19 @@ def calibration(outcome: Outcome) -> Calibration:
         choices=choices,
         correlation=_correlation(shape),
         chi2=max(shape.least, 0.0),
-        measurements=problem.measurements,
+        measurements=measurements,
         designs=shape.designs,
         missing=0,
         wanted=(),
-        remarks=tuple(_remarks(problem, shape, searched, estimates, evidence)),
+        remarks=tuple(_remarks(measurements, shape, searched, estimates, evidence)),
     )
 
 
-def _evidence(outcome: Outcome) -> tuple[Array, Evidence]:
+def _evidence(outcome: Outcome, measured: Misfit) -> tuple[Array, Evidence]:
     """Return the points of the designs that have not failed, and their chi^2."""
-    measurements = outcome.problem.measurements or 1
     points = outcome.problem.genome.canonical(list(outcome.estimates))
-    estimates = [of_all[0] for of_all in outcome.estimates.values()]
-    chi2 = measurements * np.array([one.mean for one in estimates])
-    variance = measurements**2 * np.array([one.std for one in estimates]) ** 2
-    starts = np.array([one.starts for one in estimates], dtype=float)
-    common = bool(outcome.settings.ensemble.common_starts)
-    return points, Evidence.of_runs(points, chi2, variance, starts, measurements, common)
+    off = [measured.off(outcome.quantities[string]) for string in outcome.estimates]
+    return points, Evidence.of_quantities(points, off, bool(outcome.settings.ensemble.common_starts))
 
 
 def _estimate(gene: Searched, shape: MisfitShape, k: int) -> GeneEstimate:
@@ -199,7 +193,7 @@ def _wanted(
 
 
 def _remarks(
-    problem: Problem,
+    measurements: int,
     shape: MisfitShape,
     genes: Sequence[Searched],
     estimates: Sequence[GeneEstimate],
@@ -221,11 +215,11 @@ def _remarks(
                     f"{other.name} and {one.name} are hardly told apart: more of one goes with {more} of "
                     f"the other (correlation {rho:.2f})."
                 )
-    freedom = max((problem.measurements or 1) - len(genes), 1)
-    if chi2_distribution.sf((shape.least - evidence.offset) / (1.0 + evidence.shift), freedom) < _UNLIKELY:
+    freedom = max(measurements - len(genes), 1)
+    if chi2_distribution.sf(shape.least / (1.0 + evidence.shift), freedom) < _UNLIKELY:
         remarks.append(
             f"The measurements are not met together: the least chi^2 is {shape.least:.3g} of "
-            f"{problem.measurements} quantities. The intervals hold for a model that can meet them."
+            f"{measurements} quantities. The intervals hold for a model that can meet them."
         )
     if not np.any(evidence.noise) and shape.scatter > 1.0:
         remarks.append(

@@ -9,6 +9,7 @@ the matrix of second derivatives (section 15.4).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,65 +41,33 @@ class Evidence:
     points : shape (designs, genes), of the unit cube. chi2 : shape (designs,). noise : the variance of each
     chi2 that random starts have left in it, shape (designs,), 0 where runs have no noise. shift : by random
     starts that are the same for all designs, the variance of what they add to a measured quantity, in squared
-    uncertainties. offset : how much of chi2 is the spread of the starts alone.
+    uncertainties.
     """
 
     points: Array
     chi2: Array
     noise: Array
     shift: float = 0.0
-    offset: float = 0.0
 
     @classmethod
-    def of_runs(
-        cls, points: Array, chi2: Array, variance: Array, starts: Array, measurements: int, common: bool
-    ) -> Evidence:
-        """Return the evidence of means over starts of the chi^2 of single runs.
-
-        variance : from start to start, NaN for one start. common : whether all designs have the same starts.
-        A run whose quantities q differ from their means by e, in uncertainties, has the chi^2 |r + e|^2, of
-        which the mean is |r|^2 + |e|^2 and the variance 4 tau^2 |r|^2 + 2 N tau^4 if e is normal, of variance
-        tau^2 in each of N quantities. |e|^2 = N tau^2 is an offset that moves no minimum where tau does not
-        depend on the design. tau^2 is had from how the variance grows with the mean.
-        """
-        several = (starts > 1) & np.isfinite(variance)
-        if not np.any(several) or not np.any(variance[several] > 0):
-            return cls(points, chi2, np.zeros(len(chi2)))
-        tau2 = _noise_of_quantities(chi2[several], variance[several], starts[several], measurements)
-        expected = 4.0 * tau2 * np.maximum(chi2 - measurements * tau2, 0.0) + 2.0 * measurements * tau2**2
-        # Of common starts only the spread around their own mean is seen.
-        n = float(np.median(starts[several]))
-        shift = tau2 / (n - 1.0) if common else 0.0
-        return cls(points, chi2, expected / starts, shift, measurements * tau2)
-
-    @classmethod
-    def of_quantities(
-        cls, points: Array, values: Array, measured: Array, uncertainty: Array, common: bool
-    ) -> Evidence:
+    def of_quantities(cls, points: Array, off: Sequence[Array], common: bool) -> Evidence:
         """Return the evidence of the quantities of all runs: the chi^2 of their means over the starts.
 
-        values : shape (designs, starts, quantities), two starts or more. measured, uncertainty : shape
-        (quantities,). The squared distance of a mean over n starts is too large by its variance, s^2 / n,
-        which is subtracted.
+        off : of each design how far its runs are from what was measured, in uncertainties, shape (starts,
+        quantities); of designs with one start that have no other the runs are taken to have no noise.
+        common : whether all designs have the same starts. The squared distance of a mean over n starts is too
+        large by its variance, s^2 / n, which is subtracted.
         """
-        starts = values.shape[1]
-        off = (values.mean(axis=1) - measured) / uncertainty
-        variance = (values.std(axis=1, ddof=1) / uncertainty) ** 2 / starts
-        pooled = variance.mean(axis=0)
-        chi2 = (off**2 - variance).sum(axis=1)
-        noise = (4.0 * off**2 * pooled + 2.0 * pooled**2).sum(axis=1)
-        return cls(points, chi2, noise, float(pooled.mean()) if common else 0.0)
-
-
-def _noise_of_quantities(chi2: Array, variance: Array, starts: Array, measurements: int) -> float:
-    """Return tau^2 of ``Evidence.of_runs``: the value for which the variances of the third of the designs
-    with the least chi^2 add up to what is expected of them."""
-    least = np.argsort(chi2, kind="stable")[: max(len(chi2) // 3, min(len(chi2), 10))]
-    freedom = starts[least] - 1.0
-    mean, spread = np.average(chi2[least], weights=freedom), np.average(variance[least], weights=freedom)
-    # spread = 4 tau^2 (mean - N tau^2) + 2 N tau^4, the smaller root.
-    root = math.sqrt(max(4.0 * mean**2 - 2.0 * measurements * spread, 0.0))
-    return (2.0 * mean - root) / (2.0 * measurements)
+        starts = np.array([len(one) for one in off], dtype=float)[:, None]
+        means = np.array([one.mean(axis=0) for one in off])
+        squares = np.array([((one - one.mean(axis=0)) ** 2).sum(axis=0) for one in off])
+        freedom = np.maximum(starts - 1.0, 0.0)
+        pooled = squares.sum(axis=0) / max(freedom.sum(), 1.0)
+        own = np.where(starts > 1, squares / np.maximum(freedom, 1.0), pooled) / starts
+        chi2 = (means**2 - own).sum(axis=1)
+        noise = (4.0 * means**2 * pooled / starts + 2.0 * (pooled / starts) ** 2).sum(axis=1)
+        shift = float(pooled.mean() / np.median(starts)) if common else 0.0
+        return cls(points, chi2, noise, shift)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from optimize.evaluation.estimate import FitnessEstimate, converged_after
 from optimize.evaluation.runs import Evaluator, Runs, Sample
+from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
@@ -30,15 +31,16 @@ FRESH = 10**6
 class EnsembleSettings(Checked):
     """How many random starts a fitness is averaged over.
 
-    min_starts : starts of every design. tolerance : TOL of Z04 Eq. 8.1: starts are added, ``block`` in each
+    min_starts : starts of every design, more where the statistic of an objective needs more (10 for a 0.9
+    quantile). tolerance : TOL of Z04 Eq. 8.1: starts are added, ``block`` in each
     call of the evaluator, until the mean changes by less than this part of it, max_starts at most. None: no
     more are added. common_starts : start k is the same for every design, so that designs are compared on
     equal terms; False: each design has starts of its own; None: what is best for the method.
     race : starts that a generation spends on telling the best designs apart (0: none).
     select : starts that each of the best designs gets once the search has ended, before the best is chosen.
     confirm : fresh starts of each of the best designs after that, from which they are reported (0: none, and
-    no intervals). Of max_evaluations an eighth is kept for both, of several objectives a quarter; where that
-    does not suffice, fewer designs are reported.
+    no intervals); more where the interval of a statistic needs more. Of max_evaluations an eighth is kept for
+    both, of several objectives a quarter; where that does not suffice, fewer designs are reported.
     """
 
     min_starts: int = Field(2, ge=1)
@@ -71,8 +73,9 @@ class Ensemble:
 
     budget : most runs that may be asked for (inf: no end); exhausted : it has cut an estimate short.
     repeatable : whether all starts of a design give the same run, so that one is enough; found out by looking
-    at the first designs, None before. runs : counts them. An estimate is a tuple, one FitnessEstimate of the
-    cost for each objective.
+    at the first designs, None before. runs : counts them. min_starts : of every design: those asked for, or
+    what the statistics of the objectives need. An estimate is a tuple, one FitnessEstimate of the cost for
+    each objective.
     """
 
     def __init__(
@@ -83,11 +86,12 @@ class Ensemble:
         settings: EnsembleSettings,
         seed: int,
     ) -> None:
-        self.settings, self.objectives = settings, len(problem.objectives)
+        self.settings, self.objectives = settings, problem.objectives
         self.runs = Runs(problem, evaluator, cache, seed, settings.common_starts is not False)
         self.budget = math.inf
         self.exhausted = False
         self.repeatable: bool | None = True if problem.deterministic else None
+        self.min_starts = max(settings.min_starts, *(one.statistic.fewest_starts for one in self.objectives))
         self._known: dict[bytes, Sample] = {}
 
     @property
@@ -107,17 +111,17 @@ class Ensemble:
         settings = self.settings
         samples = [self._sample(design) for design in designs]
         different = list(dict.fromkeys(samples))
-        if self.repeatable is None and settings.min_starts > 1:
+        if self.repeatable is None and self.min_starts > 1:
             self._look(different)
-        least = 1 if self.repeatable else settings.min_starts
+        least = 1 if self.repeatable else self.min_starts
         most = settings.max_starts if settings.tolerance and not self.repeatable else least
         largest_fraction = 0.0
         while running := [sample for sample in different if sample.open]:
-            goals = {s: len(s.costs) + settings.block if len(s.costs) >= least else least for s in running}
-            goals = {s: min(max(goal, len(s.costs)), most) for s, goal in goals.items()}
+            goals = {s: len(s.values) + settings.block if len(s.values) >= least else least for s in running}
+            goals = {s: min(max(goal, len(s.values)), most) for s, goal in goals.items()}
             afforded = self._afforded(running, goals)
-            finished = sum(1.0 if not s.open else len(s.costs) / most for s in different)
-            share = sum(goals[s] - len(s.costs) for s in afforded) / most
+            finished = sum(1.0 if not s.open else len(s.values) / most for s in different)
+            share = sum(goals[s] - len(s.values) for s in afforded) / most
 
             def report(fraction: float, finished: float = finished, share: float = share) -> None:
                 nonlocal largest_fraction
@@ -127,7 +131,7 @@ class Ensemble:
 
             for sample in running[len(afforded) :]:
                 sample.open = False
-            self.runs.add([(s, range(len(s.costs), goals[s])) for s in afforded], report)
+            self.runs.add([(s, range(len(s.values), goals[s])) for s in afforded], report)
             for sample in afforded:
                 self._judge(sample, most)
         if progress is not None:
@@ -139,16 +143,16 @@ class Ensemble:
         if sample.reason:
             sample.open = False
             return
-        tolerance, least = self.settings.tolerance, self.settings.min_starts
-        converged = converged_after(sample.costs, tolerance, least) if tolerance else None
-        sample.used = converged or len(sample.costs)
+        tolerance, least = self.settings.tolerance, self.min_starts
+        converged = converged_after(self._running(sample), tolerance, least) if tolerance else None
+        sample.used = converged or len(sample.values)
         sample.converged = converged is not None or bool(self.repeatable)
-        sample.open = converged is None and len(sample.costs) < most
+        sample.open = converged is None and len(sample.values) < most
 
     def look(self) -> None:
         """Find out whether all starts of a design give the same run, where that is not known yet."""
         if self.repeatable is None:
-            self._look([sample for sample in self._known.values() if sample.costs and not sample.reason])
+            self._look([sample for sample in self._known.values() if sample.values and not sample.reason])
 
     def _look(self, samples: Sequence[Sample]) -> None:
         """Run the first designs from two starts each, and see whether these end in the same state, to the
@@ -156,19 +160,19 @@ class Ensemble:
         more designs, and different ones for different designs: rare outcomes are equal by chance, too."""
         looked: list[Sample] = []
         for group in (samples[:LOOKED_AT], samples[LOOKED_AT:MOST_LOOKED_AT]):
-            additions = [(sample, range(len(sample.costs), 2)) for sample in group]
+            additions = [(sample, range(len(sample.values), 2)) for sample in group]
             if sum(len(starts) for _, starts in additions) > self.budget - self.requested:
                 return
             self.runs.add(additions)
             looked += [sample for sample in group if not sample.reason]
-            if any(len(set(sample.costs[:2])) > 1 for sample in looked):
+            if any(len(set(sample.values[:2])) > 1 for sample in looked):
                 self.repeatable = False
                 return
             if looked and all(None not in sample.ends for sample in looked):
                 self.repeatable = all(len(set(sample.ends[:2])) == 1 for sample in looked)
                 return
         if looked:
-            self.repeatable = len({sample.costs[0] for sample in looked}) >= LEAST_DIFFERENT
+            self.repeatable = len({sample.values[0] for sample in looked}) >= LEAST_DIFFERENT
 
     def race(
         self, designs: Sequence[Design], progress: Report | None = None
@@ -185,7 +189,7 @@ class Ensemble:
         purse = self.settings.race
         while len(racing) > 1:
             goals = {s: min(s.used + self.settings.block, self.settings.max_starts) for s in racing}
-            additions = [(s, range(len(s.costs), goal)) for s, goal in goals.items()]
+            additions = [(s, range(len(s.values), goal)) for s, goal in goals.items()]
             price = sum(len(starts) for _, starts in additions)
             if (
                 price > purse
@@ -205,10 +209,10 @@ class Ensemble:
     ) -> list[tuple[FitnessEstimate, ...]]:
         """Give each of these designs that number of starts more; their estimates afterwards."""
         samples = [self._sample(design) for design in designs]
-        additions = [(s, range(len(s.costs), len(s.costs) + starts)) for s in dict.fromkeys(samples)]
+        additions = [(s, range(len(s.values), len(s.values) + starts)) for s in dict.fromkeys(samples)]
         self.runs.add(additions, progress or (lambda fraction: None))
         for sample, _ in additions:
-            sample.used = len(sample.costs)
+            sample.used = len(sample.values)
         return [self._summary(sample) for sample in samples]
 
     def fresh(
@@ -227,13 +231,19 @@ class Ensemble:
         additions = [(sample, range(first, first + starts)) for sample in samples]
         self.runs.add(additions, progress or (lambda fraction: None))
         for sample in samples:
-            sample.used, sample.converged = len(sample.costs), bool(self.repeatable)
+            sample.used, sample.converged = len(sample.values), bool(self.repeatable)
         return [self._summary(sample) for sample in samples]
 
     def constraint_means(self, design: Design) -> tuple[float, ...]:
         """Return the mean of each constraint of the result over the starts of a design that has run."""
         limited = self._sample(design).limited
         return tuple(float(np.mean(column)) for column in zip(*limited, strict=True))
+
+    def values(self, design: Design) -> np.ndarray:
+        """Return the quantities of each start that the estimate of a design stands on, (starts,
+        quantities)."""
+        sample = self._sample(design)
+        return np.array(sample.values[: sample.used], dtype=float).reshape(sample.used, -1)
 
     def _sample(self, design: Design) -> Sample:
         return self._known.setdefault(canonical(dict(design)), Sample(design))
@@ -242,7 +252,7 @@ class Ensemble:
         """Return those of the samples, from the first, whose starts the budget can pay."""
         left = self.budget - self.requested
         for count, sample in enumerate(running):
-            left -= goals[sample] - len(sample.costs)
+            left -= goals[sample] - len(sample.values)
             if left < 0:
                 self.exhausted = True
                 return running[:count]
@@ -250,26 +260,42 @@ class Ensemble:
 
     def _unbeaten(self, samples: Sequence[Sample]) -> list[Sample]:
         good = [sample for sample in dict.fromkeys(samples) if not sample.reason]
-        return [one for one in good if not any(_beats(other, one) for other in good)]
+        return [one for one in good if not any(self._beats(other, one) for other in good)]
+
+    def _beats(self, one: Sample, other: Sample) -> bool:
+        """Return whether one is better in every objective, its 95 % confidence interval of the difference
+        above 0."""
+        n = min(one.used, other.used)
+        if n < 2:
+            return False
+        lead = self._pseudo_costs(other, n) - self._pseudo_costs(one, n)
+        return bool(np.all(np.mean(lead, axis=0) > half_width(lead)))
+
+    def _pseudo_costs(self, sample: Sample, starts: int) -> np.ndarray:
+        """Return a cost for each of the first starts and each objective, (starts, objectives)."""
+        parts = self._of_objectives(sample.values[:starts])
+        return np.column_stack([one.pseudo_costs(part) for one, part in parts])
+
+    def _running(self, sample: Sample) -> np.ndarray:
+        """Return the costs by the first 1, 2, ... starts, (starts, objectives)."""
+        parts = self._of_objectives(sample.values)
+        counts = range(1, len(sample.values) + 1)
+        return np.array([[one.cost(part[:n]) for one, part in parts] for n in counts])
+
+    def _of_objectives(self, values: Sequence[tuple[float, ...]]) -> list[tuple[Objective, np.ndarray]]:
+        """Return each objective with its own columns of the values of starts."""
+        columns = np.array(values, dtype=float).reshape(len(values), -1)
+        ends = np.cumsum([len(one.quantities) for one in self.objectives])[:-1]
+        return list(zip(self.objectives, np.split(columns, ends, axis=1), strict=True))
 
     def _summary(self, sample: Sample) -> tuple[FitnessEstimate, ...]:
         if sample.reason:
-            return (FitnessEstimate.failed(len(sample.costs), sample.reason),) * self.objectives
-        columns = list(zip(*sample.costs[: sample.used], strict=True))
+            return (FitnessEstimate.failed(len(sample.values), sample.reason),) * len(self.objectives)
         if self.repeatable:
-            return tuple(FitnessEstimate.certain(column[0]) for column in columns)
-        seen = self.runs.seen
+            parts = self._of_objectives(sample.values[:1])
+            return tuple(FitnessEstimate.certain(one.cost(part)) for one, part in parts)
+        seen = dict(zip(self.runs.problem.quantities, self.runs.seen, strict=True))
         return tuple(
-            FitnessEstimate.of(column, sample.converged, sorted(values))
-            for column, values in zip(columns, seen, strict=True)
+            FitnessEstimate.of(one, part, sample.converged, sorted(seen[one.quantities[0]]))
+            for one, part in self._of_objectives(sample.values[: sample.used])
         )
-
-
-def _beats(one: Sample, other: Sample) -> bool:
-    """Return whether one is better in every objective, its 95 % confidence interval of the difference above
-    0."""
-    n = min(one.used, other.used)
-    if n < 2:
-        return False
-    lead = np.array(other.costs[:n]) - np.array(one.costs[:n])
-    return bool(np.all(np.mean(lead, axis=0) > half_width(lead)))

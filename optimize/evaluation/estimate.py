@@ -1,4 +1,4 @@
-"""Fitness averaged over random starts, and when the average has converged (Z04 Eq. 8.1)."""
+"""Fitness over random starts, and when it has converged (Z04 Eq. 8.1)."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tisim.numerics.skewed import interval
+from optimize.problem.objective import Objective
 
 
 @dataclass(frozen=True)
 class FitnessEstimate:
     """Fitness of one design.
 
-    mean : of the first `starts` starts, +inf if the design failed. std : sample standard deviation.
-    low, high : ends of the 95 % confidence interval of the mean (tisim.numerics.skewed). It holds for starts
-    that have not had a part in choosing the design. converged : Eq. 8.1 was met. reason : "" or why the
-    design failed. std, low and high are NaN where they are not known, and for failed designs.
+    mean : of the first `starts` starts, or another statistic where the objective has one; +inf if the design
+    failed. std : standard deviation from start to start; of another statistic, of its pseudo-values.
+    low, high : ends of the 95 % confidence interval. It holds for starts that have not had a part in choosing
+    the design. converged : Eq. 8.1 was met. reason : "" or why the design failed. std, low and high are NaN
+    where they are not known, and for failed designs.
     """
 
     mean: float
@@ -45,15 +46,19 @@ class FitnessEstimate:
         return self.std / math.sqrt(self.starts) if self.starts else math.nan
 
     @classmethod
-    def of(cls, values: Sequence[float], converged: bool, seen: Sequence[float] = ()) -> FitnessEstimate:
-        """Return the estimate from the fitness of each start; at least one.
+    def of(
+        cls, objective: Objective, values: ArrayLike, converged: bool, seen: Sequence[float] = ()
+    ) -> FitnessEstimate:
+        """Return the estimate of an objective's cost from the values of each start; at least one.
 
-        seen : values that other designs have had: starts that are all equal do not exclude these.
+        values : shape (starts, quantities). seen : values that other designs have had: starts that are all
+        equal do not exclude these.
         """
-        n = len(values)
-        mean = float(np.cumsum(values)[-1] / n)  # summed as in converged_after, to the last bit
-        std = float(np.std(values, ddof=1)) if n > 1 else math.nan
-        return cls(mean, std, *interval(values, seen), n, converged)
+        columns = np.asarray(values, dtype=float).reshape(-1, len(objective.quantities))
+        n = len(columns)
+        std = float(np.std(objective.pseudo_costs(columns), ddof=1)) if n > 1 else math.nan
+        low, high = objective.interval_of_cost(columns, seen)
+        return cls(objective.cost(columns), std, low, high, n, converged)
 
     @classmethod
     def certain(cls, value: float) -> FitnessEstimate:
@@ -66,17 +71,17 @@ class FitnessEstimate:
         return cls(math.inf, math.nan, math.nan, math.nan, starts, False, reason)
 
 
-def converged_after(values: ArrayLike, tolerance: float, min_starts: int) -> int | None:
+def converged_after(costs: ArrayLike, tolerance: float, min_starts: int) -> int | None:
     """Return the least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04
     Eq. 8.1).
 
-    values : shape (starts,) or (starts, objectives); of several objectives each must meet it at once.
-    Two equal means count as converged, also when both are zero. None if there is no such n in values.
+    costs : the mean of the first 1, 2, ... starts, shape (starts,) or (starts, objectives); of several
+    objectives each must meet it at once. Two equal means count as converged, also when both are zero. None if
+    there is no such n.
     """
-    numbers = np.asarray(values, dtype=float)
-    columns = numbers.reshape(len(numbers), -1)
-    means = np.cumsum(columns, axis=0) / np.arange(1, len(columns) + 1)[:, None]
-    for n in range(max(min_starts, 2), len(columns) + 1):
+    numbers = np.asarray(costs, dtype=float)
+    means = numbers.reshape(len(numbers), -1)
+    for n in range(max(min_starts, 2), len(means) + 1):
         change = np.abs(means[n - 1] - means[n - 2])
         if np.all((change == 0) | (change < tolerance * np.abs(means[n - 1]))):
             return n

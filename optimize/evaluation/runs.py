@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from optimize.problem.calls import FaultyProblem, constraint_value, make_scene, value_of
+from optimize.problem.calls import FaultyProblem, constraint_value, make_scene, values_of
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
 from optimize.storage.record import Record, canonical, evaluation_key
@@ -80,14 +80,15 @@ def _widen(seen: list[float], value: float) -> None:
 class Sample:
     """The starts of one design so far.
 
-    costs, limited : of each start, those of the objectives and the values of the constraints of the result.
+    values, limited : of each start, the quantities of the problem's objectives and the values of the
+    constraints of the result.
     ends : of each start, what tells its run from another (see ``work_of``). used : how many of the starts,
     from the first, its estimate stands on. converged : see FitnessEstimate. reason : "" or why the design
     failed. open : whether more starts are to come.
     """
 
     design: Mapping[str, float]
-    costs: list[tuple[float, ...]] = field(default_factory=list)
+    values: list[tuple[float, ...]] = field(default_factory=list)
     limited: list[tuple[float, ...]] = field(default_factory=list)
     ends: list[int | None] = field(default_factory=list)
     used: int = 0
@@ -99,8 +100,8 @@ class Sample:
 class Runs:
     """Runs what is requested and not known. evaluations, hits : runs made, and found in the cache instead;
     together they are the different runs that were requested, the same for a search that was resumed.
-    requested : all of them, those that were asked for twice too. seen : for each objective the least and the
-    largest cost so far, and one between.
+    requested : all of them, those that were asked for twice too. seen : for each quantity the least and the
+    largest value so far, and one between.
 
     common : start k is the same for every design.
     """
@@ -113,7 +114,7 @@ class Runs:
         self.evaluations = 0
         self.hits = 0
         self.requested = 0
-        self.seen: list[list[float]] = [[] for _ in problem.objectives]
+        self.seen: list[list[float]] = [[] for _ in problem.quantities]
         self._requested: set[str] = set()
 
     def add(
@@ -121,7 +122,7 @@ class Runs:
         additions: Iterable[tuple[Sample, range]],
         report: Callable[[float], None] = lambda fraction: None,
     ) -> None:
-        """Add to each sample the costs of these starts; all that is not in the cache in one call.
+        """Add to each sample the values of these starts; all that is not in the cache in one call.
 
         report is called with the finished fraction. Errors of the evaluator itself and KeyboardInterrupt pass
         through; what was finished by then is in the cache.
@@ -158,13 +159,13 @@ class Runs:
             if not record.ok and not sample.reason:
                 sample.reason = f"start {start} (seed {seed}): {record.reason}"
             if record.ok:
-                values = [record.values[objective.name] for objective in self.problem.objectives]
-                sample.costs.append(self.problem.costs(values))
+                values = tuple(record.values[name] for name in self.problem.quantities)
+                sample.values.append(values)
                 limited = self.problem.result_constraints
                 sample.limited.append(tuple(record.values[one.name] for one in limited))
                 sample.ends.append(record.work.get(END))
-                for seen, cost in zip(self.seen, sample.costs[-1], strict=True):
-                    _widen(seen, cost)
+                for seen, value in zip(self.seen, values, strict=True):
+                    _widen(seen, value)
 
     def _run(
         self, missing: Mapping[str, tuple[Scene, Sample, int, int]], report: Callable[[float], None]
@@ -182,12 +183,13 @@ class Runs:
     def _record(self, key: str, sample: Sample, start: int, seed: int, result: Result) -> Record:
         problem = self.problem
         ok, reason = result.status.ok, result.status.reason or "failed without a reason"
-        names = [one.name for one in problem.objectives] + [one.name for one in problem.result_constraints]
+        names = [*problem.quantities, *(one.name for one in problem.result_constraints)]
         values = dict.fromkeys(names, math.nan)
         if ok:
-            values = {one.name: value_of(one, result, problem) for one in problem.objectives}
+            for objective in problem.objectives:
+                values |= values_of(objective, result, problem)
             values |= {one.name: constraint_value(one, result, problem) for one in problem.result_constraints}
-            bare = not problem.several and not problem.result_constraints
+            bare = len(names) == 1
             for name, value in values.items():
                 if ok and not math.isfinite(value):
                     ok, reason = False, f"{'objective' if bare else name} is {value}"

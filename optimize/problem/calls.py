@@ -57,15 +57,24 @@ def check_design(problem: Problem, design: Mapping[str, Any]) -> None:
              Words(f"{value:.10g} {constraint.unit}".rstrip()))  # fmt: skip
 
 
-def value_of(objective: Objective, result: Any, problem: Problem) -> float:
-    """Return the value of an objective. FaultyProblem unless it is a real number, NaN and infinity among
-    them, and no file was read for it that is not in the files of the problem."""
-    return _number(f"objective {objective.name}", objective.of, result, problem)
+def values_of(objective: Objective, result: Any, problem: Problem) -> dict[str, float]:
+    """Return the values of an objective's quantities by name. FaultyProblem unless each is a real number, NaN
+    and infinity among them, and no file was read for it that is not in the files of the problem."""
+    what = f"objective {objective.name}"
+    names = objective.statistic.quantities
+    if not names:
+        return {objective.name: _number(what, _called(what, "a number", objective.of, result, problem))}
+    rule = f"a dictionary of {', '.join(names)}"
+    found = _called(what, rule, objective.of, result, problem)
+    if not isinstance(found, Mapping) or not all(name in found for name in names):
+        raise FaultyProblem(f"{what} must return {rule}; received {abbreviated(found)}")
+    return {name: _number(f"{what}, of {name},", found[name]) for name in names}
 
 
 def constraint_value(constraint: InequalityConstraint, of: Any, problem: Problem) -> float:
-    """Return the value of a constraint of a result, or of a design; as ``value_of`` an objective's."""
-    return _number(f"constraint {constraint.name}", constraint.of, of, problem)
+    """Return the value of a constraint of a result, or of a design; as ``values_of`` an objective's."""
+    what = f"constraint {constraint.name}"
+    return _number(what, _called(what, "a number", constraint.of, of, problem))
 
 
 def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, frozenset[Path]]:
@@ -89,9 +98,9 @@ def function_name(of: Callable[..., Any]) -> str:
     return getattr(of, "__name__", type(of).__name__).strip("<>")
 
 
-def _number(what: str, of: Callable[[Any], Any], argument: Any, problem: Problem) -> float:
-    """Return the number that a function of the problem gives of a result or a design."""
-    rule = f"{what} must return a number"
+def _called(what: str, wanted: str, of: Callable[[Any], Any], argument: Any, problem: Problem) -> Any:
+    """Return what a function of the problem gives of a result or a design."""
+    rule = f"{what} must return {wanted}"
     known = {Path(file).resolve() for file in problem.files}
     try:
         with _files_read() as read:
@@ -106,6 +115,12 @@ def _number(what: str, of: Callable[[Any], Any], argument: Any, problem: Problem
             f"{what} must read no file but those in Problem(files=[...]), as its values "
             f"are used again while these are the same; received {printable(unknown[0])}"
         )
+    return value
+
+
+def _number(what: str, value: Any) -> float:
+    """Return what a function has given as a number of 64 bits."""
+    rule = f"{what} must return a number"
     if isinstance(value, np.ndarray) and value.shape == () and not np.ma.is_masked(value):
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real | Decimal):

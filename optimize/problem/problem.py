@@ -16,6 +16,7 @@ from optimize.problem.gene_values import Value
 from optimize.problem.genome import AnyGene, Genome
 from optimize.problem.given_genes import DependentGene
 from optimize.problem.objective import Objective
+from optimize.problem.statistic import Misfit
 from tisim.errors import InputError, must
 from tisim.files import python_file, regular_file
 from tisim.files.python_file import sha256
@@ -46,9 +47,6 @@ class Problem:
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
     met_at : the fitness at which a design meets all that is asked, and so does any better one; the report
         then has how far each gene spreads over those that the search has seen. For one objective only.
-    measurements : the objective is the mean over so many measured quantities of the squared distance from
-        what was measured, in its uncertainty: chi^2 over their number. What the search has run then tells how
-        well each gene is known; see optimize.calibration. For one objective only, which is minimised.
     constraints : what a design must keep to beside: any number of ResultConstraints and DesignConstraints.
     code : a text that tells it from another problem of this name and version, in place of the checksums of
         scene and objectives, of their files and of all that they are bound to (see fingerprint.py).
@@ -70,7 +68,6 @@ class Problem:
     picture: Callable[[Scene, Result], Figure] | None = None
     details: Callable[[Mapping[str, Any], Result], Mapping[str, float]] | None = None
     met_at: float | None = None
-    measurements: int | None = None
     code: str = ""
     files: Sequence[str | Path] = ()
     constraints: Sequence[InequalityConstraint] = ()
@@ -88,19 +85,13 @@ class Problem:
         must(not isinstance(self.files, str | Path), "files", "a list of paths", self.files)
         one = len(names) == 1 or self.met_at is None
         must(one, "met_at", "left out for several objectives", self.met_at)
-        if self.measurements is not None:
-            whole = isinstance(self.measurements, int) and self.measurements > 0
-            must(whole, "measurements", "a whole number above 0", self.measurements)
-            misfit = len(names) == 1 and not self.objectives[0].maximise
-            must(
-                misfit, "measurements", "left out but for one objective that is minimised", self.measurements
-            )
         for constraint in self.constraints:
             able = isinstance(constraint, ResultConstraint | DesignConstraint)
             must(able, "constraint", "a ResultConstraint or a DesignConstraint", constraint)
-        headings = [*self.genome.names, *names, *(constraint.name for constraint in self.constraints)]
-        twice = sorted({name for name in headings[len(self.genome.names) :] if headings.count(name) > 1})
-        must(not twice or not self.constraints, "names of constraints",
+        own = [*self.quantities, *(constraint.name for constraint in self.constraints)]
+        headings = [*self.genome.names, *own]
+        twice = sorted({name for name in own if headings.count(name) > 1})
+        must(not twice or own == names, "names of constraints, and of quantities,",
              "other than each other's, and than those of genes and objectives", twice)  # fmt: skip
 
     @classmethod
@@ -160,6 +151,17 @@ class Problem:
         return tuple(self.objective)
 
     @property
+    def quantities(self) -> tuple[str, ...]:
+        """The names of the values that are kept of each run: those of all objectives, in their order."""
+        return tuple(name for objective in self.objectives for name in objective.quantities)
+
+    @property
+    def measured(self) -> Misfit | None:
+        """What was measured, where the only objective is the misfit to it."""
+        statistic = self.objectives[0].statistic
+        return statistic if isinstance(statistic, Misfit) and not self.several else None
+
+    @property
     def identity(self) -> str:
         """A checksum of scene, objectives and the functions of genes and constraints, and what they are bound
         to, as it is now; see ``code``."""
@@ -178,7 +180,9 @@ class Problem:
     def objective_identity(self) -> str:
         """A checksum of objectives, constraints of a run and data files, and of a plain function. Together
         with a scene they decide a value."""
-        return _checksum([self.code or self._run_checksums(), [sha256(read(file)) for file in self.files]])
+        measured = [name for one in self.objectives for name in one.statistic.quantities]
+        files = [sha256(read(file)) for file in self.files]
+        return _checksum([self.code or self._run_checksums(), files, *([measured] if measured else [])])
 
     def _run_checksums(self) -> dict[str, str]:
         """Return checksums of the functions that decide what a run is worth, by name."""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 class Analysis:
     """An analysis is what there is to tell of a search.
 
-    calibration : None where the problem does not say that its objective is a misfit. sensitivity : of each
+    calibration : None where the objective is not the misfit of what was measured. sensitivity : of each
     objective; empty where too few designs are known.
     """
 
@@ -40,7 +40,7 @@ class Analysis:
         """Return all that there is to tell of a search that has found a design."""
         enough = len(outcome.estimates) >= sensing.least_designs(outcome.problem.genome)
         return cls(
-            calibrating.calibration(outcome) if outcome.problem.measurements else None,
+            calibrating.calibration(outcome) if outcome.problem.measured else None,
             sensing.sensitivity(outcome) if enough else (),
         )
 

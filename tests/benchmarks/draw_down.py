@@ -5,7 +5,7 @@
 
 First each quantity of cases/granular_bench/measured.py with its mean and half of the 95 % interval of that,
 its standard deviation over random starts, which are others than those of a search, and the uncertainty that
-a calibration takes it with; and the mean misfit of a start, with half of its 95 % interval. A design is
+a calibration takes it with; and the misfit of the means, with its 95 % interval. A design is
 friction, rolling friction and restitution. With --valley: of each friction the rolling friction of some with
 which angle of repose and discharge rate, means over the starts, are nearest to those of the known design at
 its restitution; with these and their misfit.
@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
-from cases.granular_bench.problem import EXAMPLES, KNOWN, SIMULATED, UNCERTAINTIES, misfit, other_runs
+from cases.granular_bench.problem import EXAMPLES, KNOWN, SIMULATED, UNCERTAINTIES, calibration_to, other_runs
 from tisim.analysis import Mean
 
 FRICTIONS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
@@ -36,7 +36,10 @@ def measured(design: dict[str, float], size: str, starts: int) -> None:
     for name, measure in SIMULATED.items():
         values = np.array([measure(result) for result in results])
         print(f"{name:16} {Mean.of(values)!s:>16} {values.std(ddof=1):9.2g} {UNCERTAINTIES[name]:11g}")
-    print("misfit", Mean.of([misfit(result, EXAMPLES[size]) for result in results]))
+    (objective,) = calibration_to(EXAMPLES[size], size).objectives
+    values = np.array([list(objective.of(result).values()) for result in results])
+    low, high = objective.interval_of_cost(values)
+    print(f"misfit {objective.cost(values):.2g}, 95 % interval {low:.2g} to {high:.2g}")
 
 
 def valley(size: str, starts: int) -> None:

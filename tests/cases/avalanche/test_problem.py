@@ -9,9 +9,10 @@ import optimize
 import tisim
 from cases.avalanche.measured import MeasuredProfile, area, read
 from cases.avalanche.measures import profile, repose
-from cases.avalanche.problem import EXAMPLE, KNOWN, calibration, misfit, other_runs
+from cases.avalanche.problem import EXAMPLE, KNOWN, calibration, measured, other_runs, simulated
 from cases.case import every
 from cases.granular_bench.measured import Measurement
+from optimize import Misfit
 from optimize.tables import met_columns
 from tests.cases.avalanche.slopes import leaning
 from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
@@ -46,6 +47,14 @@ def test_an_angle_is_met_in_uncertainties(tmp_path):
     assert misfit(result, target) == pytest.approx(((repose(result.state) - 41) / 2) ** 2)
 
 
+def misfit(result, target):
+    return Misfit(measured(target)).value([list(simulated(result, target).values())])
+
+
+def off(target, place, height):
+    return Misfit(measured(target)).value([list(target.compared(place, height).values())])
+
+
 def triangle(top, foot, uncertainty):
     """A measured profile of a straight slope, of 9 points and one beyond its foot."""
     place = np.append(np.linspace(0, foot, 9), 1.2 * foot)
@@ -57,11 +66,11 @@ def test_a_profile_is_met_by_the_same_slope_of_any_size():
     height = np.maximum(1.5 - place, 0.0)
     assert area(place, height) == pytest.approx(1.125, rel=1e-3)
     for size in (1.0, 30.0):
-        assert triangle(1.5 * size, 1.5 * size, 0.01 * size).misfit(place, height) < 0.01
+        assert off(triangle(1.5 * size, 1.5 * size, 0.01 * size), place, height) < 0.01
     # One that is flatter is off by what its heights are: at the end of the cell by 1.5 - 1.5 / sqrt(1.5).
     flatter = triangle(1.5, 1.5 * 1.5, 0.1)
-    off = flatter.height - np.maximum(1.5 * 1.5**0.5 - flatter.distance, 0.0)
-    assert flatter.misfit(place, height) == pytest.approx(float(((off / 0.1) ** 2).mean()), rel=0.02)
+    gap = flatter.height - np.maximum(1.5 * 1.5**0.5 - flatter.distance, 0.0)
+    assert off(flatter, place, height) == pytest.approx(float(((gap / 0.1) ** 2).mean()), rel=0.02)
 
 
 def test_a_profile_tells_slopes_apart():

@@ -17,7 +17,6 @@ from cases.granular_bench.problem import (
     UNCERTAINTIES,
     calibration,
     calibration_to,
-    misfit,
     other_runs,
     problem,
 )
@@ -55,8 +54,10 @@ def test_misfit_counts_in_uncertainties(monkeypatch):
     monkeypatch.setitem(calibrating.SIMULATED, "angle_of_repose", lambda result: 22.0)
     monkeypatch.setitem(calibrating.SIMULATED, "discharge_rate", lambda result: 0.156)
     both = {"angle_of_repose": Measurement(20.0, 1.0), "discharge_rate": Measurement(0.15, 3e-3)}
-    assert misfit(result, both) == pytest.approx((4 + 4) / 2)
-    assert misfit(result, {"discharge_rate": both["discharge_rate"]}) == pytest.approx(4)
+    for measured, misfit in ((both, (4 + 4) / 2), ({"discharge_rate": both["discharge_rate"]}, 4)):
+        (objective,) = calibrating.calibration_to(measured, "small").objectives
+        values = objective.of(result)
+        assert objective.cost([[values[name] for name in objective.quantities]]) == pytest.approx(misfit)
 
 
 def test_a_bed_in_a_cup_is_not_calibrated():

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 import optimize
-from optimize import Gene, Problem
+from optimize import Gene, Misfit, Objective, Problem
 from optimize.analysis.misfit_shape import Evidence, fit
 
 GENES = (
@@ -44,6 +44,11 @@ def right_widths(truth, number):
     return 2 * 1.96 * np.sqrt(np.diag(np.linalg.inv(slopes @ slopes.T)))
 
 
+def measured_objective(wanted):
+    """The misfit of what a function returns to what was measured, name -> (value, uncertainty)."""
+    return Objective("misfit", lambda result: result.value, statistic=Misfit(wanted))
+
+
 def synthetic(seed, number=4, inside=(0.2, 0.8)):
     """A true design, and data measured of it: (truth, data, rng)."""
     rng = np.random.default_rng(seed)
@@ -65,7 +70,7 @@ def cloud(rng, misfits, runs=300, size=10):
     return np.vstack(points)
 
 
-def interval_of(seed, number=4, tau=0.0, starts=1, common=True, of_quantities=False, inside=(0.2, 0.8)):
+def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8)):
     """(truth, intervals, right widths) of a data set, by an archive of 300 designs.
 
     tau : what random starts add to each quantity, in uncertainties.
@@ -73,25 +78,15 @@ def interval_of(seed, number=4, tau=0.0, starts=1, common=True, of_quantities=Fa
     truth, data, rng = synthetic(seed, number, inside)
     sigma = UNCERTAINTY[:number]
     same = tau * rng.normal(size=(starts, number))
-    chi2, variance, values = [], [], []
+    off = []
 
     def misfits(points):
         own = same if common else tau * rng.normal(size=(len(points), starts, number))
-        values.append(quantities(points, number)[:, None] + sigma * own)
-        of_runs = (((values[-1] - data) / sigma) ** 2).sum(axis=-1)
-        variance.append(of_runs.var(axis=1, ddof=1) if starts > 1 else np.full(len(points), np.nan))
-        chi2.append(of_runs.mean(axis=1))
-        return chi2[-1]
+        off.append((quantities(points, number)[:, None] - data) / sigma + own)
+        return (off[-1].mean(axis=1) ** 2).sum(axis=-1)
 
     points = cloud(rng, misfits)
-    if of_quantities:
-        evidence = Evidence.of_quantities(points, np.concatenate(values), data, sigma, common)
-    else:
-        counts = np.full(len(points), float(starts))
-        evidence = Evidence.of_runs(
-            points, np.concatenate(chi2), np.concatenate(variance), counts, number, common
-        )
-    shape = fit(evidence)
+    shape = fit(Evidence.of_quantities(points, np.concatenate(off), common))
     return truth, np.array([shape.interval(k) for k in range(3)]), right_widths(truth, number)
 
 
@@ -107,11 +102,14 @@ def searched(seed, method, number, runs):
     """(truth, outcome) of a search for the design that data were measured of."""
     truth, data, _ = synthetic(seed, number)
 
-    def misfit(design):
-        point = (np.array(list(design.values())) - LOW) / (HIGH - LOW)
-        return float(np.mean(((quantities(point, number) - data) / UNCERTAINTY[:number]) ** 2))
+    names = ("sliding angle", "rebound", "angle of repose", "rate")[:number]
 
-    problem = Problem.of_function(misfit, GENES, ("misfit",), "grains", measurements=number, code=f"{seed}")
+    def experiment(design):
+        point = (np.array(list(design.values())) - LOW) / (HIGH - LOW)
+        return dict(zip(names, quantities(point, number), strict=True))
+
+    wanted = dict(zip(names, zip(data, UNCERTAINTY[:number], strict=True), strict=True))
+    problem = Problem.of_function(experiment, GENES, (measured_objective(wanted),), "grains", code=f"{seed}")
     outcome = optimize.run(problem, method=method, seed=seed, max_evaluations=runs, generations=10**6)
     return truth, outcome
 

@@ -10,9 +10,9 @@ from optimize import Choice, Gene, Problem
 from optimize.analysis.misfit_shape import Evidence, coefficients, fit
 from optimize.report.analysis import Analysis
 from tests.optimize.analysis.granular_experiment import (
-    GENES,
     coverage,
     interval_of,
+    measured_objective,
     right_widths,
     searched,
     searched_coverage,
@@ -35,15 +35,11 @@ def test_intervals_hold_the_truth_and_have_the_right_width(number):
     assert width == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("common", "of_quantities", "grown"),
-    [(True, False, 1.118), (True, True, 1.118), (False, False, 1.0), (False, True, 1.0)],
-)
-def test_noise_of_random_starts_widens_and_does_not_bias(common, of_quantities, grown):
+@pytest.mark.parametrize(("common", "grown"), [(True, 1.118), (False, 1.0)])
+def test_noise_of_random_starts_widens_and_does_not_bias(common, grown):
     """Four starts whose spread is the uncertainty: common to all designs they shift all means by a variance
     of 1/4, so that the interval is sqrt(1.25) = 1.118 times as wide; each design's own average out."""
-    settings = {"tau": 1.0, "starts": 4, "common": common, "of_quantities": of_quantities}
-    inside, width = coverage(SETS, **settings)
+    inside, width = coverage(SETS, tau=1.0, starts=4, common=common)
     assert holds(inside)
     assert width == pytest.approx(grown, abs=0.06)
 
@@ -86,8 +82,8 @@ def test_an_interval_that_reaches_an_end_is_the_profile_within_the_range():
     assert high == pytest.approx(inside.max(), abs=1e-3)
 
 
-def outcome_of(function, genes, runs=200, **fields):
-    problem = Problem.of_function(function, genes, ("misfit",), "made", code="made", **fields)
+def outcome_of(function, genes, wanted, runs=200):
+    problem = Problem.of_function(function, genes, (measured_objective(wanted),), "made", code="made")
     return optimize.run(problem, method="cma-es", seed=1, max_evaluations=runs, generations=10**6)
 
 
@@ -107,9 +103,7 @@ def test_what_is_not_told_is_said():
 def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
     genes = [Gene("a", "", 0, 1), Gene("b", "", 0, 1), Gene("c", "", 0, 1)]
     outcome = outcome_of(
-        lambda d: (((d["a"] + d["b"] - 1) / 0.1) ** 2 + ((d["c"] - 0.5) / 0.1) ** 2) / 2,
-        genes,
-        measurements=2,
+        lambda d: {"sum": d["a"] + d["b"], "own": d["c"]}, genes, {"sum": (1.0, 0.1), "own": (0.5, 0.1)}
     )
     found = optimize.calibration(outcome)
     assert [one.told for one in found.genes] == [False, False, True]
@@ -122,14 +116,14 @@ def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
 def test_measurements_that_are_not_met_together_are_told():
     genes = [Gene("a", "", 0, 1)]
     outcome = outcome_of(
-        lambda d: (((d["a"] - 0.2) / 0.02) ** 2 + ((d["a"] - 0.6) / 0.02) ** 2) / 2, genes, measurements=2
+        lambda d: {"one": d["a"], "other": d["a"]}, genes, {"one": (0.2, 0.02), "other": (0.6, 0.02)}
     )
     assert any("not met together" in remark for remark in optimize.calibration(outcome).remarks)
 
 
 def test_too_few_designs_ask_for_more_and_say_which():
-    outcome = outcome_of(lambda d: ((d["a"] - 0.5) / 0.001) ** 2 + ((d["b"] - 0.5) / 0.001) ** 2,
-                         [Gene("a", "m", 0, 1), Gene("b", "m", 0, 1)], runs=12, measurements=1)  # fmt: skip
+    genes, wanted = [Gene("a", "m", 0, 1), Gene("b", "m", 0, 1)], {"p": (0.5, 0.001), "q": (0.5, 0.001)}
+    outcome = outcome_of(lambda d: {"p": d["a"], "q": d["b"]}, genes, wanted, runs=12)
     found = optimize.calibration(outcome)
     assert found.genes == ()
     assert 0 < found.missing <= 2 * coefficients(2)
@@ -140,23 +134,21 @@ def test_too_few_designs_ask_for_more_and_say_which():
 
 def test_a_choice_is_kept_at_the_best_and_others_as_good_are_listed():
     genes = [Gene("a", "", 1, 100, "log"), Choice("law", ("one", "two", "three"))]
-    extra = {"one": 0.0, "two": 0.0, "three": 50.0}
-    outcome = outcome_of(lambda d: (np.log(d["a"] / 10) / 0.1) ** 2 + extra[d["law"]], genes, measurements=1)
+    extra = {"one": 0.0, "two": 0.0, "three": 7.0}
+    outcome = outcome_of(
+        lambda d: {"log a": np.log(d["a"]), "extra": extra[d["law"]]}, genes,
+        {"log a": (np.log(10), 0.1), "extra": (0.0, 1.0)},
+    )  # fmt: skip
     found = optimize.calibration(outcome)
     (gene,) = found.genes
     assert (gene.low, gene.high) == pytest.approx((10 * np.exp(-0.196), 10 * np.exp(0.196)), rel=0.01)
     assert set(found.choices["law"]) <= {"one", "two"}
 
 
-@pytest.mark.parametrize("wrong", [0, -1, 1.5])
-def test_a_number_of_measurements_that_cannot_be_is_refused(wrong):
-    with pytest.raises(InputError, match="measurements must be a whole number above 0; received"):
-        Problem.of_function(lambda d: 0.0, GENES, measurements=wrong)
-
-
 def test_a_problem_that_is_no_misfit_is_refused():
-    outcome = outcome_of(lambda d: d["a"], [Gene("a", "", 0, 1)], runs=20)
-    with pytest.raises(InputError, match="measurements must be given in a problem that is calibrated"):
+    problem = Problem.of_function(lambda d: d["a"], [Gene("a", "", 0, 1)], code="made")
+    outcome = optimize.run(problem, max_evaluations=20)
+    with pytest.raises(InputError, match="must be the Misfit of what was measured in a problem that is cal"):
         optimize.calibration(outcome)
 
 

@@ -67,10 +67,13 @@ def test_a_rule_is_told_in_words():
             lambda: fake_problem(constraints=["m"]),
             "constraint must be a ResultConstraint or a DesignConstraint; received 'm'",
         ),
-        (lambda: fake_problem(constraints=[FIRST, FIRST]), "names of constraints must be other than"),
+        (
+            lambda: fake_problem(constraints=[FIRST, FIRST]),
+            "names of constraints, and of quantities, must be other than",
+        ),
         (
             lambda: fake_problem(constraints=[ResultConstraint("x1", len, at_most=1)]),
-            "names of constraints must be",
+            "names of constraints, and of quantities, must be",
         ),
         (
             lambda: fake_problem(constraints=[ResultConstraint("fitness", len, at_most=1)]),
@@ -102,7 +105,7 @@ def test_an_infeasible_design_costs_no_run():
     runs = Runs(fake_problem(genes=1, constraints=[FIRST]), evaluator, FakeCache(), seed=1)
     inside, outside = Sample({"x0": 0.25}), Sample({"x0": 0.75})
     runs.add([(inside, range(3)), (outside, range(3))])
-    assert (len(inside.costs), len(outside.costs)) == (3, 0)
+    assert (len(inside.values), len(outside.values)) == (3, 0)
     assert outside.reason == "infeasible: first must be at most 0.5 m; received 0.75 m"
     assert (len(evaluator.digests), runs.requested) == (3, 3)
 

@@ -1,0 +1,235 @@
+"""What an objective takes of the values that a design has had from its random starts: their mean, a quantile,
+the worst of a number of starts, or the misfit of means to what was measured.
+
+Each has an estimate, a standard error by the jackknife (B. Efron, The Jackknife, the Bootstrap and Other
+Resampling Plans, SIAM (1982), chapter 3), and a 95 % interval of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betainc, comb
+
+from tisim.errors import is_number, must
+from tisim.numerics import intervals, skewed
+
+Array = NDArray[np.float64]
+
+
+class Statistic(ABC):
+    """One number of the values of all starts of a design.
+
+    Values have the shape (starts,), or (starts, quantities) where ``quantities`` are named. sign : 1 where
+    small values are wanted, -1 where large ones are.
+    """
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """What it is, as a part of a table heading."""
+
+    @property
+    def described(self) -> str:
+        """All that decides its value, as text; "" for the mean. Part of the identity of a search."""
+        return repr(self)
+
+    @property
+    def fewest_starts(self) -> int:
+        """The starts that an estimate with a standard error needs."""
+        return 2
+
+    @property
+    def fewest_fresh(self) -> int:
+        """The starts that an interval with two ends needs."""
+        return self.fewest_starts
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The names of the quantities of a run that it needs; () for one without a name."""
+        return ()
+
+    @abstractmethod
+    def value(self, values: Array, sign: float = 1.0) -> float:
+        """Return the estimate of one start or more."""
+
+    @abstractmethod
+    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
+        """Return the ends of the 95 % interval, NaN where one is not known.
+
+        seen : values that other designs have had.
+        """
+
+    def pseudo_values(self, values: Array, sign: float = 1.0) -> Array:
+        """Return n theta - (n - 1) theta_without_i of each start i: values of which theta is about the mean
+        (Efron 1982, Eq. 3.10), shape (starts,)."""
+        n = len(values)
+        if n < 2:
+            return np.full(n, self.value(values, sign))
+        without = [self.value(np.delete(values, i, axis=0), sign) for i in range(n)]
+        return n * self.value(values, sign) - (n - 1) * np.array(without)
+
+
+@dataclass(frozen=True)
+class Mean(Statistic):
+    """The mean over the starts."""
+
+    @property
+    def label(self) -> str:
+        return ""
+
+    @property
+    def described(self) -> str:
+        return ""
+
+    @property
+    def fewest_starts(self) -> int:
+        return 1
+
+    def value(self, values: Array, sign: float = 1.0) -> float:
+        return float(np.cumsum(values)[-1] / len(values))  # a running mean has the same last bits
+
+    def pseudo_values(self, values: Array, sign: float = 1.0) -> Array:
+        return np.asarray(values, dtype=float)
+
+    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
+        return skewed.interval(values, seen)
+
+
+@dataclass(frozen=True)
+class Quantile(Statistic):
+    """The value that a share of all starts do not exceed.
+
+    share : between 0 and 1; 0.9 of a loss that is to be small, 0.1 of a yield that is to be large.
+    The estimate is that of F. E. Harrell and C. E. Davis, Biometrika 69 (1982) 635-640, a weighted sum of the
+    sorted values. The interval is that of order statistics (intervals.of_quantile). Each design needs so many
+    starts that one beyond the quantile is to be expected: 10 for 0.9.
+    """
+
+    share: float
+
+    def __post_init__(self) -> None:
+        must(
+            is_number(self.share) and 0 < self.share < 1, "share of a quantile", "between 0 and 1", self.share
+        )
+
+    @property
+    def label(self) -> str:
+        return f"{self.share:g} quantile"
+
+    @property
+    def fewest_starts(self) -> int:
+        return max(2, math.ceil(round(1.0 / min(self.share, 1.0 - self.share), 9)))
+
+    @property
+    def fewest_fresh(self) -> int:
+        return intervals.fewest_of_quantile(self.share)
+
+    def value(self, values: Array, sign: float = 1.0) -> float:
+        n = len(values)
+        edges = betainc((n + 1) * self.share, (n + 1) * (1 - self.share), np.linspace(0.0, 1.0, n + 1))
+        return float(np.sort(values) @ np.diff(edges))
+
+    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
+        return intervals.of_quantile(values, self.share)
+
+
+@dataclass(frozen=True)
+class WorstOf(Statistic):
+    """The worst that is to be expected of a number of starts: the expectation of the largest of their values
+    where small ones are wanted, and of the smallest where large ones are.
+
+    starts : 2 or more. The estimate is the mean of the worst over all subsets of that size. It is
+    unbiased, so that designs with different numbers of starts can be compared.
+    """
+
+    starts: int
+
+    def __post_init__(self) -> None:
+        whole = isinstance(self.starts, int) and not isinstance(self.starts, bool) and self.starts > 1
+        must(whole, "starts of WorstOf", "a whole number above 1", self.starts)
+
+    @property
+    def label(self) -> str:
+        return f"worst of {self.starts} starts"
+
+    @property
+    def fewest_starts(self) -> int:
+        return self.starts + 1
+
+    @property
+    def fewest_fresh(self) -> int:
+        return 4 * self.starts
+
+    def value(self, values: Array, sign: float = 1.0) -> float:
+        n = len(values)
+        if n < self.starts:
+            return sign * float(np.max(sign * values))
+        weights = comb(np.arange(n), self.starts - 1) / comb(n, self.starts)
+        return sign * float(np.sort(sign * values) @ weights)
+
+    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
+        return skewed.interval(self.pseudo_values(values, sign)) if len(values) > self.starts else _UNKNOWN
+
+
+@dataclass(frozen=True)
+class Misfit(Statistic):
+    """How far the means over the starts are from what was measured: the mean over the quantities of
+    ((mean - measured) / uncertainty)^2, that is chi^2 over their number.
+
+    measured : quantity -> (measured value, its standard uncertainty), both in the unit of the quantity. The
+    function of the objective returns a dictionary with these names. The squared distance of a mean of n
+    starts is too large by its variance, which is subtracted: the estimate is unbiased, and may be below 0 for
+    a design that meets the measurements. The designs that such a search has run tell how well each gene is
+    known (optimize.calibration).
+    """
+
+    measured: Mapping[str, tuple[float, float]]
+
+    def __post_init__(self) -> None:
+        must(isinstance(self.measured, Mapping) and len(self.measured) > 0, "measured of a Misfit",
+             "a dictionary of quantity: (value, uncertainty)", self.measured)  # fmt: skip
+        for name, pair in self.measured.items():
+            must(
+                isinstance(name, str) and bool(name.strip()),
+                "quantity of a Misfit",
+                "a non-empty string",
+                name,
+            )
+            two = isinstance(pair, tuple | list) and len(pair) == 2 and all(map(is_number, pair))
+            sound = two and math.isfinite(pair[0]) and 0 < pair[1] < math.inf
+            must(sound, f"measured {name}", "(value, uncertainty above 0), both finite", pair)
+        plain = {name: (float(value), float(error)) for name, (value, error) in self.measured.items()}
+        object.__setattr__(self, "measured", plain)
+
+    @property
+    def label(self) -> str:
+        return ""
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        return tuple(self.measured)
+
+    def off(self, values: Array) -> Array:
+        """Return how far values are from those measured, in uncertainties, shape (..., quantities)."""
+        wanted, uncertainty = np.array(list(self.measured.values())).T
+        return np.asarray((values - wanted) / uncertainty)
+
+    def value(self, values: Array, sign: float = 1.0) -> float:
+        off = self.off(values)
+        n = len(off)
+        variance = off.var(axis=0, ddof=1) / n if n > 1 else np.zeros(off.shape[1])
+        return float(np.mean(off.mean(axis=0) ** 2 - variance))
+
+    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
+        return intervals.of_squared_distance(self.off(values)) if len(values) > 1 else _UNKNOWN
+
+
+_UNKNOWN = math.nan, math.nan
+MEAN = Mean()
+"""The statistic of an objective for which none is given."""

@@ -1,0 +1,89 @@
+"""Confidence intervals of a quantile, and of the squared distance of means from what was measured."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+from scipy.stats import binom, chi2, ncx2
+from scipy.stats import t as student
+
+from tisim.numerics.statistics import CONFIDENCE
+
+Array = NDArray[np.float64]
+
+_NODES = (np.arange(64) + 0.5) / 64
+"""Probabilities at which the distribution of an estimated variance is taken."""
+_FAR = 1e4
+"""Squared distance, in variances of the means, beyond which its root is as good as Student's."""
+
+
+def of_quantile(values: ArrayLike, share: float, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Return the ends of the interval of a quantile of independent values, shape (n,).
+
+    The ends are order statistics, interpolated so that the confidence is met (J. Nyblom, Statist. Probab.
+    Lett. 14 (1992) 129-131). NaN in place of an end for which there are too few values.
+    """
+    ordered = np.sort(np.asarray(values, dtype=float))
+    return _low_end(ordered, share, confidence), -_low_end(-ordered[::-1], 1.0 - share, confidence)
+
+
+def fewest_of_quantile(share: float, confidence: float = CONFIDENCE) -> int:
+    """Return how many values an interval of a quantile needs to have both ends."""
+    return math.ceil(math.log(0.5 - confidence / 2) / math.log(max(share, 1.0 - share)))
+
+
+def _low_end(ordered: Array, share: float, confidence: float) -> float:
+    n, wanted = len(ordered), 0.5 + confidence / 2
+    below = binom.sf(np.arange(n), n, share)  # that the (r+1)-th value is below the quantile
+    if n == 0 or below[0] < wanted:
+        return math.nan
+    k = int(np.flatnonzero(below >= wanted)[-1])
+    if k == n - 1 or below[k] == wanted:
+        return float(ordered[k])
+    r = k + 1
+    odds = r * (1 - share) * (wanted - below[k + 1]) / ((n - r) * share * (below[k] - wanted))
+    part = 1.0 / (1.0 + odds)
+    return float((1 - part) * ordered[k] + part * ordered[k + 1])
+
+
+def of_squared_distance(off: ArrayLike, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Return the ends of the interval of |mu|^2 / K, the mean of the squares of K expectations.
+
+    off : shape (n, K), n > 1 independent values with the expectations mu. |mean|^2 is taken for c times a
+    noncentral chi^2 of nu degrees of freedom, c and nu being those of its first two moments
+    (F. E. Satterthwaite, Biometrics Bull. 2 (1946) 110-114). c is itself an estimate, of n - 1 degrees of
+    freedom or more, over which the distribution is averaged: for one quantity the result is Student's.
+    """
+    sample = np.asarray(off, dtype=float)
+    n, count = sample.shape
+    mean, covariance = sample.mean(axis=0), np.atleast_2d(np.cov(sample.T)) / n
+    trace, squares = float(np.trace(covariance)), float(np.sum(covariance**2))
+    total = float(mean @ mean)
+    if trace == 0.0:
+        return total / count, total / count
+    distance = max(total - trace, 0.0)
+    along = max(float(mean @ covariance @ mean) - squares, 0.0)
+    c = (squares + 2.0 * along) / (trace + 2.0 * distance)
+    freedom, far = trace / c, 2.0 * distance / (trace + 2.0 * distance)
+    of_variance = (n - 1) * ((1.0 - far) * trace**2 / squares + far)
+    ratio = total / c
+    if ratio > _FAR:
+        half = float(student.ppf(0.5 + confidence / 2, of_variance))
+        return c * (math.sqrt(ratio) - half) ** 2 / count, c * (math.sqrt(ratio) + half) ** 2 / count
+    weights = chi2.ppf(_NODES, of_variance) / of_variance
+
+    def excess(noncentrality: float, probability: float) -> float:
+        return float(np.mean(ncx2.cdf(ratio * weights, freedom, noncentrality * weights))) - probability
+
+    def end(probability: float) -> float:
+        if excess(0.0, probability) <= 0.0:
+            return 0.0
+        top = ratio + 10.0
+        while excess(top, probability) > 0.0:
+            top *= 2.0
+        return c * float(brentq(excess, 0.0, top, args=(probability,))) / count
+
+    return end(0.5 + confidence / 2), end(0.5 - confidence / 2)
