@@ -77,7 +77,8 @@ def test_two_that_pass_each_other_in_a_step_are_not_unseen():
     assert beside.status.ok, beside.status.reason
 
 
-@pytest.mark.parametrize("sheet", ["disc", pytest.param("triangles", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("sheet", ["disc", "triangles"])
 def test_a_grain_does_not_go_through_a_sheet_unseen(sheet):
     """Nothing is behind a disc or a triangle that would feel it later: neither one that is past it in a step
     nor one that is pressed through it, which the sheet then pushed out on the other side."""
