@@ -21,9 +21,8 @@ from tisim.numerics.statistics import half_width
 
 Design = Mapping[str, Any]
 Report = Callable[[float], None]
-LOOKED_AT, MOST_LOOKED_AT, LEAST_DIFFERENT = 2, 6, 3
-"""Designs that are run from two starts, to see whether these differ: where runs leave a state, and where they
-leave none. Of the latter so many must have different costs."""
+LOOKED_AT = 2
+"""Designs that are run from two starts, to see whether these differ."""
 FRESH = 10**6
 """The number of the first start that only reports use. None of a search is as large."""
 
@@ -156,23 +155,15 @@ class Ensemble:
 
     def _look(self, samples: Sequence[Sample]) -> None:
         """Run the first designs from two starts each, and see whether these end in the same state, to the
-        last bit, after the same work. What leaves no state, as a plain function, must give equal costs for
-        more designs, and different ones for different designs: rare outcomes are equal by chance, too."""
-        looked: list[Sample] = []
-        for group in (samples[:LOOKED_AT], samples[LOOKED_AT:MOST_LOOKED_AT]):
-            additions = [(sample, range(len(sample.values), 2)) for sample in group]
-            if sum(len(starts) for _, starts in additions) > self.budget - self.requested:
-                return
-            self.runs.add(additions)
-            looked += [sample for sample in group if not sample.reason]
-            if any(len(set(sample.values[:2])) > 1 for sample in looked):
-                self.repeatable = False
-                return
-            if looked and all(None not in sample.ends for sample in looked):
-                self.repeatable = all(len(set(sample.ends[:2])) == 1 for sample in looked)
-                return
-        if looked:
-            self.repeatable = len({sample.values[0] for sample in looked}) >= LEAST_DIFFERENT
+        last bit, after the same work. Of what leaves no state, as a function of design and seed, equal values
+        do not tell: rare outcomes are equal by chance, too."""
+        additions = [(sample, range(len(sample.values), 2)) for sample in samples[:LOOKED_AT]]
+        if sum(len(starts) for _, starts in additions) > self.budget - self.requested:
+            return
+        self.runs.add(additions)
+        if looked := [sample for sample, _ in additions if not sample.reason]:
+            ends = [set(sample.ends[:2]) for sample in looked]
+            self.repeatable = all(len(end) == 1 and None not in end for end in ends)
 
     def race(
         self, designs: Sequence[Design], progress: Report | None = None

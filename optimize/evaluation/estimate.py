@@ -36,6 +36,12 @@ class FitnessEstimate:
         return not self.reason
 
     @property
+    def exact(self) -> bool:
+        """Whether it is known that all starts of the design give the same; starts that happen to be equal do
+        not tell that."""
+        return self.starts == 1 and self.std == 0
+
+    @property
     def half_width(self) -> float:
         """Half of the width of the interval."""
         return (self.high - self.low) / 2

@@ -20,7 +20,7 @@ def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np
     """Return the posterior mean of each cost of designs, (strings, objectives), in units that may be others
     than those of the costs, in the same order; without noise, the costs. None of the strings has failed."""
     costs = np.array([string.fitness.values for string in strings])
-    if len(strings) < 3 or all(one.std == 0 for string in strings for one in string.estimates):
+    if len(strings) < 3 or all(one.exact for string in strings for one in string.estimates):
         return costs
     belief = Belief(genome.features)
     belief.learn(strings, iterations=60)

@@ -54,7 +54,9 @@ class FakeEvaluator:
             value = self.function(scene.design, scene.seed)
             failed = isinstance(value, str)
             status = SimpleNamespace(ok=not failed, reason=value if failed else "")
-            yield index, SimpleNamespace(status=status, wall_s=0.25, work={"steps": np.int64(7)}, value=value)
+            state = {} if failed else {"value": np.array([value])}
+            work = {"steps": np.int64(7)}
+            yield index, SimpleNamespace(status=status, wall_s=0.25, work=work, value=value, state=state)
 
     def close(self):
         pass

@@ -254,7 +254,7 @@ def test_a_search_stops_at_a_target_only_when_it_is_met_for_sure(tmp_path):
 def test_a_function_without_noise_is_found_out_and_run_once(tmp_path):
     outcome = run(tmp_path / "a.h5", generations=5, ensemble={})
     assert {string.estimates[0].starts for string in outcome.hall} == {1}
-    assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 6
+    assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 2
     assert outcome.designs[0].intervals["fitness"] == (outcome.designs[0].values["fitness"],) * 2
 
 

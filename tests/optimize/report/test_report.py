@@ -1,11 +1,14 @@
 import csv
 import io
 
+import numpy as np
 import pytest
 from matplotlib.image import imread
 from rich.console import Console
 
+import optimize
 from cases.agglomeration.problem import problem as agglomeration
+from optimize import Gene, Problem
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
@@ -240,3 +243,19 @@ def test_where_no_design_meets_what_is_asked_that_is_said(tmp_path):
     assert title == f"0 of {len(found.estimates)} designs have fitness of at most 0.1"
     assert rows == {}
     assert {path.name for path in report.write(found, tmp_path / "out").values()} >= {"best.csv", "met.csv"}
+
+
+def rare(design, seed):
+    """One start in 40 is another one."""
+    return design["x"] + (np.random.default_rng(seed).random() < 1 / 40)
+
+
+def test_starts_that_happen_to_be_equal_are_not_taken_for_one():
+    problem = Problem.of_function(rare, [Gene("x", "m", 0, 1)])
+    kept = {"select": 0, "confirm": 0}
+    outcome = optimize.run(problem, method="random", options={"population": 20}, generations=0, ensemble=kept)
+    assert outcome.best.estimates[0].std == 0
+    assert outcome.designs[0].intervals["value"] is None
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(report.notes(outcome))
+    assert "starts: random starts that the mean is over" in console.export_text()
