@@ -15,6 +15,10 @@ from optimize.problem.genome import Genome
 from tisim.components.component import Checked
 
 
+EDGE = 0.05
+"""Distance from a bound within which the genes are bent towards it, in widths of the range."""
+
+
 class CmaOptions(Checked):
     """The settings of CMA-ES.
 
@@ -36,9 +40,9 @@ class CmaOptions(Checked):
 class CmaEs(SearchMethod):
     """N. Hansen and A. Ostermeier, Evol. Comput. 9 (2001) 159-195, as deap.cma.Strategy has it.
 
-    Starts in the middle of the range. A component outside the range is reflected at its bound, as often as
-    it takes, and the strategy learns from where the string was evaluated. Converged, it begins again from a
-    random middle with twice the population (A. Auger and N. Hansen, IEEE CEC (2005) 1769-1776).
+    Starts in the middle of the range. The strategy searches a space without bounds, of which ``within`` gives
+    the genes. Converged, it begins again from a random middle with twice the population (A. Auger and
+    N. Hansen, IEEE CEC (2005) 1769-1776).
     """
 
     name = "cma-es"
@@ -49,6 +53,7 @@ class CmaEs(SearchMethod):
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
         sizes = {} if options.population is None else {"lambda_": options.population}
         self.strategy = cma.Strategy(np.full(len(genome), 0.5), options.sigma, **sizes)
+        self.asked: dict[tuple[float, ...], NDArray[np.float64]] = {}
 
     @property
     def width(self) -> float:  # type: ignore[override]
@@ -59,20 +64,42 @@ class CmaEs(SearchMethod):
     def ask(self) -> list[Individual]:
         now = self.strategy
         normal = self.rng.standard_normal((now.lambda_, now.dim))
-        return [Individual(point) for point in reflected(now.centroid + now.sigma * normal @ now.BD.T)]
+        points = folded(now.centroid + now.sigma * normal @ now.BD.T)
+        strings = [Individual(point) for point in within(points)]
+        self.asked = {tuple(string): point for string, point in zip(strings, points, strict=True)}
+        return strings
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         self.moved = False
         if all(string.failed for string in population):
             return  # ranks of nothing but failures would lead it astray; the next strings are others
-        self.strategy.update(list(population))
+        self.strategy.update([self._as_drawn(string) for string in population])
         now = self.strategy
         if now.sigma * now.diagD[-1] < self.options.smallest or not now.diagD[0] > 0:
             middle = self.rng.random(now.dim)
             self.strategy = cma.Strategy(middle, self.options.sigma, lambda_=2 * now.lambda_)
             self.moved = True
 
+    def _as_drawn(self, string: Individual) -> Individual:
+        """Return a string where the strategy has drawn it, with its fitness."""
+        drawn = Individual(self.asked.get(tuple(string), string))
+        drawn.fitness = string.fitness
+        return drawn
 
-def reflected(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points, shape (strings, genes), with what lies outside 0..1 reflected at 0 and 1."""
-    return 1 - np.abs(1 - np.mod(points, 2))
+
+def within(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points of [-EDGE, 1 + EDGE] as points of [0, 1]: the same but within EDGE of a bound, where a
+    parabola leads smoothly up to it. A best design on a bound is then a smooth minimum of the strategy.
+
+    The transformation of N. Hansen's program cma, BoundTransform.
+    """
+    low, high = points < EDGE, points > 1 - EDGE
+    inside = np.where(low, (points + EDGE) ** 2 / (4 * EDGE), points)
+    return np.clip(np.where(high, 1 - (1 + EDGE - points) ** 2 / (4 * EDGE), inside), 0.0, 1.0)
+
+
+def folded(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points, shape (strings, genes), with what lies outside [-EDGE, 1 + EDGE] reflected at its ends,
+    where the transformation is level."""
+    width = 1 + 2 * EDGE
+    return width - np.abs(width - np.mod(points + EDGE, 2 * width)) - EDGE
