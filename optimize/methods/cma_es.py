@@ -14,7 +14,6 @@ from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
 from tisim.components.component import Checked
 
-
 EDGE = 0.05
 """Distance from a bound within which the genes are bent towards it, in widths of the range."""
 
