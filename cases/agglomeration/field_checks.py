@@ -34,6 +34,8 @@ RADIUS, GRAIN_DENSITY, START_DISTANCE = 1e-3, 5e3, 8e-3
 MASS = GRAIN_DENSITY * 4 / 3 * np.pi * RADIUS**3
 CHARGED: Mapping[str, float] = {**fields.NO_FIELDS, "surface_charge": 2e-3}
 CHARGE = 4 * np.pi * RADIUS**2 * CHARGED["surface_charge"]
+OWN_STEPPER = fields.stepper({**CHARGED, "density": GRAIN_DENSITY}, RADIUS)
+"""The stepper of the case for the two charges."""
 STEPS = 4000
 """Number of steps in which two grains fall together; the error goes with the square of the step."""
 FORM_BOUND = 1e-7
@@ -106,7 +108,11 @@ def closed_forms() -> Iterator[Check]:
     time = fall_time(MASS, CHARGE, START_DISTANCE, 2 * RADIUS)
     for name, stepper, bound in (
         (f"{STEPS} steps", Verlet(control=FixedStep(dt=time / STEPS)), FORM_BOUND),
-        ("the steps of the case", fields.stepper(RADIUS), OWN_STEPPER_BOUND),
+        (
+            "the steps of the case",
+            fields.stepper({**CHARGED, "density": GRAIN_DENSITY}, RADIUS),
+            OWN_STEPPER_BOUND,
+        ),
     ):
         yield Check(f"opposite charges meet, in {name} (s)", meeting(stepper, time), time, bound * time)
 

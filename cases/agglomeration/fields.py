@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from scipy.constants import epsilon_0
+from scipy.constants import epsilon_0, mu_0
 
 from optimize.problem.genome import Gene
 from tisim.effects import CARBONYL_IRON, DipoleDipole, Effect, FroehlichMoment, Lorentz, NearField
@@ -56,9 +56,8 @@ SHOWN: Mapping[str, float] = {
 """Charges and fields that are felt, of the flow that is shown with them."""
 
 COULOMB = NearField(alpha2=1 / (4 * math.pi * epsilon_0), beta2=2, strength="charge")
-LONGEST_STEP = 5e-3
-"""Steps are at most as long as this, s, times the radius, m: forces act between impacts too, and the time of
-an oscillation that they can cause goes with the radius (docs/agglomeration.md)."""
+PHASE = 0.2
+"""Steps are at most as long as this over the rate of an oscillation that the forces of fields can cause."""
 
 
 def has_fields(design: Mapping[str, float]) -> bool:
@@ -97,6 +96,25 @@ def forces(design: Mapping[str, float]) -> tuple[Effect, ...]:
     )
 
 
-def stepper(radius: float) -> Stepper:
-    """Return the stepper of grains of a radius (m) in fields."""
-    return Verlet(control=ApproachTime(longest=LONGEST_STEP * radius))
+def rate(design: Mapping[str, float], radius: float) -> float:
+    """Return the rate (1/s) of an oscillation that charges and fields can cause: sqrt(a/b), b the radius and
+    a the acceleration of two touching grains by all forces of the fields together.
+
+    With the surface charge sigma and the magnetisation M, a touching pair attracts each other by
+    pi b^2 sigma^2 / epsilon_0 and pi mu_0 b^2 M^2 / 6, and a field E pulls by 4 pi b^2 sigma E. Charge and
+    moment of grains that merge are summed, so that larger grains have no higher rate.
+    """
+    charge = design["surface_charge"] * max(1.0, abs(design["charge_ratio"]))
+    electric, magnetic = (
+        design[f"{kind}_field"] + design[f"{kind}_amplitude"] for kind in ("electric", "magnetic")
+    )
+    magnetisation = min(3 * magnetic / mu_0, CARBONYL_IRON.parameters()["saturation"])
+    pressure = charge**2 / epsilon_0 + mu_0 * magnetisation**2 / 6 + 4 * charge * electric
+    return math.sqrt(0.75 * pressure / design["density"]) / radius
+
+
+def stepper(design: Mapping[str, float], radius: float) -> Stepper:
+    """Return the stepper of grains of a design and a radius (m) in fields: forces act between impacts, too,
+    so that steps are bounded by what these can do."""
+    fastest = rate(design, radius)
+    return Verlet(control=ApproachTime(longest=PHASE / fastest) if fastest else ApproachTime())

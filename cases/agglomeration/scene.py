@@ -94,7 +94,7 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
             *(fields.forces(design) if charged else ()),
         ),
         domain=Box(low=(-HALF_SIDE,) * 3, high=(HALF_SIDE,) * 3, images=charged),
-        stepper=fields.stepper(radius) if charged else Verlet(control=ApproachTime()),
+        stepper=fields.stepper(design, radius) if charged else Verlet(control=ApproachTime()),
         duration=duration,
         seed=seed,
     )  # fmt: skip

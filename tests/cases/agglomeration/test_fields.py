@@ -145,7 +145,7 @@ def test_two_charges_meet_when_the_closed_form_says_and_are_one_without_charge()
         field_checks.MASS, field_checks.CHARGE, field_checks.START_DISTANCE, 2 * field_checks.RADIUS
     )
     charges = (field_checks.CHARGE, -field_checks.CHARGE)
-    steps = fields.stepper(field_checks.RADIUS)
+    steps = field_checks.OWN_STEPPER
     early, late = (
         simulate([field_checks.pair(field_checks.CHARGED, part * time, steps, charges)])[0]
         for part in (0.999, 1.001)
@@ -211,3 +211,29 @@ def test_what_fields_do_to_one_flow_is_beside_the_same_starts():
     assert cells[0][2] == ""
     gain, half = (float(part) for part in cells[-2][2].split(" ± "))
     assert gain - half > 0.02
+
+
+@pytest.mark.parametrize(
+    "felt",
+    [
+        {"surface_charge": 3e-3, "charge_ratio": -1.0},
+        {"magnetic_field": 1.0},
+        {"surface_charge": 1e-3, "charge_ratio": 0.0, "electric_field": 5e6, "electric_amplitude": 2e6},
+    ],
+    ids=["charges", "moments", "electric field"],
+)
+def test_the_rate_is_that_of_two_touching_grains(felt):
+    """Its square is their acceleration over the radius, for charges of both classes and moments in line; of
+    an electric field alone it counts the largest charge."""
+    radius, design = 1e-3, {**BEST, **fields.NO_FIELDS, **felt}
+    mass = 4 / 3 * np.pi * radius**3 * design["density"]
+    charge = 4 * np.pi * radius**2 * design["surface_charge"]
+    m = moment(design["magnetic_field"], radius) if design["magnetic_field"] else 0.0
+    force = charge**2 / (4 * np.pi * epsilon_0 * 4 * radius**2) + 6 * mu_0 * m**2 / (
+        4 * np.pi * 16 * radius**4
+    )
+    force += charge * (design["electric_field"] + design["electric_amplitude"])
+    exact = np.sqrt(force / mass / radius)
+    # Iron at 1 T is not quite saturated.
+    assert 0.999 * exact < fields.rate(design, radius) < (1.15 if m else 1.001) * exact
+    assert fields.rate({**design, **fields.NO_FIELDS}, radius) == 0.0
