@@ -108,11 +108,7 @@ def closed_forms() -> Iterator[Check]:
     time = fall_time(MASS, CHARGE, START_DISTANCE, 2 * RADIUS)
     for name, stepper, bound in (
         (f"{STEPS} steps", Verlet(control=FixedStep(dt=time / STEPS)), FORM_BOUND),
-        (
-            "the steps of the case",
-            fields.stepper({**CHARGED, "density": GRAIN_DENSITY}, RADIUS),
-            OWN_STEPPER_BOUND,
-        ),
+        ("the steps of the case", OWN_STEPPER, OWN_STEPPER_BOUND),
     ):
         yield Check(f"opposite charges meet, in {name} (s)", meeting(stepper, time), time, bound * time)
 
