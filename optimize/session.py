@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from optimize.report import report
 from optimize.report.analysis import Analysis
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, check
+from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN, check, results_of
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
 from tisim.backend import runtime
@@ -91,36 +92,52 @@ def session(
     bar: Console,
     stopping: Callable[[], None],
     overwrite: bool = False,
+    begun: bool = False,
 ) -> Outcome:
     """Search, or go on with the search in the folder, and write what optimize.search_folder lists.
 
     say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
     search cleanly (Outcome.interrupted). overwrite : replace files of other origin that have such names.
-    InputError when the folder is another search's, has such files, or cannot be written. Other processes may
-    join the search, but not begin anew.
+    begun : refuse a search that has not begun there. InputError when the folder has searches of another
+    problem, or files of other origin, or cannot be written. Other processes may join the search, or make
+    others of the problem, but not begin anew.
     """
     claim(folder, SEARCH_FILES, overwrite)
     with lock.acquire(folder, exclusive=False):
         with Cache(folder / SEARCH_FILE) as cache:
-            if check(folder, cache, identity(problem, settings, evaluator.settings)):
-                line = f"going on with {folder / SEARCH_FILE}, which has {len(cache)} runs"
-                bar.print(line, highlight=False)
+            known = check(folder, cache, identity(problem, settings, evaluator.settings), begun)
+            if known or len(cache):
+                what = "going on with" if known else "another search in"
+                bar.print(f"{what} {folder / SEARCH_FILE}, which has {len(cache)} runs", highlight=False)
             outcome = _search_with_display(problem, settings, evaluator, cache, bar, stopping)
         paths = [folder / SEARCH_FILE]
         if outcome.best is not None:
-            paths += report.write(outcome, folder).values()
-            say.print(report.best_table(outcome))
-            say.print(report.notes(outcome))
-            if problem.met_at is not None:
-                say.print(report.met_table(outcome))
-            if not outcome.interrupted:
-                analysis = Analysis.of(outcome)
-                paths += analysis.write(folder)
-                for table in analysis.tables():
-                    say.print(table)
-                paths += _show_best(outcome.best, outcome, evaluator, folder, say)
+            paths += _write_results(outcome, outcome.best, evaluator, folder, say)
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
     return outcome
+
+
+def _write_results(
+    outcome: Outcome, best: Individual, evaluator: Evaluator, folder: Path, say: Console
+) -> list[Path]:
+    """Print what a search has found, and write its result files in place of those of any search before;
+    return their paths."""
+    problem = outcome.problem
+    analysis = None if outcome.interrupted else Analysis.of(outcome)
+    run = None if outcome.interrupted else _BestRun.of(best, outcome, evaluator)
+    say.print(report.best_table(outcome))
+    say.print(report.notes(outcome))
+    if problem.met_at is not None:
+        say.print(report.met_table(outcome))
+    with results_of(folder, outcome.name):
+        paths = [folder / SHOWN, *report.write(outcome, folder).values()]
+        if analysis is not None:
+            paths += analysis.write(folder)
+            for table in analysis.tables():
+                say.print(table)
+        if run is not None:
+            paths += run.write(problem, folder, say)
+    return paths
 
 
 def _search_with_display(
@@ -141,26 +158,41 @@ def _search_with_display(
         return search(problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step)
 
 
-def _show_best(
-    best: Individual, outcome: Outcome, evaluator: Evaluator, folder: Path, say: Console
-) -> list[Path]:
-    """Run the best design once more, from the first start, for its picture and what else it shows."""
-    problem, settings = outcome.problem, outcome.settings
-    design = problem.genome.decode(best)
-    own = None if settings.ensemble.common_starts else design
-    scene = problem.scene(design, start_seed(settings.seed, 0, own))
-    paths = []
-    if problem.function is None:
-        paths.append(folder / "best_scene.toml")
-        replace_file(paths[-1], scene.to_toml().encode())
-    if problem.picture is None and problem.details is None:
+@dataclass(frozen=True)
+class _BestRun:
+    """The best design of a search, run once more from the first start for its picture and what else it shows.
+
+    result : None where the problem says of neither.
+    """
+
+    design: dict[str, Any]
+    scene: Any
+    result: Any
+
+    @classmethod
+    def of(cls, best: Individual, outcome: Outcome, evaluator: Evaluator) -> _BestRun:
+        """Return that run."""
+        problem, settings = outcome.problem, outcome.settings
+        design = problem.genome.decode(best)
+        own = None if settings.ensemble.common_starts else design
+        scene = problem.scene(design, start_seed(settings.seed, 0, own))
+        if problem.picture is None and problem.details is None:
+            return cls(design, scene, None)
+        _, result = next(evaluator.evaluate([scene]))
+        return cls(design, scene, result)
+
+    def write(self, problem: Problem, folder: Path, say: Console) -> list[Path]:
+        """Write its scene and what it shows; return the paths."""
+        paths = []
+        if problem.function is None:
+            paths.append(folder / "best_scene.toml")
+            replace_file(paths[-1], self.scene.to_toml().encode())
+        if problem.details is not None:
+            details = problem.details(self.design, self.result)
+            paths.append(folder / "best_run.csv")
+            replace_file(paths[-1], report.details_csv(details))
+            say.print(report.details_table(details))
+        if (draw := problem.picture) is not None:
+            picture = folder / "best_cloud.png"
+            paths += pictures.write_beside_data(picture, lambda: draw(self.scene, self.result))
         return paths
-    _, result = next(evaluator.evaluate([scene]))
-    if problem.details is not None:
-        details = problem.details(design, result)
-        paths.append(folder / "best_run.csv")
-        replace_file(paths[-1], report.details_csv(details))
-        say.print(report.details_table(details))
-    if (draw := problem.picture) is not None:
-        paths += pictures.write_beside_data(folder / "best_cloud.png", lambda: draw(scene, result))
-    return paths

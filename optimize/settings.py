@@ -17,7 +17,7 @@ from tisim.errors import must
 
 METHOD = "genetic"
 """The method of a search for which none is given."""
-IDENTITY_FORMAT = 4
+IDENTITY_FORMAT = 5
 """The version of the identity below; it is raised when a search of before cannot be resumed any more."""
 
 
@@ -77,6 +77,11 @@ def _ensemble(method: type[SearchMethod], options: Any, given: Any) -> Any:
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
 _AFTERWARDS = {"select", "confirm"}
+_OF_THE_PROBLEM = (
+    "format", "problem", "problem_version", "problem_code", "units", "objectives", "objective_order",
+    "evaluator",
+)  # fmt: skip
+"""What two searches have in common whose runs are of the same kind."""
 
 
 def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any]) -> dict[str, Any]:
@@ -93,6 +98,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "problem_code": problem.identity,
         "genes": {gene.name: gene.described for gene in problem.genome.genes},
         "gene_order": list(problem.genome.names),
+        "units": {gene.name: gene.unit for gene in problem.genome.genes},
         **(
             {"constraints": {one.name: one.described for one in problem.constraints}}
             if problem.constraints
@@ -109,9 +115,18 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
     }
 
 
+def of_the_problem(identity: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of an identity that decides what a run of a design is, and what its values mean. Where
+    it is the same, runs are shared; ranges of genes, bounds of constraints, method, seed and all other
+    settings may differ."""
+    return {name: identity[name] for name in _OF_THE_PROBLEM if name in identity}
+
+
 def search_name(identity: Mapping[str, Any]) -> str:
-    """Return the name of the group of a search in its cache file."""
-    return f"searches/{identity['problem']}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
+    """Return the name of the group of a search in its cache file: by problem, method, seed, and a checksum of
+    all that decides its course."""
+    named = identity["problem"], identity["search"]["method"], str(identity["search"]["seed"])
+    return f"searches/{'-'.join(named)}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
 
 
 def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -117,7 +117,10 @@ def optimize(
     out_folder = folder or Path("out") / problem.name
     with closing(evaluator_for(problem, executor, device, precision, threads, arithmetic)) as evaluator:
         resume_or_clear(out_folder, fresh, overwrite)
-        outcome = session(problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite)
+        outcome = session(
+            problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite,
+            begun=fresh is False,
+        )  # fmt: skip
     if outcome.interrupted:
         err().print(
             f"stopped; {out_folder / SEARCH_FILE} has all that is done. {resume_hint(fresh, overwrite)}"
