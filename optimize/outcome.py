@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from deap import tools
 
+from optimize.beginning import NOTHING, Beginning
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.frames import data_frame
 from optimize.hall_of_fame import compromise
@@ -76,12 +77,13 @@ class Outcome:
     infinitely bad if there is none), and for one objective mean and std of the successful designs in the
     population (NaN if there is none), for several the number of designs in the front, and best for each.
     evaluations, hits : run, and found in the cache. stopped : the rule that ended it.
-    identity : see optimize.settings. name : of its group in the cache file.
+    beginning : what it began with. identity : see optimize.settings. name : of its group in the cache file.
     """
 
     problem: Problem
     settings: Settings
     identity: Mapping[str, Any]
+    beginning: Beginning = NOTHING
     hall: list[Individual] = field(default_factory=list)
     estimates: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     failures: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)

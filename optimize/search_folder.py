@@ -92,9 +92,9 @@ def resume_or_clear(
 def check(folder: Path, cache: Cache, requested: Mapping[str, Any], begun: bool = False) -> bool:
     """Return whether the cache file has the search of this identity, which is then gone on with.
 
-    begun : whether it has to. InputError where it has not, and where the file has runs of another problem.
+    The file has none of another problem (``check_problem``). begun : whether it has to; InputError where it
+    has not.
     """
-    check_problem(folder, "search", cache, requested)
     stored = {name: json.loads(attributes["identity"]) for name, attributes in searches(cache).items()}
     known = search_name(requested) in stored
     if begun and stored and not known:

@@ -11,6 +11,8 @@ from typing import Any
 
 from rich.console import Console
 
+from optimize.beginning import NOTHING, Beginning
+from optimize.designs_csv import Given
 from optimize.evaluation.executors import evaluator_for
 from optimize.evaluation.runs import Evaluator, start_seed
 from optimize.methods.individual import Individual
@@ -20,12 +22,14 @@ from optimize.report import report
 from optimize.report.analysis import Analysis
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN, check, results_of
+from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN, check, check_problem, results_of
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
+from optimize.warm_start import warmed
 from tisim.backend import runtime
 from tisim.console import err, print_stopping
 from tisim.console import out as standard_output
+from tisim.errors import must
 from tisim.files import lock, pictures
 from tisim.files.atomic import replace_file
 from tisim.files.ownership import claim
@@ -38,6 +42,9 @@ def run(
     out: str | Path | None = None,
     executor: str = "batch",
     verbose: bool = False,
+    starting_designs: Given | None = None,
+    experiments: Given | None = None,
+    warm_start: bool = False,
     **settings: Any,
 ) -> Outcome:
     """Search for the best design of a problem, or the front of several objectives.
@@ -47,21 +54,32 @@ def run(
     goes on there when it is run again. Without one nothing is kept but what is returned. executor : "batch"
     (this process), "processes:N" or "dask://HOST:PORT". verbose : show tables and a bar on the terminal.
 
+    starting_designs : designs that are run before generation 0, with every method: a CSV file with a column
+    for each gene, such as best.csv, or dictionaries by the names of genes. experiments : the same with what
+    was measured of each, and its standard error where that is known; the method learns from them and does not
+    run them (optimize.experiments). warm_start : learn from all runs in the folder that other searches of the
+    problem have left, and run the best of their designs first.
+
     Device, precision and arithmetic are those of ``tisim.init``. Ctrl-C ends the search, which says so in
     ``Outcome.stopped``. Other threads that call ``tisim.run``, or ``tisim.init`` with other settings, wait
     until a search in this process is over. InputError for settings that cannot be, before anything runs.
     """
     search_settings = Settings(**proposed(problem, settings, settings.get("method")))
-    fit(problem, search_settings)
+    beginning = Beginning.of(problem, starting_designs, experiments, warm_start)
+    must(not warm_start or out is not None, "warm_start", "given with a folder, out", warm_start)
+    fit(problem, search_settings, beginning)
     with ExitStack() as stack:
         evaluator = _evaluator(problem, executor, stack)
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
-            return session(problem, search_settings, evaluator, Path(out), say, bar, print_stopping)
+            return session(
+                problem, search_settings, evaluator, Path(out), say, bar, print_stopping, beginning=beginning
+            )
         with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / SEARCH_FILE) as cache:
             return _search_with_display(
                 problem,
                 search_settings,
+                beginning,
                 evaluator,
                 cache,
                 err() if verbose else Console(quiet=True),
@@ -93,6 +111,7 @@ def session(
     stopping: Callable[[], None],
     overwrite: bool = False,
     begun: bool = False,
+    beginning: Beginning = NOTHING,
 ) -> Outcome:
     """Search, or go on with the search in the folder, and write what optimize.search_folder lists.
 
@@ -105,11 +124,16 @@ def session(
     claim(folder, SEARCH_FILES, overwrite)
     with lock.acquire(folder, exclusive=False):
         with Cache(folder / SEARCH_FILE) as cache:
-            known = check(folder, cache, identity(problem, settings, evaluator.settings), begun)
+            check_problem(folder, "search", cache, identity(problem, settings, evaluator.settings))
+            beginning = warmed(cache, problem, settings, evaluator.settings, beginning)
+            requested = identity(problem, settings, evaluator.settings, beginning)
+            known = check(folder, cache, requested, begun)
             if known or len(cache):
                 what = "going on with" if known else "another search in"
                 bar.print(f"{what} {folder / SEARCH_FILE}, which has {len(cache)} runs", highlight=False)
-            outcome = _search_with_display(problem, settings, evaluator, cache, bar, stopping)
+            if beginning.warm is not None:
+                bar.print(f"a warm start from {len(beginning.warm)} designs", highlight=False)
+            outcome = _search_with_display(problem, settings, beginning, evaluator, cache, bar, stopping)
         paths = [folder / SEARCH_FILE]
         if outcome.best is not None:
             paths += _write_results(outcome, outcome.best, evaluator, folder, say)
@@ -143,6 +167,7 @@ def _write_results(
 def _search_with_display(
     problem: Problem,
     settings: Settings,
+    beginning: Beginning,
     evaluator: Evaluator,
     cache: Cache,
     bar: Console,
@@ -155,7 +180,10 @@ def _search_with_display(
             display.step(progress)
             ctrl_c.check()
 
-        return search(problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step)
+        return search(
+            problem, evaluator, cache, settings, beginning,
+            on_generation=display.generation, on_progress=step,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import Field, SerializeAsAny, model_validator
 
+from optimize.beginning import Beginning
 from optimize.evaluation.ensemble import EnsembleSettings
 from optimize.methods.base import SearchMethod, code_of, every, find
 from optimize.problem.problem import Problem
@@ -84,10 +85,12 @@ _OF_THE_PROBLEM = (
 """What two searches have in common whose runs are of the same kind."""
 
 
-def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any]) -> dict[str, Any]:
+def identity(
+    problem: Problem, settings: Settings, evaluator: Mapping[str, Any], beginning: Beginning | None = None
+) -> dict[str, Any]:
     """Return all that decides the course of a search: not when it stops, nor what is run again at its end.
 
-    evaluator : the settings of the evaluator.
+    evaluator : the settings of the evaluator. beginning : what it begins with; nothing unless given.
     """
     left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
     method_code = code_of(settings.method)
@@ -111,6 +114,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "objective_order": [one.name for one in problem.objectives],
         "search": settings.model_dump(mode="json", exclude=left_out),
         **({"method_code": method_code} if method_code else {}),
+        **({} if beginning is None else beginning.identity(problem)),
         "evaluator": dict(evaluator),
     }
 
@@ -146,12 +150,20 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
     return {**usual, "options": options}
 
 
-def fit(problem: Problem, settings: Settings) -> None:
-    """Raise InputError when the method, or a stopping rule, cannot be for the problem's objectives."""
+def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None) -> None:
+    """Raise InputError when the method, or a stopping rule, cannot be for the problem's objectives, or not
+    for what the search begins with."""
     if problem.several:
         able = [name for name, method in every().items() if method.several]
         must(settings.method in able, "method", f"for several objectives: {', '.join(able)}", settings.method)
         must(settings.target is None, "target", "left out for several objectives", settings.target)
+    if beginning is not None and beginning.experiments:
+        able = [name for name, method in every().items() if method.takes_experiments]
+        must(settings.method in able, "method", f"for experiments: {', '.join(able)}", settings.method)
+    if beginning is not None and settings.max_evaluations is not None:
+        first = len(beginning.designs)
+        rule = f"at most max_evaluations = {settings.max_evaluations}, as each of them is run"
+        must(first <= settings.max_evaluations, "number of starting designs", rule, first)
 
 
 def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:

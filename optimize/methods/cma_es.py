@@ -36,12 +36,14 @@ class CmaOptions(Checked):
 class CmaEs(SearchMethod):
     """N. Hansen and A. Ostermeier, Evol. Comput. 9 (2001) 159-195, as deap.cma.Strategy has it.
 
-    Starts in the middle of the range. A component outside the range is reflected at its bound, as often as
-    it takes, and the strategy learns from where the string was evaluated. Converged, it begins again from a
-    random middle with twice the population (A. Auger and N. Hansen, IEEE CEC (2005) 1769-1776).
+    Starts in the middle of the range, or at the best design that is known by then. A component outside the
+    range is reflected at its bound, as often as it takes, and the strategy learns from where the string was
+    evaluated. Converged, it begins again from a random middle with twice the population (A. Auger and N.
+    Hansen, IEEE CEC (2005) 1769-1776).
     """
 
     name = "cma-es"
+    takes_experiments = True
     Options = CmaOptions
 
     def __init__(self, genome: Genome, objectives: int, options: CmaOptions, seed: int) -> None:
@@ -49,6 +51,8 @@ class CmaEs(SearchMethod):
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
         sizes = {} if options.population is None else {"lambda_": options.population}
         self.strategy = cma.Strategy(np.full(len(genome), 0.5), options.sigma, **sizes)
+        self.start: Individual | None = None
+        self.begun = False
 
     @property
     def width(self) -> float:  # type: ignore[override]
@@ -57,7 +61,7 @@ class CmaEs(SearchMethod):
         return float(np.minimum(spread, 1.0).mean())
 
     def ask(self) -> list[Individual]:
-        now = self.strategy
+        now, self.begun = self.strategy, True
         normal = self.rng.standard_normal((now.lambda_, now.dim))
         return [Individual(point) for point in reflected(now.centroid + now.sigma * normal @ now.BD.T)]
 
@@ -71,6 +75,12 @@ class CmaEs(SearchMethod):
             middle = self.rng.random(now.dim)
             self.strategy = cma.Strategy(middle, self.options.sigma, lambda_=2 * now.lambda_)
             self.moved = True
+
+    def learn(self, strings: Sequence[Individual]) -> None:
+        known = [one for one in (self.start, *strings) if one is not None and not one.failed]
+        if known and not self.begun:
+            self.start = min(known, key=lambda string: string.fitness.values)
+            self.strategy.centroid = np.array(self.start)
 
 
 def reflected(points: NDArray[np.float64]) -> NDArray[np.float64]:
