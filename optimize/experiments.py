@@ -38,7 +38,7 @@ def experiments(given: Given, problem: Problem, what: str = "experiments") -> tu
         with naming(place):
             check_headings(problem, row)
             point = tuple(map(float, problem.genome.encode(design_of(problem, row))))
-            found.setdefault(point, []).append(_row_values(problem, row))
+            found.setdefault(point, []).append(row_values(problem, row))
     strings = []
     for point, of_design in found.items():
         with naming(what):
@@ -136,7 +136,7 @@ def _restored(problem: Problem, row: Mapping[str, Any]) -> Individual:
     return string
 
 
-def _row_values(problem: Problem, row: Mapping[str, str]) -> tuple[Values, Values, Values]:
+def row_values(problem: Problem, row: Mapping[str, str]) -> tuple[Values, Values, Values]:
     """Return the values of a row, their standard errors and the constraints of the result."""
     values, errors = [], []
     for objective in problem.objectives:

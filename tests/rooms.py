@@ -27,7 +27,7 @@ ROOMS = (
     "optimize.tables", "optimize.designs_csv", "optimize.experiments", "optimize.beginning",
     "optimize.settings",
     "optimize.outcome", "optimize.search_records", "optimize.search_folder", "optimize.search_file",
-    "optimize.warm_start",
+    "optimize.warm_start", "optimize.ask_tell",
     "optimize.conclusion", "optimize.search", "optimize.analysis",
     "optimize.report", "optimize.session", "optimize",
     "cases", "cases.statistics", "cases.case", "cases.runs", "cases.capture", "cases.*", "tisim.cli",
