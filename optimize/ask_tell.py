@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from optimize.beginning import Beginning
-from optimize.designs_csv import ASKED, GENERATION, Given, check_headings, design_of, naming, rows
+from optimize.designs_csv import WHETHER_ASKED, GENERATION, Given, check_headings, design_of, naming, rows
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.experiments import Values, known, row_values
 from optimize.hall_of_fame import Hall
@@ -264,7 +264,7 @@ class AskTell:
     def _heading(self) -> list[str]:
         problem = self.problem
         return [
-            GENERATION, ASKED, *(gene.label for gene in problem.genome.searched),
+            GENERATION, WHETHER_ASKED, *(gene.label for gene in problem.genome.searched),
             *(objective.label for objective in problem.objectives),
             *(error_of(objective.name) for objective in problem.objectives),
             *(constraint.name for constraint in problem.result_constraints),
@@ -291,12 +291,17 @@ class AskTell:
         self._content = content
         for place, row in rows(self._file, "campaign file"):
             with naming(place):
-                must({GENERATION, ASKED} <= set(row), "campaign file", "one of an AskTell", str(self._file))
+                must(
+                    {GENERATION, WHETHER_ASKED} <= set(row),
+                    "campaign file",
+                    "one of an AskTell",
+                    str(self._file),
+                )
                 point, tried = self._read(row)
                 self._go_on_to(row[GENERATION])
                 asked = self._same(point) in self._open
                 must(
-                    asked or row[ASKED] != "yes",
+                    asked or row[WHETHER_ASKED] != "yes",
                     "campaign file",
                     _SETTINGS,
                     Words("a design that was not asked for"),

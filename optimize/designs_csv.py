@@ -22,9 +22,9 @@ from tisim.files import regular_file
 
 MOST_ROWS = 10_000
 """The largest number of designs that are taken from a file."""
-GENERATION, ASKED = "generation", "asked"
+GENERATION, WHETHER_ASKED = "generation", "asked"
 """Headings of what a campaign of ask and tell keeps beside designs and values."""
-COUNTS = ("rank", "front", "starts", "converged", "failed", GENERATION, ASKED)
+COUNTS = ("rank", "front", "starts", "converged", "failed", GENERATION, WHETHER_ASKED)
 """Headings that result files have beside genes and values; they are not looked at."""
 Row = tuple[str, Mapping[str, str]]
 """Where a row stands, in words, and its cells by heading."""

@@ -165,7 +165,8 @@ class _Search:
         """Run the designs that the search begins with, as far as the budget goes; tell the method of them and
         of those that are known, each by what has more starts."""
         first = self.outcome.beginning.first(self.problem)
-        self._estimate(first, 0)
+        if first:
+            self._estimate(first, 0, part=0.0)
         first = [string for string in first if string.fitness.valid]
         strings = {tuple(string): string for string in first}
         for string in self.learned:
@@ -176,11 +177,14 @@ class _Search:
             self.method.learn(list(strings.values()) if self.method.takes_experiments else first)
         return first
 
-    def _estimate(self, population: list[Individual], generation: int) -> int:
-        """Estimate strings of unknown fitness, as far as the budget goes; return how many these were."""
+    def _estimate(self, population: list[Individual], generation: int, part: float = 1.0) -> int:
+        """Estimate strings of unknown fitness, as far as the budget goes; return how many these were. part :
+        of the generation that these are, by which progress is told."""
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
-        new_estimates = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
+        new_estimates = self.ensemble.estimate(
+            designs, lambda fraction: self._report(generation, part * fraction)
+        )
         for string, estimates in zip(fresh, new_estimates, strict=True):
             if estimates is not None:
                 string.know(estimates)

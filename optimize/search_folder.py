@@ -56,18 +56,18 @@ RESULT_FILES = (
     "best_cloud.png",
     "best_run.csv",
 )
-"""Names of the files that a search writes at its end, beside SHOWN."""
-SHOWN = "shown.json"
+"""Names of the files that a search writes at its end, beside SHOWN_FILE."""
+SHOWN_FILE = "shown.json"
 """Name of the file that says which search the result files are of."""
 SEARCH_FILES = (
-    SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", SHOWN, *RESULT_FILES, lock.LOCK,
+    SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", SHOWN_FILE, *RESULT_FILES, lock.LOCK,
 )  # fmt: skip
 """Names of all files that a search writes into its folder."""
 
 
 def resume_or_clear(
     folder: Path, fresh: bool | None, overwrite: bool,
-    command: str = "search", file: str = SEARCH_FILE, result_files: Sequence[str] = (SHOWN, *RESULT_FILES),
+    command: str = "search", file: str = SEARCH_FILE, result_files: Sequence[str] = (SHOWN_FILE, *RESULT_FILES),
 ) -> bool:  # fmt: skip
     """Return whether a command resumes what is in its folder (``resuming.resumes``); if not, remove that.
 
@@ -129,13 +129,13 @@ def check_problem(folder: Path, command: str, cache: Cache, requested: Mapping[s
 @contextmanager
 def results_of(folder: Path, name: str) -> Iterator[None]:
     """Write result files of the search of that name within this context, which other processes wait for.
-    SHOWN says that they are of it; those of another search are removed. RunError if the disk is full."""
+    SHOWN_FILE says that they are of it; those of another search are removed. RunError if the disk is full."""
     content = (json.dumps({"search": name.removeprefix("searches/")}) + "\n").encode()
     with locked(folder / ownership.MARKER, exclusive=True):
-        if regular_file.content(folder / SHOWN) != content:
+        if regular_file.content(folder / SHOWN_FILE) != content:
             for file in RESULT_FILES:
                 (folder / file).unlink(missing_ok=True)
-            replace_file(folder / SHOWN, content)
+            replace_file(folder / SHOWN_FILE, content)
         yield
 
 

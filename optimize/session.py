@@ -22,7 +22,7 @@ from optimize.report import report
 from optimize.report.analysis import Analysis
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN, check, check_problem, results_of
+from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN_FILE, check, check_problem, results_of
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
 from optimize.warm_start import warmed
@@ -154,7 +154,7 @@ def _write_results(
     if problem.met_at is not None:
         say.print(report.met_table(outcome))
     with results_of(folder, outcome.name):
-        paths = [folder / SHOWN, *report.write(outcome, folder).values()]
+        paths = [folder / SHOWN_FILE, *report.write(outcome, folder).values()]
         if analysis is not None:
             paths += analysis.write(folder)
             for table in analysis.tables():

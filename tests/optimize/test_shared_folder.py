@@ -119,7 +119,7 @@ def test_a_warm_start_goes_on_as_it_has_begun(tmp_path):
 
 
 def test_it_learns_only_from_what_it_could_ask_for(tmp_path):
-    constraint = DesignConstraint("x", lambda design: design["x"], "m", at_most=0.9)
+    constraint = DesignConstraint("place", lambda design: design["x"], "m", at_most=0.9)
     whole = problem(constraints=[constraint])
     optimize.run(whole, out=tmp_path, method="random", seed=1, generations=0)
     all_x = {record.design["x"] for record in existing(tmp_path / "search.h5").records()}

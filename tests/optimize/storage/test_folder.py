@@ -182,6 +182,35 @@ def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path,
     assert (code, err.strip()) == (2, "parents must be < population = 8; received 8")
 
 
+def test_a_search_begins_with_files_and_with_the_folder(optimize, tmp_path):
+    assert optimize("--seed", 1)[0] == 0
+    (tmp_path / "tried.csv").write_text("x0,x1 (m)\n0.25,0.5\n0.3,0.3\n")
+    (tmp_path / "measured.csv").write_text("x0,x1,fitness,std. error\n0.3,0.35,0.51,0.01\n0.9,0.9,1.2,0.01\n")
+    ways = {
+        "starting_designs": ("--start-from", "tried.csv"),
+        "experiments": ("--experiments", "measured.csv", "--method", "genetic"),
+        "warm_start": ("--warm-start", "--method", "genetic", "--seed", 2),
+    }
+    for way in ways.values():
+        assert optimize(*way)[0] == 0
+        assert optimize(*way, "--resume")[0] == 0
+    with Cache(tmp_path / "s/search.h5") as cache:
+        begun = {name.rpartition("/")[2]: cache.table(name) for name in cache.tables()}
+        assert begun["starting_designs"].columns == {"x0": [0.25, 0.3], "x1": [0.5, 0.3]}
+        assert begun["experiments"].columns["fitness std. deviation"] == [0.01, 0.01]
+        assert len(begun["warm_start"]) > 8
+        assert len(searches(cache)) == 4
+    code, err = optimize("--seed", 9, "--start-from", "tried.csv", "--resume")
+    assert "differs (search.seed is 0 there and 9 here)" in err
+    (tmp_path / "tried.csv").write_text("x0,x1 (m)\n0.25,0.5\n0.3,1.3\n")
+    code, err = optimize("--start-from", "tried.csv")
+    assert (code, err.strip()) == (
+        2, "tried.csv, line 3: gene x1 must be a number within 0..1 m; received 1.3",
+    )  # fmt: skip
+    code, err = optimize("--experiments", "measured.csv")
+    assert "method must be for experiments: cma-es, gaussian-process, genetic, nsga2; received" in err
+
+
 @pytest.mark.parametrize("name", ["best.csv", "convergence.png.new", "search.h5.journal", "best_scene.toml"])
 def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
     users = tmp_path / "s" / name
