@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from optimize.beginning import Beginning
-from optimize.designs_csv import WHETHER_ASKED, GENERATION, Given, check_headings, design_of, naming, rows
+from optimize.designs_csv import GENERATION, WHETHER_ASKED, Given, check_headings, design_of, naming, rows
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.experiments import Values, known, row_values
 from optimize.hall_of_fame import Hall

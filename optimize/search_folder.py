@@ -67,7 +67,8 @@ SEARCH_FILES = (
 
 def resume_or_clear(
     folder: Path, fresh: bool | None, overwrite: bool,
-    command: str = "search", file: str = SEARCH_FILE, result_files: Sequence[str] = (SHOWN_FILE, *RESULT_FILES),
+    command: str = "search", file: str = SEARCH_FILE,
+    result_files: Sequence[str] = (SHOWN_FILE, *RESULT_FILES),
 ) -> bool:  # fmt: skip
     """Return whether a command resumes what is in its folder (``resuming.resumes``); if not, remove that.
 
