@@ -13,6 +13,7 @@ from .analysis.sensitivity import (
 from .analysis.sensitivity import (
     sensitivity as sensitivity,
 )
+from .ask_tell import AskTell as AskTell
 from .evaluation.ensemble import EnsembleSettings as EnsembleSettings
 from .fitness_record import FitnessRecord as FitnessRecord
 from .outcome import (

@@ -10,6 +10,7 @@ import numpy as np
 from deap import tools
 from numpy.typing import NDArray
 
+from optimize.beginning import NOTHING, Beginning
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.frames import data_frame
 from optimize.hall_of_fame import compromise
@@ -79,12 +80,13 @@ class Outcome:
     infinitely bad if there is none), and for one objective mean and std of the successful designs in the
     population (NaN if there is none), for several the number of designs in the front, and best for each.
     evaluations, hits : run, and found in the cache. stopped : the rule that ended it.
-    identity : see optimize.settings. name : of its group in the cache file.
+    beginning : what it began with. identity : see optimize.settings. name : of its group in the cache file.
     """
 
     problem: Problem
     settings: Settings
     identity: Mapping[str, Any]
+    beginning: Beginning = NOTHING
     hall: list[Individual] = field(default_factory=list)
     estimates: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     quantities: dict[tuple[float, ...], NDArray[np.float64]] = field(default_factory=dict)

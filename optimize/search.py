@@ -6,11 +6,13 @@ on the same cache file: every finished evaluation comes from there, the rest fol
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from optimize.beginning import NOTHING, Beginning
 from optimize.conclusion import concluded, proven, reserve
 from optimize.evaluation.ensemble import Ensemble
 from optimize.evaluation.runs import Evaluator
@@ -39,18 +41,21 @@ def search(
     evaluator: Evaluator,
     cache: Cache,
     settings: Settings | None = None,
+    beginning: Beginning = NOTHING,
     *,
     on_generation: Callable[[Progress], None] | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Outcome:
     """Search for the problem's best design, or its front, over its genome.
 
-    on_generation is called after each generation, on_progress as evaluations finish. After each generation
-    settings, versions, logbook and hall of fame are in the cache file, below Outcome.name.
+    beginning : designs that are run first, and what is known of others. on_generation is called after each
+    generation, on_progress as evaluations finish. After each generation settings, versions, logbook and hall
+    of fame are in the cache file, below Outcome.name.
     KeyboardInterrupt ends the search cleanly and is reported in Outcome.stopped.
     Raises InputError for a method that cannot work on the problem, RunError if the disk is full.
     """
-    return _Search(problem, evaluator, cache, settings or Settings(), on_generation, on_progress).run()
+    wished = settings or Settings()
+    return _Search(problem, evaluator, cache, wished, beginning, on_generation, on_progress).run()
 
 
 class _Search:
@@ -62,10 +67,11 @@ class _Search:
         evaluator: Evaluator,
         cache: Cache,
         settings: Settings,
+        beginning: Beginning,
         on_generation: Callable[[Progress], None] | None,
         on_progress: Callable[[Progress], None] | None,
     ) -> None:
-        fit(problem, settings)
+        fit(problem, settings, beginning)
         self.problem, self.cache, self.settings = problem, cache, settings
         self.on_generation, self.on_progress = on_generation, on_progress
         self.ensemble = Ensemble(problem, evaluator, cache, settings.ensemble, settings.seed)
@@ -77,7 +83,9 @@ class _Search:
         self.ranked: list[Individual] = []
         self.tried: set[tuple[float, ...]] = set()  # designs that did not meet the target for sure
         self.stagnation = self.refused = 0
-        self.outcome = Outcome(problem, settings, identity(problem, settings, evaluator.settings))
+        self.learned = copy.deepcopy(beginning.learned)  # strings that have not run, whatever they are worth
+        identified = identity(problem, settings, evaluator.settings, beginning)
+        self.outcome = Outcome(problem, settings, identified, beginning)
         self.began = time.monotonic()
 
     def run(self) -> Outcome:
@@ -119,13 +127,16 @@ class _Search:
             width = self.method.width
             self.ensemble.budget = self._budget - reserve(self.problem, self.settings, self.ensemble)
             requested_before = self.ensemble.requested
-            population = self.method.ask()
-            fresh = self._estimate(population, generation)
-            population = [string for string in population if string.fitness.valid]
+            first = [] if generation else self._begin()
+            asked = self.method.ask()
+            fresh = len(first) + self._estimate(asked, generation)
+            asked = [string for string in asked if string.fitness.valid]
+            kept = set(map(id, asked))
+            population = [*asked, *(string for string in first if id(string) not in kept)]
             better = self.hall.update(population)
             self._race(population, generation)
             if not self.ensemble.exhausted:  # or the generation is not whole, and the last
-                self.method.tell(population, self.hall.strings)
+                self.method.tell(asked, self.hall.strings)
             self.stagnation = 0 if better else self.stagnation + 1
             self.outcome.logbook.record(
                 gen=generation,
@@ -152,11 +163,30 @@ class _Search:
             if self.outcome.stopped:
                 return
 
-    def _estimate(self, population: list[Individual], generation: int) -> int:
-        """Estimate strings of unknown fitness, as far as the budget goes; return how many these were."""
+    def _begin(self) -> list[Individual]:
+        """Run the designs that the search begins with, as far as the budget goes; tell the method of them and
+        of those that are known, each by what has more starts."""
+        first = self.outcome.beginning.first(self.problem)
+        if first:
+            self._estimate(first, 0, part=0.0)
+        first = [string for string in first if string.fitness.valid]
+        strings = {tuple(string): string for string in first}
+        for string in self.learned:
+            ran = strings.setdefault(tuple(string), string)
+            if string.estimates[0].starts > ran.estimates[0].starts:
+                strings[tuple(string)] = string
+        if strings:
+            self.method.learn(list(strings.values()) if self.method.takes_experiments else first)
+        return first
+
+    def _estimate(self, population: list[Individual], generation: int, part: float = 1.0) -> int:
+        """Estimate strings of unknown fitness, as far as the budget goes; return how many these were. part :
+        of the generation that these are, by which progress is told."""
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
-        new_estimates = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
+        new_estimates = self.ensemble.estimate(
+            designs, lambda fraction: self._report(generation, part * fraction)
+        )
         for string, estimates in zip(fresh, new_estimates, strict=True):
             if estimates is not None:
                 string.know(estimates)
@@ -169,10 +199,11 @@ class _Search:
     def _constrain(self, fresh: list[Individual]) -> None:
         """Let designs that do not keep to a constraint of the result come behind all that do, by how far."""
         constraints = self.problem.result_constraints
-        known = [string for string in self.known.values() if not string.failed]
+        ran = [string for string in self.known.values() if not string.failed]
+        known = [*(string for string in self.learned if not string.failed), *ran]
         if not constraints or not known:
             return
-        for string in (*known, *(one for one in fresh if one.fitness.valid and not one.failed)):
+        for string in (*ran, *(one for one in fresh if one.fitness.valid and not one.failed)):
             string.limit(constraints, self.ensemble.constraint_means(self.problem.genome.decode(string)))
         costs = [[estimate.mean for estimate in string.estimates] for string in known]
         ordered = penalised(costs, [string.violation for string in known])

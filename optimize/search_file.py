@@ -15,7 +15,7 @@ from optimize.search_folder import SEARCH_FILE
 from optimize.search_records import searches
 from optimize.storage.cache import Cache, existing
 from optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE, descriptions
-from optimize.storage.runs_table import RunsTable, packed
+from optimize.storage.runs_table import RunsTable
 from optimize.tables import error_of
 from tisim.errors import must
 from tisim.files.regular_file import is_folder
@@ -130,7 +130,7 @@ def _text(column: NDArray[Any]) -> NDArray[Any]:
 
 def _designs(part: RunsTable) -> dict[str, NDArray[Any]]:
     """Return the columns of the different designs of a table of runs, in the order of their first runs."""
-    first, design = _different(part)
+    first, design = part.designs()
     ok = part.facts["ok"] == 1
     columns = {name: _text(column[first]) for name, column in part.genes.items()}
     for name, values in part.values.items():
@@ -141,17 +141,6 @@ def _designs(part: RunsTable) -> dict[str, NDArray[Any]]:
     failed = np.flatnonzero(~ok)[::-1]  # the first of a design is written last
     reasons[design[failed]] = _text(part.facts["reason"][failed])
     return {**columns, "failed": reasons}
-
-
-def _different(part: RunsTable) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the row of the first run of each design, and the number of the design of each run."""
-    designs = packed(part.genes.values())
-    same_bytes = designs.view(f"V{designs.shape[1]}").ravel()
-    _, first, design = np.unique(same_bytes, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    number = np.empty(len(first), dtype=int)
-    number[order] = np.arange(len(first))
-    return first[order], number[design]
 
 
 def _means(values: NDArray[Any], design: NDArray[Any], designs: int) -> tuple[NDArray[Any], NDArray[Any]]:

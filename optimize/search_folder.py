@@ -1,6 +1,10 @@
-"""The folder of a search: it belongs to one search, and to no other until that is to be overwritten.
+"""The folder of the searches of one problem. They share their runs; another problem is refused there.
 
-search.h5         every evaluation, the settings, logbooks and best designs; all that is needed to go on
+search.h5         every run, and of each search settings, logbook and best designs: all that it takes to go on
+
+All others are of the search that ended last with a design:
+
+shown.json        its name in search.h5
 best.csv          the best designs, all digits
 met.csv           all that meet what is asked, where the problem says which do
 calibration.csv   (and .png, .pdf) each gene with its 95 % interval, where the objective is the misfit of what
@@ -17,18 +21,19 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from optimize.search_records import searches
-from optimize.settings import IDENTITY_FORMAT, search_name
+from optimize.settings import IDENTITY_FORMAT, of_the_problem, search_name
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
 from tisim import InputError
 from tisim.errors import abbreviated, must
-from tisim.files import lock, ownership
-from tisim.files.atomic import locked
+from tisim.files import lock, ownership, regular_file
+from tisim.files.atomic import locked, replace_file
 from tisim.files.regular_file import file_status
 from tisim.files.resuming import resumes
 
@@ -51,14 +56,19 @@ RESULT_FILES = (
     "best_cloud.png",
     "best_run.csv",
 )
-"""Names of the files that a search writes at its end."""
-SEARCH_FILES = (SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", *RESULT_FILES, lock.LOCK)
+"""Names of the files that a search writes at its end, beside SHOWN_FILE."""
+SHOWN_FILE = "shown.json"
+"""Name of the file that says which search the result files are of."""
+SEARCH_FILES = (
+    SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", SHOWN_FILE, *RESULT_FILES, lock.LOCK,
+)  # fmt: skip
 """Names of all files that a search writes into its folder."""
 
 
 def resume_or_clear(
     folder: Path, fresh: bool | None, overwrite: bool,
-    command: str = "search", file: str = SEARCH_FILE, result_files: Sequence[str] = RESULT_FILES,
+    command: str = "search", file: str = SEARCH_FILE,
+    result_files: Sequence[str] = (SHOWN_FILE, *RESULT_FILES),
 ) -> bool:  # fmt: skip
     """Return whether a command resumes what is in its folder (``resuming.resumes``); if not, remove that.
 
@@ -80,39 +90,67 @@ def resume_or_clear(
     return resume
 
 
-def check(folder: Path, cache: Cache, requested: Mapping[str, Any]) -> bool:
-    """Return whether the cache file has the search of this identity; InputError when it has another."""
-    stored_searches = searches(cache)
-    if stored_searches and search_name(requested) not in stored_searches:
-        refuse(folder, "search", json.loads(next(iter(stored_searches.values()))["identity"]), requested)
-    return bool(stored_searches)
+def check(folder: Path, cache: Cache, requested: Mapping[str, Any], begun: bool = False) -> bool:
+    """Return whether the cache file has the search of this identity, which is then gone on with.
 
-
-def refuse(folder: Path, command: str, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> NoReturn:
-    """Raise the InputError that says in what the identities of the stored and the requested search differ.
-
-    command : "search", or what else the folder is of.
+    The file has none of another problem (``check_problem``). begun : whether it has to; InputError where it
+    has not.
     """
-    must(
-        stored.get("format") == IDENTITY_FORMAT,
-        "output folder",
-        f"of a {command} of this version of the program (or give --out or --overwrite)",
-        str(folder),
-    )
-    old = _leaves(stored)
-    new = _leaves(json.loads(canonical(requested)))
+    stored = {name: json.loads(attributes["identity"]) for name, attributes in searches(cache).items()}
+    known = search_name(requested) in stored
+    if begun and stored and not known:
+        nearest = min((_differences(one, requested) for one in stored.values()), key=len)
+        raise InputError(
+            f"output folder must be one in which this search has begun; received {str(folder)!r}, where the "
+            f"most similar one differs ({'; '.join(nearest)})"
+        )
+    return known
+
+
+def check_problem(folder: Path, command: str, cache: Cache, requested: Mapping[str, Any]) -> None:
+    """Raise InputError where the cache file has searches of another problem than that of an identity, and say
+    in what it differs. command : "search", or what else the folder is of."""
+    for attributes in searches(cache).values():
+        stored = json.loads(attributes["identity"])
+        must(
+            stored.get("format") == IDENTITY_FORMAT,
+            "output folder",
+            f"of a {command} of this version of the program (or give --out or --overwrite)",
+            str(folder),
+        )
+        differences = _differences(of_the_problem(stored), of_the_problem(requested))
+        if differences:
+            raise InputError(
+                f"output folder must be free of a {command} of another problem; received {str(folder)!r}, "
+                f"which holds one that differs ({'; '.join(differences)}). Use another --out, or --overwrite "
+                "to replace it"
+            )
+
+
+@contextmanager
+def results_of(folder: Path, name: str) -> Iterator[None]:
+    """Write result files of the search of that name within this context, which other processes wait for.
+    SHOWN_FILE says that they are of it; those of another search are removed. RunError if the disk is full."""
+    content = (json.dumps({"search": name.removeprefix("searches/")}) + "\n").encode()
+    with locked(folder / ownership.MARKER, exclusive=True):
+        if regular_file.content(folder / SHOWN_FILE) != content:
+            for file in RESULT_FILES:
+                (folder / file).unlink(missing_ok=True)
+            replace_file(folder / SHOWN_FILE, content)
+        yield
+
+
+def _differences(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list[str]:
+    """Return in what two identities differ, in words."""
+    old, new = _leaves(stored), _leaves(json.loads(canonical(requested)))
     names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
     # Of the functions only a checksum is kept.
-    differences = "; ".join(
+    return [
         "the problem file, or a value that its functions use, has changed"
         if name == "problem_code"
         else f"{name} is {_shown(old, name)} there and {_shown(new, name)} here"
         for name in names
-    )
-    raise InputError(
-        f"output folder must be free of another {command}; received {str(folder)!r}, which holds one that "
-        f"differs ({differences}). Use another --out, or --overwrite to replace it"
-    )
+    ]
 
 
 def _shown(leaves: Mapping[str, Any], name: str) -> str:

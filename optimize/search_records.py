@@ -10,6 +10,7 @@ from typing import Any
 
 import deap
 
+from optimize.experiments import table_of
 from optimize.outcome import Outcome
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
@@ -17,6 +18,10 @@ from optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE
 from optimize.storage.record import canonical
 from optimize.tables import best_columns, logbook_columns, units
 from tisim.io.run_folder import versions
+
+WARM_START = "warm_start"
+"""Name of the table of what runs of other searches had found when a search began; in an identity its
+checksum."""
 
 
 def store(cache: Cache, outcome: Outcome) -> None:
@@ -33,7 +38,8 @@ def store(cache: Cache, outcome: Outcome) -> None:
         "versions": json.dumps({**versions(), "deap": deap.__version__}),
         "stopped": outcome.stopped,
     }
-    cache.put_table(name, {}, attributes)
+    for below, columns in beginning_tables(outcome).items():
+        cache.put_table(f"{name}/{below}", columns)
     cache.put_table(f"{name}/{GENES_TABLE}", genes(problem))
     cache.put_table(f"{name}/{OBJECTIVES_TABLE}", objectives(problem))
     for below, columns in (
@@ -42,8 +48,23 @@ def store(cache: Cache, outcome: Outcome) -> None:
     ):
         about = {heading: {"unit": unit} for heading, unit in units(problem).items() if heading in columns}
         cache.put_table(f"{name}/{below}", columns, about=about)
+    cache.put_table(name, {}, attributes)
     if outcome.stopped or not outcome.logbook:
         cache.fold()
+
+
+def beginning_tables(outcome: Outcome) -> dict[str, dict[str, list[Any]]]:
+    """Return the columns of the tables of what a search begins with, where it begins with anything."""
+    problem, beginning = outcome.problem, outcome.beginning
+    tables = {}
+    if beginning.designs:
+        names = beginning.designs[0]
+        tables["starting_designs"] = {name: [design[name] for design in beginning.designs] for name in names}
+    if beginning.experiments:
+        tables["experiments"] = table_of(problem, beginning.experiments)
+    if beginning.warm is not None:
+        tables[WARM_START] = table_of(problem, beginning.warm)
+    return tables
 
 
 def genes(problem: Problem) -> dict[str, list[Any]]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from optimize.beginning import NOTHING, Beginning
+from optimize.designs_csv import Given
 from optimize.evaluation.executors import evaluator_for
 from optimize.evaluation.runs import Evaluator, start_seed
 from optimize.methods.individual import Individual
@@ -19,12 +22,14 @@ from optimize.report import report
 from optimize.report.analysis import Analysis
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, check
+from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN_FILE, check, check_problem, results_of
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
+from optimize.warm_start import warmed
 from tisim.backend import runtime
 from tisim.console import err, print_stopping
 from tisim.console import out as standard_output
+from tisim.errors import must
 from tisim.files import lock, pictures
 from tisim.files.atomic import replace_file
 from tisim.files.ownership import claim
@@ -37,6 +42,9 @@ def run(
     out: str | Path | None = None,
     executor: str = "batch",
     verbose: bool = False,
+    starting_designs: Given | None = None,
+    experiments: Given | None = None,
+    warm_start: bool = False,
     **settings: Any,
 ) -> Outcome:
     """Search for the best design of a problem, or the front of several objectives.
@@ -46,21 +54,32 @@ def run(
     goes on there when it is run again. Without one nothing is kept but what is returned. executor : "batch"
     (this process), "processes:N" or "dask://HOST:PORT". verbose : show tables and a bar on the terminal.
 
+    starting_designs : designs that are run before generation 0, with every method: a CSV file with a column
+    for each gene, such as best.csv, or dictionaries by the names of genes. experiments : the same with what
+    was measured of each, and its standard error where that is known; the method learns from them and does not
+    run them (optimize.experiments). warm_start : learn from all runs in the folder that other searches of the
+    problem have left, and run the best of their designs first.
+
     Device, precision and arithmetic are those of ``tisim.init``. Ctrl-C ends the search, which says so in
     ``Outcome.stopped``. Other threads that call ``tisim.run``, or ``tisim.init`` with other settings, wait
     until a search in this process is over. InputError for settings that cannot be, before anything runs.
     """
     search_settings = Settings(**proposed(problem, settings, settings.get("method")))
-    fit(problem, search_settings)
+    beginning = Beginning.of(problem, starting_designs, experiments, warm_start)
+    must(not warm_start or out is not None, "warm_start", "given with a folder, out", warm_start)
+    fit(problem, search_settings, beginning)
     with ExitStack() as stack:
         evaluator = _evaluator(problem, executor, stack)
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
-            return session(problem, search_settings, evaluator, Path(out), say, bar, print_stopping)
+            return session(
+                problem, search_settings, evaluator, Path(out), say, bar, print_stopping, beginning=beginning
+            )
         with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / SEARCH_FILE) as cache:
             return _search_with_display(
                 problem,
                 search_settings,
+                beginning,
                 evaluator,
                 cache,
                 err() if verbose else Console(quiet=True),
@@ -91,41 +110,64 @@ def session(
     bar: Console,
     stopping: Callable[[], None],
     overwrite: bool = False,
+    begun: bool = False,
+    beginning: Beginning = NOTHING,
 ) -> Outcome:
     """Search, or go on with the search in the folder, and write what optimize.search_folder lists.
 
     say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
     search cleanly (Outcome.interrupted). overwrite : replace files of other origin that have such names.
-    InputError when the folder is another search's, has such files, or cannot be written. Other processes may
-    join the search, but not begin anew.
+    begun : refuse a search that has not begun there. InputError when the folder has searches of another
+    problem, or files of other origin, or cannot be written. Other processes may join the search, or make
+    others of the problem, but not begin anew.
     """
     claim(folder, SEARCH_FILES, overwrite)
     with lock.acquire(folder, exclusive=False):
         with Cache(folder / SEARCH_FILE) as cache:
-            if check(folder, cache, identity(problem, settings, evaluator.settings)):
-                line = f"going on with {folder / SEARCH_FILE}, which has {len(cache)} runs"
-                bar.print(line, highlight=False)
-            outcome = _search_with_display(problem, settings, evaluator, cache, bar, stopping)
+            check_problem(folder, "search", cache, identity(problem, settings, evaluator.settings))
+            beginning = warmed(cache, problem, settings, evaluator.settings, beginning)
+            requested = identity(problem, settings, evaluator.settings, beginning)
+            known = check(folder, cache, requested, begun)
+            if known or len(cache):
+                what = "going on with" if known else "another search in"
+                bar.print(f"{what} {folder / SEARCH_FILE}, which has {len(cache)} runs", highlight=False)
+            if beginning.warm is not None:
+                bar.print(f"a warm start from {len(beginning.warm)} designs", highlight=False)
+            outcome = _search_with_display(problem, settings, beginning, evaluator, cache, bar, stopping)
         paths = [folder / SEARCH_FILE]
         if outcome.best is not None:
-            paths += report.write(outcome, folder).values()
-            say.print(report.best_table(outcome))
-            say.print(report.notes(outcome))
-            if problem.met_at is not None:
-                say.print(report.met_table(outcome))
-            if not outcome.interrupted:
-                analysis = Analysis.of(outcome)
-                paths += analysis.write(folder)
-                for table in analysis.tables():
-                    say.print(table)
-                paths += _show_best(outcome.best, outcome, evaluator, folder, say)
+            paths += _write_results(outcome, outcome.best, evaluator, folder, say)
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
     return outcome
+
+
+def _write_results(
+    outcome: Outcome, best: Individual, evaluator: Evaluator, folder: Path, say: Console
+) -> list[Path]:
+    """Print what a search has found, and write its result files in place of those of any search before;
+    return their paths."""
+    problem = outcome.problem
+    analysis = None if outcome.interrupted else Analysis.of(outcome)
+    run = None if outcome.interrupted else _BestRun.of(best, outcome, evaluator)
+    say.print(report.best_table(outcome))
+    say.print(report.notes(outcome))
+    if problem.met_at is not None:
+        say.print(report.met_table(outcome))
+    with results_of(folder, outcome.name):
+        paths = [folder / SHOWN_FILE, *report.write(outcome, folder).values()]
+        if analysis is not None:
+            paths += analysis.write(folder)
+            for table in analysis.tables():
+                say.print(table)
+        if run is not None:
+            paths += run.write(problem, folder, say)
+    return paths
 
 
 def _search_with_display(
     problem: Problem,
     settings: Settings,
+    beginning: Beginning,
     evaluator: Evaluator,
     cache: Cache,
     bar: Console,
@@ -138,29 +180,47 @@ def _search_with_display(
             display.step(progress)
             ctrl_c.check()
 
-        return search(problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step)
+        return search(
+            problem, evaluator, cache, settings, beginning,
+            on_generation=display.generation, on_progress=step,
+        )  # fmt: skip
 
 
-def _show_best(
-    best: Individual, outcome: Outcome, evaluator: Evaluator, folder: Path, say: Console
-) -> list[Path]:
-    """Run the best design once more, from the first start, for its picture and what else it shows."""
-    problem, settings = outcome.problem, outcome.settings
-    design = problem.genome.decode(best)
-    own = None if settings.ensemble.common_starts else design
-    scene = problem.scene(design, start_seed(settings.seed, 0, own))
-    paths = []
-    if problem.function is None:
-        paths.append(folder / "best_scene.toml")
-        replace_file(paths[-1], scene.to_toml().encode())
-    if problem.picture is None and problem.details is None:
+@dataclass(frozen=True)
+class _BestRun:
+    """The best design of a search, run once more from the first start for its picture and what else it shows.
+
+    result : None where the problem says of neither.
+    """
+
+    design: dict[str, Any]
+    scene: Any
+    result: Any
+
+    @classmethod
+    def of(cls, best: Individual, outcome: Outcome, evaluator: Evaluator) -> _BestRun:
+        """Return that run."""
+        problem, settings = outcome.problem, outcome.settings
+        design = problem.genome.decode(best)
+        own = None if settings.ensemble.common_starts else design
+        scene = problem.scene(design, start_seed(settings.seed, 0, own))
+        if problem.picture is None and problem.details is None:
+            return cls(design, scene, None)
+        _, result = next(evaluator.evaluate([scene]))
+        return cls(design, scene, result)
+
+    def write(self, problem: Problem, folder: Path, say: Console) -> list[Path]:
+        """Write its scene and what it shows; return the paths."""
+        paths = []
+        if problem.function is None:
+            paths.append(folder / "best_scene.toml")
+            replace_file(paths[-1], self.scene.to_toml().encode())
+        if problem.details is not None:
+            details = problem.details(self.design, self.result)
+            paths.append(folder / "best_run.csv")
+            replace_file(paths[-1], report.details_csv(details))
+            say.print(report.details_table(details))
+        if (draw := problem.picture) is not None:
+            picture = folder / "best_cloud.png"
+            paths += pictures.write_beside_data(picture, lambda: draw(self.scene, self.result))
         return paths
-    _, result = next(evaluator.evaluate([scene]))
-    if problem.details is not None:
-        details = problem.details(design, result)
-        paths.append(folder / "best_run.csv")
-        replace_file(paths[-1], report.details_csv(details))
-        say.print(report.details_table(details))
-    if (draw := problem.picture) is not None:
-        paths += pictures.write_beside_data(folder / "best_cloud.png", lambda: draw(scene, result))
-    return paths

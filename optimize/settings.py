@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import Field, SerializeAsAny, model_validator
 
+from optimize.beginning import Beginning
 from optimize.evaluation.ensemble import EnsembleSettings
 from optimize.methods.base import SearchMethod, code_of, every, find
 from optimize.problem.problem import Problem
@@ -17,7 +18,7 @@ from tisim.errors import must
 
 METHOD = "genetic"
 """The method of a search for which none is given."""
-IDENTITY_FORMAT = 4
+IDENTITY_FORMAT = 5
 """The version of the identity below; it is raised when a search of before cannot be resumed any more."""
 
 
@@ -77,12 +78,19 @@ def _ensemble(method: type[SearchMethod], options: Any, given: Any) -> Any:
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
 _AFTERWARDS = {"select", "confirm"}
+_OF_THE_PROBLEM = (
+    "format", "problem", "problem_version", "problem_code", "units", "objectives", "objective_order",
+    "evaluator",
+)  # fmt: skip
+"""What two searches have in common whose runs are of the same kind."""
 
 
-def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any]) -> dict[str, Any]:
+def identity(
+    problem: Problem, settings: Settings, evaluator: Mapping[str, Any], beginning: Beginning | None = None
+) -> dict[str, Any]:
     """Return all that decides the course of a search: not when it stops, nor what is run again at its end.
 
-    evaluator : the settings of the evaluator.
+    evaluator : the settings of the evaluator. beginning : what it begins with; nothing unless given.
     """
     left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
     method_code = code_of(settings.method)
@@ -93,6 +101,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "problem_code": problem.identity,
         "genes": {gene.name: gene.described for gene in problem.genome.genes},
         "gene_order": list(problem.genome.names),
+        "units": {gene.name: gene.unit for gene in problem.genome.genes},
         **(
             {"constraints": {one.name: one.described for one in problem.constraints}}
             if problem.constraints
@@ -107,13 +116,23 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "objective_order": [one.name for one in problem.objectives],
         "search": settings.model_dump(mode="json", exclude=left_out),
         **({"method_code": method_code} if method_code else {}),
+        **({} if beginning is None else beginning.identity(problem)),
         "evaluator": dict(evaluator),
     }
 
 
+def of_the_problem(identity: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of an identity that decides what a run of a design is, and what its values mean. Where
+    it is the same, runs are shared; ranges of genes, bounds of constraints, method, seed and all other
+    settings may differ."""
+    return {name: identity[name] for name in _OF_THE_PROBLEM if name in identity}
+
+
 def search_name(identity: Mapping[str, Any]) -> str:
-    """Return the name of the group of a search in its cache file."""
-    return f"searches/{identity['problem']}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
+    """Return the name of the group of a search in its cache file: by problem, method, seed, and a checksum of
+    all that decides its course."""
+    named = identity["problem"], identity["search"]["method"], str(identity["search"]["seed"])
+    return f"searches/{'-'.join(named)}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
 
 
 def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -133,9 +152,9 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
     return {**usual, "options": options}
 
 
-def fit(problem: Problem, settings: Settings) -> None:
+def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None) -> None:
     """Raise InputError when the method, a stopping rule or the number of starts cannot be for the problem's
-    objectives."""
+    objectives, or not for what the search begins with."""
     for objective in problem.objectives:
         fewest = objective.statistic.fewest_starts
         must(
@@ -148,6 +167,13 @@ def fit(problem: Problem, settings: Settings) -> None:
         able = [name for name, method in every().items() if method.several]
         must(settings.method in able, "method", f"for several objectives: {', '.join(able)}", settings.method)
         must(settings.target is None, "target", "left out for several objectives", settings.target)
+    if beginning is not None and beginning.experiments:
+        able = [name for name, method in every().items() if method.takes_experiments]
+        must(settings.method in able, "method", f"for experiments: {', '.join(able)}", settings.method)
+    if beginning is not None and settings.max_evaluations is not None:
+        first = len(beginning.designs)
+        rule = f"at most max_evaluations = {settings.max_evaluations}, as each of them is run"
+        must(first <= settings.max_evaluations, "number of starting designs", rule, first)
 
 
 def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:

@@ -27,12 +27,16 @@ class SearchMethod(ABC):
     2. ``tell`` gets all of them, all with a fitness (of costs, to be minimised; +inf for failed ones), and
        the hall: the best designs so far, or the front. Strings keep their identity: a fitness may have
        changed since, because more starts were spent on the design.
-    3. Its random numbers are its own and follow from the seed alone. What it asks is a function of the seed
+    3. ``learn`` gets strings that it has not asked for, between generations: designs of the user, which have
+       run before generation 0, and designs whose worth is known.
+    4. Its random numbers are its own and follow from the seed alone. What it asks is a function of the seed
        and of what it was told: to resume a search is to run it again from the start with the same cache.
 
     name : as in ``--method NAME``; several : whether it can search for several objectives at once.
     own_starts : whether it works best where each design has random starts of its own, and not the same as all
     others: a method that fits a function through noisy means is led astray by noise that they share.
+    takes_experiments : whether it learns from designs that the search has not run: it asks for none of what
+    ``learn`` has given it.
     ensemble : settings of the ensemble that are its own.
     Options : its settings, as in ``--set search.options.KEY=VALUE``. dependent_options : by option, those
     whose defaults depend on it: a case's own values of those go with its own value of this one.
@@ -43,6 +47,7 @@ class SearchMethod(ABC):
     name: ClassVar[str]
     several: ClassVar[bool] = False
     own_starts: ClassVar[bool] = False
+    takes_experiments: ClassVar[bool] = False
     ensemble: ClassVar[Mapping[str, Any]] = {}
     Options: ClassVar[type[Checked]]
     dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {}
@@ -65,6 +70,10 @@ class SearchMethod(ABC):
     @abstractmethod
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         """Learn what the strings of the last ``ask`` are worth."""
+
+    def learn(self, strings: Sequence[Individual]) -> None:  # noqa: B027
+        """Take in strings that it has not asked for, all with a fitness and different. A method that does not
+        say how knows of them by the hall alone."""
 
 
 def every() -> dict[str, type[SearchMethod]]:

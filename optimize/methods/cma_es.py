@@ -39,12 +39,13 @@ class CmaOptions(Checked):
 class CmaEs(SearchMethod):
     """N. Hansen and A. Ostermeier, Evol. Comput. 9 (2001) 159-195, as deap.cma.Strategy has it.
 
-    Starts in the middle of the range. The strategy searches a space without bounds, of which ``within`` gives
-    the genes. Converged, it begins again from a random middle with twice the population (A. Auger and
-    N. Hansen, IEEE CEC (2005) 1769-1776).
+    Starts in the middle of the range, or at the best design that is known by then. The strategy searches a
+    space without bounds, of which ``within`` gives the genes. Converged, it begins again from a random middle
+    with twice the population (A. Auger and N. Hansen, IEEE CEC (2005) 1769-1776).
     """
 
     name = "cma-es"
+    takes_experiments = True
     Options = CmaOptions
 
     def __init__(self, genome: Genome, objectives: int, options: CmaOptions, seed: int) -> None:
@@ -53,6 +54,8 @@ class CmaEs(SearchMethod):
         sizes = {} if options.population is None else {"lambda_": options.population}
         self.strategy = cma.Strategy(np.full(len(genome), 0.5), options.sigma, **sizes)
         self.asked: dict[tuple[float, ...], NDArray[np.float64]] = {}
+        self.start: Individual | None = None
+        self.begun = False
 
     @property
     def width(self) -> float:  # type: ignore[override]
@@ -61,7 +64,7 @@ class CmaEs(SearchMethod):
         return float(np.minimum(spread, 1.0).mean())
 
     def ask(self) -> list[Individual]:
-        now = self.strategy
+        now, self.begun = self.strategy, True
         normal = self.rng.standard_normal((now.lambda_, now.dim))
         points = folded(now.centroid + now.sigma * normal @ now.BD.T)
         strings = [Individual(point) for point in within(points)]
@@ -79,6 +82,12 @@ class CmaEs(SearchMethod):
             self.strategy = cma.Strategy(middle, self.options.sigma, lambda_=2 * now.lambda_)
             self.moved = True
 
+    def learn(self, strings: Sequence[Individual]) -> None:
+        known = [one for one in (self.start, *strings) if one is not None and not one.failed]
+        if known and not self.begun:
+            self.start = min(known, key=lambda string: string.fitness.values)
+            self.strategy.centroid = drawn_of(np.array(self.start))
+
     def _as_drawn(self, string: Individual) -> Individual:
         """Return a string where the strategy has drawn it, with its fitness."""
         drawn = Individual(self.asked.get(tuple(string), string))
@@ -95,6 +104,12 @@ def within(points: NDArray[np.float64]) -> NDArray[np.float64]:
     low, high = points < EDGE, points > 1 - EDGE
     inside = np.where(low, (points + EDGE) ** 2 / (4 * EDGE), points)
     return np.clip(np.where(high, 1 - (1 + EDGE - points) ** 2 / (4 * EDGE), inside), 0.0, 1.0)
+
+
+def drawn_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the points of [-EDGE, 1 + EDGE] of which ``within`` gives these."""
+    low, high = 2 * np.sqrt(EDGE * points) - EDGE, 1 + EDGE - 2 * np.sqrt(EDGE * (1 - points))
+    return np.where(points < EDGE, low, np.where(points > 1 - EDGE, high, points))
 
 
 def folded(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -45,15 +45,17 @@ class GaussianProcessOptions(Checked):
 class GaussianProcessSearch(SearchMethod):
     """Bayesian optimisation with a Gaussian process of known noise; see optimize.surrogate.
 
-    Generation 0 is a scrambled Sobol' sequence. Then each batch is chosen by expected improvement, or by the
-    hypervolume of several objectives, from designs all over the range and around the best. Where designs are
-    without noise, half of the batch is chosen by a process of its own in a region around the best, which
-    shrinks and grows as it finds less or more (D. Eriksson and others, NeurIPS 32 (2019)).
+    Generation 0 is a scrambled Sobol' sequence, of fewer designs where some are known. Then each batch is
+    chosen by expected improvement, or by the hypervolume of several objectives, from designs all over the
+    range and around the best. Where designs are without noise, half of the batch is chosen by a process of
+    its own in a region around the best, which shrinks and grows as it finds less or more (D. Eriksson and
+    others, NeurIPS 32 (2019)).
     """
 
     name = "gaussian-process"
     several = True
     own_starts = True
+    takes_experiments = True
     Options = GaussianProcessOptions
 
     def __init__(self, genome: Genome, objectives: int, options: GaussianProcessOptions, seed: int) -> None:
@@ -64,12 +66,14 @@ class GaussianProcessSearch(SearchMethod):
         self.region = TrustRegion(genome)
         self.strings: list[Individual] = []
         self.local = 0
+        self.begun = False
 
     def ask(self) -> list[Individual]:
-        known = [string for string in self.strings if not string.failed]
-        if len(known) < 2:
-            count = self.options.first or max(10, 2 * self.genes)
-            points = sobol(self.genes, count, self.rng)
+        known = sum(not string.failed for string in self.strings)
+        first = missing(self.options.first or max(10, 2 * self.genes), known, self.begun)
+        self.begun = True
+        if first:
+            points = sobol(self.genes, first, self.rng)
             return [Individual(point, self.objectives) for point in self.genome.canonical(points)]
         count = max(self.options.population, len(self.strings) // _GROWTH)
         self.belief.learn(self.strings)
@@ -83,10 +87,13 @@ class GaussianProcessSearch(SearchMethod):
         return [Individual(point, self.objectives) for point in np.vstack([local, everywhere])]
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
-        known = {tuple(string) for string in self.strings}
-        self.strings += [string for string in population if tuple(string) not in known]
+        self.learn(population)
         if self.local:
             self.region.learn(population[: self.local])
+
+    def learn(self, strings: Sequence[Individual]) -> None:
+        known = {tuple(string) for string in self.strings}
+        self.strings += [string for string in strings if tuple(string) not in known]
 
     def _candidates(self, worth: Worth) -> Array:
         """Return designs all over the range and around the best, and around those of them worth most."""
@@ -107,6 +114,14 @@ class GaussianProcessSearch(SearchMethod):
         known = {tuple(string) for string in self.strings}
         rows = dict.fromkeys(map(tuple, points.tolist()))
         return np.array([row for row in rows if row not in known]).reshape(-1, self.genes)
+
+
+def missing(first: int, known: int, begun: bool) -> int:
+    """Return how many designs are to be drawn before a surrogate is made: what is missing to the first ones
+    where some are known as the search begins; all anew while hardly any has run to its end."""
+    if known < 2:
+        return first
+    return 0 if begun else max(0, first - known)
 
 
 def sobol(genes: int, count: int, rng: np.random.Generator) -> Array:

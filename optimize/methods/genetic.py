@@ -10,7 +10,7 @@ from deap import tools
 from pydantic import Field, model_validator
 
 from optimize.methods.base import SearchMethod
-from optimize.methods.gaussian_process import sobol
+from optimize.methods.gaussian_process import missing, sobol
 from optimize.methods.individual import Individual
 from optimize.methods.operators import GeneticOperator, Operators
 from optimize.problem.genome import Genome
@@ -89,6 +89,7 @@ class Genetic(SearchMethod):
 
     name = "genetic"
     several = True
+    takes_experiments = True
     Options: ClassVar[type[Checked]] = GeneticOptions
 
     def __init__(self, genome: Genome, objectives: int, options: GeneticOptions, seed: int) -> None:
@@ -112,14 +113,20 @@ class Genetic(SearchMethod):
         self.parents: list[Individual] = []
         self.belief, self.region = Belief(genome.features), TrustRegion(genome)
         self.local: int | None = None
+        self.begun = False
 
     @classmethod
     def starts_of_its_own(cls, options: BreedingOptions) -> bool:
         return isinstance(options, GeneticOptions) and options.surrogate
 
     def ask(self) -> list[Individual]:
-        if sum(not string.failed for string in self.strings) < 2:
-            points = self._first()
+        usual = self.population
+        if self.options.surrogate:
+            usual = self.options.first or max(10, 2 * self.genes)
+        first = missing(usual, sum(not string.failed for string in self.strings), self.begun)
+        self.begun = True
+        if first:
+            points = self._first(first)
         elif self.options.surrogate:
             points = self._worth_most()
         else:
@@ -127,7 +134,13 @@ class Genetic(SearchMethod):
         return self._strings(points)
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
-        new = [string for string in population if tuple(string) not in self.known]
+        self.learn(population)
+        if self.local is not None:
+            self.region.learn(population[: self.local])
+            self.local = None
+
+    def learn(self, strings: Sequence[Individual]) -> None:
+        new = [string for string in strings if tuple(string) not in self.known]
         self.known |= {tuple(string) for string in new}
         if self.options.surrogate:
             self.strings += new
@@ -135,15 +148,12 @@ class Genetic(SearchMethod):
             # What is not among the best designs now will never be again.
             good = [string for string in [*self.strings, *new] if not string.failed]
             self.strings = self._best(good, self.population)
-        if self.local is not None:
-            self.region.learn(population[: self.local])
-            self.local = None
 
-    def _first(self) -> Array:
+    def _first(self, count: int) -> Array:
         if self.options.surrogate:
-            points = sobol(self.genes, self.options.first or max(10, 2 * self.genes), self.rng)
+            points = sobol(self.genes, count, self.rng)
         else:
-            points = self.rng.random((self.population, self.genes))
+            points = self.rng.random((count, self.genes))
         return self.genome.canonical(points)
 
     def _offspring(self) -> Array:

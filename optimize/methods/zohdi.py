@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from deap import tools
+
 from optimize.methods.base import SearchMethod
 from optimize.methods.breeding import Breeder
 from optimize.methods.breeding_settings import Breeding
@@ -33,6 +35,13 @@ class Zohdi(SearchMethod):
 
     def ask(self) -> list[Individual]:
         return self.next_strings or self.breeder.first()
+
+    def learn(self, strings: Sequence[Individual]) -> None:
+        """Put the best of them, as many as there are parents, in the place of random strings."""
+        good = [string for string in strings if not string.failed]
+        best = tools.selBest(good, self.options.parents)
+        population = self.next_strings or self.breeder.first()
+        self.next_strings = [*best, *population[: len(population) - len(best)]]
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         every = self.options.recentre_every

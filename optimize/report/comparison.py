@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,11 +19,9 @@ from optimize.evaluation.runs import Evaluator
 from optimize.outcome import Outcome, Progress
 from optimize.problem.problem import Problem
 from optimize.search import search
-from optimize.search_folder import refuse, resume_or_clear
-from optimize.search_records import searches
+from optimize.search_folder import check_problem, resume_or_clear
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
-from optimize.storage.record import canonical
 from tisim import RunError
 from tisim.console import plain_table
 from tisim.errors import must
@@ -62,12 +59,8 @@ def claim(folder: Path, fresh: bool | None, overwrite: bool) -> Iterator[bool]:
 
 def check(folder: Path, cache: Cache, problem: Problem, evaluator: Mapping[str, Any]) -> None:
     """Raise InputError when the file in the folder is of a comparison on another problem; methods, their
-    settings and numbers of runs may be others. evaluator : the settings of the evaluator."""
-    for attributes in searches(cache).values():
-        old = json.loads(attributes["identity"])
-        requested = {**identity(problem, Settings(), evaluator), "search": old["search"]}
-        if canonical(old) != canonical(requested):
-            refuse(folder, "comparison", old, requested)
+    settings, ranges of genes and numbers of runs may be others. evaluator : the settings of the evaluator."""
+    check_problem(folder, "comparison", cache, identity(problem, Settings(), evaluator))
 
 
 def settings_of(

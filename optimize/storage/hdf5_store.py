@@ -54,6 +54,9 @@ Runs of a search for good designs, written by tisim (optimize.read reads it; so 
 /searches/<name>         a search. Attributes: problem; settings, identity (all that decides its course) and
                          versions, as JSON; stopped, the rule that ended it (empty while it goes on)
     genes, objectives    what it varies and what it wants: names, units, ranges, directions
+    starting_designs     designs that it was told to run first
+    experiments          designs that it learnt from as it began, as they were measured
+    warm_start           the same of designs that other searches in this file had run by then
     logbook              a row for each generation
     hall_of_fame         the best designs, the best first; of several objectives the front. Each objective is
                          the mean over the starts; "95 % +-" is half of its confidence interval

@@ -66,6 +66,17 @@ class RunsTable:
         """Return the table with one row for each key, the first that has it."""
         return self.chosen(np.isin(np.arange(len(self)), list(self.rows.values())))
 
+    def designs(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the row of the first run of each different design, ascending, and for each row of which of
+        these it is."""
+        designs = packed(self.genes.values())
+        same_bytes = designs.view(f"V{designs.shape[1]}").ravel()
+        _, first, design = np.unique(same_bytes, return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        number = np.empty(len(first), dtype=int)
+        number[order] = np.arange(len(first))
+        return first[order], number[design]
+
     def record(self, row: int) -> Record:
         """Return the evaluation in a row. ValueError where its text is none."""
         facts = {name: _plain(column[row]) for name, column in self.facts.items()}

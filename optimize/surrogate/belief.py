@@ -26,7 +26,8 @@ class Belief:
 
     features : of points of the unit cube, (n, genes) -> (n, features).
     The noise of the mean of n starts is the variance of those starts over n. The variance of a single design,
-    known from two starts or so, is drawn towards that of all designs. A failed design has the worst cost.
+    known from two starts or so, is drawn towards that of all designs; that of a value that came with its
+    standard error is known. A failed design has the worst cost.
     """
 
     def __init__(self, features: Callable[[Array], Array] = np.asarray) -> None:
@@ -83,20 +84,27 @@ def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
         pooled = _pooled(strings, k)
         for i, string in enumerate(strings):
             estimate = string.estimates[k]
-            n = max(estimate.starts, 1)
-            own = estimate.std**2 if n > 1 and math.isfinite(estimate.std) else pooled
+            n, known = max(estimate.starts, 1), math.isfinite(estimate.std)
+            if n == 1 and known:
+                noise[i, k] = estimate.std**2
+                continue
+            own = estimate.std**2 if known else pooled
             noise[i, k] = (_PRIOR_STARTS * pooled + (n - 1) * own) / (_PRIOR_STARTS + n - 1) / n
     return costs, noise
 
 
 def _pooled(strings: Sequence[Individual], objective: int) -> float:
-    """Return the variance of a cost from start to start, of all designs together; 0 where it is not known."""
+    """Return the variance of a cost from start to start, of all designs together: where no design has two
+    starts, the mean of those that came with their standard errors; 0 where it is not known."""
+    known = [string.estimates[objective] for string in strings]
+    known = [estimate for estimate in known if estimate.ok and math.isfinite(estimate.std)]
     squares, freedom = 0.0, 0
-    for string in strings:
-        estimate = string.estimates[objective]
-        if estimate.ok and estimate.starts > 1 and math.isfinite(estimate.std):
+    for estimate in known:
+        if estimate.starts > 1:
             squares += (estimate.starts - 1) * estimate.std**2
             freedom += estimate.starts - 1
+    if not freedom and known:
+        return float(np.mean([estimate.std**2 for estimate in known]))
     return squares / freedom if freedom else 0.0
 
 

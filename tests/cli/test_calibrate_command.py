@@ -61,4 +61,4 @@ def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim
     mine.write_text("quantity,value,uncertainty\ndischarge_rate,0.05,0.0125\n")
     code, _, err = tisim(*SEARCH)
     assert code == 2
-    assert "output folder must be free of another search" in " ".join(err.split())
+    assert "output folder must be free of a search of another problem" in " ".join(err.split())

@@ -95,6 +95,15 @@ def search(path):
         )
 
 
+def shared(folder, method, *seed_and_more):
+    """A search of shared_case, naming each evaluation as it is stored."""
+    from tests.optimize.shared_case import searched
+
+    announce()
+    seed, *warm = seed_and_more
+    searched(folder, method, int(seed), warm_start=bool(warm))
+
+
 def announce():
     """Have each evaluation named on standard output when it is stored; who reads slowly holds it up."""
     put = Cache.put
@@ -140,5 +149,5 @@ def tisim(*arguments):
 
 
 if __name__ == "__main__":
-    functions = (write, stepwise, limited, search, asleep, tisim)
+    functions = (write, stepwise, limited, search, shared, asleep, tisim)
     {function.__name__: function for function in functions}[sys.argv[1]](*sys.argv[2:])

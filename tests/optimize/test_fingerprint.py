@@ -209,7 +209,7 @@ def away(result, target):
 
 
 @pytest.mark.long
-def test_another_target_in_the_same_folder_is_another_search(tmp_path):
+def test_another_target_in_the_same_folder_is_another_problem(tmp_path):
     """The second search is refused; it does not reuse the values of the first."""
 
     def of(target):
@@ -227,9 +227,14 @@ def test_another_target_in_the_same_folder_is_another_search(tmp_path):
 
 @pytest.mark.long
 def test_another_range_of_a_gene_is_another_search(tmp_path):
+    """It is not taken for the same, and a value of the same design is."""
     made = problem("default", "")
-    optimize.run(made, out=tmp_path, **FEW)
     gene, *others = made.genome.genes
     wider = replace(made, genome=optimize.Genome((replace(gene, high=2 * gene.high), *others)))
-    with pytest.raises(InputError, match=rf"genes.{gene.name} is '.* to .*' there and '.*' here"):
-        optimize.run(wider, out=tmp_path, **FEW)
+    first, second = (optimize.run(one, out=tmp_path, **FEW) for one in (made, wider))
+    assert second.evaluations == first.evaluations
+    assert first.name != second.name
+    assert sorted(optimize.read(tmp_path).searches) == sorted(
+        one.name.removeprefix("searches/") for one in (first, second)
+    )
+    assert max(design.genes[gene.name] for design in second.designs) > gene.high

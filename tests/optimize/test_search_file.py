@@ -136,7 +136,9 @@ def test_a_file_of_several_searches_wants_a_name(tmp_path):
     file = optimize.read(tmp_path)
     names = [outcome.name.removeprefix("searches/") for outcome in (first, second)]
     assert sorted(file.searches) == sorted(names)
-    with pytest.raises(InputError, match=r"search must be one of bowl-\w+, bowl-\w+; received None"):
+    with pytest.raises(
+        InputError, match=r"search must be one of bowl-genetic-1-\w+, bowl-genetic-2-\w+; received None"
+    ):
         file.logbook()
     assert file.settings(names[1])["seed"] == 2
     assert len(file.runs()) == first.evaluations + second.evaluations

@@ -49,6 +49,20 @@ SearchChanges = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
 ]
+StartingDesigns = Annotated[
+    Path | None,
+    typer.Option(
+        "--start-from", metavar="FILE.csv", callback=nameable,
+        help="Designs to run first: a column for each gene, as in best.csv.",
+    ),
+]  # fmt: skip
+Experiments = Annotated[
+    Path | None,
+    typer.Option(
+        "--experiments", metavar="FILE.csv", callback=nameable,
+        help="Designs with what was measured of them, to learn from without running them.",
+    ),
+]  # fmt: skip
 FixedGenes = Annotated[
     list[str] | None,
     typer.Option("--fix", metavar="GENE=VALUE", help="Keep a gene at a value of its range. Repeatable."),
@@ -75,6 +89,14 @@ def optimize(
     ] = None,
     budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
     budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
+    start_from: StartingDesigns = None,
+    experiments: Experiments = None,
+    warm_start: Annotated[
+        bool,
+        typer.Option(
+            "--warm-start", help="Learn from all runs in the folder, and run the best of their designs first."
+        ),
+    ] = False,
     measured: Measurements = None,
     fixed: FixedGenes = None,
     changes: SearchChanges = None,
@@ -91,6 +113,7 @@ def optimize(
 
     All goes to search.h5. The same command, given again, goes on where it was stopped.
     """
+    from optimize.beginning import Beginning
     from optimize.evaluation.executors import evaluator_for
     from optimize.search_folder import SEARCH_FILE, resume_or_clear
     from optimize.session import session
@@ -113,11 +136,15 @@ def optimize(
             without_dependent_options(proposed(problem, defaults, method), changed), changed
         )
     )
-    fit(problem, settings)
+    beginning = Beginning.of(problem, start_from, experiments, warm_start)
+    fit(problem, settings, beginning)
     out_folder = folder or Path("out") / problem.name
     with closing(evaluator_for(problem, executor, device, precision, threads, arithmetic)) as evaluator:
         resume_or_clear(out_folder, fresh, overwrite)
-        outcome = session(problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite)
+        outcome = session(
+            problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite,
+            begun=fresh is False, beginning=beginning,
+        )  # fmt: skip
     if outcome.interrupted:
         err().print(
             f"stopped; {out_folder / SEARCH_FILE} has all that is done. {resume_hint(fresh, overwrite)}"

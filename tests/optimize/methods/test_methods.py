@@ -6,7 +6,7 @@ import pytest
 from optimize.evaluation.ensemble import EnsembleSettings
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.base import every, find
-from optimize.methods.cma_es import EDGE, folded, within
+from optimize.methods.cma_es import EDGE, drawn_of, folded, within
 from optimize.methods.individual import Individual
 from optimize.search import search
 from optimize.settings import Settings
@@ -167,6 +167,7 @@ def test_the_way_to_the_bounds():
     assert np.abs(np.diff(slope)).max() < 0.02
     assert slope.min() >= 0
     np.testing.assert_allclose(within(1 - points), 1 - inside, atol=1e-15)
+    np.testing.assert_allclose(drawn_of(inside), points, atol=1e-12)
     far = np.array([-EDGE - 0.2, 1 + EDGE + 0.2, 3 + 5 * EDGE + 0.1, 0.5])
     np.testing.assert_allclose(
         folded(far), [-EDGE + 0.2, 1 + EDGE - 0.2, 1 + EDGE - 0.1 - 0, 0.5], atol=1e-12

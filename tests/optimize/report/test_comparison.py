@@ -151,7 +151,7 @@ def test_command(tmp_path, monkeypatch, capsys):
     runs = len(Cache(store))
     for more, code, message in (
         (["--evaluations", "61", "--repeats", "1"], 0, f"compare.h5, which has {runs} runs"),
-        (["--precision", "f32"], 2, "free of another comparison; received"),
+        (["--precision", "f32"], 2, "free of a comparison of another problem; received"),
         (["--fresh"], 2, "without results of a comparison (or give --overwrite)"),
     ):
         with pytest.raises(SystemExit) as exit_:

@@ -1,6 +1,7 @@
-"""A folder belongs to one search: another one is refused before it runs, and nothing is overwritten."""
+"""A folder belongs to one problem: another one is refused before it runs, and nothing is overwritten."""
 
 import csv
+import json
 import tomllib
 from dataclasses import replace
 
@@ -8,7 +9,9 @@ import pytest
 
 from cases import case as catalogue
 from cases.case import Case, Size
+from optimize.problem.genome import Genome
 from optimize.search_folder import SEARCH_FILES, resume_or_clear
+from optimize.search_records import searches
 from optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
@@ -43,23 +46,10 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
+def test_the_same_search_goes_on_and_with_overwrite_all_begins_anew(optimize, tmp_path):
     folder = tmp_path / "s"
     assert optimize("--seed", 1)[0] == 0
     first, runs = contents(folder), len(Cache(folder / "search.h5"))
-    rule = "output folder must be free of another search; received 's', which holds one that differs"
-    for other, differ in {
-        ("--seed", 2): "search.seed is 1 there and 2 here",
-        ("--seed", 1, "--population", 9, "--set", "search.ensemble.block=2"): (
-            "search.ensemble.block is 6 there and 2 here; search.options.population is 8 there and 9 here"
-        ),
-    }.items():
-        code, err = optimize(*other)
-        assert (code, err.strip()) == (
-            2,
-            f"{rule} ({differ}). Use another --out, or --overwrite to replace it",
-        )
-        assert contents(folder) == first
     code, err = optimize("--seed", 1, "--generations", 2)
     assert code == 0
     assert f"going on with s/search.h5, which has {runs} runs" in " ".join(err.split())
@@ -72,7 +62,93 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     code, err = optimize("--seed", 2, "--overwrite", "--target", 1e9, "--generations", 0)
     assert code == 0
     assert contents(folder)["best.csv"] != first["best.csv"]
-    assert optimize("--seed", 1)[0] == 2
+    assert len(searches(Cache(folder / "search.h5"))) == 1
+
+
+def test_another_problem_is_refused_and_nothing_changes(optimize, tmp_path, monkeypatch):
+    assert optimize()[0] == 0
+    first = contents(tmp_path / "s")
+    rule = "output folder must be free of a search of another problem; received 's', which holds one that"
+    x0, x1 = fake_problem(2).genome.genes
+    for changes, differ in (
+        ({"name": "trough"}, "problem is 'bowl' there and 'trough' here"),
+        ({"version": 2}, "problem_version is 1 there and 2 here"),
+        ({"genome": Genome((x0, replace(x1, unit="mm")))}, "units.x1 is 'm' there and 'mm' here"),
+        ({"symbol": "R"}, "objective_order is ['fitness'] there and ['R'] here"),
+        (
+            {"objective": lambda r: -r.value},
+            "the problem file, or a value that its functions use, has changed",
+        ),
+    ):
+        other = replace(fake_problem(2), **changes)
+        case = replace(BOWL, problem=lambda size, variant, other=other: other)
+        monkeypatch.setattr(catalogue, "every", lambda case=case: {BOWL.name: case})
+        code, err = optimize("--seed", 7)
+        assert code == 2
+        assert differ in err.strip()
+        assert err.startswith(rule)
+        assert err.strip().endswith(". Use another --out, or --overwrite to replace it")
+        assert contents(tmp_path / "s") == first
+
+
+def test_searches_of_one_problem_share_their_runs(optimize, tmp_path):
+    """Two methods that propose the same designs first, from common starts of the same seed."""
+    folder = tmp_path / "s"
+    assert optimize("--seed", 1)[0] == 0
+    runs = len(Cache(folder / "search.h5"))
+    (first,) = searches(Cache(folder / "search.h5"))
+    code, err = optimize("--seed", 1, "--method", "restart", "--generations", 0, "--population", 8)
+    assert code == 0
+    assert f"another search in s/search.h5, which has {runs} runs" in " ".join(err.split())
+    assert "(0 runs" in err.split("generation   0")[1].split("\n")[0]
+    for change in (
+        ("--seed", 2),
+        ("--population", 9),
+        ("--fix", "x1=0.5"),
+        ("--set", "search.ensemble.min_starts=3"),
+    ):
+        assert optimize(*change)[0] == 0
+    with Cache(folder / "search.h5") as cache:
+        assert len(searches(cache)) == 6
+        assert first in searches(cache)
+        assert len(cache) > runs
+
+
+def test_results_are_of_the_search_that_ended_last(optimize, tmp_path):
+    folder = tmp_path / "s"
+
+    def shown():
+        return f"searches/{json.loads((folder / 'shown.json').read_text())['search']}"
+
+    assert optimize("--seed", 1)[0] == 0
+    first = contents(folder)
+    assert shown() == next(iter(searches(Cache(folder / "search.h5"))))
+    assert "sensitivity.csv" in first
+    # So few designs tell nothing of sensitivity: what the search before has told must not stay.
+    assert optimize("--seed", 2, "--generations", 0, "--population", 4)[0] == 0
+    now = contents(folder)
+    with Cache(folder / "search.h5") as cache:
+        assert cache.table(shown()).attrs["stopped"] == "generations"
+        assert json.loads(cache.table(shown()).attrs["settings"])["seed"] == 2
+    assert not [name for name in now if name.startswith("sensitivity")]
+    assert now["best.csv"] != first["best.csv"]
+    assert optimize("--seed", 1)[0] == 0
+    assert {
+        name: content for name, content in contents(folder).items() if name.endswith((".csv", ".toml"))
+    } == {name: content for name, content in first.items() if name.endswith((".csv", ".toml"))}
+
+
+def test_resume_asks_for_a_search_that_has_begun(optimize, tmp_path):
+    assert optimize("--seed", 1)[0] == 0
+    assert optimize("--seed", 2, "--population", 9)[0] == 0
+    before = contents(tmp_path / "s")
+    code, err = optimize("--seed", 3, "--population", 9, "--resume")
+    rule = (
+        "output folder must be one in which this search has begun; received 's', where the most similar one"
+    )
+    assert (code, err.strip()) == (2, f"{rule} differs (search.seed is 2 there and 3 here)")
+    assert contents(tmp_path / "s") == before
+    assert optimize("--seed", 1, "--resume")[0] == 0
 
 
 def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp_path, monkeypatch):
@@ -104,6 +180,35 @@ def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path,
     assert (code, "best f" in err) == (0, True)
     code, err = optimize("--population", 8, "--set", "search.options.parents=8")
     assert (code, err.strip()) == (2, "parents must be < population = 8; received 8")
+
+
+def test_a_search_begins_with_files_and_with_the_folder(optimize, tmp_path):
+    assert optimize("--seed", 1)[0] == 0
+    (tmp_path / "tried.csv").write_text("x0,x1 (m)\n0.25,0.5\n0.3,0.3\n")
+    (tmp_path / "measured.csv").write_text("x0,x1,fitness,std. error\n0.3,0.35,0.51,0.01\n0.9,0.9,1.2,0.01\n")
+    ways = {
+        "starting_designs": ("--start-from", "tried.csv"),
+        "experiments": ("--experiments", "measured.csv", "--method", "genetic"),
+        "warm_start": ("--warm-start", "--method", "genetic", "--seed", 2),
+    }
+    for way in ways.values():
+        assert optimize(*way)[0] == 0
+        assert optimize(*way, "--resume")[0] == 0
+    with Cache(tmp_path / "s/search.h5") as cache:
+        begun = {name.rpartition("/")[2]: cache.table(name) for name in cache.tables()}
+        assert begun["starting_designs"].columns == {"x0": [0.25, 0.3], "x1": [0.5, 0.3]}
+        assert begun["experiments"].columns["fitness std. deviation"] == [0.01, 0.01]
+        assert len(begun["warm_start"]) > 8
+        assert len(searches(cache)) == 4
+    code, err = optimize("--seed", 9, "--start-from", "tried.csv", "--resume")
+    assert "differs (search.seed is 0 there and 9 here)" in err
+    (tmp_path / "tried.csv").write_text("x0,x1 (m)\n0.25,0.5\n0.3,1.3\n")
+    code, err = optimize("--start-from", "tried.csv")
+    assert (code, err.strip()) == (
+        2, "tried.csv, line 3: gene x1 must be a number within 0..1 m; received 1.3",
+    )  # fmt: skip
+    code, err = optimize("--experiments", "measured.csv")
+    assert "method must be for experiments: cma-es, gaussian-process, genetic, nsga2; received" in err
 
 
 @pytest.mark.parametrize("name", ["best.csv", "convergence.png.new", "search.h5.journal", "best_scene.toml"])
@@ -144,7 +249,7 @@ def test_a_folder_of_before_markers_goes_on_and_unrelated_files_do_not_matter(op
     assert optimize()[0] == 0
     (folder / MARKER).unlink()
     # Searches of that time left none of these.
-    for later in folder.glob("sensitivity.*"):
+    for later in (*folder.glob("sensitivity.*"), folder / "shown.json"):
         later.unlink()
     first = contents(folder)
     assert optimize("--generations", 2)[0] == 0

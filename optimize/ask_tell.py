@@ -1,0 +1,356 @@
+"""Ask and tell: a search method for experiments, or for a simulator, that are elsewhere.
+
+The methods are those of a search, and what one asks for follows from its seed and from what it was told. So
+a CSV file of what was told is enough to go on with: a new object of the same settings tells it all again.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from optimize.beginning import Beginning
+from optimize.designs_csv import GENERATION, WHETHER_ASKED, Given, check_headings, design_of, naming, rows
+from optimize.evaluation.estimate import FitnessEstimate
+from optimize.experiments import Values, known, row_values
+from optimize.hall_of_fame import Hall
+from optimize.methods.base import find
+from optimize.methods.individual import Individual
+from optimize.outcome import Design, Outcome
+from optimize.problem.calls import check_design
+from optimize.problem.feasibility import penalised
+from optimize.problem.genome import AnyGene, Genome
+from optimize.problem.objective import Objective
+from optimize.problem.problem import Problem
+from optimize.settings import METHOD, Settings, fit, identity
+from optimize.surrogate.ranking import best
+from optimize.tables import error_of
+from tisim.errors import InputError, Words, is_number, must
+from tisim.files import regular_file
+from tisim.files.atomic import replace_file
+
+SAME = 1e-9
+"""A design that is told is the one that was asked for within this, in widths of the ranges of genes."""
+_TRIES = 100
+"""Generations of nothing new in a row after which a method is taken to have no more to ask for."""
+_SETTINGS = "of the same genes, method, seed, options and starting designs as this campaign"
+Point = tuple[float, ...]
+"""A design as a point of the unit cube, in the middle of the cells of whole numbers and choices."""
+Tried = tuple[Values, Values, Values]
+"""Values, their standard errors and constraints of one time that a design was tried."""
+
+
+class AskTell:
+    """A campaign: ``ask`` for designs, find out elsewhere what they are worth, ``tell``.
+
+    problem : a Problem, whose scene and objectives are then not used, or a genome or its genes with
+    ``objectives``: names of what is to be small, {name: "smallest" or "largest"}, or Objectives.
+    method, seed, options : as of a search. starting_designs : are asked for first (optimize.run).
+    file : a CSV file that all that is told is written to; one that is there is gone on with.
+
+    InputError for a method that cannot work on the problem, and for a file of other genes or settings.
+    """
+
+    def __init__(
+        self,
+        problem: Problem | Genome | Sequence[AnyGene],
+        objectives: Sequence[str | Objective] | Mapping[str, Literal["smallest", "largest"]] = ("value",),
+        *,
+        method: str = METHOD,
+        seed: int = 0,
+        options: Mapping[str, Any] | None = None,
+        starting_designs: Given | None = None,
+        file: str | Path | None = None,
+    ) -> None:
+        self.problem = problem if isinstance(problem, Problem) else _elsewhere(problem, objectives)
+        self.settings = Settings(method=method, seed=seed, options=dict(options or {}))
+        beginning = Beginning.of(self.problem, starting_designs, None, False)
+        fit(self.problem, self.settings, beginning)
+        genome, count = self.problem.genome, len(self.problem.objectives)
+        self._method = find(method)(genome, count, self.settings.options, seed)
+        self._starting = beginning.first(self.problem)
+        self._asked: list[Individual] = []  # of the generation under way
+        self._open: dict[Point, list[Individual]] = {}  # those of them that are to be told, by design
+        self._by_method = False  # whether the method has asked for them
+        self._generations = 0
+        self._told: dict[Point, list[Tried]] = {}
+        self._strings: dict[Point, list[Individual]] = {}  # of designs that were told, the first as told
+        self._not_learned: list[Point] = []
+        self._file, self._content = None if file is None else Path(file), b""
+        self._lines: list[list[str]] = []
+        self._replay()
+
+    def ask(self) -> list[dict[str, Any]]:
+        """Return the designs that are to be tried now, by the names of all genes, in their units: the same
+        ones until each has been told, then others. None where the method has nothing new."""
+        for _ in range(_TRIES):
+            if self._open:
+                return [self.problem.genome.decode(strings[0]) for strings in self._open.values()]
+            self._next()
+        return []
+
+    def tell(
+        self, designs: Given | Mapping[str, Any], values: Any = None, standard_errors: Any = None
+    ) -> None:
+        """Say what designs are worth: those that were asked for, in any order and number, or others.
+
+        designs : one, or a list, by the names of the searched genes, or a CSV file (optimize.experiments).
+        values : for each design its value, in the unit of the objective; for several objectives a list in
+        their order or a dictionary by their names, in which constraints of the result stand, too. NaN, or
+        None, for a design that failed. Left out where the designs have them as further keys or columns.
+        standard_errors : of the values, in the same way, where they are known. A design that is told more
+        than once has the mean of its values: weighted by standard errors, if it has them; else its noise is
+        had from how its values differ. Without either, a value counts as exact.
+
+        InputError for what cannot be; then nothing of it counts.
+        """
+        given: Any = [designs] if isinstance(designs, Mapping) else designs
+        in_file = isinstance(given, str | Path)
+        for what, of in (("values", values), ("standard_errors", standard_errors)):
+            able = of is None or (not in_file and values is not None)
+            must(able, what, "left out where the designs have them", of)
+        if values is not None:
+            given = self._joined(list(given), values, standard_errors, designs is not given)
+        read = []
+        for place, row in rows(given, "told design"):
+            with naming(place):
+                read.append((row, *self._read(row)))
+        lines = [self._line(row, self._same(point) in self._open) for row, point, _ in read]
+        tries, strings = self._known([(point, tried) for _, point, tried in read])
+        self._write(lines)
+        self._take(tries, strings)
+
+    @property
+    def best(self) -> Design | None:
+        """The best design by posterior mean; of several objectives the compromise. None before one is
+        known."""
+        outcome = self.outcome
+        return next((one for one, string in zip(outcome.designs, outcome.hall, strict=True)
+                     if string is outcome.best), None)  # fmt: skip
+
+    @property
+    def designs(self) -> list[Design]:
+        """The best designs, best first; of several objectives the front. Their values have had a part in
+        choosing them, and flatter them."""
+        return self.outcome.designs
+
+    @property
+    def outcome(self) -> Outcome:
+        """What has been found so far, as of a search, for ``to_frame`` and ``optimize.sensitivity``."""
+        found = Outcome(self.problem, self.settings, identity(self.problem, self.settings, {}))
+        strings = self._ranked()
+        for string in strings:
+            (found.failures if string.failed else found.estimates)[tuple(string)] = string.estimates
+        places = len(strings) if self.problem.several else self.settings.hall_of_fame
+        found.hall = best(self.problem.genome, [s for s in strings if not s.failed], places)
+        return found
+
+    def _next(self) -> None:
+        """Tell the method what is known, and ask for the next generation."""
+        hall = Hall(self.settings.hall_of_fame)
+        hall.update(self._ranked())
+        if self._by_method:
+            self._method.tell(self._asked, hall.strings)
+        if self._not_learned:
+            self._method.learn([self._strings[point][0] for point in self._not_learned])
+            self._not_learned = []
+        self._by_method = bool(self._generations) or not self._starting
+        self._asked = self._method.ask() if self._by_method else self._starting
+        self._generations += 1
+        for string in self._asked:
+            if not string.fitness.valid:
+                self._recognise(string)
+
+    def _recognise(self, string: Individual) -> None:
+        """Give a string that is asked for what is known of its design. One that does not keep to a constraint
+        of the design fails."""
+        design = self.problem.genome.decode(string)
+        point = self._point(design)
+        if point in self._strings:
+            _become(string, self._strings[point][0])
+            self._strings[point].append(string)
+            return
+        try:
+            check_design(self.problem, design)
+        except InputError as error:
+            failed = FitnessEstimate.failed(0, f"infeasible: {error}")
+            string.know((failed,) * len(self.problem.objectives))
+        else:
+            self._open.setdefault(point, []).append(string)
+
+    def _ranked(self) -> list[Individual]:
+        """Return the strings of all designs that were told, with costs that put the feasible ones first."""
+        strings = [of_design[0] for of_design in self._strings.values()]
+        good = [string for string in strings if not string.failed]
+        if good and self.problem.result_constraints:
+            costs = [[estimate.mean for estimate in string.estimates] for string in good]
+            ordered = penalised(costs, [string.violation for string in good])
+            for string, cost in zip(good, ordered.tolist(), strict=True):
+                string.fitness.values = tuple(cost)
+            for first, *others in self._strings.values():
+                for string in others:
+                    string.fitness.values = first.fitness.values
+        return strings
+
+    def _known(
+        self, told: Sequence[tuple[Point, Tried]]
+    ) -> tuple[dict[Point, list[Tried]], dict[Point, Individual]]:
+        """Return of each design in what is told all its tries, and the string that they make."""
+        tries: dict[Point, list[Tried]] = {}
+        for point, tried in told:
+            same = self._same(point)
+            tries.setdefault(same, [*self._told.get(same, ())]).append(tried)
+        strings = {}
+        for point, of_design in tries.items():
+            values, errors, limits = zip(*of_design, strict=True)
+            strings[point] = known(self.problem, point, values, errors, np.mean(limits, axis=0).tolist())
+        return tries, strings
+
+    def _take(self, tries: Mapping[Point, list[Tried]], strings: Mapping[Point, Individual]) -> None:
+        """Take in what designs are worth."""
+        self._told |= tries
+        for point, string in strings.items():
+            if point not in self._strings:
+                if not (self._by_method and point in self._open):
+                    self._not_learned.append(point)
+                self._strings[point] = self._open.pop(point, [string])
+            for other in self._strings[point]:
+                _become(other, string)
+
+    def _same(self, point: Point) -> Point:
+        """Return the design, asked for or told, that a design is taken for; itself where there is none."""
+        points = list(dict.fromkeys((*self._open, *self._strings)))
+        if point in self._open or point in self._strings or not points:
+            return point
+        apart = np.abs(np.array(points) - point).max(axis=1)
+        return points[int(np.argmin(apart))] if apart.min() <= SAME else point
+
+    def _point(self, design: Mapping[str, Any]) -> Point:
+        return tuple(map(float, self.problem.genome.encode(design)))
+
+    def _read(self, row: Mapping[str, str]) -> tuple[Point, Tried]:
+        check_headings(self.problem, row)
+        return self._point(design_of(self.problem, row)), row_values(self.problem, row)
+
+    def _joined(self, designs: list[Any], values: Any, errors: Any, one: bool) -> list[dict[str, Any]]:
+        """Return designs with their values and standard errors as further keys."""
+        objectives = [objective.name for objective in self.problem.objectives]
+        names = [*objectives, *(constraint.name for constraint in self.problem.result_constraints)]
+        values_of = [values] if one else list(values)
+        errors_of = [None] * len(designs) if errors is None else [errors] if one else list(errors)
+        for what, of in (("values", values_of), ("standard_errors", errors_of)):
+            must(len(of) == len(designs), what, f"one for each of {len(designs)} designs", of)
+        found = []
+        for design, value, error in zip(designs, values_of, errors_of, strict=True):
+            must(isinstance(design, Mapping), "design", "a dictionary by the names of genes", design)
+            by_name = _by_name(value, names, "values of a design")
+            errors_by_name = {} if error is None else _by_name(error, objectives, "standard errors")
+            found.append({**design, **by_name, **{error_of(k): v for k, v in errors_by_name.items()}})
+        return found
+
+    def _line(self, row: Mapping[str, str], asked: bool) -> list[str]:
+        """Return the line of the file for a row that was told."""
+        _, (values, errors, limits) = self._read(row)
+        design = design_of(self.problem, row)
+        numbers = ("" if np.isnan(number) else repr(number) for number in (*values, *errors, *limits))
+        return [str(self._generations), "yes" if asked else "no", *map(str, design.values()), *numbers]
+
+    @property
+    def _heading(self) -> list[str]:
+        problem = self.problem
+        return [
+            GENERATION, WHETHER_ASKED, *(gene.label for gene in problem.genome.searched),
+            *(objective.label for objective in problem.objectives),
+            *(error_of(objective.name) for objective in problem.objectives),
+            *(constraint.name for constraint in problem.result_constraints),
+        ]  # fmt: skip
+
+    def _write(self, lines: list[list[str]]) -> None:
+        """Write these lines behind those of the file, if there is one. RunError if the disk is full."""
+        if self._file is not None:
+            rule = "as this campaign has left it; make a new AskTell to go on with it"
+            same = (regular_file.content(self._file) or b"") == self._content
+            must(same, "campaign file", rule, f"{self._file}, which has changed")
+            text = io.StringIO(newline="")
+            csv.writer(text).writerows([self._heading, *self._lines, *lines])
+            content = text.getvalue().encode()
+            replace_file(self._file, content)
+            self._content = content
+        self._lines += lines
+
+    def _replay(self) -> None:
+        """Tell what is in the file, as it was told."""
+        content = None if self._file is None else regular_file.content(self._file)
+        if self._file is None or not content:
+            return
+        self._content = content
+        for place, row in rows(self._file, "campaign file"):
+            with naming(place):
+                must(
+                    {GENERATION, WHETHER_ASKED} <= set(row),
+                    "campaign file",
+                    "one of an AskTell",
+                    str(self._file),
+                )
+                point, tried = self._read(row)
+                self._go_on_to(row[GENERATION])
+                asked = self._same(point) in self._open
+                must(
+                    asked or row[WHETHER_ASKED] != "yes",
+                    "campaign file",
+                    _SETTINGS,
+                    Words("a design that was not asked for"),
+                )
+                self._lines.append(self._line(row, asked))
+                self._take(*self._known([(point, tried)]))
+
+    def _go_on_to(self, generation: str) -> None:
+        must(generation.isdigit(), GENERATION, "a whole number", generation)
+        while self._generations < int(generation):
+            must(not self._open, "campaign file", _SETTINGS, Words("one without some designs before"))
+            self._next()
+
+
+def _become(string: Individual, other: Individual) -> None:
+    """Give a string what is known of another one of the same design."""
+    string.know(other.estimates)
+    string.limited, string.violation = other.limited, other.violation
+    string.fitness.values = other.fitness.values
+
+
+def _by_name(value: Any, names: Sequence[str], what: str) -> dict[str, Any]:
+    """Return a number, or several, by names."""
+    if isinstance(value, Mapping):
+        must(set(value) == set(names), what, f"of {', '.join(names)}", [*value])
+        return dict(value)
+    numbers = [value] if value is None or is_number(value) else value
+    listed = isinstance(numbers, Sequence | np.ndarray) and len(numbers) == len(names)
+    must(listed and not isinstance(value, str), what, f"of {', '.join(names)}", value)
+    return dict(zip(names, numbers, strict=True))
+
+
+def _elsewhere(
+    genes: Genome | Sequence[AnyGene], objectives: Sequence[str | Objective] | Mapping[str, str]
+) -> Problem:
+    """Return the problem of a campaign on these genes."""
+    must(not isinstance(objectives, str), "objectives", "a list or a dictionary of names", objectives)
+    directions = dict(objectives) if isinstance(objectives, Mapping) else {}
+    for name, direction in directions.items():
+        must(direction in ("smallest", "largest"), f"objective {name}", "'smallest' or 'largest'", direction)
+    made = [
+        one
+        if isinstance(one, Objective)
+        else Objective(one, _not_here, maximise=directions.get(one) == "largest")
+        for one in objectives
+    ]
+    return Problem.of_function(_not_here, genes, made, name="campaign")
+
+
+def _not_here(design: Any) -> float:
+    """Stands for what a campaign finds out elsewhere."""
+    raise InputError("a campaign must be told what designs are worth; received a call of its objective")

@@ -1,0 +1,84 @@
+"""What a search begins with: designs that are run first, and what is known of others before anything runs."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from optimize.designs_csv import Given, designs
+from optimize.experiments import experiments
+from optimize.methods.individual import Individual
+from optimize.problem.problem import Problem
+from optimize.storage.record import canonical
+from optimize.surrogate.ranking import best
+
+RUN_AGAIN = 6
+"""Of the designs that a warm start learns from, so many of the best are run first."""
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """A beginning is part of what decides the course of a search.
+
+    designs : of the user, the searched genes by name. They run before generation 0, for any method.
+    experiments : measured designs, which the method learns from and which are not run.
+    warm : what runs of other searches have found, from which the method learns too; the best of them are run
+    with the user's designs. None where that is not asked for.
+    """
+
+    designs: tuple[dict[str, Any], ...] = ()
+    experiments: tuple[Individual, ...] = ()
+    warm: tuple[Individual, ...] | None = None
+
+    @classmethod
+    def of(
+        cls, problem: Problem, starting_designs: Given | None, measured: Given | None, warm_start: bool
+    ) -> Beginning:
+        """Return the beginning of what a user gives; ``warm`` is still without what it learns from.
+        InputError for designs that are none of the problem."""
+        first = () if starting_designs is None else designs(starting_designs, problem)
+        known = () if measured is None else experiments(measured, problem)
+        return cls(first, known, () if warm_start else None)
+
+    @property
+    def learned(self) -> tuple[Individual, ...]:
+        """The designs that the method learns from without running them."""
+        return (*self.experiments, *(self.warm or ()))
+
+    def first(self, problem: Problem) -> list[Individual]:
+        """Return the strings that are run before generation 0, without a fitness."""
+        points = [tuple(map(float, problem.genome.encode(design))) for design in self.designs]
+        points += [tuple(string) for string in best(problem.genome, self.warm or (), RUN_AGAIN)]
+        return [Individual(point, len(problem.objectives)) for point in dict.fromkeys(points)]
+
+    def identity(self, problem: Problem) -> dict[str, str]:
+        """Return its part of the identity of a search; nothing of one that begins with nothing."""
+        parts = {}
+        if self.designs:
+            parts["starting_designs"] = _checksum(list(self.designs))
+        if self.experiments:
+            parts["experiments"] = _checksum(_plain(problem, self.experiments))
+        if self.warm is not None:
+            parts["warm_start"] = _checksum(_plain(problem, self.warm))
+        return parts
+
+
+def _plain(problem: Problem, strings: Sequence[Individual]) -> list[Any]:
+    return [
+        [
+            problem.genome.decode(string),
+            [[one.mean, one.std, one.starts, one.reason] for one in string.estimates],
+            list(string.limited),
+        ]
+        for string in strings
+    ]
+
+
+def _checksum(value: Any) -> str:
+    return hashlib.sha256(canonical(value)).hexdigest()[:12]
+
+
+NOTHING = Beginning()
+"""That of a search of which no more is said."""

@@ -1,0 +1,167 @@
+"""Designs whose worth is known without a run of the search: what was measured, told, or found before.
+
+They are strings as those of a search. Where a value came with its standard error, its estimate has one start
+and that as its standard deviation (see FitnessEstimate.standard_error).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from optimize.designs_csv import Given, cell_of, check_headings, design_of, naming, rows
+from optimize.evaluation.estimate import FitnessEstimate
+from optimize.methods.individual import Individual
+from optimize.problem.problem import Problem
+from optimize.tables import ERROR, error_of
+from tisim.errors import InputError, abbreviated, must
+
+DEVIATION = "std. deviation"
+"""The end of the heading of the standard deviation from start to start."""
+FAILED = "failed"
+Values = tuple[float, ...]
+
+
+def experiments(given: Given, problem: Problem, what: str = "experiments") -> tuple[Individual, ...]:
+    """Return the designs of a CSV file, or of rows of one, with what was measured of them.
+
+    Columns are the genes, each objective and each constraint of the result, in their units, and, where it is
+    known, the standard error of each value ("NAME std. error", or "std. error" of a single objective). An
+    objective without a number says that the design failed. Rows of one design are repeats of it. InputError
+    for what is no such row, naming it.
+    """
+    found: dict[tuple[float, ...], list[tuple[Values, Values, Values]]] = {}
+    for place, row in rows(given, what):
+        with naming(place):
+            check_headings(problem, row)
+            point = tuple(map(float, problem.genome.encode(design_of(problem, row))))
+            found.setdefault(point, []).append(row_values(problem, row))
+    strings = []
+    for point, of_design in found.items():
+        with naming(what):
+            values, errors, limits = zip(*of_design, strict=True)
+            strings.append(known(problem, point, values, errors, np.mean(limits, axis=0).tolist()))
+    return tuple(strings)
+
+
+def known(
+    problem: Problem, point: Sequence[float], values: Sequence[Values], errors: Sequence[Values],
+    limits: Sequence[float] = (),
+) -> Individual:  # fmt: skip
+    """Return the string of a design by all its values.
+
+    point : of the unit cube. values, errors : of each time that it was tried, for each objective its value,
+    in its unit, and the standard error of that; NaN where there is none. limits : of each constraint of the
+    result its mean. A design fails where any of its values is no finite number.
+    """
+    string = Individual(point, len(problem.objectives))
+    if not np.all(np.isfinite(values)):
+        string.know((FitnessEstimate.failed(len(values), "told to have failed"),) * len(problem.objectives))
+        return string
+    columns = zip(*(problem.costs(row) for row in values), strict=True)
+    string.know(
+        tuple(combined(column, of) for column, of in zip(columns, zip(*errors, strict=True), strict=True))
+    )
+    string.limit(problem.result_constraints, limits)
+    return string
+
+
+def combined(values: Sequence[float], errors: Sequence[float]) -> FitnessEstimate:
+    """Return the estimate of a cost from repeated values.
+
+    errors : the standard error of each value; NaN for all where it is not known: then it is had from how the
+    values differ. Known ones weigh the values by their inverse squares, one of 0 outweighing all others.
+    """
+    x, s = np.asarray(values, dtype=float), np.asarray(errors, dtype=float)
+    if np.all(np.isnan(s)):
+        return plain(x)
+    rule = "given for all values of a design or for none"
+    must(not np.any(np.isnan(s)), "standard error", rule, list(errors))
+    if np.any(s == 0):
+        return FitnessEstimate.certain(float(np.mean(x[s == 0])))
+    weights = s**-2.0
+    mean, error = float(np.sum(weights * x) / np.sum(weights)), float(np.sum(weights) ** -0.5)
+    return FitnessEstimate(mean, error, math.nan, math.nan, 1, False)
+
+
+def plain(values: Sequence[float] | Any) -> FitnessEstimate:
+    """Return mean, standard deviation and number of values, without an interval."""
+    std = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
+    return FitnessEstimate(float(np.mean(values)), std, math.nan, math.nan, len(values), False)
+
+
+def table_of(problem: Problem, strings: Sequence[Individual]) -> dict[str, list[Any]]:
+    """Return the columns of a table of strings from which ``restored`` makes them, to the last bit."""
+    designs = [problem.genome.decode(string) for string in strings]
+    found: dict[str, list[Any]] = {
+        gene.name: [design[gene.name] for design in designs] for gene in problem.genome.searched
+    }
+    for k, objective in enumerate(problem.objectives):
+        mine = [string.estimates[k] for string in strings]
+        found[objective.name] = [objective.sign * one.mean if one.ok else math.nan for one in mine]
+        found[f"{objective.name} {DEVIATION}"] = [one.std for one in mine]
+    for k, constraint in enumerate(problem.result_constraints):
+        found[constraint.name] = [s.limited[k] if s.limited else math.nan for s in strings]
+    found["starts"] = [string.estimates[0].starts for string in strings]
+    found[FAILED] = [string.estimates[0].reason for string in strings]
+    return found
+
+
+def restored(problem: Problem, table: Mapping[str, Sequence[Any]]) -> tuple[Individual, ...]:
+    """Return the strings of a table of ``table_of``."""
+    lines = zip(*table.values(), strict=True)
+    return tuple(_restored(problem, dict(zip(table, cells, strict=True))) for cells in lines)
+
+
+def _restored(problem: Problem, row: Mapping[str, Any]) -> Individual:
+    cells = {gene: row[gene.name] for gene in problem.genome.searched}
+    # A choice between texts and numbers is a column of texts.
+    design = {gene.name: gene.parse(cell) if isinstance(cell, str) else cell for gene, cell in cells.items()}
+    string = Individual(problem.genome.encode(design), len(problem.objectives))
+    if row[FAILED]:
+        string.know((FitnessEstimate.failed(row["starts"], row[FAILED]),) * len(problem.objectives))
+        return string
+    means = problem.costs([row[one.name] for one in problem.objectives])
+    deviations = (row[f"{one.name} {DEVIATION}"] for one in problem.objectives)
+    string.know(
+        tuple(
+            FitnessEstimate(mean, std, math.nan, math.nan, row["starts"], False)
+            for mean, std in zip(means, deviations, strict=True)
+        )
+    )
+    string.limit(problem.result_constraints, [row[one.name] for one in problem.result_constraints])
+    return string
+
+
+def row_values(problem: Problem, row: Mapping[str, str]) -> tuple[Values, Values, Values]:
+    """Return the values of a row, their standard errors and the constraints of the result."""
+    values, errors = [], []
+    for objective in problem.objectives:
+        values.append(_number(objective.name, cell_of(objective, row)))
+        headings = (error_of(objective.name), *(() if problem.several else (ERROR,)))
+        cells = [row[heading] for heading in headings if heading in row]
+        errors.append(_number(error_of(objective.name), cells[0]) if cells else math.nan)
+        able = math.isnan(errors[-1]) or 0 <= errors[-1] < math.inf
+        must(able, error_of(objective.name), "0 or more, or empty", errors[-1])
+    limits = [_number(one.name, _limit(one.name, row)) for one in problem.result_constraints]
+    return tuple(values), tuple(errors), tuple(limits)
+
+
+def _limit(name: str, row: Mapping[str, str]) -> str | None:
+    """Return the cell of a constraint, whose heading may have a bound behind its name."""
+    return next((cell for head, cell in row.items() if head.partition(",")[0] == name), None)
+
+
+def _number(name: str, cell: str | None) -> float:
+    """Return a number that was measured; NaN for an empty cell. InputError without one."""
+    must(cell is not None, "columns", f"of all objectives and constraints, {name} among them", "none")
+    if not cell:
+        return math.nan
+    try:
+        return float(cell)
+    except ValueError:
+        rule = f"{name} must be a number, or empty where there is none"
+        raise InputError(f"{rule}; received {abbreviated(cell)}") from None

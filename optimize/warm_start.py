@@ -1,0 +1,114 @@
+"""A warm start: a search learns from the runs that others have left in its file.
+
+What it learns from is written down as the search begins, and read back when it goes on: by then the file has
+more runs, its own among them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optimize.beginning import Beginning
+from optimize.evaluation.estimate import FitnessEstimate
+from optimize.experiments import restored
+from optimize.methods.individual import Individual
+from optimize.problem.calls import check_design
+from optimize.problem.genes import Choice, Gene
+from optimize.problem.genome import AnyGene
+from optimize.problem.given_genes import DependentGene
+from optimize.problem.objective import Objective
+from optimize.problem.problem import Problem
+from optimize.search_records import WARM_START, searches
+from optimize.settings import Settings, identity
+from optimize.storage.cache import Cache
+from optimize.storage.record import canonical
+from optimize.storage.runs_table import RunsTable
+from optimize.surrogate.belief import MOST_LEARNED, costs_and_noise, representative
+from tisim.errors import InputError, is_number
+
+
+def warmed(
+    cache: Cache, problem: Problem, settings: Settings, evaluator: Mapping[str, Any], beginning: Beginning
+) -> Beginning:
+    """Return a beginning with what it learns from, where it has a warm start: what the same search has
+    learnt from when it began, if it has; else the runs that are in the file now."""
+    if beginning.warm is None:
+        return beginning
+    requested = json.loads(canonical(identity(problem, settings, evaluator, beginning)))
+    for name, attributes in searches(cache).items():
+        stored = json.loads(attributes["identity"])
+        if WARM_START in stored and {**stored, WARM_START: ""} == {**requested, WARM_START: ""}:
+            return replace(beginning, warm=restored(problem, cache.table(f"{name}/{WARM_START}").columns))
+    strings = [string for part in cache.runs() for string in _of_runs(problem, part)]
+    return replace(beginning, warm=tuple(strings))
+
+
+def _of_runs(problem: Problem, part: RunsTable) -> list[Individual]:
+    """Return the designs of a table of runs that are within the genome, as many as a surrogate learns from;
+    none where all have failed."""
+    values_needed = {*problem.quantities, *(one.name for one in problem.result_constraints)}
+    genes = {gene.name for gene in problem.genome.searched}
+    if part.problem != problem.name or not (genes <= set(part.genes) and values_needed <= set(part.values)):
+        return []
+    first, design = part.designs()
+    by_design = np.split(np.argsort(design, kind="stable"), np.cumsum(np.bincount(design))[:-1])
+    fewest = 1 if problem.deterministic else max(one.statistic.fewest_starts for one in problem.objectives)
+    found: list[tuple[Individual, Mapping[str, Any]]] = []
+    for row, rows in zip(first, by_design, strict=True):
+        if len(rows) < fewest:
+            continue
+        values = part.record(int(row)).design
+        if all(_allows(gene, values.get(gene.name)) for gene in problem.genome.genes):
+            found.append((_string(problem, part, rows), values))
+    strings = [string for string, _ in found]
+    if not strings or all(string.failed for string in strings):
+        return []
+    # The points are made last, as to find one takes longer than all else.
+    chosen = [found[k] for k in np.sort(representative(costs_and_noise(strings)[0], MOST_LEARNED))]
+    learned = []
+    for string, values in chosen:
+        string[:] = map(float, problem.genome.encode({name: values[name] for name in genes}))
+        with suppress(InputError):
+            check_design(problem, problem.genome.decode(string))
+            learned.append(string)
+    return learned
+
+
+def _allows(gene: AnyGene, value: Any) -> bool:
+    """Return whether a design may have this value of a gene; None where a run has none of it."""
+    if isinstance(gene, Gene):
+        within = is_number(value) and gene.low <= value <= gene.high
+        return within and (not gene.integer or float(value).is_integer())
+    if isinstance(gene, Choice):
+        return value in gene.choices
+    return isinstance(gene, DependentGene) or value in (gene.value, None)
+
+
+def _string(problem: Problem, part: RunsTable, rows: NDArray[np.intp]) -> Individual:
+    """Return the string of a design by the rows of its runs, still without its point."""
+    string = Individual((), len(problem.objectives))
+    failed = rows[part.facts["ok"][rows] == 0]
+    if len(failed):
+        reason = part.record(int(failed[0])).reason
+        string.know((FitnessEstimate.failed(len(rows), reason),) * len(problem.objectives))
+        return string
+    string.know(tuple(_estimate(one, part, rows) for one in problem.objectives))
+    string.limit(
+        problem.result_constraints,
+        [float(part.values[one.name][rows].mean()) for one in problem.result_constraints],
+    )
+    return string
+
+
+def _estimate(objective: Objective, part: RunsTable, rows: NDArray[np.intp]) -> FitnessEstimate:
+    """Return the estimate of a cost by some rows of runs, without an interval."""
+    values = np.column_stack([part.values[name][rows] for name in objective.quantities])
+    std = float(np.std(objective.pseudo_costs(values), ddof=1)) if len(rows) > 1 else np.nan
+    return FitnessEstimate(objective.cost(values), std, np.nan, np.nan, len(rows), False)

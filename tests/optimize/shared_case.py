@@ -1,0 +1,21 @@
+"""A noisy function of two genes whose searches, of several methods, share a folder."""
+
+import numpy as np
+
+import optimize
+from optimize.problem.genes import Gene
+from optimize.problem.problem import Problem
+
+
+def noisy(design, seed):
+    """A bowl with its least value, 0.5, at x = 0.3, y = 0.6, and noise that follows from the seed."""
+    noise = 0.01 * np.random.default_rng(seed).normal()
+    return (design["x"] - 0.3) ** 2 + (design["y"] - 0.6) ** 2 + 0.5 + noise
+
+
+def problem(high=1.0, **fields):
+    return Problem.of_function(noisy, [Gene("x", "m", 0, high), Gene("y", "m", 0, 1)], **fields)
+
+
+def searched(folder, method, seed, **settings):
+    return optimize.run(problem(), out=folder, method=method, seed=seed, **{"generations": 3, **settings})

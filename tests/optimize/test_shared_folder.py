@@ -1,0 +1,175 @@
+"""Searches of one problem in one folder: one after the other, at once, killed; and warm starts."""
+
+import csv
+import json
+import random
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import optimize
+from optimize.problem.constraint import DesignConstraint
+from optimize.report import report
+from optimize.report.analysis import Analysis
+from optimize.storage.cache import Cache, existing
+from optimize.storage.maintenance import verify
+from tests.optimize.cache_files import PIPE, worker
+from tests.optimize.shared_case import problem, searched
+from tisim import InputError
+
+METHODS = ("zohdi", "cma-es", "random", "restart")
+
+
+@pytest.fixture(autouse=True)
+def without_pictures(monkeypatch):
+    """Sensitivities and pictures take most of the time of such searches."""
+    monkeypatch.setattr(report, "picture", lambda path, draw: [])
+    monkeypatch.setattr(Analysis, "of", lambda outcome: Analysis(None, ()))
+
+
+def tables_of(folder, name):
+    """All that a search has left in its file, but for when it was."""
+    cache = Cache(folder / "search.h5")
+    return {
+        table.removeprefix(name): repr(cache.table(table).columns)
+        for table in cache.tables()
+        if table.startswith(f"{name}/")
+    }
+
+
+def test_each_search_is_what_it_is_alone(tmp_path):
+    for method in ("zohdi", "cma-es"):
+        alone = searched(tmp_path / method, method, 1)
+        beside = searched(tmp_path / "both", method, 1)
+        assert (beside.designs, beside.name) == (alone.designs, alone.name)
+        assert tables_of(tmp_path / "both", beside.name) == tables_of(tmp_path / method, alone.name)
+    file = optimize.read(tmp_path / "both")
+    assert [name.rsplit("-", 1)[0] for name in file.searches] == ["noisy-cma-es-1", "noisy-zohdi-1"]
+    pytest.importorskip("pandas")
+    assert len(file.hall(file.searches[0])) == 6
+    assert len(file.logbook(file.searches[1])) == 4
+
+
+def test_a_search_takes_what_others_have_run(tmp_path):
+    """More generations, the same first generation, the same starting designs."""
+    first = searched(tmp_path, "zohdi", 1)
+    more = searched(tmp_path, "zohdi", 1, generations=5)
+    assert first.name == more.name
+    assert 0 < more.evaluations < more.hits
+    restart = searched(tmp_path, "restart", 1, generations=0, ensemble={"confirm": 0, "select": 0})
+    assert (restart.evaluations, restart.hits > 0) == (0, True)
+    other = searched(tmp_path, "zohdi", 2)
+    assert other.hits == 0, "other starts"
+    designs = [{"x": 0.2, "y": 0.5}]
+    searched(tmp_path, "cma-es", 1, starting_designs=designs)
+    again = searched(tmp_path, "random", 1, starting_designs=designs, generations=0)
+    assert again.hits >= 2
+
+
+@pytest.mark.long
+def test_several_processes_with_different_methods(tmp_path):
+    folder = tmp_path / "both"
+    at_work = [worker("shared", folder, method, 1, stderr=subprocess.PIPE) for method in METHODS]
+    for process in at_work:
+        _, err = process.communicate()
+        assert process.returncode == 0, err
+    report = verify(folder / "search.h5")
+    assert report.ok
+    assert report.duplicates == 0
+    names = {}
+    for method in METHODS:
+        alone = searched(tmp_path / method, method, 1)
+        names[alone.name.removeprefix("searches/")] = tmp_path / method
+        assert tables_of(folder, alone.name) == tables_of(tmp_path / method, alone.name)
+    shown = json.loads((folder / "shown.json").read_text())["search"]
+    assert (folder / "best.csv").read_bytes() == (names[shown] / "best.csv").read_bytes()
+
+
+def test_a_warm_start_learns_and_runs_the_best_first(tmp_path):
+    first = searched(tmp_path, "zohdi", 1)
+    by_design = {}
+    for record in existing(tmp_path / "search.h5").records():
+        by_design.setdefault(tuple(record.design.values()), []).append(record.values["value"])
+    warm = searched(tmp_path, "gaussian-process", 2, warm_start=True)
+    table = existing(tmp_path / "search.h5").table(f"{warm.name}/warm_start").columns
+    assert {(x, y) for x, y in zip(table["x"], table["y"], strict=True)} == set(by_design)
+    for x, y, value, count in zip(table["x"], table["y"], table["value"], table["starts"], strict=True):
+        assert value == pytest.approx(np.mean(by_design[x, y]), rel=1e-12)
+        assert count == len(by_design[x, y])
+    assert warm.logbook[0]["designs"] == 6 + 8, "the best, and a batch by the surrogate"
+    ran = [warm.problem.genome.decode(string) for string in warm.estimates][:6]
+    assert first.designs[0].genes in ran
+    cold = searched(tmp_path / "cold", "gaussian-process", 2)
+    assert cold.logbook[0]["best"] > warm.logbook[0]["best"]
+
+
+def test_a_warm_start_goes_on_as_it_has_begun(tmp_path):
+    """Its own runs, and those of others since, are not what it has begun with."""
+    searched(tmp_path, "zohdi", 1)
+    warm = searched(tmp_path, "gaussian-process", 2, warm_start=True)
+    assert searched(tmp_path, "gaussian-process", 2).name != warm.name
+    searched(tmp_path, "random", 5)
+    again = searched(tmp_path, "gaussian-process", 2, warm_start=True)
+    assert (again.name, again.evaluations, again.designs) == (warm.name, 0, warm.designs)
+    more = searched(tmp_path, "gaussian-process", 2, warm_start=True, generations=4)
+    assert (more.name, list(more.logbook)[:4]) == (warm.name, list(warm.logbook))
+    assert searched(tmp_path, "gaussian-process", 3, warm_start=True).name != warm.name
+
+
+def test_it_learns_only_from_what_it_could_ask_for(tmp_path):
+    constraint = DesignConstraint("place", lambda design: design["x"], "m", at_most=0.9)
+    whole = problem(constraints=[constraint])
+    optimize.run(whole, out=tmp_path, method="random", seed=1, generations=0)
+    all_x = {record.design["x"] for record in existing(tmp_path / "search.h5").records()}
+    x, y = whole.genome.genes
+    half = {k for k in all_x if k <= 0.5}
+    assert 0 < len(half) < len(all_x)
+    for narrow, learned in (
+        (replace(whole, genome=optimize.Genome((replace(x, high=0.5), y))), half),
+        (replace(whole, constraints=[replace(constraint, at_most=0.5)]), half),
+        (whole.fix(y=0.25), set()),
+    ):
+        warm = optimize.run(narrow, out=tmp_path, method="genetic", seed=4, generations=0, warm_start=True)
+        told = existing(tmp_path / "search.h5").table(f"{warm.name}/warm_start").columns["x"]
+        assert set(told) & all_x == learned
+        if learned:
+            assert max(told) <= 0.5
+
+
+def test_a_warm_start_wants_a_folder():
+    with pytest.raises(InputError, match="warm_start must be given with a folder, out; received True"):
+        optimize.run(problem(), warm_start=True)
+
+
+@pytest.mark.long
+def test_killed_beside_another_it_ends_as_if_never_stopped(tmp_path):
+    """A warm start, killed again and again, while another search of the folder goes on."""
+    for folder in ("whole", "cut"):
+        searched(tmp_path / folder, "zohdi", 1)
+    whole = searched(tmp_path / "whole", "gaussian-process", 2, warm_start=True)
+    rng = random.Random(5)
+    folder = tmp_path / "cut"
+    kept = len(existing(folder / "search.h5"))
+    with worker("shared", folder, "gaussian-process", 2, "warm", pipesize=PIPE) as process:
+        assert process.stdout.readline().startswith("stored")
+        process.kill()
+    for _ in range(2):
+        with (
+            worker("shared", folder, "random", 3, pipesize=PIPE) as beside,
+            worker("shared", folder, "gaussian-process", 2, "warm", pipesize=PIPE) as process,
+        ):
+            for _ in range(rng.randint(1, 15)):
+                if not process.stdout.readline():
+                    break
+            process.kill()
+            beside.kill()
+        assert verify(folder / "search.h5").ok
+    assert len(existing(folder / "search.h5")) > kept
+    again = searched(folder, "gaussian-process", 2, warm_start=True)
+    assert (again.name, again.designs) == (whole.name, whole.designs)
+    assert tables_of(folder, again.name) == tables_of(tmp_path / "whole", whole.name)
+    assert verify(folder / "search.h5").duplicates == 0
+    with (folder / "best.csv").open() as file:
+        assert float(next(csv.DictReader(file))["x (m)"]) == whole.designs[0].genes["x"]
