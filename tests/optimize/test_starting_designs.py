@@ -10,6 +10,7 @@ from optimize.beginning import Beginning
 from optimize.designs_csv import designs
 from optimize.experiments import combined, experiments, restored, table_of
 from optimize.methods.base import every
+from optimize.methods.cma_es import CmaEs
 from optimize.methods.individual import Individual
 from optimize.problem.constraint import ResultConstraint
 from optimize.problem.genes import Choice, Gene
@@ -54,6 +55,28 @@ def test_every_method_has_them_run_first(path, method):
     assert sum(outcome.logbook.select("starts")) == len(evaluator.digests) - 4 * 6 - 16 * 6
     assert outcome.designs[0].genes == BEST, "nothing else is as good by chance"
     assert outcome.name != run(path.with_name("alone.h5"), method=method, generations=0).name
+
+
+def test_a_method_is_told_of_what_it_has_asked_for_alone(path, monkeypatch):
+    asked, told = [], []
+
+    class Spy(CmaEs):
+        name = "spy"
+
+        def ask(self):
+            asked.append(super().ask())
+            return asked[-1]
+
+        def tell(self, population, hall):
+            told.append(population)
+            assert hall
+            super().tell(population, hall)
+
+    monkeypatch.setitem(globals(), "Spy", Spy)
+    monkeypatch.setattr(Spy, "__qualname__", "Spy")
+    outcome = run(path, beginning=Beginning((BEST,)), method="spy")
+    assert [[tuple(s) for s in one] for one in told] == [[tuple(s) for s in one] for one in asked]
+    assert outcome.designs[0].genes == BEST
 
 
 def learned(method, points):
