@@ -41,8 +41,10 @@ def test_a_gene_is_kept_at_a_value(own_file, tmp_path, capsys):
     assert row["wall"] == "flat"
     assert float(row["value"]) >= 1.0
     assert not (tmp_path / "b/best_scene.toml").exists()
-    assert run(str(file), "--out", str(tmp_path / "b")) == 2
+    assert run(str(file), "--out", str(tmp_path / "b"), "--resume") == 2
     assert "genes.wall is" in capsys.readouterr().err.replace("\n", " ")
+    assert run(str(file), "--out", str(tmp_path / "b")) == 0, "another search of the folder"
+    assert best(tmp_path / "b") == best(tmp_path / "a")
 
 
 def test_what_cannot_be_fixed_is_told(own_file, tmp_path, capsys):

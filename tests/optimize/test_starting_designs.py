@@ -10,6 +10,7 @@ from optimize.beginning import Beginning
 from optimize.designs_csv import designs
 from optimize.experiments import combined, experiments, restored, table_of
 from optimize.methods.base import every
+from optimize.methods.cma_es import CmaEs
 from optimize.methods.individual import Individual
 from optimize.problem.constraint import ResultConstraint
 from optimize.problem.genes import Choice, Gene
@@ -54,6 +55,21 @@ def test_every_method_has_them_run_first(path, method):
     assert sum(outcome.logbook.select("starts")) == len(evaluator.digests) - 4 * 6 - 16 * 6
     assert outcome.designs[0].genes == BEST, "nothing else is as good by chance"
     assert outcome.name != run(path.with_name("alone.h5"), method=method, generations=0).name
+
+
+def test_a_method_is_told_of_what_it_has_asked_for_alone(path, monkeypatch):
+    asked, told, tell = [], [], CmaEs.tell
+
+    def noted(method, population, hall):
+        told.append([tuple(string) for string in population])
+        tell(method, population, hall)
+
+    ask = CmaEs.ask
+    monkeypatch.setattr(CmaEs, "ask", lambda method: asked.append(ask(method)) or asked[-1])
+    monkeypatch.setattr(CmaEs, "tell", noted)
+    outcome = run(path, beginning=Beginning((BEST,)), method="cma-es")
+    assert told == [[tuple(string) for string in population] for population in asked]
+    assert outcome.designs[0].genes == BEST
 
 
 def learned(method, points):
