@@ -56,7 +56,7 @@ SHOWN: Mapping[str, float] = {
 """Charges and fields that are felt, of the flow that is shown with them."""
 
 COULOMB = NearField(alpha2=1 / (4 * math.pi * epsilon_0), beta2=2, strength="charge")
-PHASE = 0.2
+PHASE = 0.1
 """Steps are at most as long as this over the rate of an oscillation that the forces of fields can cause."""
 
 
@@ -116,5 +116,6 @@ def rate(design: Mapping[str, float], radius: float) -> float:
 def stepper(design: Mapping[str, float], radius: float) -> Stepper:
     """Return the stepper of grains of a design and a radius (m) in fields: forces act between impacts, too,
     so that steps are bounded by what these can do."""
-    fastest = rate(design, radius)
-    return Verlet(control=ApproachTime(longest=PHASE / fastest) if fastest else ApproachTime())
+    fastest, usual = rate(design, radius), ApproachTime()
+    longest = min(PHASE / fastest, usual.longest) if fastest else usual.longest
+    return Verlet(control=ApproachTime(shortest=min(usual.shortest, longest), longest=longest))

@@ -1,6 +1,6 @@
 """Whether the steps of agglomeration in fields are short enough, and what they cost.
 
-    python tests/benchmarks/field_steps.py [--designs 64] [--starts 16] [--phases 0.4 0.2 0.08] [--grains 60]
+    python tests/benchmarks/field_steps.py [--designs 64] [--starts 16] [--phases 0.2 0.1 0.05] [--grains 60]
 
 Designs are drawn from the ranges of the search, every other one soft and fast. The phase is the longest step
 times the rate of an oscillation that the forces of fields can cause. A line for each phase has how many runs
@@ -46,7 +46,7 @@ if __name__ == "__main__":
     parser.add_argument("--designs", type=int, default=64)
     parser.add_argument("--starts", type=int, default=16)
     parser.add_argument("--grains", type=int, default=60)
-    parser.add_argument("--phases", type=float, nargs="+", default=[0.4, 0.2, 0.08])
+    parser.add_argument("--phases", type=float, nargs="+", default=[0.2, 0.1, 0.05])
     options = parser.parse_args()
     designs, found = drawn(options.designs), {}
     for phase in options.phases:

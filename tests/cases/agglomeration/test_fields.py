@@ -237,3 +237,13 @@ def test_the_rate_is_that_of_two_touching_grains(felt):
     # Iron at 1 T is not quite saturated.
     assert 0.999 * exact < fields.rate(design, radius) < (1.15 if m else 1.001) * exact
     assert fields.rate({**design, **fields.NO_FIELDS}, radius) == 0.0
+
+
+def test_steps_of_small_grains_in_strong_fields_may_be_shorter_than_those_of_the_paper():
+    strong = {**BEST, **FELT["opposite charges"], "magnetic_field": 1.0, "density": 1e3, "length_ratio": 0.4}
+    control = scene({**fields.NO_FIELDS, **strong}, 1, 1000).stepper.control
+    assert control.shortest == control.longest < 1e-6
+    weak = scene(
+        {**fields.NO_FIELDS, **strong, "surface_charge": 1e-9, "magnetic_field": 0.0}, 1, 60
+    ).stepper.control
+    assert (weak.shortest, weak.longest) == (1e-6, 1e-3)
