@@ -80,7 +80,7 @@ class _Search:
         )
         self.hall = Hall(settings.hall_of_fame)
         self.known: dict[tuple[float, ...], Individual] = {}
-        self.ranked: list[Individual] = []
+        self.ranked: list[Individual] | None = None
         self.tried: set[tuple[float, ...]] = set()  # designs that did not meet the target for sure
         self.stagnation = self.refused = 0
         self.learned = copy.deepcopy(beginning.learned)  # strings that have not run, whatever they are worth
@@ -114,8 +114,11 @@ class _Search:
             self.problem, self.settings, self.ensemble, list(self.known.values()),
             lambda fraction: self._report(last, 1.0), met,
         )  # fmt: skip
-        self.outcome.estimates |= {tuple(string): string.estimates for string in self.known.values()
-                                   if not string.failed}  # fmt: skip
+        for string in self.known.values():  # further starts have changed some, or made them fail
+            known = self.outcome.failures if string.failed else self.outcome.estimates
+            known[tuple(string)] = string.estimates
+            if string.failed:
+                self.outcome.estimates.pop(tuple(string), None)
 
     @property
     def _budget(self) -> float:
@@ -273,7 +276,7 @@ class _Search:
     def _store(self) -> None:
         """Bring the outcome up to date and put it into the cache file."""
         out = self.outcome
-        out.hall = self.ranked or list(self.hall.strings)
+        out.hall = list(self.hall.strings) if self.ranked is None else self.ranked
         out.evaluations, out.hits = self.ensemble.runs.evaluations, self.ensemble.runs.hits
         out.elapsed_s = time.monotonic() - self.began
         store(self.cache, out)

@@ -41,7 +41,7 @@ class Statistic(ABC):
 
     @property
     def fewest_starts(self) -> int:
-        """The starts that an estimate with a standard error needs."""
+        """The starts that an estimate needs."""
         return 2
 
     @property
@@ -210,6 +210,14 @@ class Misfit(Statistic):
     @property
     def label(self) -> str:
         return ""
+
+    @property
+    def fewest_starts(self) -> int:
+        return 1
+
+    @property
+    def fewest_fresh(self) -> int:
+        return 2
 
     @property
     def quantities(self) -> tuple[str, ...]:

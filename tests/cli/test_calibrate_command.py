@@ -23,7 +23,8 @@ def table(path):
 def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim, tmp_path, monkeypatch):
     """The misfit of the best design is that of its run from the numbers in the file, in their uncertainties;
     other numbers are not taken for these."""
-    settings = {**draw_down.SEARCH_SETTINGS, "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1}}
+    one_start = {"min_starts": 1, "block": 1, "max_starts": 1, "select": 0, "confirm": 0}
+    settings = {**draw_down.SEARCH_SETTINGS, "ensemble": one_start}
     monkeypatch.setitem(draw_down.SIZES, "default", Size("a small draw-down test", SMALL, settings))
     mine = tmp_path / "mine.csv"
     mine.write_text(

@@ -285,3 +285,16 @@ def _fail(design, seed):
 
 def _full(handle, data, offset):
     raise OSError(28, "No space left on device")
+
+
+def test_designs_that_fail_from_further_starts_are_not_reported(tmp_path):
+    """One start in three fails, so that no design passes the starts in which the best are chosen."""
+
+    def function(design, seed):
+        return "lost" if (seed + int(1e9 * design["x0"])) % 3 == 0 else bowl(design, seed, noise=0.01)
+
+    outcome = run(tmp_path / "a.h5", FakeEvaluator(function), generations=1, ensemble={"min_starts": 1})
+    assert outcome.logbook.select("failed")[0] < 20
+    assert all(math.isfinite(string.fitness.values[0]) for string in outcome.hall)
+    assert all(not string.failed for string in outcome.hall)
+    assert not set(outcome.estimates) & set(outcome.failures)
