@@ -16,14 +16,19 @@ from optimize.hall_of_fame import not_dominated
 from optimize.methods.individual import Individual
 from optimize.problem.problem import Problem
 from optimize.settings import Settings
+from optimize.surrogate.noise import moments
 from optimize.surrogate.ranking import best
+from tisim.numerics.skewed import Moments
 
 FEWEST_FRESH = 4
 """Fresh starts of each design of a front, where the budget does not pay for more."""
 _PROOF = 2 * 10**6
 """The number of the first start that is used to see whether a design meets a target."""
 _STARTS_OF_PROOF = 16
+WRONGLY_MET = 0.05
+"""The chance that a search stops at a design that does not meet its target, where none does, at most."""
 Report = Callable[[float], None]
+Noise = Sequence[Moments] | None
 
 
 def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
@@ -47,8 +52,9 @@ def concluded(
     asked = settings.ensemble
     if asked.select or asked.confirm:
         ensemble.look()
+    noise = _noise(problem, settings, ensemble, known) if asked.confirm else None
     if problem.several:
-        return _front(problem, settings, ensemble, known, report)
+        return _front(problem, settings, ensemble, known, report, noise)
     count = settings.hall_of_fame
     if ensemble.repeatable:
         return _first(met, best(problem.genome, known, count))
@@ -58,12 +64,17 @@ def concluded(
     if asked.confirm:
         count = int(max(1, min(count, _left(ensemble) // asked.confirm)))
     chosen = _first(met, best(problem.genome, known, count))
-    _confirm(problem, chosen, ensemble, int(min(asked.confirm, _left(ensemble))), report)
+    _confirm(problem, chosen, ensemble, int(min(asked.confirm, _left(ensemble))), report, noise)
     return chosen
 
 
 def _front(
-    problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual], report: Report
+    problem: Problem,
+    settings: Settings,
+    ensemble: Ensemble,
+    known: Sequence[Individual],
+    report: Report,
+    noise: Noise,
 ) -> list[Individual]:
     """Return the front, of which no design is dominated by the fresh means of another."""
     front = best(problem.genome, known, len(known))
@@ -74,31 +85,61 @@ def _front(
     if not math.isinf(left):
         confirm = max(min(confirm, int(left) // len(front)), min(confirm, FEWEST_FRESH))
         front = best(problem.genome, known, max(1, int(left) // confirm))
-    _confirm(problem, front, ensemble, confirm, report)
+    _confirm(problem, front, ensemble, confirm, report, noise)
     return not_dominated(front) if front[0].confirmed else front
 
 
-def proven(problem: Problem, leader: Individual, ensemble: Ensemble, goal: float) -> bool:
-    """Return whether a design is as good as a goal, a cost, with the confidence of an interval: whether its
-    upper end over starts of its own is no higher."""
+def proven(
+    problem: Problem,
+    settings: Settings,
+    ensemble: Ensemble,
+    known: Sequence[Individual],
+    leader: Individual,
+    goal: float,
+    tried: int,
+) -> bool:
+    """Return whether a design is as good as a goal, a cost, with confidence: whether the upper end of its
+    interval over starts of its own is no higher.
+
+    known : all designs that have run. tried : designs that have not met the goal before it. Of many that are
+    tried some would meet it by luck; the k-th has a chance of 0.05 / (k (k + 1)) to do so, and all together
+    one of 0.05 at most.
+    """
     ensemble.look()
     if ensemble.repeatable:
         return leader.fitness.values[0] <= goal
     if _left(ensemble) < _STARTS_OF_PROOF:
         return False
-    design = problem.genome.decode(leader)
-    ((estimate,),) = ensemble.fresh([design], _STARTS_OF_PROOF, first=_PROOF)
+    chance = WRONGLY_MET / ((tried + 1) * (tried + 2))
+    noise = _noise(problem, settings, ensemble, known)
+    ((estimate,),) = ensemble.fresh(
+        [problem.genome.decode(leader)], _STARTS_OF_PROOF, _PROOF, noise=noise, confidence=1.0 - 2.0 * chance
+    )
     return estimate.high <= goal
 
 
 def _confirm(
-    problem: Problem, chosen: Sequence[Individual], ensemble: Ensemble, starts: int, report: Report
+    problem: Problem,
+    chosen: Sequence[Individual],
+    ensemble: Ensemble,
+    starts: int,
+    report: Report,
+    noise: Noise,
 ) -> None:
     if not starts or starts * len(chosen) > _left(ensemble):
         return
     designs = [problem.genome.decode(string) for string in chosen]
-    for string, estimates in zip(chosen, ensemble.fresh(designs, starts, progress=report), strict=True):
+    fresh = ensemble.fresh(designs, starts, progress=report, noise=noise)
+    for string, estimates in zip(chosen, fresh, strict=True):
         string.confirmed = estimates
+
+
+def _noise(problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual]) -> Noise:
+    """Return what the search tells of the noise of each cost, where it can: not of starts that all designs
+    have in common, whose noise is no less alike."""
+    if ensemble.repeatable or settings.ensemble.common_starts:
+        return None
+    return moments(problem.genome, known)
 
 
 def _know(problem: Problem, candidates: Sequence[Individual], ensemble: Ensemble, starts: int) -> None:

@@ -16,7 +16,8 @@ from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
 from tisim.components.component import Checked
 from tisim.errors import must
-from tisim.numerics.statistics import half_width
+from tisim.numerics.skewed import Moments, shared_skewness
+from tisim.numerics.statistics import CONFIDENCE, half_width
 
 Design = Mapping[str, Any]
 Report = Callable[[float], None]
@@ -217,18 +218,28 @@ class Ensemble:
         starts: int,
         first: int = FRESH,
         progress: Report | None = None,
+        noise: Sequence[Moments] | None = None,
+        confidence: float = CONFIDENCE,
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Return the estimates of each design from that number of starts that nothing else has used; first :
-        the number of the first of these.
+        """Return the estimates of each design from that number of starts that nothing else has used, and that
+        are its own.
 
-        A winner has won by being good and by being lucky in its starts; this is without the luck.
+        A winner has won by being good and by being lucky in its starts; this is without the luck. Designs
+        tell each other how skewed noise is: rare outcomes have come to some of them. first : the number of
+        the first start. noise : what the search knows of the noise of each cost. confidence : of intervals.
         """
-        samples = [Sample(design) for design in designs]
+        samples = [Sample(design, own=True) for design in designs]
         additions = [(sample, range(first, first + starts)) for sample in samples]
         self.runs.add(additions, progress or (lambda fraction: None))
         for sample in samples:
             sample.used, sample.converged = len(sample.costs), bool(self.repeatable)
-        return [self._summary(sample) for sample in samples]
+        good = [sample for sample in samples if not sample.reason]
+        skewness = [
+            shared_skewness([_column(sample, k) for sample in good], noise[k] if noise else None)
+            for k in range(self.objectives)
+        ]
+        ranges = [self._range(good, k) for k in range(self.objectives)]
+        return [self._summary(sample, skewness, ranges, confidence) for sample in samples]
 
     def constraint_means(self, design: Design) -> tuple[float, ...]:
         """Return the mean of each constraint of the result over the starts of a design that has run."""
@@ -252,17 +263,47 @@ class Ensemble:
         good = [sample for sample in dict.fromkeys(samples) if not sample.reason]
         return [one for one in good if not any(_beats(other, one) for other in good)]
 
-    def _summary(self, sample: Sample) -> tuple[FitnessEstimate, ...]:
+    def _summary(
+        self,
+        sample: Sample,
+        skewness: Sequence[float | None] | None = None,
+        ranges: Sequence[float] | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> tuple[FitnessEstimate, ...]:
         if sample.reason:
             return (FitnessEstimate.failed(len(sample.costs), sample.reason),) * self.objectives
-        columns = list(zip(*sample.costs[: sample.used], strict=True))
+        columns = [_column(sample, k) for k in range(self.objectives)]
         if self.repeatable:
             return tuple(FitnessEstimate.certain(column[0]) for column in columns)
-        seen = self.runs.seen
         return tuple(
-            FitnessEstimate.of(column, sample.converged, sorted(values))
-            for column, values in zip(columns, seen, strict=True)
+            FitnessEstimate.of(
+                column,
+                sample.converged,
+                _may_occur(column, sorted(seen), ranges[k] if ranges else math.inf),
+                skewness[k] if skewness else None,
+                confidence,
+            )
+            for k, (column, seen) in enumerate(zip(columns, self.runs.seen, strict=True))
         )
+
+    def _range(self, samples: Sequence[Sample], objective: int) -> float:
+        """Return the largest difference between two starts of one design that has been seen."""
+        columns = [_column(one, objective) for one in (*self._known.values(), *samples) if one.used]
+        return max((max(column) - min(column) for column in columns), default=0.0)
+
+
+def _column(sample: Sample, objective: int) -> list[float]:
+    """Return the costs of an objective that its estimate stands on."""
+    return [costs[objective] for costs in sample.costs[: sample.used]]
+
+
+def _may_occur(column: Sequence[float], seen: Sequence[float], most: float) -> Sequence[float]:
+    """Return values that may occur beside equal ones of a design: those that differ by no more than ``most``
+    from them, between the least and the largest of all designs. Where only two are known at all, these; where
+    no difference between starts is known, all."""
+    if len(seen) < 3 or not most:
+        return seen
+    return max(seen[0], column[0] - most), min(seen[-1], column[0] + most)
 
 
 def _beats(one: Sample, other: Sample) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tisim.numerics.skewed import interval
+from tisim.numerics.statistics import CONFIDENCE
 
 
 @dataclass(frozen=True)
@@ -17,9 +18,10 @@ class FitnessEstimate:
     """Fitness of one design.
 
     mean : of the first `starts` starts, +inf if the design failed. std : sample standard deviation.
-    low, high : ends of the 95 % confidence interval of the mean (tisim.numerics.skewed). It holds for starts
-    that have not had a part in choosing the design. converged : Eq. 8.1 was met. reason : "" or why the
-    design failed. std, low and high are NaN where they are not known, and for failed designs.
+    low, high : ends of the confidence interval of the mean (tisim.numerics.skewed), 95 % unless said
+    otherwise. It holds for starts that have not had a part in choosing the design. converged : Eq. 8.1 was
+    met. reason : "" or why the design failed. std, low and high are NaN where they are not known, and for
+    failed designs.
     """
 
     mean: float
@@ -45,15 +47,23 @@ class FitnessEstimate:
         return self.std / math.sqrt(self.starts) if self.starts else math.nan
 
     @classmethod
-    def of(cls, values: Sequence[float], converged: bool, seen: Sequence[float] = ()) -> FitnessEstimate:
+    def of(
+        cls,
+        values: Sequence[float],
+        converged: bool,
+        seen: Sequence[float] = (),
+        skewness: float | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> FitnessEstimate:
         """Return the estimate from the fitness of each start; at least one.
 
-        seen : values that other designs have had: starts that are all equal do not exclude these.
+        seen : values that may occur: starts that are all equal do not exclude these. skewness : of what the
+        values are drawn from, where other designs tell it. confidence : of the interval.
         """
         n = len(values)
         mean = float(np.cumsum(values)[-1] / n)  # summed as in converged_after, to the last bit
         std = float(np.std(values, ddof=1)) if n > 1 else math.nan
-        return cls(mean, std, *interval(values, seen), n, converged)
+        return cls(mean, std, *interval(values, seen, skewness, confidence), n, converged)
 
     @classmethod
     def certain(cls, value: float) -> FitnessEstimate:
