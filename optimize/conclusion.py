@@ -57,7 +57,7 @@ def concluded(
         return _front(problem, settings, ensemble, known, report, noise)
     count = settings.hall_of_fame
     if ensemble.repeatable:
-        return _first(met, best(problem.genome, known, count))
+        return _exact(problem, _first(met, best(problem.genome, known, count)), ensemble)
     candidates = best(problem.genome, known, count)
     if 3 * asked.select * len(candidates) <= _left(ensemble):
         _know(problem, candidates, ensemble, asked.select)
@@ -79,7 +79,9 @@ def _front(
     """Return the front, of which no design is dominated by the fresh means of another."""
     front = best(problem.genome, known, len(known))
     confirm = settings.ensemble.confirm
-    if ensemble.repeatable or not confirm or not front:
+    if ensemble.repeatable:
+        return _exact(problem, front, ensemble)
+    if not confirm or not front:
         return front
     left = _left(ensemble)
     if not math.isinf(left):
@@ -147,6 +149,12 @@ def _know(problem: Problem, candidates: Sequence[Individual], ensemble: Ensemble
     for string, estimates in zip(candidates, ensemble.more(designs, starts), strict=True):
         string.know(estimates)
         string.limit(problem.result_constraints, ensemble.constraint_means(problem.genome.decode(string)))
+
+
+def _exact(problem: Problem, chosen: list[Individual], ensemble: Ensemble) -> list[Individual]:
+    """Let designs be known for sure that had several starts before these were seen to be all the same."""
+    _know(problem, [one for one in chosen if not all(e.exact for e in one.estimates)], ensemble, 0)
+    return chosen
 
 
 def _first(met: Individual | None, chosen: list[Individual]) -> list[Individual]:

@@ -116,7 +116,7 @@ class Outcome:
         estimates = string.confirmed or string.estimates
         names = [objective.name for objective in self.problem.objectives]
         means = self.problem.costs([estimate.mean for estimate in estimates])
-        sure = bool(string.confirmed) or all(estimate.std == 0 for estimate in estimates)
+        sure = bool(string.confirmed) or all(estimate.exact for estimate in estimates)
         intervals = {
             one.name: interval_of_value(estimate, one) if sure else None
             for one, estimate in zip(self.problem.objectives, estimates, strict=True)

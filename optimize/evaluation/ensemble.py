@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,9 +21,12 @@ from tisim.numerics.statistics import CONFIDENCE, half_width
 
 Design = Mapping[str, Any]
 Report = Callable[[float], None]
-LOOKED_AT, MOST_LOOKED_AT, LEAST_DIFFERENT = 2, 6, 3
-"""Designs that are run from two starts, to see whether these differ: where runs leave a state, and where they
-leave none. Of the latter so many must have different costs."""
+LOOKED_AT = 2
+"""Designs that are run from two starts, to see whether these end in different states."""
+EQUAL_STARTS, DIFFERENT_DESIGNS = 60, 3
+"""What leaves no state is taken to be without noise when so many starts have repeated the costs of their
+designs, and so many of these costs are different. Of an outcome of 1 run in 20 none is among 60 in 5 % of
+cases; when each of two runs may have it, in 0.2 %."""
 FRESH = 10**6
 """The number of the first start that only reports use. None of a search is as large."""
 
@@ -72,8 +75,8 @@ class Ensemble:
 
     budget : most runs that may be asked for (inf: no end); exhausted : it has cut an estimate short.
     repeatable : whether all starts of a design give the same run, so that one is enough; found out by looking
-    at the first designs, None before. runs : counts them. An estimate is a tuple, one FitnessEstimate of the
-    cost for each objective.
+    at the designs that run, None before. runs : counts them. An estimate is a tuple, one FitnessEstimate of
+    the cost for each objective.
     """
 
     def __init__(
@@ -153,23 +156,30 @@ class Ensemble:
 
     def _look(self, samples: Sequence[Sample]) -> None:
         """Run the first designs from two starts each, and see whether these end in the same state, to the
-        last bit, after the same work. What leaves no state, as a plain function, must give equal costs for
-        more designs, and different ones for different designs: rare outcomes are equal by chance, too."""
-        looked: list[Sample] = []
-        for group in (samples[:LOOKED_AT], samples[LOOKED_AT:MOST_LOOKED_AT]):
-            additions = [(sample, range(len(sample.costs), 2)) for sample in group]
-            if sum(len(starts) for _, starts in additions) > self.budget - self.requested:
-                return
-            self.runs.add(additions)
-            looked += [sample for sample in group if not sample.reason]
-            if any(len(set(sample.costs[:2])) > 1 for sample in looked):
-                self.repeatable = False
-                return
-            if looked and all(None not in sample.ends for sample in looked):
-                self.repeatable = all(len(set(sample.ends[:2])) == 1 for sample in looked)
-                return
-        if looked:
-            self.repeatable = len({sample.costs[0] for sample in looked}) >= LEAST_DIFFERENT
+        last bit, after the same work. What leaves no state, as a plain function, is judged by its costs: rare
+        outcomes are equal by chance, too."""
+        group = samples[:LOOKED_AT]
+        additions = [(sample, range(len(sample.costs), 2)) for sample in group]
+        if sum(len(starts) for _, starts in additions) > self.budget - self.requested:
+            return
+        self.runs.add(additions)
+        looked = [sample for sample in group if not sample.reason]
+        if any(len(set(sample.costs[:2])) > 1 for sample in looked):
+            self.repeatable = False
+        elif looked and all(None not in sample.ends for sample in looked):
+            self.repeatable = all(len(set(sample.ends[:2])) == 1 for sample in looked)
+        else:
+            self._judge_costs(self._known.values())
+
+    def _judge_costs(self, samples: Iterable[Sample]) -> None:
+        """Say whether starts matter, by the costs of those that there are, where these tell."""
+        several = [sample for sample in samples if len(sample.costs) > 1 and not sample.reason]
+        if any(len(set(sample.costs)) > 1 for sample in several):
+            self.repeatable = False
+            return
+        repeats = sum(len(sample.costs) - 1 for sample in several)
+        if repeats >= EQUAL_STARTS and len({sample.costs[0] for sample in several}) >= DIFFERENT_DESIGNS:
+            self.repeatable = True
 
     def race(
         self, designs: Sequence[Design], progress: Report | None = None
@@ -231,6 +241,8 @@ class Ensemble:
         samples = [Sample(design, own=True) for design in designs]
         additions = [(sample, range(first, first + starts)) for sample in samples]
         self.runs.add(additions, progress or (lambda fraction: None))
+        if self.repeatable is None:
+            self._judge_costs((*self._known.values(), *samples))
         for sample in samples:
             sample.used, sample.converged = len(sample.costs), bool(self.repeatable)
         good = [sample for sample in samples if not sample.reason]

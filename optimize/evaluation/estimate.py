@@ -37,6 +37,11 @@ class FitnessEstimate:
         return not self.reason
 
     @property
+    def exact(self) -> bool:
+        """Whether all starts are known to be the same, so that the interval has no width."""
+        return self.low == self.high
+
+    @property
     def half_width(self) -> float:
         """Half of the width of the interval."""
         return (self.high - self.low) / 2

@@ -63,7 +63,7 @@ def notes(outcome: Outcome) -> RenderableType:
         "starts": "random starts that the mean is over",
         ERROR: "standard error of that mean. It does not count that the design was chosen for its luck, too",
     }
-    if all(estimate.std == 0 for estimate in first.estimates):
+    if all(estimate.exact for estimate in first.estimates):
         words = {"starts": "one: all random starts of a design give the same run"}
     if any(string.estimates[0].converged for string in outcome.hall) and ensemble.tolerance:
         words["converged"] = (

@@ -116,13 +116,17 @@ def searched(kind, seed, several=False, **settings):
 
 
 def held(kind, outcome, several=False):
-    """For each reported design and objective whether its interval has the truth, (designs, objectives)."""
+    """For each reported design and objective whether its interval has the truth, (designs, objectives); NaN
+    where none is given, as all runs of the search are equal."""
     found = []
     for design in outcome.designs:
         true = truths(kind, design.genes, several)
         ends = [design.intervals[name] for name in design.values]
-        found.append([low - 1e-12 <= t <= high + 1e-12 for (low, high), t in zip(ends, true, strict=True)])
-    return np.array(found)
+        found.append(
+            [math.nan if math.isnan(low) else low - 1e-12 <= t <= high + 1e-12
+             for (low, high), t in zip(ends, true, strict=True)]
+        )  # fmt: skip
+    return np.array(found, dtype=float)
 
 
 def coverage(kind, searches, several=False, **settings):
@@ -134,11 +138,12 @@ def coverage(kind, searches, several=False, **settings):
         outcome = searched(kind, seed, several, **settings)
         holds = held(kind, outcome, several)
         best = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
-        first.append(holds[best].mean())
-        everything.append(holds.mean())
+        if not np.any(np.isnan(holds)):
+            first.append(holds[best].mean())
+            everything.append(holds.mean())
         widths += [np.ptp(ends) for design in outcome.designs for ends in design.intervals.values()]
-    error = np.std(everything, ddof=1) / math.sqrt(searches)
-    return np.mean(first), np.mean(everything), error, np.median(widths)
+    error = np.std(everything, ddof=1) / math.sqrt(len(everything))
+    return np.mean(first), np.mean(everything), error, np.nanmedian(widths)
 
 
 def table(searches, kinds):

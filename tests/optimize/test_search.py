@@ -255,8 +255,26 @@ def test_a_search_stops_at_a_target_only_when_it_is_met_for_sure(tmp_path):
 def test_a_function_without_noise_is_found_out_and_run_once(tmp_path):
     outcome = run(tmp_path / "a.h5", generations=5, ensemble={})
     assert {string.estimates[0].starts for string in outcome.hall} == {1}
-    assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 6
+    assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 2
     assert outcome.designs[0].intervals["fitness"] == (outcome.designs[0].values["fitness"],) * 2
+
+
+def test_what_leaves_no_state_is_without_noise_when_sixty_starts_have_repeated_others(tmp_path):
+    evaluator = FakeEvaluator(quiet_bowl, leaves_state=False)
+    outcome = run(tmp_path / "a.h5", evaluator, generations=5, ensemble=EnsembleSettings(min_starts=2))
+    designs, starts = outcome.logbook.select("designs"), outcome.logbook.select("starts")
+    assert starts[:4] == [2 * count for count in designs[:4]]
+    assert sum(designs[:4]) >= 60 > sum(designs[:3])
+    assert starts[5] == designs[5]
+    assert outcome.designs[0].intervals["fitness"] == (outcome.designs[0].values["fitness"],) * 2
+
+
+def test_a_rare_outcome_that_has_not_come_yet_leaves_an_interval(tmp_path):
+    """Of few runs that are all equal nothing says that others would be."""
+    evaluator = FakeEvaluator(quiet_bowl, leaves_state=False)
+    outcome = run(tmp_path / "a.h5", evaluator, max_evaluations=40, ensemble={})
+    (low, high), value = outcome.designs[0].intervals["fitness"], outcome.designs[0].values["fitness"]
+    assert low <= value < high
 
 
 def test_unfit_operators_stop_it_before_anything_runs(path):
