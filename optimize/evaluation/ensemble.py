@@ -172,12 +172,15 @@ class Ensemble:
             self._judge_costs(self._known.values())
 
     def _judge_costs(self, samples: Iterable[Sample]) -> None:
-        """Say whether starts matter, by the costs of those that there are, where these tell."""
+        """Say whether starts matter, by the costs of those that there are, where these tell. A start that all
+        designs have in common is one repeat, whatever their number."""
         several = [sample for sample in samples if len(sample.costs) > 1 and not sample.reason]
         if any(len(set(sample.costs)) > 1 for sample in several):
             self.repeatable = False
             return
-        repeats = sum(len(sample.costs) - 1 for sample in several)
+        own = [len(one.costs) - 1 for one in several if one.own or not self.runs.common]
+        common = [len(one.costs) - 1 for one in several if not one.own and self.runs.common]
+        repeats = sum(own) + max(common, default=0)
         if repeats >= EQUAL_STARTS and len({sample.costs[0] for sample in several}) >= DIFFERENT_DESIGNS:
             self.repeatable = True
 

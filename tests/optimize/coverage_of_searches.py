@@ -146,6 +146,33 @@ def coverage(kind, searches, several=False, **settings):
     return np.mean(first), np.mean(everything), error, np.nanmedian(widths)
 
 
+def stopped_at_target(kind, searches, above, **settings):
+    """(part of searches that stop at a target, part of these whose design does not meet it); the target is so
+    much above what the best design has."""
+    goal = KINDS[kind].mean(0.0) + above
+    usual = {"generations": 12, "options": {"population": 20}, "target": goal, "ensemble": OWN}
+    stopped, wrong = 0, 0
+    for seed in range(searches):
+        outcome = searched(kind, seed, **{**usual, **settings})
+        if outcome.stopped == "target":
+            stopped += 1
+            wrong += truths(kind, outcome.designs[0].genes)[0] > goal
+    return stopped / searches, wrong / max(stopped, 1)
+
+
+def dominated(outcome):
+    """The number of listed designs that another one dominates by the values that are listed."""
+    values = np.array([list(design.values.values()) for design in outcome.designs])
+    no_better = np.all(values[:, None] >= values[None], axis=2)
+    return int(np.sum(no_better & np.any(values[:, None] > values[None], axis=2)))
+
+
+def truly_dominated(kind, outcome):
+    """The part of the listed designs that another one dominates by the true means."""
+    true = np.array([truths(kind, design.genes, True) for design in outcome.designs])
+    return np.mean(np.any(np.all(true[:, None] > true[None], axis=2), axis=1))
+
+
 def table(searches, kinds):
     """Print a line for each kind of noise and way to search."""
     for kind in kinds:
@@ -153,6 +180,13 @@ def table(searches, kinds):
             report(kind, way, coverage(kind, searches, **settings))
         for way, settings in WAYS_TO_FRONTS.items():
             report(kind, way, coverage(kind, searches, several=True, **settings))
+
+        for above in (-1e-9, 0.1):
+            stopped, wrong = stopped_at_target(kind, searches, above)
+            print(
+                f"{kind:40s} target {above:+.1f}: {stopped:.3f} stop, {wrong:.3f} of these in error",
+                flush=True,
+            )
 
 
 def report(kind, way, found):

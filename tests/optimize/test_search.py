@@ -261,7 +261,8 @@ def test_a_function_without_noise_is_found_out_and_run_once(tmp_path):
 
 def test_what_leaves_no_state_is_without_noise_when_sixty_starts_have_repeated_others(tmp_path):
     evaluator = FakeEvaluator(quiet_bowl, leaves_state=False)
-    outcome = run(tmp_path / "a.h5", evaluator, generations=5, ensemble=EnsembleSettings(min_starts=2))
+    own = EnsembleSettings(min_starts=2, common_starts=False)
+    outcome = run(tmp_path / "a.h5", evaluator, generations=5, ensemble=own)
     designs, starts = outcome.logbook.select("designs"), outcome.logbook.select("starts")
     assert starts[:4] == [2 * count for count in designs[:4]]
     assert sum(designs[:4]) >= 60 > sum(designs[:3])
@@ -270,11 +271,14 @@ def test_what_leaves_no_state_is_without_noise_when_sixty_starts_have_repeated_o
 
 
 def test_a_rare_outcome_that_has_not_come_yet_leaves_an_interval(tmp_path):
-    """Of few runs that are all equal nothing says that others would be."""
+    """Of few runs that are all equal nothing says that others would be; nor of many from two starts that all
+    designs have in common."""
     evaluator = FakeEvaluator(quiet_bowl, leaves_state=False)
-    outcome = run(tmp_path / "a.h5", evaluator, max_evaluations=40, ensemble={})
-    (low, high), value = outcome.designs[0].intervals["fitness"], outcome.designs[0].values["fitness"]
-    assert low <= value < high
+    for runs, common in ((40, False), (200, True)):
+        settings = {"max_evaluations": runs, "ensemble": {"common_starts": common}}
+        outcome = run(tmp_path / f"{runs}.h5", evaluator, **settings)
+        (low, high), value = outcome.designs[0].intervals["fitness"], outcome.designs[0].values["fitness"]
+        assert low <= value < high
 
 
 def test_unfit_operators_stop_it_before_anything_runs(path):
