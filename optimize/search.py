@@ -242,9 +242,11 @@ class _Search:
             (goal,) = self.problem.costs([settings.target])
             leader = self.hall.strings[0]
             if leader.fitness.values[0] <= goal and tuple(leader) not in self.tried:
-                self.tried.add(tuple(leader))
                 self.ensemble.budget = self._budget
-                if proven(self.problem, leader, self.ensemble, goal):
+                known = list(self.known.values())
+                met = proven(self.problem, settings, self.ensemble, known, leader, goal, len(self.tried))
+                self.tried.add(tuple(leader))
+                if met:
                     return "target"
         if settings.patience is not None and self.stagnation >= settings.patience:
             return "patience"

@@ -115,14 +115,15 @@ def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
     found = []
     for k, objective in enumerate(outcome.problem.objectives):
         model = GaussianProcess(genome.features(points), objective.sign * costs[:, k], noise[:, k])
+        others = [_resampled(model, k) for k in range(_RESAMPLED)]
         q2 = _predicted(model, genome)
-        first, total = _indices(model, genome) if q2 >= LEAST_Q2 else ([UNKNOWN] * len(genome),) * 2
+        first, total = _indices(model, others, genome) if q2 >= LEAST_Q2 else ([UNKNOWN] * len(genome),) * 2
         genes = tuple(
             GeneSensitivity(
                 name=gene.name,
                 unit=gene.unit,
                 at=gene.decode(float(best[j])),
-                changes=_changes(model, genome, best, j),
+                changes=_changes(model, others, genome, best, j),
                 first=first[j],
                 total=total[j],
             )
@@ -161,21 +162,24 @@ def _predicted(model: GaussianProcess, genome: Genome) -> float:
     return 1.0 - max(missed, 0.0) / there if there > 0 else 0.0
 
 
-def _changes(model: GaussianProcess, genome: Genome, best: Array, j: int) -> dict[float, Between]:
-    """Return the changes of an objective when gene j moves from the best design."""
+def _changes(
+    model: GaussianProcess, others: list[GaussianProcess], genome: Genome, best: Array, j: int
+) -> dict[float, Between]:
+    """Return the changes of an objective when gene j moves from the best design.
+
+    Half of the interval is 1.96 times the root of the mean square by which the changes of functions of the
+    other processes are off the value.
+    """
     gene = genome.searched[j]
+    if gene.kind == "category":
+        return dict.fromkeys(MOVES, UNKNOWN)
     moved = np.tile(best, (len(MOVES), 1))
     moved[:, j] = np.clip(best[j] + np.array(MOVES), 0.0, 1.0)
     moved = genome.canonical(moved)
-    if gene.kind == "category":
-        return dict.fromkeys(MOVES, UNKNOWN)
     at = genome.features(np.vstack([best, moved]))
-    means, _ = model.predict(at)
-    explained = model.half_solved(at)
-    joint = model.covariance(at, at) - explained.T @ explained
-    variance = joint[0, 0] + np.diag(joint)[1:] - 2.0 * joint[0, 1:]
-    half = _NORMAL_95 * model.scale * np.sqrt(np.maximum(variance, 0.0))
-    change = means[1:] - means[0]
+    change, _ = _differences(model, at)
+    means, variances = zip(*(_differences(one, at) for one in others), strict=True)
+    half = _NORMAL_95 * np.sqrt(np.mean((np.array(means) - change) ** 2 + np.array(variances), axis=0))
     # At the end of a range a move is shorter than its name says.
     whole = np.abs(np.abs(moved[:, j] - best[j]) - np.abs(MOVES)) < 1e-9
     whole |= (gene.kind != "real") & (moved[:, j] != best[j])
@@ -185,20 +189,27 @@ def _changes(model: GaussianProcess, genome: Genome, best: Array, j: int) -> dic
     }
 
 
-def _indices(model: GaussianProcess, genome: Genome) -> tuple[list[Between], list[Between]]:
+def _differences(model: GaussianProcess, at: Array) -> tuple[Array, Array]:
+    """Return mean and variance of how far a process is at all points but the first from what it is there."""
+    means, _ = model.predict(at)
+    explained = model.half_solved(at)
+    joint = model.covariance(at, at) - explained.T @ explained
+    variance = joint[0, 0] + np.diag(joint)[1:] - 2.0 * joint[0, 1:]
+    return means[1:] - means[0], model.scale**2 * np.maximum(variance, 0.0)
+
+
+def _indices(
+    model: GaussianProcess, others: list[GaussianProcess], genome: Genome
+) -> tuple[list[Between], list[Between]]:
     """Return the first-order and total indices of each gene.
 
-    Values are means over functions drawn from the process. For the interval the process is fitted anew to
-    designs that are drawn with replacement (B. Efron, Ann. Statist. 7 (1979) 1-26), as one process takes its
-    length scales for known and is too sure of what is far from all designs. Half of the interval is 1.96
-    times the root of the mean square by which functions of these processes are off the values.
+    Values are means over functions drawn from the process. Half of the interval is 1.96 times the root of the
+    mean square by which functions of the other processes are off the values.
     """
     whole = np.concatenate([_drawn(model, genome, [k, 0], _SAMPLES) for k in range(_SETS)])
     value = whole.mean(axis=0)
-    others = np.concatenate(
-        [_drawn(_resampled(model, k), genome, [k, 1], _SAMPLES // 2) for k in range(_RESAMPLED)]
-    )
-    half = _NORMAL_95 * np.sqrt(((others - value) ** 2).mean(axis=0))
+    drawn = np.concatenate([_drawn(other, genome, [k, 1], _SAMPLES // 2) for k, other in enumerate(others)])
+    half = _NORMAL_95 * np.sqrt(((drawn - value) ** 2).mean(axis=0))
     first, total = (
         [Between(float(v), float(v - h), float(v + h)) for v, h in zip(*pair, strict=True)]
         for pair in zip(value, half, strict=True)
@@ -218,7 +229,8 @@ def _drawn(model: GaussianProcess, genome: Genome, seed: list[int], samples: int
 
 
 def _resampled(model: GaussianProcess, k: int) -> GaussianProcess:
-    """Return the process through as many of its designs, drawn with replacement; each is used once."""
+    """Return the process through as many of its designs, drawn with replacement (B. Efron, Ann. Statist. 7
+    (1979) 1-26); each is used once. One process takes its length scales for known, and is too sure."""
     count = len(model.points)
     chosen = np.unique(np.random.default_rng([k, 2]).integers(count, size=count))
     values = model.centre + model.scale * model.values[chosen]

@@ -17,7 +17,8 @@ from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
 from tisim.components.component import Checked
 from tisim.errors import must
-from tisim.numerics.statistics import half_width
+from tisim.numerics.skewed import Moments, shared_skewness
+from tisim.numerics.statistics import CONFIDENCE, half_width
 
 Design = Mapping[str, Any]
 Report = Callable[[float], None]
@@ -212,18 +213,30 @@ class Ensemble:
         starts: int,
         first: int = FRESH,
         progress: Report | None = None,
+        noise: Sequence[Moments] | None = None,
+        confidence: float = CONFIDENCE,
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Return the estimates of each design from that number of starts that nothing else has used; first :
-        the number of the first of these.
+        """Return the estimates of each design from that number of starts that nothing else has used, and that
+        are its own.
 
-        A winner has won by being good and by being lucky in its starts; this is without the luck.
+        A winner has won by being good and by being lucky in its starts; this is without the luck. Designs
+        tell each other how skewed noise is: rare outcomes have come to some of them. first : the number of
+        the first start. noise : what the search knows of the noise of each cost. confidence : of intervals.
         """
-        samples = [Sample(design) for design in designs]
+        samples = [Sample(design, own=True) for design in designs]
         additions = [(sample, range(first, first + starts)) for sample in samples]
         self.runs.add(additions, progress or (lambda fraction: None))
         for sample in samples:
             sample.used, sample.converged = len(sample.values), bool(self.repeatable)
-        return [self._summary(sample) for sample in samples]
+        good = [sample for sample in samples if not sample.reason]
+        by_design = [self._costs(sample) for sample in good]
+        skewness = [
+            shared_skewness([costs[k] for costs in by_design], noise[k] if noise else None)
+            for k in range(len(self.objectives))
+        ]
+        searched = [self._costs(sample) for sample in self._known.values() if sample.used]
+        ranges = self._ranges([*searched, *by_design])
+        return [self._summary(sample, skewness, ranges, confidence) for sample in samples]
 
     def constraint_means(self, design: Design) -> tuple[float, ...]:
         """Return the mean of each constraint of the result over the starts of a design that has run."""
@@ -279,14 +292,42 @@ class Ensemble:
         ends = np.cumsum([len(one.quantities) for one in self.objectives])[:-1]
         return list(zip(self.objectives, np.split(columns, ends, axis=1), strict=True))
 
-    def _summary(self, sample: Sample) -> tuple[FitnessEstimate, ...]:
+    def _summary(
+        self,
+        sample: Sample,
+        skewness: Sequence[float | None] | None = None,
+        ranges: Sequence[float] | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> tuple[FitnessEstimate, ...]:
         if sample.reason:
             return (FitnessEstimate.failed(len(sample.values), sample.reason),) * len(self.objectives)
         if self.repeatable:
             parts = self._of_objectives(sample.values[:1])
             return tuple(FitnessEstimate.certain(one.cost(part)) for one, part in parts)
         seen = dict(zip(self.runs.problem.quantities, self.runs.seen, strict=True))
-        return tuple(
-            FitnessEstimate.of(one, part, sample.converged, sorted(seen[one.quantities[0]]))
-            for one, part in self._of_objectives(sample.values[: sample.used])
-        )
+        estimates = []
+        for k, (one, part) in enumerate(self._of_objectives(sample.values[: sample.used])):
+            costs = sorted(one.sign * value for value in seen[one.quantities[0]])
+            may_occur = _may_occur(one.pseudo_costs(part), costs, ranges[k] if ranges else math.inf)
+            shared = skewness[k] if skewness else None
+            estimates.append(FitnessEstimate.of(one, part, sample.converged, may_occur, shared, confidence))
+        return tuple(estimates)
+
+    def _costs(self, sample: Sample) -> list[np.ndarray]:
+        """Return for each objective a cost of each start that the estimate of a design stands on."""
+        parts = self._of_objectives(sample.values[: sample.used])
+        return [one.pseudo_costs(part) for one, part in parts]
+
+    def _ranges(self, by_design: Sequence[Sequence[np.ndarray]]) -> list[float]:
+        """Return for each objective the largest difference between two starts of one design."""
+        columns = zip(*by_design, strict=True)
+        return [max(float(np.ptp(costs)) for costs in column if len(costs)) for column in columns]
+
+
+def _may_occur(costs: np.ndarray, seen: Sequence[float], most: float) -> Sequence[float]:
+    """Return costs that may occur beside equal ones of a design: those that differ by no more than ``most``
+    from them, between the least and the largest of all designs. Where only two are known at all, these; where
+    no difference between starts is known, all."""
+    if len(seen) < 3 or not most:
+        return seen
+    return max(seen[0], float(costs[0]) - most), min(seen[-1], float(costs[0]) + most)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from optimize.problem.objective import Objective
+from tisim.numerics.statistics import CONFIDENCE
 
 
 @dataclass(frozen=True)
@@ -18,9 +19,9 @@ class FitnessEstimate:
 
     mean : of the first `starts` starts, or another statistic where the objective has one; +inf if the design
     failed. std : standard deviation from start to start; of another statistic, of its pseudo-values.
-    low, high : ends of the 95 % confidence interval. It holds for starts that have not had a part in choosing
-    the design. converged : Eq. 8.1 was met. reason : "" or why the design failed. std, low and high are NaN
-    where they are not known, and for failed designs.
+    low, high : ends of the confidence interval, 95 % unless said otherwise. It holds for starts that have not
+    had a part in choosing the design. converged : Eq. 8.1 was met. reason : "" or why the design failed.
+    std, low and high are NaN where they are not known, and for failed designs.
     """
 
     mean: float
@@ -53,18 +54,25 @@ class FitnessEstimate:
 
     @classmethod
     def of(
-        cls, objective: Objective, values: ArrayLike, converged: bool, seen: Sequence[float] = ()
+        cls,
+        objective: Objective,
+        values: ArrayLike,
+        converged: bool,
+        seen: Sequence[float] = (),
+        skewness: float | None = None,
+        confidence: float = CONFIDENCE,
     ) -> FitnessEstimate:
         """Return the estimate of an objective's cost from the values of each start; at least one.
 
-        values : shape (starts, quantities). seen : values that other designs have had: starts that are all
-        equal do not exclude these.
+        values : shape (starts, quantities). seen : costs that may occur: starts that are all equal do not
+        exclude these. skewness : of what the costs are drawn from, where other designs tell it. confidence :
+        of the interval.
         """
-        columns = np.asarray(values, dtype=float).reshape(-1, len(objective.quantities))
-        n = len(columns)
-        std = float(np.std(objective.pseudo_costs(columns), ddof=1)) if n > 1 else math.nan
-        low, high = objective.interval_of_cost(columns, seen)
-        return cls(objective.cost(columns), std, low, high, n, converged)
+        costs, statistic = objective.costs(values), objective.statistic_of_costs
+        n = len(costs)
+        std = float(np.std(statistic.pseudo_values(costs), ddof=1)) if n > 1 else math.nan
+        low, high = statistic.interval(costs, seen, skewness, confidence)
+        return cls(statistic.value(costs), std, low, high, n, converged)
 
     @classmethod
     def certain(cls, value: float) -> FitnessEstimate:

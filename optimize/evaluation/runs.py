@@ -84,10 +84,12 @@ class Sample:
     constraints of the result.
     ends : of each start, what tells its run from another (see ``work_of``). used : how many of the starts,
     from the first, its estimate stands on. converged : see FitnessEstimate. reason : "" or why the design
-    failed. open : whether more starts are to come.
+    failed. open : whether more starts are to come. own : its starts are its own, though others have common
+    ones.
     """
 
     design: Mapping[str, float]
+    own: bool = False
     values: list[tuple[float, ...]] = field(default_factory=list)
     limited: list[tuple[float, ...]] = field(default_factory=list)
     ends: list[int | None] = field(default_factory=list)
@@ -132,7 +134,8 @@ class Runs:
         missing: dict[str, tuple[Scene, Sample, int, int]] = {}
         for sample, starts in additions:
             for start in starts:
-                seed = start_seed(self.seed, start, None if self.common else sample.design)
+                common = self.common and not sample.own
+                seed = start_seed(self.seed, start, None if common else sample.design)
                 try:
                     scene = make_scene(self.problem, sample.design, seed)
                 except FaultyProblem:

@@ -54,22 +54,21 @@ class Objective:
         """The names of the values that are kept of each run: its own, or those that were measured."""
         return self.statistic.quantities or (self.name,)
 
+    @property
+    def statistic_of_costs(self) -> Statistic:
+        """What counts of the costs of all starts."""
+        return self.statistic.mirrored if self.maximise else self.statistic
+
+    def costs(self, values: ArrayLike) -> np.ndarray:
+        """Return what the statistic takes: the cost of each run, shape (starts,), or the quantities that were
+        measured as they are. values : of the runs, shape (starts, quantities)."""
+        columns = np.asarray(values, dtype=float).reshape(-1, len(self.quantities))
+        return columns if self.statistic.quantities else self.sign * columns[:, 0]
+
     def cost(self, values: ArrayLike) -> float:
-        """Return the cost of a design; values : of its runs, shape (starts, quantities)."""
-        return self.sign * self.statistic.value(self._columns(values), self.sign)
+        """Return the cost of a design by the values of its runs, shape (starts, quantities)."""
+        return self.statistic_of_costs.value(self.costs(values))
 
     def pseudo_costs(self, values: ArrayLike) -> np.ndarray:
         """Return a value of each run of which the cost is about the mean (Statistic.pseudo_values)."""
-        return self.sign * self.statistic.pseudo_values(self._columns(values), self.sign)
-
-    def interval_of_cost(self, values: ArrayLike, seen: ArrayLike = ()) -> tuple[float, float]:
-        """Return the ends of the 95 % interval of the cost; seen : values that runs of other designs have
-        had."""
-        ends = self.statistic.interval(self._columns(values), np.asarray(seen, dtype=float), self.sign)
-        return ends if self.sign > 0 else (-ends[1], -ends[0])
-
-    def _columns(self, values: ArrayLike) -> np.ndarray:
-        """Return values as its statistic takes them: without the second axis where there is one quantity that
-        has no name of its own."""
-        columns = np.asarray(values, dtype=float).reshape(-1, len(self.quantities))
-        return columns if self.statistic.quantities else columns[:, 0]
+        return self.statistic_of_costs.pseudo_values(self.costs(values))

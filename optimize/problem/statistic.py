@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,15 +18,15 @@ from scipy.special import betainc, comb
 
 from tisim.errors import is_number, must
 from tisim.numerics import intervals, skewed
+from tisim.numerics.statistics import CONFIDENCE
 
 Array = NDArray[np.float64]
 
 
 class Statistic(ABC):
-    """One number of the values of all starts of a design.
+    """One number of the values of all starts of a design, small ones being better.
 
-    Values have the shape (starts,), or (starts, quantities) where ``quantities`` are named. sign : 1 where
-    small values are wanted, -1 where large ones are.
+    Values have the shape (starts,), or (starts, quantities) where ``quantities`` are named.
     """
 
     @property
@@ -54,25 +54,37 @@ class Statistic(ABC):
         """The names of the quantities of a run that it needs; () for one without a name."""
         return ()
 
+    @property
+    def mirrored(self) -> Statistic:
+        """The statistic of the negative values, where large ones are wanted."""
+        return self
+
     @abstractmethod
-    def value(self, values: Array, sign: float = 1.0) -> float:
+    def value(self, values: Array) -> float:
         """Return the estimate of one start or more."""
 
     @abstractmethod
-    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
-        """Return the ends of the 95 % interval, NaN where one is not known.
+    def interval(
+        self,
+        values: Array,
+        seen: Sequence[float] = (),
+        skewness: float | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> tuple[float, float]:
+        """Return the ends of the interval of that confidence, NaN where one is not known.
 
-        seen : values that other designs have had.
+        seen : values that other designs have had. skewness : of what the values are drawn from, where other
+        designs tell it. Both are for a mean (tisim.numerics.skewed).
         """
 
-    def pseudo_values(self, values: Array, sign: float = 1.0) -> Array:
+    def pseudo_values(self, values: Array) -> Array:
         """Return n theta - (n - 1) theta_without_i of each start i: values of which theta is about the mean
         (Efron 1982, Eq. 3.10), shape (starts,)."""
         n = len(values)
         if n < 2:
-            return np.full(n, self.value(values, sign))
-        without = [self.value(np.delete(values, i, axis=0), sign) for i in range(n)]
-        return n * self.value(values, sign) - (n - 1) * np.array(without)
+            return np.full(n, self.value(values))
+        without = [self.value(np.delete(values, i, axis=0)) for i in range(n)]
+        return n * self.value(values) - (n - 1) * np.array(without)
 
 
 @dataclass(frozen=True)
@@ -91,14 +103,20 @@ class Mean(Statistic):
     def fewest_starts(self) -> int:
         return 1
 
-    def value(self, values: Array, sign: float = 1.0) -> float:
+    def value(self, values: Array) -> float:
         return float(np.cumsum(values)[-1] / len(values))  # a running mean has the same last bits
 
-    def pseudo_values(self, values: Array, sign: float = 1.0) -> Array:
+    def pseudo_values(self, values: Array) -> Array:
         return np.asarray(values, dtype=float)
 
-    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
-        return skewed.interval(values, seen)
+    def interval(
+        self,
+        values: Array,
+        seen: Sequence[float] = (),
+        skewness: float | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> tuple[float, float]:
+        return skewed.interval(values, seen, skewness, confidence)
 
 
 @dataclass(frozen=True)
@@ -123,6 +141,10 @@ class Quantile(Statistic):
         return f"{self.share:g} quantile"
 
     @property
+    def mirrored(self) -> Statistic:
+        return Quantile(1.0 - self.share)
+
+    @property
     def fewest_starts(self) -> int:
         return max(2, math.ceil(round(1.0 / min(self.share, 1.0 - self.share), 9)))
 
@@ -130,19 +152,25 @@ class Quantile(Statistic):
     def fewest_fresh(self) -> int:
         return intervals.fewest_of_quantile(self.share)
 
-    def value(self, values: Array, sign: float = 1.0) -> float:
+    def value(self, values: Array) -> float:
         n = len(values)
         edges = betainc((n + 1) * self.share, (n + 1) * (1 - self.share), np.linspace(0.0, 1.0, n + 1))
         return float(np.sort(values) @ np.diff(edges))
 
-    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
-        return intervals.of_quantile(values, self.share)
+    def interval(
+        self,
+        values: Array,
+        seen: Sequence[float] = (),
+        skewness: float | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> tuple[float, float]:
+        return intervals.of_quantile(values, self.share, confidence)
 
 
 @dataclass(frozen=True)
 class WorstOf(Statistic):
     """The worst that is to be expected of a number of starts: the expectation of the largest of their values
-    where small ones are wanted, and of the smallest where large ones are.
+    where small ones are wanted, and of the smallest where large ones are wanted.
 
     starts : 2 or more. The estimate is the mean of the worst over all subsets of that size. It is
     unbiased, so that designs with different numbers of starts can be compared.
@@ -166,15 +194,23 @@ class WorstOf(Statistic):
     def fewest_fresh(self) -> int:
         return 4 * self.starts
 
-    def value(self, values: Array, sign: float = 1.0) -> float:
+    def value(self, values: Array) -> float:
         n = len(values)
         if n < self.starts:
-            return sign * float(np.max(sign * values))
+            return float(np.max(values))
         weights = comb(np.arange(n), self.starts - 1) / comb(n, self.starts)
-        return sign * float(np.sort(sign * values) @ weights)
+        return float(np.sort(values) @ weights)
 
-    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
-        return skewed.interval(self.pseudo_values(values, sign)) if len(values) > self.starts else _UNKNOWN
+    def interval(
+        self,
+        values: Array,
+        seen: Sequence[float] = (),
+        skewness: float | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> tuple[float, float]:
+        if len(values) <= self.starts:
+            return _UNKNOWN
+        return skewed.interval(self.pseudo_values(values), confidence=confidence)
 
 
 @dataclass(frozen=True)
@@ -228,14 +264,22 @@ class Misfit(Statistic):
         wanted, uncertainty = np.array(list(self.measured.values())).T
         return np.asarray((values - wanted) / uncertainty)
 
-    def value(self, values: Array, sign: float = 1.0) -> float:
+    def value(self, values: Array) -> float:
         off = self.off(values)
         n = len(off)
         variance = off.var(axis=0, ddof=1) / n if n > 1 else np.zeros(off.shape[1])
         return float(np.mean(off.mean(axis=0) ** 2 - variance))
 
-    def interval(self, values: Array, seen: Array, sign: float = 1.0) -> tuple[float, float]:
-        return intervals.of_squared_distance(self.off(values)) if len(values) > 1 else _UNKNOWN
+    def interval(
+        self,
+        values: Array,
+        seen: Sequence[float] = (),
+        skewness: float | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> tuple[float, float]:
+        if len(values) < 2:
+            return _UNKNOWN
+        return intervals.of_squared_distance(self.off(values), confidence)
 
 
 _UNKNOWN = math.nan, math.nan

@@ -181,10 +181,10 @@ def as_csv(problem: Problem, results: Sequence[MethodResult]) -> bytes:
             f"{objective.label}, fresh starts",
             "95 % +-",
             "claimed",
-            "95 % +- claimed",
+            "std. error claimed",
         )
     )
     for f in results:
         means = objective.sign * f.fresh.mean, f.fresh.half_width, objective.sign * f.claimed.mean
-        writer.writerow((f.method, f.repeat, f.evaluations, *means, f.claimed.half_width))
+        writer.writerow((f.method, f.repeat, f.evaluations, *means, f.claimed.standard_error))
     return text.getvalue().encode()

@@ -1,8 +1,8 @@
 """The front of several objectives is drawn: what is given up of one for more of another.
 
 Of many designs that were estimated from few starts, the luckiest lie beyond the front, which is known from
-more. So only those that have had as many starts as the front are drawn as what is known, with their
-intervals; the others are marked as few starts.
+more. So only those that have had as many starts as the front are drawn as what is known; the others are
+marked as few starts. Intervals are drawn of fresh starts only, as those that chose a design flatter it.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ Estimates = tuple[FitnessEstimate, ...]
 
 
 def front_figure(outcome: Outcome) -> Figure:
-    """Draw a panel for each pair of objectives: the front with 95 % confidence intervals, from fresh starts
-    where there are any; behind it other designs; and the compromise (Outcome.best).
+    """Draw a panel for each pair of objectives: the front, with 95 % confidence intervals where it has fresh
+    starts; behind it other designs; and the compromise (Outcome.best).
     """
     pairs = list(combinations(range(len(outcome.problem.objectives)), 2))
     figure = empty(5.6 * len(pairs), 5.0)
@@ -67,13 +67,22 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
             label=f"other designs, only {_starts(few)}: the luckiest lie beyond the front",
         )  # fmt: skip
     if many:
-        _bars(axis, outcome, many, (x, y), _MANY_STARTS_COLOUR, f"other designs, {_starts(many)}")
+        means, _ = _values(outcome, many)
+        axis.plot(
+            means[:, x], means[:, y], "o", color=_MANY_STARTS_COLOUR, ms=2.5, zorder=2,
+            label=f"other designs, {_starts(many)}",
+        )  # fmt: skip
     if not outcome.hall:
         return
     front = [string.confirmed or string.estimates for string in outcome.hall]
-    fresh = "run again: " if outcome.hall[0].confirmed else ""
-    _bars(axis, outcome, front, (x, y), _FRONT_COLOUR, f"front, {fresh}{_starts(front)}")
-    means, _ = _values(outcome, front)
+    fresh = bool(outcome.hall[0].confirmed)
+    means, widths = _values(outcome, front)
+    again = "run again: " if fresh else ""
+    axis.errorbar(
+        means[:, x], means[:, y], xerr=widths[:, :, x] if fresh else None,
+        yerr=widths[:, :, y] if fresh else None, fmt="o", color=_FRONT_COLOUR, ms=4, lw=0.8, zorder=4,
+        label=f"front, {again}{_starts(front)}" + ", 95 % intervals" * bool(fresh and widths.any()),
+    )  # fmt: skip
     compromise = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
     axis.plot(
         *means[compromise, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN_COLOUR, mew=1.5, zorder=5, ls="",
@@ -82,20 +91,6 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
     everything, _ = _values(outcome, [*many, *few, *front])
     axis.set_xscale(scale_of(means[:, x]) if everything[:, x].min() > 0 else "linear")
     axis.set_yscale(scale_of(means[:, y]) if everything[:, y].min() > 0 else "linear")
-
-
-def _bars(
-    axis: Axes, outcome: Outcome, estimates: Sequence[Estimates], of: tuple[int, int], colour: str, label: str
-) -> None:
-    """Draw points, with their intervals where they have had several starts."""
-    means, widths = _values(outcome, estimates)
-    unsure = bool(widths.any())
-    axis.errorbar(
-        means[:, of[0]], means[:, of[1]], xerr=widths[:, :, of[0]], yerr=widths[:, :, of[1]], fmt="o",
-        color=colour, ms=4 if colour == _FRONT_COLOUR else 2.5, lw=0.8 if colour == _FRONT_COLOUR else 0.4,
-        zorder=4 if colour == _FRONT_COLOUR else 2,
-        label=label + ", 95 % intervals" * unsure,
-    )  # fmt: skip
 
 
 def _values(outcome: Outcome, estimates: Sequence[Estimates]) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,7 @@ import numpy as np
 
 import tisim
 from cases.granular_bench.problem import EXAMPLES, KNOWN, SIMULATED, UNCERTAINTIES, calibration_to, other_runs
+from optimize.evaluation.estimate import FitnessEstimate
 from tisim.analysis import Mean
 
 FRICTIONS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
@@ -38,8 +39,8 @@ def measured(design: dict[str, float], size: str, starts: int) -> None:
         print(f"{name:16} {Mean.of(values)!s:>16} {values.std(ddof=1):9.2g} {UNCERTAINTIES[name]:11g}")
     (objective,) = calibration_to(EXAMPLES[size], size).objectives
     values = np.array([list(objective.of(result).values()) for result in results])
-    low, high = objective.interval_of_cost(values)
-    print(f"misfit {objective.cost(values):.2g}, 95 % interval {low:.2g} to {high:.2g}")
+    found = FitnessEstimate.of(objective, values, converged=True)
+    print(f"misfit {found.mean:.2g}, 95 % interval {found.low:.2g} to {found.high:.2g}")
 
 
 def valley(size: str, starts: int) -> None:

@@ -36,12 +36,13 @@ class FakeEvaluator:
     """function(design, seed) -> fitness, or a string: the reason of a failed run.
 
     Yields in reverse order, to catch whoever relies on the order; interrupt_after: KeyboardInterrupt then.
+    leaves_state: runs have a last state, as scenes have and functions have not.
     """
 
-    def __init__(self, function=bowl, interrupt_after=math.inf, delay=0.0):
+    def __init__(self, function=bowl, interrupt_after=math.inf, delay=0.0, leaves_state=True):
         self.settings = {"precision": "f64", "device": "cpu"}
         self.function, self.interrupt_after, self.delay = function, interrupt_after, delay
-        self.calls, self.digests = [], []
+        self.calls, self.digests, self.leaves_state = [], [], leaves_state
 
     def evaluate(self, scenes, progress):
         self.calls.append(list(scenes))
@@ -54,7 +55,7 @@ class FakeEvaluator:
             value = self.function(scene.design, scene.seed)
             failed = isinstance(value, str)
             status = SimpleNamespace(ok=not failed, reason=value if failed else "")
-            state = {} if failed else {"value": np.array([value])}
+            state = {"value": np.array([value])} if self.leaves_state and not failed else {}
             work = {"steps": np.int64(7)}
             yield index, SimpleNamespace(status=status, wall_s=0.25, work=work, value=value, state=state)
 

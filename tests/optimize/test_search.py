@@ -215,13 +215,14 @@ def test_best_designs_are_reported_from_starts_that_have_not_been_used(path):
     settings = EnsembleSettings(min_starts=3, select=5, confirm=10)
     evaluator = FakeEvaluator(lambda design, seed: bowl(design, seed + int(1e9 * design["x0"]), noise=0.3))
     outcome = run(path, evaluator, generations=3, ensemble=settings)
-    fresh = {start_seed(1, FRESH + k) for k in range(10)}
+    designs = [outcome.problem.genome.decode(string) for string in outcome.hall]
+    fresh = [[start_seed(1, FRESH + k, design) for k in range(10)] for design in designs]
     *before, more, last = evaluator.calls
     assert {scene.seed for call in before for scene in call} == {start_seed(1, k) for k in range(3)}
     assert {scene.seed for scene in more} == {start_seed(1, k) for k in range(3, 8)}
-    assert {scene.seed for scene in last} == fresh
-    for string in outcome.hall:
-        values = [evaluator.function(outcome.problem.genome.decode(string), seed) for seed in fresh]
+    assert {scene.seed for scene in last} == {seed for seeds in fresh for seed in seeds}
+    for string, design, seeds in zip(outcome.hall, designs, fresh, strict=True):
+        values = [evaluator.function(design, seed) for seed in seeds]
         assert string.confirmed[0].starts == 10
         assert string.confirmed[0].mean == pytest.approx(np.mean(values), rel=1e-12)
         assert string.estimates[0].starts in (3, 8)
@@ -256,6 +257,17 @@ def test_a_function_without_noise_is_found_out_and_run_once(tmp_path):
     assert {string.estimates[0].starts for string in outcome.hall} == {1}
     assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 2
     assert outcome.designs[0].intervals["fitness"] == (outcome.designs[0].values["fitness"],) * 2
+
+
+def test_a_rare_outcome_that_has_not_come_yet_leaves_an_interval(tmp_path):
+    """Of few runs that are all equal nothing says that others would be; nor of many from two starts that all
+    designs have in common."""
+    evaluator = FakeEvaluator(quiet_bowl, leaves_state=False)
+    for runs, common in ((40, False), (200, True)):
+        settings = {"max_evaluations": runs, "ensemble": {"common_starts": common}}
+        outcome = run(tmp_path / f"{runs}.h5", evaluator, **settings)
+        (low, high), value = outcome.designs[0].intervals["fitness"], outcome.designs[0].values["fitness"]
+        assert low <= value < high
 
 
 def test_unfit_operators_stop_it_before_anything_runs(path):

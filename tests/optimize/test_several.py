@@ -121,6 +121,7 @@ def test_log_and_report(outcome, tmp_path):
     assert [float(row["price"]) for row in rows] == list(values(outcome)[:, 1])
     (axis,) = front_figure(outcome).axes
     series = {bars.get_label(): bars.lines[0].get_xydata() for bars in axis.containers}
+    series |= {line.get_label(): line.get_xydata() for line in axis.get_lines()}
     np.testing.assert_array_equal(series["front, 1 start"], values(outcome))
     assert len(series["other designs, 1 start"]) == len(outcome.estimates) - len(outcome.hall)
     assert axis.get_xlabel() == "gain (1/s), more is better"
@@ -139,18 +140,18 @@ def test_designs_of_few_starts_are_distinguished_from_those_that_are_known(outco
         return string
 
     front, precise, lucky = design(0.5, 9), design(0.4, 9), design(0.9, 3)
-    front.fitness.values = (-0.5, 0.5)
+    front.fitness.values, front.confirmed = (-0.5, 0.5), front.estimates
     other = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
     other.estimates = {tuple(string): string.estimates for string in (front, precise, lucky)}
     assert others(other) == ([precise.estimates], [lucky.estimates])
     (axis,) = front_figure(other).axes
-    lines = {bars.get_label(): bars for bars in axis.containers}
-    assert list(lines) == [
-        "other designs, 9 starts, 95 % intervals",
-        "front, 9 starts, 95 % intervals",
-    ]
-    across = lines["front, 9 starts, 95 % intervals"].lines[2][0].get_segments()[0]
+    (bars,) = axis.containers
+    assert bars.get_label() == "front, run again: 9 starts, 95 % intervals"
+    across = bars.lines[2][0].get_segments()[0]
     np.testing.assert_allclose(across, [[0.45, 0.5], [0.55, 0.5]])
+    assert any(line.get_label() == "other designs, 9 starts" for line in axis.get_lines())
+    front.confirmed = ()
+    assert not front_figure(other).axes[0].containers[0].has_xerr
     few = next(line for line in axis.get_lines() if "only 3 starts" in str(line.get_label()))
     assert few.get_xydata().tolist() == [[0.9, 0.09999999999999998]]
 

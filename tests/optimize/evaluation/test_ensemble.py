@@ -105,7 +105,7 @@ def test_a_failed_start_never_wins_and_is_recorded(tmp_path, bad, reason):
     def function(design, seed):
         return bad if design["x0"] == 0.9 and seed == third else 1.0
 
-    evaluator = FakeEvaluator(function)
+    evaluator = FakeEvaluator(function, leaves_state=False)
     run = ensemble(tmp_path, evaluator, min_starts=6)
     (good,), (failed,), _ = run.estimate(DESIGNS)
     assert good.mean == 1.0
