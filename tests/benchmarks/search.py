@@ -6,12 +6,12 @@
 The peers are those of ``python -m pip install ".[bench]"``. Each search is a line of JSON in ``--out`` once
 it has ended; the same command goes on with those that are missing, and ``--table`` prints what is there.
 
-A design of a peer has as many starts as ``Task.starts`` says, the same for all designs; a method of tisim has
-its defaults, with what it spends on choosing and reporting its best within the budget. What is returned is
-judged by its exact cost, or by the mean over fresh starts that no search has used. For one cost is printed
-how far that is from the least there is, less is better; for several the hypervolume of what is returned, over the
-largest that there is or may be, more is better. Then come the mean over the seeds with the half width of its
-95 % interval, and the seconds of a search beside those of its runs.
+A design of a peer has as many starts as ``Task.starts`` says, the same for all designs; a method of tisim
+has its defaults, with what it spends on choosing and reporting its best within the budget. What is returned
+is judged by its exact cost, or by the mean over fresh starts that no search has used. For one cost is
+printed how far that is from the least there is, less is better; for several the hypervolume of what is
+returned, over the largest that there is or may be, more is better. Then come the mean over the seeds with
+the half width of its 95 % interval, and the seconds of a search beside those of its runs.
 """
 
 from __future__ import annotations
