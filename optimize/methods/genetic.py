@@ -17,7 +17,7 @@ from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
-from optimize.surrogate.trust_region import TrustRegion
+from optimize.surrogate.trust_region import APART, TrustRegion
 from tisim.components.component import Checked
 from tisim.errors import must
 
@@ -160,7 +160,7 @@ class Genetic(SearchMethod):
     def _worth_most(self) -> Array:
         """Return the designs that are worth most together by the surrogate."""
         count = max(self.population, len(self.strings) // _GROWTH)
-        self.belief.learn(self.strings)
+        self.belief.learn(self.strings, apart=APART)
         local = np.empty((0, self.genes))
         if self.belief.exact and self.objectives == 1:
             proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
@@ -178,15 +178,20 @@ class Genetic(SearchMethod):
         """
         belief, most = self.belief, _PARENTS * self.objectives
         parents = self._best(self._strings(belief.points[belief.chosen], belief.means), most)
-        drawn = [self.genome.canonical(self.rng.random((count, self.genes)))]
+        drawn = [self._open(self.rng.random((count, self.genes)))]
         for _ in range(self.options.inner):
-            drawn.append(self.genome.canonical(self.operators.bred(parents, count)))
+            drawn.append(self._open(self.operators.bred(parents, count)))
             points = drawn[-1] if len(drawn) > 2 else np.vstack(drawn)
             means, deviations = belief.predict(points)
             costs = -worth(means, deviations)[:, None] if self.objectives == 1 else means
             kept = parents if len(drawn) > 2 else []
             parents = self._best(self._strings(points, costs) + kept, most)
         return np.vstack(drawn)
+
+    def _open(self, points: Array) -> Array:
+        """Return the points that are not the trust region's, where there is one."""
+        points = self.genome.canonical(points)
+        return points if self.local is None else points[self.region.outside(points)]
 
     def _best(self, strings: list[Individual], most: int) -> list[Individual]:
         """Return the strings of so many that are selected as parents."""

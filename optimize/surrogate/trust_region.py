@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
@@ -17,8 +18,11 @@ from optimize.surrogate.gaussian_process import Array
 
 _FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-6
 """Half-widths of the region in the unit cube: at first, the largest, and that at which it has converged."""
+APART = 0.02
+"""Of designs that are closer together than this in all genes the process of the whole range needs one."""
 _APART = 0.1
-"""Where a region has converged no other begins within this distance, in any gene."""
+"""Where a region has converged no other begins within this distance, in any gene; nor do other designs lie in
+that of the centre."""
 _ROUNDS, _DRAWN, _BEST = 6, 200, 12
 
 
@@ -63,6 +67,11 @@ class TrustRegion:
             drawn.append(np.clip(base + 0.5 * width * rng.standard_normal(base.shape), low, high))
             values.append(worth.of(drawn[-1]))
         return worth.batch(np.vstack(drawn), count, apart=1e-3 * self.half_width)
+
+    def outside(self, points: Array) -> NDArray[np.bool_]:
+        """Return which points are not near the best design, which is the region's to search: what is worth a
+        run by the process of the whole range is else all there, where little is left to be found."""
+        return np.abs(points - self.centre).max(axis=1) > _APART
 
     def learn(self, proposed: Sequence[Individual]) -> None:
         """Move the size of the region by what the designs that it proposed are worth."""
