@@ -26,7 +26,9 @@ class Belief:
 
     features : of points of the unit cube, (n, genes) -> (n, features).
     The noise of the mean of n starts is the variance of those starts over n. The variance of a single design,
-    known from two starts or so, is drawn towards that of all designs. A failed design has the worst cost.
+    known from two starts or so, is drawn towards that of all designs; where no design has more than one
+    start, noise is what the nugget of the process makes of the values. A failed design has the worst cost.
+    exact : whether it is known that there is no noise.
     """
 
     def __init__(self, features: Callable[[Array], Array] = np.asarray) -> None:
@@ -44,7 +46,7 @@ class Belief:
         self.strings = list(strings)
         self.points = np.array([list(string) for string in strings])
         costs, self.noise = costs_and_noise(strings)
-        self.exact = not np.any(self.noise)
+        self.exact = all(one.std == 0 for string in strings if not string.failed for one in string.estimates)
         self.starts = int(np.median([string.estimates[0].starts for string in strings])) or 1
         self.costs, slopes = _transformed(costs, _SKEWED if self.exact else _SKEWED_NOISE)
         alone = np.arange(len(costs))
@@ -60,7 +62,9 @@ class Belief:
         nugget = EXACT_NUGGET if self.exact else NUGGET
         starts = self._parameters or [None] * costs.shape[1]
         self.models = [
-            GaussianProcess(at, cost[chosen], variance[chosen], start=start, iterations=iterations, nugget=nugget)
+            GaussianProcess(
+                at, cost[chosen], variance[chosen], start=start, iterations=iterations, nugget=nugget
+            )
             for cost, variance, start in zip(self.costs.T, variances.T, starts, strict=True)
         ]
         self._parameters = [model.parameters for model in self.models]
