@@ -20,6 +20,7 @@ import argparse
 import contextlib
 import json
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -38,6 +39,9 @@ from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.evaluation.function_evaluator import FunctionEvaluator
 from optimize.evaluation.runs import Evaluator, start_seed
 from optimize.methods.base import every
+from optimize.search import search
+from optimize.settings import Settings
+from optimize.storage.cache import Cache
 from optimize.surrogate.belief import beaten_by
 from tisim.analysis import Mean
 
@@ -127,9 +131,15 @@ def peer(name: str, task: Task, evaluator: Evaluator, seed: int, budget: int) ->
     return purse.points[best] if chosen is None else chosen[None], len(purse.points)
 
 
-def ours(name: str, task: Task, seed: int, budget: int) -> tuple[np.ndarray, int]:
+def ours(name: str, task: Task, evaluator: Evaluator, seed: int, budget: int) -> tuple[np.ndarray, int]:
     """Search with a method of tisim at its defaults; as ``peer``."""
-    found = optimize.run(task.problem(), seed=seed, method=name, max_evaluations=budget, generations=budget)
+    problem = task.problem()
+    settings = {"seed": seed, "method": name, "max_evaluations": budget, "generations": budget}
+    if problem.function:
+        found = optimize.run(problem, **settings)
+    else:  # as optimize.run does, with an evaluator that has compiled the scene already
+        with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / "search.h5") as cache:
+            found = search(problem, evaluator, cache, Settings(**settings))
     assert found.evaluations + found.hits <= budget
     several = found.problem.several
     points = np.array([list(string) for string in (found.hall if several else found.hall[:1])])
@@ -150,19 +160,16 @@ def worth(task: Task, evaluator: Evaluator, points: np.ndarray) -> float:
     return float(HV(ref_point=np.array(task.reference))(means)) / task.scale
 
 
-def searched(name: str, seed: int, budget: int, method: str) -> dict[str, Any]:
+def searched(name: str, evaluator: Evaluator, seed: int, budget: int, method: str) -> dict[str, Any]:
     """Make one search, and judge it."""
     task = TASKS[name]
-    problem = task.problem()
-    evaluator = FunctionEvaluator() if problem.function else BatchEvaluator()
     RUNNING["s"], begun = 0.0, time.perf_counter()
     if method in every():
-        points, designs = ours(method, task, seed, budget)
+        points, designs = ours(method, task, evaluator, seed, budget)
     else:
         points, designs = peer(method, task, evaluator, seed, budget)
     seconds = time.perf_counter() - begun - RUNNING["s"]
     value = worth(task, evaluator, points)
-    evaluator.close()
     return {"task": name, "budget": budget, "method": method, "seed": seed, "value": value,
             "designs": designs, "returned": len(points), "seconds": seconds}  # fmt: skip
 
@@ -208,12 +215,14 @@ def main() -> None:
     with options.out.open("a") as file:
         for task in options.tasks.split(","):
             peers = SEVERAL if TASKS[task].reference else ONE
+            evaluator = FunctionEvaluator() if TASKS[task].problem().function else BatchEvaluator()
             for seed in range(options.seeds):
                 for method in options.methods.split(",") if options.methods else ("genetic", *peers):
                     if (task, options.budget, method, seed) not in done:
-                        rows.append(searched(task, seed, options.budget, method))
+                        rows.append(searched(task, evaluator, seed, options.budget, method))
                         file.write(json.dumps(rows[-1]) + "\n")
                         file.flush()
+            evaluator.close()
     show(rows)
 
 
