@@ -26,6 +26,8 @@ _GROWTH = 20
 does not cost more and more of the search."""
 _PARENTS = 20
 """Parents of a generation with a surrogate, for each objective."""
+_MOST_BRED = 2000
+"""Strings that are bred on the surrogate in each inner generation at most, or as many as are run."""
 _TRIES = 10
 """Times that a generation is bred anew where it has designs that are known already."""
 SELECT = GeneticOperator(name="selTournament", options={"tournsize": 2})
@@ -167,7 +169,8 @@ class Genetic(SearchMethod):
             local = self._new(self.genome.canonical(proposed))
             self.local = len(local)
         worth = Worth(self.belief, self.rng)
-        evolved = self._new(self._evolved(worth, count * self.options.proposals))
+        bred = max(count, min(_MOST_BRED, count * self.options.proposals))
+        evolved = self._new(self._evolved(worth, bred))
         return np.vstack([local, worth.batch(evolved, count - len(local))])
 
     def _evolved(self, worth: Worth, count: int) -> Array:

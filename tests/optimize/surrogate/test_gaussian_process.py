@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from optimize.surrogate import gaussian_process
 from optimize.surrogate.acquisition import Worth, log_expected_improvement
-from optimize.surrogate.belief import Belief, beaten_by
+from optimize.surrogate.belief import Belief, beaten_by, thinned
 from optimize.surrogate.gaussian_process import GaussianProcess, Parameters
 from optimize.surrogate.ranking import best, spread
 from tests.optimize.fake_runs import fake_problem, string_of
@@ -118,6 +118,27 @@ def test_a_batch_is_spread_where_one_design_would_be_asked_for_again():
     assert tuple(batch[0]) == tuple(points[np.argmax(alone)])
     nearest = points[np.argsort(-alone)[:6]]
     assert np.std(batch, axis=0).sum() > np.std(nearest, axis=0).sum()
+
+
+def test_noise_that_is_not_known_is_not_none():
+    """One start of each design: a belief does not go through the values, but near the bowl behind them."""
+    rng = np.random.default_rng(2)
+    points = rng.random((60, 2))
+    truth, values = bowl(points), bowl(points) + 0.1 * rng.standard_normal(60)
+    belief = Belief()
+    belief.learn([string_of(point, value, std=np.nan) for point, value in zip(points, values, strict=True)])
+    assert not belief.exact
+    assert np.mean((belief.means[:, 0] - truth) ** 2) < 0.5 * np.mean((values - truth) ** 2)
+    belief.learn([string_of(point, value) for point, value in zip(points, truth, strict=True)])
+    assert belief.exact
+    assert belief.predict(points)[0][:, 0] == pytest.approx(belief.means[:, 0], abs=1e-3)
+
+
+def test_of_designs_close_together_the_best_stands_for_all():
+    points = np.array([[0.5, 0.5], [0.51, 0.5], [0.5, 0.6], [0.52, 0.5]])
+    costs = np.array([3.0, 1.0, 2.0, 4.0])
+    assert list(thinned(points, costs, 0.015)) == [1, 2]
+    assert list(thinned(points, costs, 0.005)) == [0, 1, 2, 3]
 
 
 def test_who_is_beaten():
