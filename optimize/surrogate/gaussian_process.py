@@ -61,7 +61,8 @@ class GaussianProcess:
     """A Gaussian process with the Matern 5/2 covariance and a length scale for each feature.
 
     Its mean before any data is that of the values. A search has most of them where they are good, so that it
-    takes what it does not know for nearly as good, and looks there.
+    takes what it does not know for nearly as good, and looks there. The parameters are fitted about the
+    constant that is the likeliest.
 
     points : shape (n, features). values : shape (n,). variance : of the noise in each value, shape (n,).
     parameters : given, or fitted from those given in ``start`` by the largest posterior density. noise_free :
@@ -181,8 +182,10 @@ class _Likelihood:
         factor = _factor(covariance)
         n = len(self.values)
         inverse = cho_solve(factor, np.eye(n), check_finite=False)
-        weights = inverse @ self.values
-        value = 0.5 * float(self.values @ weights) + float(np.log(np.diag(factor[0])).sum())
+        ones = inverse.sum(axis=1)
+        residual = self.values - float(ones @ self.values) / float(ones.sum())
+        weights = inverse @ residual
+        value = 0.5 * float(residual @ weights) + float(np.log(np.diag(factor[0])).sum())
         # d K / d log l_j = s (5/3) (1 + r) exp(-r) (x_j - x'_j)^2 / l_j^2, r the root above.
         outer = 0.5 * (inverse - np.outer(weights, weights))
         common = outer * (parameters.signal * (5.0 / 3.0) * (1.0 + root) * decay)
