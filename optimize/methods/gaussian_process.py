@@ -14,7 +14,7 @@ from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
-from optimize.surrogate.trust_region import TrustRegion
+from optimize.surrogate.trust_region import APART, TrustRegion
 from tisim.components.component import Checked
 
 _ROUNDS, _DRAWN = 6, 200
@@ -65,7 +65,7 @@ class GaussianProcessSearch(SearchMethod):
         self.belief = Belief(genome.features)
         self.region = TrustRegion(genome)
         self.strings: list[Individual] = []
-        self.local = 0
+        self.local: int | None = None
         self.begun = False
 
     def ask(self) -> list[Individual]:
@@ -76,12 +76,12 @@ class GaussianProcessSearch(SearchMethod):
             points = sobol(self.genes, first, self.rng)
             return [Individual(point, self.objectives) for point in self.genome.canonical(points)]
         count = max(self.options.population, len(self.strings) // _GROWTH)
-        self.belief.learn(self.strings)
-        local = np.empty((0, self.genes))
+        self.belief.learn(self.strings, apart=APART)
+        local, self.local = np.empty((0, self.genes)), None
         if self.belief.exact and self.objectives == 1:
             proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
             local = self._new(self.genome.canonical(proposed))
-        self.local = len(local)
+            self.local = len(local)
         worth = Worth(self.belief, self.rng)
         everywhere = worth.batch(self._candidates(worth), count - len(local))
         return [Individual(point, self.objectives) for point in np.vstack([local, everywhere])]
@@ -101,13 +101,18 @@ class GaussianProcessSearch(SearchMethod):
         order = belief.chosen[np.argsort(belief.means[:, 0], kind="stable")]
         best = belief.points[order[:5] if self.objectives == 1 else worth.on_front]
         drawn = [self.rng.random((3 * _DRAWN, self.genes)), changed(best, _WIDE, 2 * _DRAWN, self.rng)]
+        drawn = [self._open(points) for points in drawn]
         values = [worth.of(points) for points in drawn]
         for turn in range(_ROUNDS):
             order = np.argsort(-np.concatenate(values))[: 12 * self.objectives]
-            points = changed(np.vstack(drawn)[order], 0.6**turn * _WIDE, _DRAWN, self.rng)
+            points = self._open(changed(np.vstack(drawn)[order], 0.6**turn * _WIDE, _DRAWN, self.rng))
             drawn.append(points)
             values.append(worth.of(points))
         return self._new(self.genome.canonical(np.vstack(drawn)))
+
+    def _open(self, points: Array) -> Array:
+        """Return the points that are not the trust region's, where there is one."""
+        return points if self.local is None else points[self.region.outside(points)]
 
     def _new(self, points: Array) -> Array:
         """Return those of the points that have not run, each once, in their order."""

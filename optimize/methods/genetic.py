@@ -17,7 +17,7 @@ from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
-from optimize.surrogate.trust_region import TrustRegion
+from optimize.surrogate.trust_region import APART, TrustRegion
 from tisim.components.component import Checked
 from tisim.errors import must
 
@@ -26,6 +26,8 @@ _GROWTH = 20
 does not cost more and more of the search."""
 _PARENTS = 20
 """Parents of a generation with a surrogate, for each objective."""
+_MOST_BRED = 2000
+"""Strings that are bred on the surrogate in each inner generation at most, or as many as are run."""
 _TRIES = 10
 """Times that a generation is bred anew where it has designs that are known already."""
 SELECT = GeneticOperator(name="selTournament", options={"tournsize": 2})
@@ -170,14 +172,15 @@ class Genetic(SearchMethod):
     def _worth_most(self) -> Array:
         """Return the designs that are worth most together by the surrogate."""
         count = max(self.population, len(self.strings) // _GROWTH)
-        self.belief.learn(self.strings)
+        self.belief.learn(self.strings, apart=APART)
         local = np.empty((0, self.genes))
         if self.belief.exact and self.objectives == 1:
             proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
             local = self._new(self.genome.canonical(proposed))
             self.local = len(local)
         worth = Worth(self.belief, self.rng)
-        evolved = self._new(self._evolved(worth, count * self.options.proposals))
+        bred = max(count, min(_MOST_BRED, count * self.options.proposals))
+        evolved = self._new(self._evolved(worth, bred))
         return np.vstack([local, worth.batch(evolved, count - len(local))])
 
     def _evolved(self, worth: Worth, count: int) -> Array:
@@ -188,15 +191,20 @@ class Genetic(SearchMethod):
         """
         belief, most = self.belief, _PARENTS * self.objectives
         parents = self._best(self._strings(belief.points[belief.chosen], belief.means), most)
-        drawn = [self.genome.canonical(self.rng.random((count, self.genes)))]
+        drawn = [self._open(self.rng.random((count, self.genes)))]
         for _ in range(self.options.inner):
-            drawn.append(self.genome.canonical(self.operators.bred(parents, count)))
+            drawn.append(self._open(self.operators.bred(parents, count)))
             points = drawn[-1] if len(drawn) > 2 else np.vstack(drawn)
             means, deviations = belief.predict(points)
             costs = -worth(means, deviations)[:, None] if self.objectives == 1 else means
             kept = parents if len(drawn) > 2 else []
             parents = self._best(self._strings(points, costs) + kept, most)
         return np.vstack(drawn)
+
+    def _open(self, points: Array) -> Array:
+        """Return the points that are not the trust region's, where there is one."""
+        points = self.genome.canonical(points)
+        return points if self.local is None else points[self.region.outside(points)]
 
     def _best(self, strings: list[Individual], most: int) -> list[Individual]:
         """Return the strings of so many that are selected as parents."""

@@ -13,7 +13,7 @@ Riche and L. Carraro (2010)).
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, ndtr
 from scipy.stats import norm
 
 from optimize.surrogate.belief import Belief, beaten_by
@@ -90,14 +90,14 @@ class Worth:
 def log_expected_improvement(mean: Array, deviation: Array, best: float) -> Array:
     """Return log E[max(best - f, 0)] of normal f, all of one shape."""
     z = (best - mean) / deviation
-    # phi(z) + z Phi(z) = phi(z) (1 + z Phi(z) / phi(z)); far below, 1 + z Phi / phi tends to 1 / z^2.
-    with np.errstate(over="ignore"):
-        ratio = np.exp(np.minimum(log_ndtr(z) - norm.logpdf(z), 700.0))
-    far = z < -30.0
-    tail = np.where(
-        far, np.maximum(z * z, 1.0) ** -1.0, np.maximum(1.0 + np.where(far, 0.0, z) * ratio, 1e-300)
+    # Below, phi(z) + z Phi(z) = phi(z) (1 + z Phi(z) / phi(z)), which far below tends to phi(z) / z^2.
+    near, below = np.maximum(z, -1.0), np.minimum(z, -1.0)
+    ratio = np.exp(log_ndtr(below) - norm.logpdf(below))
+    tail = np.where(below < -30.0, below**-2.0, np.maximum(1.0 + below * ratio, 1e-300))
+    logarithm = np.where(
+        z > -1.0, np.log(norm.pdf(near) + near * ndtr(near)), norm.logpdf(below) + np.log(tail)
     )
-    return norm.logpdf(z) + np.log(tail) + np.log(deviation)
+    return logarithm + np.log(deviation)
 
 
 class _Volume:

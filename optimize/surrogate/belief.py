@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import yeojohnson
 
 from optimize.methods.individual import Individual
-from optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
+from optimize.surrogate.gaussian_process import EXACT_NUGGET, NUGGET, Array, GaussianProcess, Parameters
 
 MOST_LEARNED = 500
 """Designs from which a process is made; of more, half are the best, and others are drawn evenly."""
@@ -27,7 +27,9 @@ class Belief:
     features : of points of the unit cube, (n, genes) -> (n, features).
     The noise of the mean of n starts is the variance of those starts over n. The variance of a single design,
     known from two starts or so, is drawn towards that of all designs; that of a value that came with its
-    standard error is known. A failed design has the worst cost.
+    standard error is known. Where no design has more than one start, noise is what the nugget of the process
+    makes of the values. A failed design has the worst cost. exact : whether it is known that there is no
+    noise.
     """
 
     def __init__(self, features: Callable[[Array], Array] = np.asarray) -> None:
@@ -36,24 +38,34 @@ class Belief:
         self._parameters: list[Parameters | None] = []
         self.starts = 1
 
-    def learn(self, strings: Sequence[Individual], iterations: int = 30) -> None:
-        """Learn from strings of known fitness, of which one or more has not failed."""
+    def learn(self, strings: Sequence[Individual], iterations: int = 30, apart: float = 0.0) -> None:
+        """Learn from strings of known fitness, of which one or more has not failed.
+
+        apart : of designs that are closer together in all genes the process is made of the best alone, where
+        there is one cost and no noise. Many equal ones at a place make it think that nothing changes.
+        """
         self.strings = list(strings)
         self.points = np.array([list(string) for string in strings])
         costs, self.noise = costs_and_noise(strings)
-        self.exact = not np.any(self.noise)
+        self.exact = all(one.exact for string in strings if not string.failed for one in string.estimates)
         self.starts = int(np.median([string.estimates[0].starts for string in strings])) or 1
         self.costs, slopes = _transformed(costs, _SKEWED if self.exact else _SKEWED_NOISE)
-        chosen = representative(costs, MOST_LEARNED)
+        alone = np.arange(len(costs))
+        if apart and self.exact and costs.shape[1] == 1:
+            alone = thinned(self.points, costs[:, 0], apart)
+        chosen = alone[representative(costs[alone], MOST_LEARNED)]
         self.chosen = chosen
         variances = self.noise * slopes**2
         self.one_start = np.array([_pooled(strings, k) for k in range(costs.shape[1])]) * np.mean(
             slopes[chosen] ** 2, axis=0
         )
         at = self.features(self.points[chosen])
+        nugget = EXACT_NUGGET if self.exact else NUGGET
         starts = self._parameters or [None] * costs.shape[1]
         self.models = [
-            GaussianProcess(at, cost[chosen], variance[chosen], start=start, iterations=iterations)
+            GaussianProcess(
+                at, cost[chosen], variance[chosen], start=start, iterations=iterations, nugget=nugget
+            )
             for cost, variance, start in zip(self.costs.T, variances.T, starts, strict=True)
         ]
         self._parameters = [model.parameters for model in self.models]
@@ -125,6 +137,16 @@ def _transformed(costs: Array, skewed: float) -> tuple[Array, Array]:
         )
         slopes[:, k] /= deviation
     return new, slopes
+
+
+def thinned(points: Array, costs: Array, apart: float) -> NDArray[np.intp]:
+    """Return the indices of designs that are farther apart than this in one gene or more, ascending; of those
+    that are closer together the best."""
+    kept: list[int] = []
+    for i in np.argsort(costs, kind="stable"):
+        if not kept or np.abs(points[kept] - points[i]).max(axis=1).min() > apart:
+            kept.append(int(i))
+    return np.sort(kept)
 
 
 def representative(costs: Array, most: int) -> NDArray[np.intp]:

@@ -20,7 +20,9 @@ MOST_FITTED = 300
 """Points from which the length scales are fitted; of more, this number is drawn. Fitting costs their cube."""
 _JITTER = 1e-8
 """Least noise variance, in units of the variance of the values: rounding of nearly equal points."""
-_SPREAD = {"length": 1.0, "signal": 1.5, "nugget": 2.0}
+NUGGET, EXACT_NUGGET = 1e-3, 1e-6
+"""Medians of the priors of the nugget: of values with noise, and of those without."""
+_SPREAD = {"length": 1.0, "signal": 1.5, "nugget": 3.0}
 """Standard deviations of the logarithms of the parameters in their priors."""
 
 
@@ -37,13 +39,13 @@ class Parameters:
     nugget: float
 
     @classmethod
-    def prior(cls, features: int) -> Parameters:
+    def prior(cls, features: int, nugget: float = NUGGET) -> Parameters:
         """Return the medians of the priors.
 
         Length scales grow with the root of the dimension, as distances do: C. Hvarfner, E. O. Hellsten and
         L. Nardi, Vanilla Bayesian optimization performs great in high dimensions, ICML (2024).
         """
-        return cls(np.full(features, 0.35 * math.sqrt(features)), 1.0, 1e-3)
+        return cls(np.full(features, 0.35 * math.sqrt(features)), 1.0, nugget)
 
     @property
     def logarithms(self) -> Array:
@@ -56,11 +58,15 @@ class Parameters:
 
 
 class GaussianProcess:
-    """A Gaussian process with the Matern 5/2 covariance, a length scale for each feature and a constant mean.
+    """A Gaussian process with the Matern 5/2 covariance and a length scale for each feature.
+
+    Its mean before any data is that of the values. A search has most of them where they are good, so that it
+    takes what it does not know for nearly as good, and looks there. The parameters are fitted about the
+    constant that is the likeliest.
 
     points : shape (n, features). values : shape (n,). variance : of the noise in each value, shape (n,).
     parameters : given, or fitted from those given in ``start`` by the largest posterior density. noise_free :
-    no variance is added to what is given.
+    no variance is added to what is given. nugget : the median of its prior.
     """
 
     def __init__(
@@ -72,6 +78,7 @@ class GaussianProcess:
         start: Parameters | None = None,
         noise_free: bool = False,
         iterations: int = 50,
+        nugget: float = NUGGET,
     ) -> None:
         self.points = np.asarray(points, dtype=float)
         values = np.asarray(values, dtype=float)
@@ -80,20 +87,17 @@ class GaussianProcess:
         self.noise = np.asarray(variance, dtype=float) / self.scale**2
         self.noise_free = noise_free
         if parameters is None:
-            parameters = self._fitted(start, iterations)
+            parameters = self._fitted(start, iterations, nugget)
         self.parameters = parameters
         covariance = _matern(self.points, self.points, parameters)
         covariance[np.diag_indices_from(covariance)] += self._diagonal(parameters.nugget)
         self._factor = _factor(covariance)
-        ones = np.ones(len(self.points))
-        self._ones = cho_solve(self._factor, ones)
-        self._mean = float(self._ones @ self.values) / float(self._ones @ ones)
-        self._weights = cho_solve(self._factor, self.values - self._mean)
+        self._weights = cho_solve(self._factor, self.values)
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation of the function, without noise, at points (m, features)."""
         across = _matern(np.atleast_2d(points), self.points, self.parameters)
-        mean = self._mean + across @ self._weights
+        mean = across @ self._weights
         solved = solve_triangular(self._factor[0], across.T, lower=True, check_finite=False)
         left = self.parameters.signal - np.einsum("ij,ij->j", solved, solved)
         return self.centre + self.scale * mean, self.scale * np.sqrt(np.maximum(left, 1e-12))
@@ -108,17 +112,15 @@ class GaussianProcess:
         """Return for each value how far it is from what the others predict of it, shape (n,), with the
         parameters of all (GPML Eq. 5.12)."""
         inverse = cho_solve(self._factor, np.eye(len(self.points)), check_finite=False)
-        return self.scale * (inverse @ (self.values - self._mean)) / np.diag(inverse)
+        return self.scale * (inverse @ self.values) / np.diag(inverse)
 
     def conditioned(self, across: Array, values: Array) -> Array:
         """Return the means that a process with other values at its points would have, shape (m, draws).
 
         across : covariance with its points, shape (m, n). values : shape (n, draws), standardised units, as
-        the result. Each column has a constant mean of its own.
+        the result.
         """
-        solved = cho_solve(self._factor, values, check_finite=False)
-        means = solved.sum(axis=0) / float(self._ones.sum())
-        return means + across @ (solved - np.outer(self._ones, means))
+        return np.asarray(across @ cho_solve(self._factor, values, check_finite=False))
 
     def covariance(self, points: Array, others: Array) -> Array:
         """Return the covariance of the function before any data, shape (m, k), in standardised units."""
@@ -132,9 +134,9 @@ class GaussianProcess:
     def _diagonal(self, nugget: float) -> Array:
         return self.noise + (_JITTER if self.noise_free else nugget + _JITTER)
 
-    def _fitted(self, start: Parameters | None, iterations: int) -> Parameters:
+    def _fitted(self, start: Parameters | None, iterations: int, nugget: float) -> Parameters:
         """Return the parameters of largest posterior density, from those of the prior and from ``start``."""
-        prior = Parameters.prior(self.points.shape[1])
+        prior = Parameters.prior(self.points.shape[1], nugget)
         chosen = np.arange(len(self.points))
         if len(chosen) > MOST_FITTED:
             # The best are kept: the search is there. The rest is drawn evenly.

@@ -15,16 +15,21 @@ from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
 from optimize.surrogate.belief import Belief, beaten_by
 
+_UNSEEN = 1e-4
+"""Of noise that is not known: the part of the variance of all costs below which it is taken for none."""
+
 
 def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np.float64]:
     """Return the posterior mean of each cost of designs, (strings, objectives), in units that may be others
-    than those of the costs, in the same order; without noise, the costs. None of the strings has failed."""
+    than those of the costs, in the same order; the costs where there is no noise, or the process sees none.
+    None of the strings has failed."""
     costs = np.array([string.fitness.values for string in strings])
     if len(strings) < 3 or all(one.exact for string in strings for one in string.estimates):
         return costs
     belief = Belief(genome.features)
     belief.learn(strings, iterations=60)
-    return costs if belief.exact else belief.predict(belief.points)[0]
+    seen = any(model.nugget > _UNSEEN or np.any(model.noise) for model in belief.models)
+    return belief.predict(belief.points)[0] if seen else costs
 
 
 def best(genome: Genome, strings: Sequence[Individual], count: int) -> list[Individual]:

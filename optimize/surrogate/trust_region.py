@@ -1,6 +1,7 @@
 """A region around the best design with a Gaussian process of its own.
 
-It converges where the process of the whole range, which must be true everywhere, does not.
+It converges where the process of the whole range, which must be true everywhere, does not. Then it begins
+anew elsewhere (D. Eriksson and others, NeurIPS 32 (2019)).
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
@@ -15,42 +17,44 @@ from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
 
-_FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-6
+_FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-3
 """Half-widths of the region in the unit cube: at first, the largest, and that at which it has converged."""
+APART = 0.02
+"""Of designs that are closer together than this in all genes the process of the whole range needs one."""
 _APART = 0.1
-"""Where a region has converged no other begins within this distance, in any gene."""
+"""Designs by the process of the whole range are farther from the centre than this, in one gene at least."""
 _ROUNDS, _DRAWN, _BEST = 6, 200, 12
 
 
 class TrustRegion:
     """A trust region for one cost without noise.
 
-    centre : the best design outside regions that have converged. half_width : of the region around it.
+    centre : the best design; once a region has converged, the best of those of the next, which begins with
+    random designs. half_width : of the region around it. own : the designs of a region that has begun anew.
     """
 
     def __init__(self, genome: Genome) -> None:
         self.genome, self.genes = genome, len(genome)
         self.half_width = _FIRST
-        self.converged: list[Array] = []
+        self.own: list[Individual] | None = None
         self.centre = np.full(self.genes, 0.5)
         self.cost = np.inf
         self.belief = Belief(self._within)
 
     def propose(self, belief: Belief, count: int, rng: np.random.Generator) -> Array:
         """Return the designs in the region that are worth a run, (count, genes), by all that is known."""
-        costs = np.array([string.fitness.values[0] for string in belief.strings])
-        open_to = np.ones(len(costs), dtype=bool)
-        for old in self.converged:
-            open_to &= np.abs(belief.points - old).max(axis=1) > _APART
-        if not np.any(np.isfinite(costs[open_to])):
-            return np.empty((0, self.genes))
-        best = np.flatnonzero(open_to)[np.argmin(costs[open_to])]
-        self.centre, self.cost = belief.points[best], float(costs[best])
+        strings = belief.strings if self.own is None else self.own
+        best = min((s for s in strings if not s.failed), key=lambda s: s.fitness.values, default=None)
+        if best is None:
+            self.cost = np.inf
+            return rng.random((count, self.genes))
+        self.centre, self.cost = np.array(best), float(best.fitness.values[0])
         # As many as a quadratic function has coefficients, and some more.
         enough = max(40, min(200, (self.genes + 1) * (self.genes + 2)))
         nearest = np.argsort(((belief.points - self.centre) ** 2).sum(axis=1), kind="stable")[:enough]
         self.belief.learn([belief.strings[i] for i in nearest])
         worth = Worth(self.belief, rng)
+        worth.best = self.belief.costs[0]  # of the centre, which others may have bettered elsewhere
         low = np.maximum(self.centre - self.half_width, 0.0)
         high = np.minimum(self.centre + self.half_width, 1.0)
         drawn = [low + rng.random((_DRAWN, self.genes)) * (high - low), self.centre[None]]
@@ -64,9 +68,18 @@ class TrustRegion:
             values.append(worth.of(drawn[-1]))
         return worth.batch(np.vstack(drawn), count, apart=1e-3 * self.half_width)
 
+    def outside(self, points: Array) -> NDArray[np.bool_]:
+        """Return which points are away from the centre. Around it the region searches; what is worth a run by
+        the process of the whole range would else be there too, where little is left to be found."""
+        return np.abs(points - self.centre).max(axis=1) > _APART
+
     def learn(self, proposed: Sequence[Individual]) -> None:
         """Move the size of the region by what the designs that it proposed are worth."""
         good = [string for string in proposed if string.fitness.valid and not string.failed]
+        if self.own is not None:
+            self.own += good
+            if np.isinf(self.cost):
+                return
         best = min(good, key=lambda string: string.fitness.values, default=None)
         if best is None or best.fitness.values[0] >= self.cost:
             self.half_width *= 0.5
@@ -75,8 +88,7 @@ class TrustRegion:
             grown = 2.0 * self.half_width if moved > 0.5 * self.half_width else 0.7 * self.half_width
             self.half_width = min(_LARGEST, max(grown, 2.0 * moved))
         if self.half_width < _SMALLEST:
-            self.converged.append(self.centre)
-            self.half_width = _FIRST
+            self.half_width, self.own = _FIRST, []
 
     def _within(self, points: Array) -> Array:
         return (self.genome.features(points) - self.genome.features(self.centre)) / self.half_width

@@ -59,6 +59,18 @@ def two_costs(x):
     return np.sum((x - 0.3) ** 2), np.sum((x - 0.7) ** 2)
 
 
+def test_designs_near_the_best_are_the_trust_regions():
+    """Without noise: of each generation half lie in the region, and the others away from its middle."""
+    one = method()
+    one.tell(told(one.ask(), valley), [])
+    for _ in range(5):
+        strings = told(one.ask(), valley)
+        distance = np.abs(np.array(strings) - one.region.centre).max(axis=1)
+        assert np.all(distance[: one.local] <= one.region.half_width + 1e-12)
+        assert np.all(distance[one.local :] > 0.1)
+        one.tell(strings, [])
+
+
 def test_the_surrogate_spends_runs_where_they_decide():
     """At 60 runs each, three seeds: far below the same algorithm without one."""
     best = {

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from optimize.surrogate import gaussian_process
 from optimize.surrogate.acquisition import Worth, log_expected_improvement
-from optimize.surrogate.belief import Belief, beaten_by
+from optimize.surrogate.belief import Belief, beaten_by, thinned
 from optimize.surrogate.gaussian_process import GaussianProcess, Parameters
 from optimize.surrogate.ranking import best, spread
 from tests.optimize.fake_runs import fake_problem, string_of
@@ -32,12 +32,11 @@ def test_predictions_are_those_of_a_dense_twin():
     z = (VALUES - VALUES.mean()) / VALUES.std()
     k = np.array([[matern(a, b) for b in POINTS] for a in POINTS])
     k += np.diag(NOISE / VALUES.var() + PARAMETERS.nugget + 1e-8)
-    inverse, ones = np.linalg.inv(k), np.ones(25)
-    constant = (ones @ inverse @ z) / (ones @ inverse @ ones)
+    inverse = np.linalg.inv(k)
     mean, deviation = process.predict(new)
     for at, m, s in zip(new, mean, deviation, strict=True):
         across = np.array([matern(at, b) for b in POINTS])
-        expected = constant + across @ inverse @ (z - constant)
+        expected = across @ inverse @ z
         assert m == pytest.approx(VALUES.mean() + VALUES.std() * expected, rel=1e-10)
         assert s == pytest.approx(
             VALUES.std() * np.sqrt(PARAMETERS.signal - across @ inverse @ across), rel=1e-8
@@ -119,6 +118,27 @@ def test_a_batch_is_spread_where_one_design_would_be_asked_for_again():
     assert tuple(batch[0]) == tuple(points[np.argmax(alone)])
     nearest = points[np.argsort(-alone)[:6]]
     assert np.std(batch, axis=0).sum() > np.std(nearest, axis=0).sum()
+
+
+def test_noise_that_is_not_known_is_not_none():
+    """One start of each design: a belief does not go through the values, but near the bowl behind them."""
+    rng = np.random.default_rng(2)
+    points = rng.random((60, 2))
+    truth, values = bowl(points), bowl(points) + 0.1 * rng.standard_normal(60)
+    belief = Belief()
+    belief.learn([string_of(point, value, std=np.nan) for point, value in zip(points, values, strict=True)])
+    assert not belief.exact
+    assert np.mean((belief.means[:, 0] - truth) ** 2) < 0.5 * np.mean((values - truth) ** 2)
+    belief.learn([string_of(point, value) for point, value in zip(points, truth, strict=True)])
+    assert belief.exact
+    assert belief.predict(points)[0][:, 0] == pytest.approx(belief.means[:, 0], abs=1e-3)
+
+
+def test_of_designs_close_together_the_best_stands_for_all():
+    points = np.array([[0.5, 0.5], [0.51, 0.5], [0.5, 0.6], [0.52, 0.5]])
+    costs = np.array([3.0, 1.0, 2.0, 4.0])
+    assert list(thinned(points, costs, 0.015)) == [1, 2]
+    assert list(thinned(points, costs, 0.005)) == [0, 1, 2, 3]
 
 
 def test_who_is_beaten():

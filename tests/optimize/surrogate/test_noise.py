@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from optimize import Gene, Genome
+from optimize import Gene, Genome, Objective
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.surrogate.noise import LEAST_DESIGNS, moments
 
 GENOME = Genome((Gene("x", "", 0.0, 1.0), Gene("y", "", 0.0, 1.0)))
+
+
+BOWL = Objective("bowl", lambda result: result.value)
 
 
 def designs(draw, number=400, starts=2, seed=1):
@@ -18,7 +21,7 @@ def designs(draw, number=400, starts=2, seed=1):
     for _ in range(number):
         point = rng.random(2)
         string = Individual(point)
-        string.know((FitnessEstimate.of((point**2).sum() + draw(rng, starts), False),))
+        string.know((FitnessEstimate.of(BOWL, (point**2).sum() + draw(rng, starts), False),))
         made.append(string)
     return made
 
