@@ -21,8 +21,8 @@ _UNSEEN = 1e-4
 
 def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np.float64]:
     """Return the posterior mean of each cost of designs, (strings, objectives), in units that may be others
-    than those of the costs, in the same order; the costs where there is no noise, or the process sees none. None
-    of the strings has failed."""
+    than those of the costs, in the same order; the costs where there is no noise, or the process sees none.
+    None of the strings has failed."""
     costs = np.array([string.fitness.values for string in strings])
     if len(strings) < 3 or all(one.std == 0 for string in strings for one in string.estimates):
         return costs
