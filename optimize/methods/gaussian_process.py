@@ -14,7 +14,7 @@ from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
-from optimize.surrogate.trust_region import APART, TrustRegion
+from optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
 from tisim.components.component import Checked
 
 _ROUNDS, _DRAWN = 6, 200
@@ -76,7 +76,7 @@ class GaussianProcessSearch(SearchMethod):
             points = sobol(self.genes, first, self.rng)
             return [Individual(point, self.objectives) for point in self.genome.canonical(points)]
         count = max(self.options.population, len(self.strings) // _GROWTH)
-        self.belief.learn(self.strings, apart=APART)
+        self.belief.learn(self.strings, apart=SAME_PLACE)
         local, self.local = np.empty((0, self.genes)), None
         if self.belief.exact and self.objectives == 1:
             proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)

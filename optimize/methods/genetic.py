@@ -17,7 +17,7 @@ from optimize.problem.genome import Genome
 from optimize.surrogate.acquisition import Worth
 from optimize.surrogate.belief import Belief
 from optimize.surrogate.gaussian_process import Array
-from optimize.surrogate.trust_region import APART, TrustRegion
+from optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
 from tisim.components.component import Checked
 from tisim.errors import must
 
@@ -172,7 +172,7 @@ class Genetic(SearchMethod):
     def _worth_most(self) -> Array:
         """Return the designs that are worth most together by the surrogate."""
         count = max(self.population, len(self.strings) // _GROWTH)
-        self.belief.learn(self.strings, apart=APART)
+        self.belief.learn(self.strings, apart=SAME_PLACE)
         local = np.empty((0, self.genes))
         if self.belief.exact and self.objectives == 1:
             proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
