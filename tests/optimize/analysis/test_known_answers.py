@@ -8,7 +8,7 @@ import pytest
 
 from tests.optimize.analysis.known_answers import EXPERIMENTS, KnownAnswers, coverage
 
-SETS = 60
+SETS = 200
 
 
 @pytest.fixture(autouse=True)
