@@ -47,7 +47,7 @@ TYPES = (
 INNER = "|".join(
     (
         r"tisim\.(io\.(recording|trajectory|recorder)|packing\.(clump|region|tried_places)|engine\.particle_state|backend\.runtime)\.\w+",
-        r"(tisim\.(components\.(materials|component)|steppers\.context|worlds\.(bound|program|state)|neighbours\.(lists|half_list)|engine\.assembly|interactions\.force_sum|effects\.contact\.granular\.parts)|optimize\.(methods\.\w+|problem\.(function|constraint)|storage\.cache|analysis\.\w+))\.\w+",
+        r"(tisim\.(components\.(materials|component)|steppers\.context|worlds\.(bound|program|state)|neighbours\.(lists|half_list)|engine\.assembly|interactions\.force_sum|effects\.contact\.granular\.parts)|optimize\.(methods\.\w+|problem\.(function|constraint|statistic)|storage\.cache|analysis\.\w+))\.\w+",
     )
 )
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in (*OTHERS, *TYPES))]
