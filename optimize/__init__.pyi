@@ -44,7 +44,7 @@ from .problem.given_genes import (
 from .problem.objective import Objective as Objective
 from .problem.problem import Problem as Problem
 from .problem.statistic import (
-    Mean as Mean,
+    Expectation as Expectation,
 )
 from .problem.statistic import (
     Misfit as Misfit,

@@ -20,7 +20,7 @@ class Objective:
     name : heading in tables and plots; unit : of the values, "" if they have none.
     of : Result -> value in that unit, of a plain function FunctionResult -> value. Called for runs that ended
         well only; NaN and inf never win. For a Misfit it returns a dictionary of the measured quantities.
-    statistic : what counts of the values from all random starts: Mean(), Quantile(0.9), WorstOf(8) or
+    statistic : what counts of the values from all random starts: Expectation(), Quantile(0.9), WorstOf(8) or
         Misfit({"angle": (27.9, 3.0)}).
     Raises InputError for an empty name, for a statistic that is none, and for a misfit that is maximised.
     """
@@ -33,7 +33,7 @@ class Objective:
 
     def __post_init__(self) -> None:
         must(bool(self.name.strip()), "objective name", "a non-empty string", self.name)
-        kinds = "Mean(), Quantile(share), WorstOf(starts) or Misfit(measured)"
+        kinds = "Expectation(), Quantile(share), WorstOf(starts) or Misfit(measured)"
         must(isinstance(self.statistic, Statistic), f"statistic of {self.name}", kinds, self.statistic)
         wanted = self.maximise and bool(self.statistic.quantities)
         must(not wanted, f"maximise of {self.name}", "False, as it is a misfit", self.maximise)

@@ -88,7 +88,7 @@ class Statistic(ABC):
 
 
 @dataclass(frozen=True)
-class Mean(Statistic):
+class Expectation(Statistic):
     """The mean over the starts."""
 
     @property
@@ -283,5 +283,5 @@ class Misfit(Statistic):
 
 
 _UNKNOWN = math.nan, math.nan
-MEAN = Mean()
+MEAN = Expectation()
 """The statistic of an objective for which none is given."""

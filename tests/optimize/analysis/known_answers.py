@@ -17,7 +17,7 @@ import numpy as np
 
 import optimize
 import tisim
-from optimize import Gene, Genome, Objective, Problem
+from optimize import Gene, Genome, Misfit, Objective, Problem
 from optimize.evaluation.executors import evaluator_named
 from optimize.search import search
 from optimize.settings import Settings
@@ -150,16 +150,18 @@ class KnownAnswers:
         uncertainty = np.array(self.experiment.uncertainty)
         measured = self.quantities(truth) + uncertainty * rng.normal(size=len(uncertainty))
 
-        def misfit(result):
-            off = (np.array(self.experiment.quantities(result)) - measured) / uncertainty
-            return float(np.mean(off**2))
+        names = [f"quantity {k}" for k in range(len(measured))]
+        pairs = zip(measured, uncertainty, strict=True)
+        statistic = Misfit(dict(zip(names, pairs, strict=True)))
+
+        def quantities(result):
+            return dict(zip(names, self.experiment.quantities(result), strict=True))
 
         problem = Problem(
             name=self.name,
             genome=self.genome,
             scene=self.experiment.scene,
-            objective=(Objective("misfit", misfit),),
-            measurements=len(uncertainty),
+            objective=(Objective("misfit", quantities, statistic=statistic),),
             code=f"{self.name} {seed}",
         )
         with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / "search.h5") as cache:

@@ -8,7 +8,7 @@ from scipy.stats import beta, norm
 from scipy.stats.mstats import hdquantiles
 
 import optimize
-from optimize import Gene, Mean, Misfit, Objective, Problem, Quantile, WorstOf
+from optimize import Expectation, Gene, Misfit, Objective, Problem, Quantile, WorstOf
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.evaluation.executors import evaluator_for
 from optimize.search import search
@@ -26,7 +26,7 @@ def objective(statistic, maximise=False, of=lambda result: result.value):
 
 
 def test_estimates_are_those_of_their_definitions():
-    assert Mean().value(VALUES) == pytest.approx(VALUES.mean(), rel=1e-14)
+    assert Expectation().value(VALUES) == pytest.approx(VALUES.mean(), rel=1e-14)
     assert Quantile(0.9).value(VALUES) == pytest.approx(hdquantiles(VALUES, [0.9])[0], rel=1e-12)
     subsets = [max(part) for part in combinations(VALUES, 3)]
     assert WorstOf(3).value(VALUES) == pytest.approx(np.mean(subsets), rel=1e-12)
@@ -61,7 +61,7 @@ def test_the_misfit_of_means_has_no_part_of_their_variance():
 @pytest.mark.parametrize(
     ("statistic", "variance"),
     [
-        (Mean(), 1 / 40),
+        (Expectation(), 1 / 40),
         (Quantile(0.5), np.pi / 2 / 40),
         (Quantile(0.9), 0.09 / norm.pdf(norm.ppf(0.9)) ** 2 / 40),
         (Misfit({"a": (3.0, 1.0)}), 4 * 9 / 40),
@@ -133,7 +133,9 @@ def searched_problem(statistic):
 
 
 @pytest.mark.parametrize(
-    ("statistic", "noise", "other"), [(Mean(), 0.0, WORST), (WorstOf(4), WORST, 0.0)], ids=["mean", "worst"]
+    ("statistic", "noise", "other"),
+    [(Expectation(), 0.0, WORST), (WorstOf(4), WORST, 0.0)],
+    ids=["mean", "worst"],
 )
 def test_a_search_finds_the_best_of_what_is_asked(statistic, noise, other):
     """Nearer in value to its own best design than to that of the other statistic."""
@@ -151,7 +153,7 @@ def test_the_same_runs_serve_every_statistic(tmp_path):
     """Values of runs are kept, so that another statistic of them costs nothing."""
     counts = []
     settings = Settings(seed=1, method="random", options={"population": 6}, generations=0)
-    for statistic in (Quantile(0.5), Mean()):
+    for statistic in (Quantile(0.5), Expectation()):
         problem = searched_problem(statistic)
         with Cache(tmp_path / "all.h5") as cache:
             outcome = search(problem, evaluator_for(problem, "batch"), cache, settings)
@@ -169,7 +171,7 @@ def test_what_cannot_be_is_refused():
             lambda: Misfit({"a": (1.0, 0.0)}),
             r"measured a must be \(value, uncertainty above 0\), both finite",
         ),
-        (lambda: objective("mean"), "statistic of value must be Mean"),
+        (lambda: objective("mean"), "statistic of value must be Expectation"),
         (lambda: objective(Misfit(TARGET), maximise=True), "maximise of value must be False"),
     ):
         with pytest.raises(InputError, match=words):

@@ -69,8 +69,9 @@ def test_h5py_alone_tells_what_every_column_is(path):
         assert {"low": 1e-3, "high": 1.0, "scale": "log"}.items() <= dict(ratio.attrs).items()
         assert "unit" not in ratio.attrs
         gain, price = runs["values/gain"], runs["values/price"]
-        assert dict(gain.attrs) == {"unit": "1/s", "direction": "largest", "description": "what is won"}
-        assert dict(price.attrs) == {"direction": "smallest"}
+        told = {"unit": "1/s", "direction": "largest", "statistic": "mean", "description": "what is won"}
+        assert dict(gain.attrs) == told
+        assert dict(price.attrs) == {"direction": "smallest", "statistic": "mean"}
         assert runs["wall_s"].attrs["unit"] == "s"
         ok = runs["ok"][...] == 1
         assert 0 < np.count_nonzero(ok) < len(ok)
