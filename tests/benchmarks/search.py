@@ -140,6 +140,8 @@ def ours(name: str, task: Task, evaluator: Evaluator, seed: int, budget: int) ->
     else:  # as optimize.run does, with an evaluator that has compiled the scene already
         with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / "search.h5") as cache:
             found = search(problem, evaluator, cache, Settings(**settings))
+    if found.interrupted:
+        raise KeyboardInterrupt  # and no line of it, so that it is made again
     assert found.evaluations + found.hits <= budget
     several = found.problem.several
     points = np.array([list(string) for string in (found.hall if several else found.hall[:1])])
