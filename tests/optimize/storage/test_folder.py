@@ -182,6 +182,7 @@ def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path,
     assert (code, err.strip()) == (2, "parents must be < population = 8; received 8")
 
 
+@pytest.mark.slow
 def test_a_search_begins_with_files_and_with_the_folder(optimize, tmp_path):
     assert optimize("--seed", 1)[0] == 0
     (tmp_path / "tried.csv").write_text("x0,x1 (m)\n0.25,0.5\n0.3,0.3\n")
