@@ -15,7 +15,7 @@ from optimize.storage.record import canonical
 from optimize.surrogate.ranking import best
 
 RUN_AGAIN = 6
-"""Of the designs that a warm start learns from, so many of the best are run first."""
+"""Number of the best designs of a warm start that are run before generation 0."""
 
 
 @dataclass(frozen=True)
@@ -81,4 +81,4 @@ def _checksum(value: Any) -> str:
 
 
 NOTHING = Beginning()
-"""That of a search of which no more is said."""
+"""A search begins with nothing unless designs, experiments or a warm start are given."""

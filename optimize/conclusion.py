@@ -51,11 +51,8 @@ def concluded(
     the target, which is reported first. The budget of the ensemble is not exceeded.
     """
     asked = settings.ensemble
-    fresh = (
-        max(asked.confirm, *(one.statistic.fewest_fresh for one in problem.objectives))
-        if asked.confirm
-        else 0
-    )
+    needed = max(one.statistic.fewest_fresh for one in problem.objectives)
+    fresh = max(asked.confirm, needed) if asked.confirm else 0
     if asked.select or asked.confirm:
         ensemble.look()
     noise = _noise(problem, settings, ensemble, known) if asked.confirm else None
@@ -96,7 +93,8 @@ def _front(
         return front
     left = _left(ensemble)
     if not math.isinf(left):
-        confirm = max(min(confirm, int(left) // len(front)), min(confirm, FEWEST_FRESH))
+        fewest = max(FEWEST_FRESH, *(one.statistic.fewest_starts for one in problem.objectives))
+        confirm = max(min(confirm, int(left) // len(front)), min(confirm, fewest))
         front = best(problem.genome, known, max(1, int(left) // confirm))
     _confirm(problem, front, ensemble, confirm, report, noise)
     if not front[0].confirmed:
@@ -145,9 +143,11 @@ def _confirm(
     noise: Noise,
     confidence: float = CONFIDENCE,
 ) -> None:
-    """Give designs their fresh starts, if the budget has these or they have been made."""
+    """Give designs their fresh starts, if these are enough for their statistics, and the budget has them or
+    they have been made."""
     again = bool(chosen) and bool(chosen[0].confirmed)
-    if not starts or (starts * len(chosen) > _left(ensemble) and not again):
+    too_few = starts < max(one.statistic.fewest_starts for one in problem.objectives)
+    if not starts or too_few or (starts * len(chosen) > _left(ensemble) and not again):
         return
     designs = [problem.genome.decode(string) for string in chosen]
     fresh = ensemble.fresh(designs, starts, progress=report, noise=noise, confidence=confidence)

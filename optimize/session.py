@@ -174,7 +174,7 @@ def _search_with_display(
     stopping: Callable[[], None],
 ) -> Outcome:
     """Run the search behind its progress bar, until it ends or Ctrl-C stops it."""
-    with Interrupt(stopping) as ctrl_c, Display(problem, settings.generations, bar) as display:
+    with Interrupt(stopping) as ctrl_c, Display(problem, settings, bar) as display:
 
         def step(progress: Progress) -> None:
             display.step(progress)

@@ -49,7 +49,7 @@ MEANINGS = {
 def cost(result: Result) -> float:
     """Pi = 1 - b_f / b*, b_f the mean final radius and b* that of all the mass in one sphere (Z04 7.1)."""
     whole = np.cbrt((result.start["radius"] ** 3).sum())
-    return float(1.0 - result.state["radius"].mean() / whole)
+    return max(0.0, float(1.0 - result.state["radius"].mean() / whole))  # below 0 by rounding only
 
 
 def problem(size: str = "default", variant: str = "paper") -> Problem:

@@ -13,6 +13,7 @@ from optimize.evaluation.estimate import FitnessEstimate, converged_after
 from optimize.evaluation.runs import Evaluator, Runs, Sample
 from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
+from optimize.problem.statistic import Others
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
 from tisim.components.component import Checked
@@ -32,10 +33,10 @@ class EnsembleSettings(Checked):
     """How many random starts a fitness is averaged over.
 
     min_starts : starts of every design, more where the statistic of an objective needs more (10 for a 0.9
-    quantile). tolerance : TOL of Z04 Eq. 8.1: starts are added, ``block`` in each
-    call of the evaluator, until the mean changes by less than this part of it, max_starts at most. None: no
-    more are added. common_starts : start k is the same for every design, so that designs are compared on
-    equal terms; False: each design has starts of its own; None: what is best for the method.
+    quantile). tolerance : TOL of Z04 Eq. 8.1: starts are added, ``block`` in each call of the evaluator,
+    until the mean changes by less than this part of it, max_starts at most. None: no more are added.
+    common_starts : start k is the same for every design, so that designs are compared on equal terms; False:
+    each design has starts of its own; None: what is best for the method.
     race : starts that a generation spends on telling the best designs apart (0: none).
     select : starts that each of the best designs gets once the search has ended, before the best is chosen.
     confirm : fresh starts of each of the best designs after that, from which they are reported (0: none, and
@@ -309,8 +310,8 @@ class Ensemble:
         for k, (one, part) in enumerate(self._of_objectives(sample.values[: sample.used])):
             costs = sorted(one.sign * value for value in seen[one.quantities[0]])
             may_occur = _may_occur(one.pseudo_costs(part), costs, ranges[k] if ranges else math.inf)
-            shared = skewness[k] if skewness else None
-            estimates.append(FitnessEstimate.of(one, part, sample.converged, may_occur, shared, confidence))
+            others = Others(may_occur, skewness[k] if skewness else None)
+            estimates.append(FitnessEstimate.of(one, part, sample.converged, others, confidence))
         return tuple(estimates)
 
     def _costs(self, sample: Sample) -> list[np.ndarray]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from optimize.problem.objective import Objective
+from optimize.problem.statistic import NO_OTHERS, Others
 from tisim.numerics.statistics import CONFIDENCE
 
 
@@ -54,24 +54,18 @@ class FitnessEstimate:
 
     @classmethod
     def of(
-        cls,
-        objective: Objective,
-        values: ArrayLike,
-        converged: bool,
-        seen: Sequence[float] = (),
-        skewness: float | None = None,
+        cls, objective: Objective, values: ArrayLike, converged: bool, others: Others = NO_OTHERS,
         confidence: float = CONFIDENCE,
-    ) -> FitnessEstimate:
+    ) -> FitnessEstimate:  # fmt: skip
         """Return the estimate of an objective's cost from the values of each start; at least one.
 
-        values : shape (starts, quantities). seen : costs that may occur: starts that are all equal do not
-        exclude these. skewness : of what the costs are drawn from, where other designs tell it. confidence :
-        of the interval.
+        values : shape (starts, quantities). others : costs that may occur besides, which starts that are all
+        equal do not exclude, and the skewness of the costs. confidence : of the interval.
         """
         costs, statistic = objective.costs(values), objective.statistic_of_costs
         n = len(costs)
         std = float(np.std(statistic.pseudo_values(costs), ddof=1)) if n > 1 else math.nan
-        low, high = statistic.interval(costs, seen, skewness, confidence)
+        low, high = statistic.interval(costs, others, confidence)
         return cls(statistic.value(costs), std, low, high, n, converged)
 
     @classmethod

@@ -21,6 +21,22 @@ from tisim.numerics import intervals, skewed
 from tisim.numerics.statistics import CONFIDENCE
 
 Array = NDArray[np.float64]
+Ends = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Others:
+    """What the runs of other designs tell of the values of a design.
+
+    seen : values that have occurred. skewness : of the noise, None where it is not known.
+    """
+
+    seen: Sequence[float] = ()
+    skewness: float | None = None
+
+
+NO_OTHERS = Others()
+"""Nothing is known of other designs."""
 
 
 class Statistic(ABC):
@@ -64,18 +80,9 @@ class Statistic(ABC):
         """Return the estimate of one start or more."""
 
     @abstractmethod
-    def interval(
-        self,
-        values: Array,
-        seen: Sequence[float] = (),
-        skewness: float | None = None,
-        confidence: float = CONFIDENCE,
-    ) -> tuple[float, float]:
-        """Return the ends of the interval of that confidence, NaN where one is not known.
-
-        seen : values that other designs have had. skewness : of what the values are drawn from, where other
-        designs tell it. Both are for a mean (tisim.numerics.skewed).
-        """
+    def interval(self, values: Array, others: Others = NO_OTHERS, confidence: float = CONFIDENCE) -> Ends:
+        """Return the ends of the interval of that confidence, NaN where one is not known; others : for a
+        mean (tisim.numerics.skewed)."""
 
     def pseudo_values(self, values: Array) -> Array:
         """Return n theta - (n - 1) theta_without_i of each start i: values of which theta is about the mean
@@ -109,14 +116,8 @@ class Expectation(Statistic):
     def pseudo_values(self, values: Array) -> Array:
         return np.asarray(values, dtype=float)
 
-    def interval(
-        self,
-        values: Array,
-        seen: Sequence[float] = (),
-        skewness: float | None = None,
-        confidence: float = CONFIDENCE,
-    ) -> tuple[float, float]:
-        return skewed.interval(values, seen, skewness, confidence)
+    def interval(self, values: Array, others: Others = NO_OTHERS, confidence: float = CONFIDENCE) -> Ends:
+        return skewed.interval(values, others.seen, others.skewness, confidence)
 
 
 @dataclass(frozen=True)
@@ -157,13 +158,7 @@ class Quantile(Statistic):
         edges = betainc((n + 1) * self.share, (n + 1) * (1 - self.share), np.linspace(0.0, 1.0, n + 1))
         return float(np.sort(values) @ np.diff(edges))
 
-    def interval(
-        self,
-        values: Array,
-        seen: Sequence[float] = (),
-        skewness: float | None = None,
-        confidence: float = CONFIDENCE,
-    ) -> tuple[float, float]:
+    def interval(self, values: Array, others: Others = NO_OTHERS, confidence: float = CONFIDENCE) -> Ends:
         return intervals.of_quantile(values, self.share, confidence)
 
 
@@ -201,13 +196,7 @@ class WorstOf(Statistic):
         weights = comb(np.arange(n), self.starts - 1) / comb(n, self.starts)
         return float(np.sort(values) @ weights)
 
-    def interval(
-        self,
-        values: Array,
-        seen: Sequence[float] = (),
-        skewness: float | None = None,
-        confidence: float = CONFIDENCE,
-    ) -> tuple[float, float]:
+    def interval(self, values: Array, others: Others = NO_OTHERS, confidence: float = CONFIDENCE) -> Ends:
         if len(values) <= self.starts:
             return _UNKNOWN
         return skewed.interval(self.pseudo_values(values), confidence=confidence)
@@ -270,13 +259,7 @@ class Misfit(Statistic):
         variance = off.var(axis=0, ddof=1) / n if n > 1 else np.zeros(off.shape[1])
         return float(np.mean(off.mean(axis=0) ** 2 - variance))
 
-    def interval(
-        self,
-        values: Array,
-        seen: Sequence[float] = (),
-        skewness: float | None = None,
-        confidence: float = CONFIDENCE,
-    ) -> tuple[float, float]:
+    def interval(self, values: Array, others: Others = NO_OTHERS, confidence: float = CONFIDENCE) -> Ends:
         if len(values) < 2:
             return _UNKNOWN
         return intervals.of_squared_distance(self.off(values), confidence)

@@ -10,6 +10,7 @@ from rich.console import Console
 from optimize.outcome import Progress
 from optimize.problem.gene_values import Value, brief
 from optimize.problem.problem import Problem
+from optimize.settings import Settings
 from tisim.console import progress_bar
 
 
@@ -19,13 +20,14 @@ class Display:
     Pass ``generation`` and ``step`` to ``optimize.search.search`` as on_generation and on_progress.
     """
 
-    def __init__(self, problem: Problem, generations: int, console: Console) -> None:
-        self.problem, self.console = problem, console
+    def __init__(self, problem: Problem, settings: Settings, console: Console) -> None:
+        self.problem, self.settings, self.console = problem, settings, console
         self.best: Mapping[str, Value] | None = None
         self.bar = progress_bar(
             "generation {task.fields[generation]} of {task.fields[last]}", "{task.fields[best]}", console
         )
-        self.task = self.bar.add_task("", total=generations + 1, generation=0, last=generations, best="")
+        last = settings.generations
+        self.task = self.bar.add_task("", total=1.0, generation=0, last=last, best="")
 
     def __enter__(self) -> Display:
         self.bar.__enter__()
@@ -37,9 +39,12 @@ class Display:
         self.bar.__exit__(kind, error, trace)
 
     def step(self, where: Progress) -> None:
-        """Show that some more evaluations are done."""
-        completed = where.generation + where.fraction
-        self.bar.update(self.task, completed=completed, generation=where.generation)
+        """Show that some more evaluations are done: the part of the generations, or of the budget of runs
+        where that will end the search before."""
+        generations = (where.generation + where.fraction) / (self.settings.generations + 1)
+        most = self.settings.max_evaluations
+        runs = (where.evaluations + where.hits) / most if most else 0.0
+        self.bar.update(self.task, completed=max(generations, runs), generation=where.generation)
 
     def generation(self, where: Progress) -> None:
         """Show that a generation is done, and its best design where that is new."""

@@ -16,7 +16,7 @@ from optimize.problem.genome import Genome
 from optimize.surrogate.belief import Belief, beaten_by
 
 _UNSEEN = 1e-4
-"""Of noise that is not known: the part of the variance of all costs below which it is taken for none."""
+"""A nugget below this part of the variance of all costs is taken for no noise, where noise is not known."""
 
 
 def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np.float64]:

@@ -20,9 +20,9 @@ from optimize.surrogate.gaussian_process import Array
 _FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-3
 """Half-widths of the region in the unit cube: at first, the largest, and that at which it has converged."""
 SAME_PLACE = 0.02
-"""Of designs that are closer together than this in all genes the process of the whole range needs one."""
+"""The process of the whole range learns from one design alone of those within this distance in all genes."""
 _APART = 0.1
-"""Designs by the process of the whole range are farther from the centre than this, in one gene at least."""
+"""The process of the whole range proposes designs farther from the centre than this in one gene or more."""
 _ROUNDS, _DRAWN, _BEST = 6, 200, 12
 
 

@@ -1,8 +1,10 @@
 """Whether the steps of agglomeration in fields are short enough, and what they cost.
 
     python tests/benchmarks/field_steps.py [--designs 64] [--starts 16] [--phases 0.2 0.1 0.05] [--grains 60]
+        [--strongest]
 
-Designs are drawn from the ranges of the search, every other one soft and fast. The phase is the longest step
+Designs are drawn from the ranges of the search, every other one soft and fast;
+with --strongest all are soft, and have the largest charges and magnetic field. The phase is the longest step
 times the rate of an oscillation that the forces of fields can cause. A line for each phase has how many runs
 were stopped, the mean of Pi, by how much it is off that of the last phase with the 95 % interval over the
 designs, and the steps of a run.
@@ -22,15 +24,17 @@ from cases.agglomeration.problem import cost, problem
 from cases.agglomeration.scene import scene
 from tisim.analysis import Mean
 
+STRONGEST = {"surface_charge": 4e-3, "magnetic_field": 1.0, "hardness": 1e5, "friction": 0.01}
 
-def drawn(number: int) -> list[dict[str, float]]:
-    """Return designs of the ranges."""
+
+def drawn(number: int, strongest: bool) -> list[dict[str, float]]:
+    """Return designs of the ranges; strongest : all of them soft, with the largest charges and field."""
     genome = problem("small", "fields").genome
     rng = np.random.default_rng(1)
     designs = [dict(genome.decode(u)) for u in rng.random((number, len(genome)))]
     for design in designs[::2]:
         design |= {"hardness": 1e5, "relative_velocity": 180.0}
-    return designs
+    return [{**design, **STRONGEST} for design in designs] if strongest else designs
 
 
 def measured(designs: list[dict[str, float]], starts: int, grains: int) -> tuple[int, np.ndarray, float]:
@@ -47,8 +51,9 @@ if __name__ == "__main__":
     parser.add_argument("--starts", type=int, default=16)
     parser.add_argument("--grains", type=int, default=60)
     parser.add_argument("--phases", type=float, nargs="+", default=[0.2, 0.1, 0.05])
+    parser.add_argument("--strongest", action="store_true")
     options = parser.parse_args()
-    designs, found = drawn(options.designs), {}
+    designs, found = drawn(options.designs, options.strongest), {}
     for phase in options.phases:
         fields.PHASE = phase
         found[phase] = measured(designs, options.starts, options.grains)

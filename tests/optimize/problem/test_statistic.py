@@ -149,6 +149,18 @@ def test_a_search_finds_the_best_of_what_is_asked(statistic, noise, other):
     assert all(len(values) >= statistic.fewest_starts for values in outcome.quantities.values())
 
 
+def test_a_statistic_is_not_reported_from_fewer_starts_than_it_needs():
+    """The worst of four, of two starts or four, is too good."""
+    outcome = optimize.run(searched_problem(WorstOf(4)), seed=1, max_evaluations=24, generations=100)
+    assert all(len(values) >= 5 for values in outcome.quantities.values())
+    assert all(not one.confirmed or one.confirmed[0].starts >= 5 for one in outcome.hall)
+    worst = [objective(WorstOf(4)), Objective("x", lambda result: result.design["x"])]
+    problem = Problem.of_function(noisy, [Gene("x", "m", 0, 1)], worst, "two", code="two")
+    front = optimize.run(problem, seed=1, max_evaluations=120, generations=100)
+    assert front.hall
+    assert all(not one.confirmed or one.confirmed[0].starts >= 5 for one in front.hall)
+
+
 def test_the_same_runs_serve_every_statistic(tmp_path):
     """Values of runs are kept, so that another statistic of them costs nothing."""
     counts = []

@@ -78,7 +78,9 @@ def test_the_spread_of_those_that_meet_has_names_of_choices():
 
 
 def test_the_bar_tells_the_best_design():
-    text = Display(PROBLEM, 3, Console(file=io.StringIO()))._design(PROBLEM.genome.decode([0.5] * 4))
+    text = Display(PROBLEM, Settings(generations=3), Console(file=io.StringIO()))._design(
+        PROBLEM.genome.decode([0.5] * 4)
+    )
     assert text == "speed 5 m/s, blades 4, wall round, open True, gap 2.5 mm, tip 10 m/s"
 
 

@@ -11,9 +11,10 @@ from cases.agglomeration.problem import problem as agglomeration
 from optimize import Gene, Problem
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
-from optimize.outcome import Outcome
+from optimize.outcome import Outcome, Progress
 from optimize.problem.objective import Objective
 from optimize.report import convergence, report
+from optimize.report.display import Display
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
@@ -259,3 +260,11 @@ def test_starts_that_happen_to_be_equal_are_not_taken_for_one():
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(report.notes(outcome))
     assert "starts: random starts that the mean is over" in console.export_text()
+
+
+@pytest.mark.parametrize(("budget", "part"), [(None, 0.25), (40, 0.5), (1000, 0.25)])
+def test_the_bar_goes_to_its_end_by_generations_or_by_the_budget(budget, part):
+    settings = Settings(generations=9, max_evaluations=budget)
+    display = Display(fake_problem(), settings, Console(file=io.StringIO()))
+    display.step(Progress(2, 9, 0.5, (1.0,), 1, None, 14, 6, 1.0))
+    assert display.bar.tasks[0].percentage == pytest.approx(100 * part)
