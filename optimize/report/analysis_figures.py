@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
 from optimize.analysis.calibration import Calibration, GeneEstimate, shown
 from optimize.analysis.sensitivity import LEAST_Q2, MOVES, Between, Sensitivity
@@ -14,8 +15,8 @@ from tisim.plotting.style import empty, letters, plain, superscripts
 
 _KNOWN, _RANGE, _FIRST, _TOTAL = "#0b5394", "0.88", "#0b5394", "#9fc5e8"
 _FAR, _CLOSE = "#b45f06", "#0b5394"
-_ROW, _PANEL_ROW = 0.5, 0.42
-"""Height of the row of a gene in a picture of a calibration and of a sensitivity, inches."""
+_ROW = 0.5
+"""Height of the row of a gene, inches."""
 
 
 def calibration_figure(found: Calibration) -> Figure:
@@ -74,7 +75,7 @@ def sensitivity_figure(found: Sequence[Sensitivity]) -> Figure:
     """Draw for each objective, a row of panels each: the change around the best design as each gene moves,
     and the first-order and total indices over the whole range; bars are 95 % intervals."""
     genes = len(found[0].genes)
-    figure = empty(8.6, (_PANEL_ROW * genes + 1.5) * len(found))
+    figure = empty(8.6, (0.42 * genes + 1.7) * len(found))
     panels = figure.subplots(len(found), 2, squeeze=False, sharey=True)
     for (left, right), one in zip(panels, found, strict=True):
         _changes(left, one)
@@ -96,7 +97,7 @@ def _changes(axis: Axes, one: Sensitivity) -> None:
         )  # fmt: skip
     axis.set_xlabel(f"change of {superscripts(one.label)}")
     axis.set_title("moved from the best design", fontsize=9)
-    _legend_below(axis, 4, len(one.genes))
+    _legend_below(axis, 4)
 
 
 def _indices(axis: Axes, one: Sensitivity) -> None:
@@ -119,13 +120,16 @@ def _indices(axis: Axes, one: Sensitivity) -> None:
         axis.errorbar(values, at, xerr=sides, fmt="none", ecolor="0.25", lw=1.0)
         ends = max(ends, max(between.high for between in what))
     axis.set_xlim(0.0, ends)
-    _legend_below(axis, 2, len(one.genes))
+    _legend_below(axis, 2)
 
 
-def _legend_below(axis: Axes, columns: int, genes: int) -> None:
-    """Put a legend below the label of the axis, however high its panel is."""
-    below = -0.55 / (_PANEL_ROW * genes)
-    axis.legend(frameon=False, fontsize=7, ncols=columns, loc="upper center", bbox_to_anchor=(0.5, below))
+def _legend_below(axis: Axes, columns: int) -> None:
+    """Put a legend below the label of the axis, at the same distance for panels of any height."""
+    inches = axis.get_figure(root=True).dpi_scale_trans
+    axis.legend(
+        frameon=False, fontsize=7, ncols=columns, loc="upper center", bbox_to_anchor=(0.5, 0.0),
+        bbox_transform=axis.transAxes + ScaledTranslation(0.0, -0.4, inches),
+    )  # fmt: skip
 
 
 def _bars(what: Sequence[Between], place: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
