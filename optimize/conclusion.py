@@ -33,12 +33,21 @@ Noise = Sequence[Moments] | None
 
 
 def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
-    """Return the number of runs that are kept back for the end: an eighth of the budget for one objective, a
-    quarter for a front; none where all starts of a design are the same."""
-    asked = settings.ensemble.select or settings.ensemble.confirm
-    if settings.max_evaluations is None or ensemble.repeatable or not asked:
+    """Return the number of runs that are kept back for the end: an eighth of the budget for one objective,
+    or what all designs that are reported need, if that is less; a quarter for a front; none where all starts
+    of a design are the same."""
+    asked, most = settings.ensemble, settings.max_evaluations
+    if most is None or ensemble.repeatable or not (asked.select or asked.confirm):
         return 0
-    return settings.max_evaluations // (4 if problem.several else 8)
+    if problem.several:
+        return most // 4
+    return min(most // 8, settings.hall_of_fame * (asked.select + _fresh(problem, settings)))
+
+
+def _fresh(problem: Problem, settings: Settings) -> int:
+    """Return the number of fresh starts of each design that is reported."""
+    asked = settings.ensemble.confirm
+    return max(asked, *(one.statistic.fewest_fresh for one in problem.objectives)) if asked else 0
 
 
 def concluded(
@@ -51,8 +60,7 @@ def concluded(
     the target, which is reported first. The budget of the ensemble is not exceeded.
     """
     asked = settings.ensemble
-    needed = max(one.statistic.fewest_fresh for one in problem.objectives)
-    fresh = max(asked.confirm, needed) if asked.confirm else 0
+    fresh = _fresh(problem, settings)
     if asked.select or asked.confirm:
         ensemble.look()
     noise = _noise(problem, settings, ensemble, known) if asked.confirm else None

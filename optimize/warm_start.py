@@ -30,7 +30,8 @@ from optimize.settings import Settings, identity
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
 from optimize.storage.runs_table import RunsTable
-from optimize.surrogate.belief import MOST_LEARNED, costs_and_noise, representative
+from optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
+from optimize.surrogate.selection import representative
 from tisim.errors import InputError, is_number
 
 
@@ -71,7 +72,8 @@ def _of_runs(problem: Problem, part: RunsTable) -> list[Individual]:
     if not strings or all(string.failed for string in strings):
         return []
     # The points are made last, as to find one takes longer than all else.
-    chosen = [found[k] for k in np.sort(representative(costs_and_noise(strings)[0], MOST_LEARNED))]
+    costs, _ = costs_and_noise(strings)
+    chosen = [found[k] for k in representative(costs, MOST_LEARNED, all_exact(strings))]
     learned = []
     for string, values in chosen:
         string[:] = map(float, problem.genome.encode({name: values[name] for name in genes}))

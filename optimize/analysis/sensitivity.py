@@ -23,9 +23,10 @@ from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
 from optimize.problem.gene_values import Value
 from optimize.problem.genome import Genome
-from optimize.surrogate.belief import MOST_LEARNED, costs_and_noise, representative
+from optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
 from optimize.surrogate.draws import Draws
 from optimize.surrogate.gaussian_process import GaussianProcess
+from optimize.surrogate.selection import representative
 from tisim.errors import Words, must
 
 Array = NDArray[np.float64]
@@ -141,7 +142,7 @@ def _known(outcome: Outcome) -> tuple[Array, Array, Array]:
         string.know(estimates)
         strings.append(string)
     costs, noise = costs_and_noise(strings)
-    chosen = representative(costs, MOST_LEARNED)
+    chosen = representative(costs, MOST_LEARNED, all_exact(strings))
     points = outcome.problem.genome.canonical([list(string) for string in strings])
     return points[chosen], costs[chosen], noise[chosen]
 

@@ -41,7 +41,8 @@ class EnsembleSettings(Checked):
     select : starts that each of the best designs gets once the search has ended, before the best is chosen.
     confirm : fresh starts of each of the best designs after that, from which they are reported (0: none, and
     no intervals); more where the interval of a statistic needs more. Of max_evaluations an eighth is kept for
-    both, of several objectives a quarter; where that does not suffice, fewer designs are reported.
+    both, if they need as much, and a quarter for several objectives; where that does not suffice, fewer
+    designs are reported.
     """
 
     min_starts: int = Field(2, ge=1)

@@ -125,7 +125,7 @@ def _indices(axis: Axes, one: Sensitivity) -> None:
 
 def _legend_below(axis: Axes, columns: int) -> None:
     """Put a legend below the label of the axis, at the same distance for panels of any height."""
-    inches = axis.get_figure(root=True).dpi_scale_trans
+    inches = axis.figure.dpi_scale_trans
     axis.legend(
         frameon=False, fontsize=7, ncols=columns, loc="upper center", bbox_to_anchor=(0.5, 0.0),
         bbox_transform=axis.transAxes + ScaledTranslation(0.0, -0.4, inches),

@@ -6,14 +6,14 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import yeojohnson
 
 from optimize.methods.individual import Individual
-from optimize.surrogate.gaussian_process import EXACT_NUGGET, NUGGET, Array, GaussianProcess, Parameters
+from optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
+from optimize.surrogate.selection import representative, thinned
 
 MOST_LEARNED = 500
-"""Designs from which a process is made; of more, half are the best, and others are drawn evenly."""
+"""Designs from which a process is made, at most."""
 _PRIOR_STARTS = 8
 """Starts that the noise of all designs together counts for beside the starts of the design itself."""
 _SKEWED, _SKEWED_NOISE = 0.5, 2.0
@@ -47,24 +47,23 @@ class Belief:
         self.strings = list(strings)
         self.points = np.array([list(string) for string in strings])
         costs, self.noise = costs_and_noise(strings)
-        self.exact = all(one.exact for string in strings if not string.failed for one in string.estimates)
+        self.exact = all_exact(strings)
         self.starts = int(np.median([string.estimates[0].starts for string in strings])) or 1
         self.costs, slopes = _transformed(costs, _SKEWED if self.exact else _SKEWED_NOISE)
         alone = np.arange(len(costs))
         if apart and self.exact and costs.shape[1] == 1:
             alone = thinned(self.points, costs[:, 0], apart)
-        chosen = alone[representative(costs[alone], MOST_LEARNED)]
+        chosen = alone[representative(costs[alone], MOST_LEARNED, self.exact)]
         self.chosen = chosen
         variances = self.noise * slopes**2
         self.one_start = np.array([_pooled(strings, k) for k in range(costs.shape[1])]) * np.mean(
             slopes[chosen] ** 2, axis=0
         )
         at = self.features(self.points[chosen])
-        nugget = EXACT_NUGGET if self.exact else NUGGET
         starts = self._parameters or [None] * costs.shape[1]
         self.models = [
             GaussianProcess(
-                at, cost[chosen], variance[chosen], start=start, iterations=iterations, nugget=nugget
+                at, cost[chosen], variance[chosen], start=start, iterations=iterations, exact=self.exact
             )
             for cost, variance, start in zip(self.costs.T, variances.T, starts, strict=True)
         ]
@@ -83,6 +82,11 @@ class Belief:
         at = self.features(np.atleast_2d(points))
         means, deviations = zip(*(model.predict(at) for model in self.models), strict=True)
         return np.column_stack(means), np.column_stack(deviations)
+
+
+def all_exact(strings: Sequence[Individual]) -> bool:
+    """Return whether all costs of the strings that have not failed are known to have no noise."""
+    return all(one.exact for string in strings if not string.failed for one in string.estimates)
 
 
 def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
@@ -137,31 +141,3 @@ def _transformed(costs: Array, skewed: float) -> tuple[Array, Array]:
         )
         slopes[:, k] /= deviation
     return new, slopes
-
-
-def thinned(points: Array, costs: Array, apart: float) -> NDArray[np.intp]:
-    """Return the indices of designs that are farther apart than this in one gene or more, ascending; of those
-    that are closer together the best."""
-    kept: list[int] = []
-    for i in np.argsort(costs, kind="stable"):
-        if not kept or np.abs(points[kept] - points[i]).max(axis=1).min() > apart:
-            kept.append(int(i))
-    return np.sort(kept)
-
-
-def representative(costs: Array, most: int) -> NDArray[np.intp]:
-    """Return the indices of at most that number of designs: the best, and others drawn evenly."""
-    if len(costs) <= most:
-        return np.arange(len(costs))
-    order = np.lexsort([costs[:, 0], beaten_by(costs)])
-    best, others = order[: most // 2], order[most // 2 :]
-    return np.concatenate([best, others[np.linspace(0, len(others) - 1, most - len(best)).astype(int)]])
-
-
-def beaten_by(costs: Array) -> NDArray[np.int64]:
-    """Return by how many of the others each design is dominated: no better in any cost, and worse in one."""
-    if costs.shape[1] == 1:
-        return np.searchsorted(np.sort(costs[:, 0]), costs[:, 0])
-    no_better = np.all(costs[:, None, :] >= costs[None, :, :], axis=2)
-    worse = np.any(costs[:, None, :] > costs[None, :, :], axis=2)
-    return np.asarray((no_better & worse).sum(axis=1))

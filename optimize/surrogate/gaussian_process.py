@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
+from optimize.surrogate.selection import representative
+
 Array = NDArray[np.float64]
 
 MOST_FITTED = 300
-"""Points from which the length scales are fitted; of more, this number is drawn. Fitting costs their cube."""
+"""Points from which the length scales are fitted, which costs their cube; of more, this number is chosen."""
 _JITTER = 1e-8
 """Least noise variance, in units of the variance of the values: rounding of nearly equal points."""
 NUGGET, EXACT_NUGGET = 1e-3, 1e-6
@@ -65,8 +67,8 @@ class GaussianProcess:
     constant that is the likeliest.
 
     points : shape (n, features). values : shape (n,). variance : of the noise in each value, shape (n,).
-    parameters : given, or fitted from those given in ``start`` by the largest posterior density. noise_free :
-    no variance is added to what is given. nugget : the median of its prior.
+    parameters : given, or fitted from those given in ``start`` by the largest posterior density. exact :
+    whether the values are known to have no noise.
     """
 
     def __init__(
@@ -76,21 +78,19 @@ class GaussianProcess:
         variance: Array,
         parameters: Parameters | None = None,
         start: Parameters | None = None,
-        noise_free: bool = False,
         iterations: int = 50,
-        nugget: float = NUGGET,
+        exact: bool = False,
     ) -> None:
         self.points = np.asarray(points, dtype=float)
         values = np.asarray(values, dtype=float)
         self.centre, self.scale = float(np.mean(values)), float(np.std(values)) or 1.0
         self.values = (values - self.centre) / self.scale
         self.noise = np.asarray(variance, dtype=float) / self.scale**2
-        self.noise_free = noise_free
         if parameters is None:
-            parameters = self._fitted(start, iterations, nugget)
+            parameters = self._fitted(start, iterations, exact)
         self.parameters = parameters
         covariance = _matern(self.points, self.points, parameters)
-        covariance[np.diag_indices_from(covariance)] += self._diagonal(parameters.nugget)
+        covariance[np.diag_indices_from(covariance)] += self.noise + self.nugget
         self._factor = _factor(covariance)
         self._weights = cho_solve(self._factor, self.values)
 
@@ -129,24 +129,13 @@ class GaussianProcess:
     @property
     def nugget(self) -> float:
         """The variance that a value has beside its known noise, in standardised units."""
-        return _JITTER if self.noise_free else self.parameters.nugget + _JITTER
+        return self.parameters.nugget + _JITTER
 
-    def _diagonal(self, nugget: float) -> Array:
-        return self.noise + (_JITTER if self.noise_free else nugget + _JITTER)
-
-    def _fitted(self, start: Parameters | None, iterations: int, nugget: float) -> Parameters:
-        """Return the parameters of largest posterior density, from those of the prior and from ``start``."""
-        prior = Parameters.prior(self.points.shape[1], nugget)
-        chosen = np.arange(len(self.points))
-        if len(chosen) > MOST_FITTED:
-            # The best are kept: the search is there. The rest is drawn evenly.
-            best = np.argsort(self.values, kind="stable")[: MOST_FITTED // 2]
-            others = np.setdiff1d(chosen, best)
-            step = np.linspace(0, len(others) - 1, MOST_FITTED - len(best)).astype(int)
-            chosen = np.concatenate([best, others[step]])
-        likelihood = _Likelihood(
-            self.points[chosen], self.values[chosen], self.noise[chosen], prior, self.noise_free
-        )
+    def _fitted(self, start: Parameters | None, iterations: int, exact: bool) -> Parameters:
+        """Return the parameters of largest posterior density, from those of the prior or from ``start``."""
+        prior = Parameters.prior(self.points.shape[1], EXACT_NUGGET if exact else NUGGET)
+        chosen = representative(self.values[:, None], MOST_FITTED, exact)
+        likelihood = _Likelihood(self.points[chosen], self.values[chosen], self.noise[chosen], prior)
         bounds = [(math.log(0.01), math.log(100.0))] * self.points.shape[1]
         bounds += [(math.log(1e-3), math.log(1e3)), (math.log(1e-8), math.log(2.0))]
         best_value, best_at = math.inf, prior.logarithms
@@ -163,8 +152,8 @@ class GaussianProcess:
 class _Likelihood:
     """Minus the log posterior density of the parameters, and its gradient (GPML Eq. 5.8, 5.9)."""
 
-    def __init__(self, points: Array, values: Array, noise: Array, prior: Parameters, exact: bool) -> None:
-        self.values, self.noise, self.exact = values, noise, exact
+    def __init__(self, points: Array, values: Array, noise: Array, prior: Parameters) -> None:
+        self.values, self.noise = values, noise
         self.squares = (points[:, None, :] - points[None, :, :]) ** 2
         self.prior = prior.logarithms
         features = points.shape[1]
@@ -176,9 +165,8 @@ class _Likelihood:
         root = np.sqrt(5.0 * (self.squares @ inverse_squares))
         decay = np.exp(-root)
         correlation = (1.0 + root + root**2 / 3.0) * decay
-        nugget = 0.0 if self.exact else parameters.nugget
         covariance = parameters.signal * correlation
-        covariance[np.diag_indices_from(covariance)] += self.noise + nugget + _JITTER
+        covariance[np.diag_indices_from(covariance)] += self.noise + parameters.nugget + _JITTER
         factor = _factor(covariance)
         n = len(self.values)
         inverse = cho_solve(factor, np.eye(n), check_finite=False)
@@ -192,7 +180,7 @@ class _Likelihood:
         gradient = np.empty_like(logarithms)
         gradient[:-2] = np.tensordot(common, self.squares, axes=2) * inverse_squares
         gradient[-2] = np.sum(outer * correlation) * parameters.signal
-        gradient[-1] = 0.0 if self.exact else np.trace(outer) * nugget
+        gradient[-1] = np.trace(outer) * parameters.nugget
         off = (logarithms - self.prior) / self.spread
         return value + 0.5 * float(off @ off), gradient + off / self.spread
 

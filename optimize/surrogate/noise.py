@@ -9,8 +9,9 @@ import numpy as np
 
 from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
-from optimize.surrogate.belief import MOST_LEARNED, costs_and_noise, representative
+from optimize.surrogate.belief import MOST_LEARNED, costs_and_noise
 from optimize.surrogate.gaussian_process import Array, GaussianProcess
+from optimize.surrogate.selection import representative
 from tisim.numerics.skewed import Moments
 
 LEAST_DESIGNS = 10
@@ -33,7 +34,7 @@ def moments(genome: Genome, strings: Sequence[Individual]) -> tuple[Moments, ...
         return None
     costs = np.array([[estimate.mean for estimate in one.estimates] for one in several])
     _, noise = costs_and_noise(several)
-    chosen = representative(costs, MOST_LEARNED)
+    chosen = representative(costs, MOST_LEARNED, exact=False)
     features = genome.features(genome.canonical([list(several[i]) for i in chosen]))
     starts = np.array([float(several[i].estimates[0].starts) for i in chosen])
     found = []

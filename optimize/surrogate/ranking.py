@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from optimize.methods.individual import Individual
 from optimize.problem.genome import Genome
-from optimize.surrogate.belief import Belief, beaten_by
+from optimize.surrogate.belief import Belief, all_exact
+from optimize.surrogate.selection import beaten_by
 
 _UNSEEN = 1e-4
 """A nugget below this part of the variance of all costs is taken for no noise, where noise is not known."""
@@ -24,7 +25,7 @@ def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np
     than those of the costs, in the same order; the costs where there is no noise, or the process sees none.
     None of the strings has failed."""
     costs = np.array([string.fitness.values for string in strings])
-    if len(strings) < 3 or all(one.exact for string in strings for one in string.estimates):
+    if len(strings) < 3 or all_exact(strings):
         return costs
     belief = Belief(genome.features)
     belief.learn(strings, iterations=60)

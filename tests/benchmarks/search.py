@@ -42,7 +42,7 @@ from optimize.methods.base import every
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
-from optimize.surrogate.belief import beaten_by
+from optimize.surrogate.selection import beaten_by
 from tisim.analysis import Mean
 
 FRESH = 10**6

@@ -8,9 +8,10 @@ from scipy.stats import norm
 
 from optimize.surrogate import gaussian_process
 from optimize.surrogate.acquisition import Worth, log_expected_improvement
-from optimize.surrogate.belief import Belief, beaten_by, thinned
+from optimize.surrogate.belief import MOST_LEARNED, Belief
 from optimize.surrogate.gaussian_process import GaussianProcess, Parameters
 from optimize.surrogate.ranking import best, spread
+from optimize.surrogate.selection import beaten_by, representative, thinned
 from tests.optimize.fake_runs import fake_problem, string_of
 
 RNG = np.random.default_rng(4)
@@ -139,6 +140,31 @@ def test_of_designs_close_together_the_best_stands_for_all():
     costs = np.array([3.0, 1.0, 2.0, 4.0])
     assert list(thinned(points, costs, 0.015)) == [1, 2]
     assert list(thinned(points, costs, 0.005)) == [0, 1, 2, 3]
+
+
+def test_a_process_of_part_of_a_large_archive_does_not_take_luck_for_truth():
+    """All 1200 designs cost 1; the means of two starts have a deviation of 0.7. A process of the 250 that
+    were luckiest and some others would predict 0.7."""
+    rng = np.random.default_rng(5)
+    points, runs = rng.random((1200, 2)), 1.0 + rng.standard_normal((1200, 2))
+    belief = Belief()
+    belief.learn(
+        [
+            string_of(point, row.mean(), std=row.std(ddof=1), starts=2)
+            for point, row in zip(points, runs, strict=True)
+        ]
+    )
+    assert len(belief.chosen) == MOST_LEARNED
+    assert belief.predict(points[::10])[0].mean() == pytest.approx(1.0, abs=0.1)
+
+
+def test_without_noise_half_of_a_large_archive_are_the_best():
+    costs = np.random.default_rng(3).random((1000, 1))
+    chosen = representative(costs, 100, exact=True)
+    assert len(set(chosen)) == 100
+    assert set(np.argsort(costs[:, 0])[:50]) <= set(chosen)
+    assert costs[chosen].max() > 0.95
+    assert list(representative(costs, 5, exact=False)) == [0, 249, 499, 749, 999]
 
 
 def test_who_is_beaten():
