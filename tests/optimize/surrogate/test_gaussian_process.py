@@ -46,7 +46,7 @@ def test_predictions_are_those_of_a_dense_twin():
 
 def test_the_gradient_of_the_likelihood_is_that_of_its_values():
     z = (VALUES - VALUES.mean()) / VALUES.std()
-    likelihood = gaussian_process._Likelihood(POINTS, z, NOISE, Parameters.prior(3), False)
+    likelihood = gaussian_process._Likelihood(POINTS, z, NOISE, Parameters.prior(3))
     at = PARAMETERS.logarithms
     assert check_grad(lambda x: likelihood(x)[0], lambda x: likelihood(x)[1], at) < 1e-5
 
