@@ -80,7 +80,7 @@ class Sensitivity:
 
     label : of the objective, with its unit. genes : those that are searched. designs : that the surrogate is
     made of. q2 : the part of the variance over all ranges that it predicts of each of them from the others,
-    beyond what random starts leave to chance.
+    beyond what random starts leave to chance; 0 to 1.
     """
 
     objective: str
@@ -88,12 +88,12 @@ class Sensitivity:
     label: str
     genes: tuple[GeneSensitivity, ...]
     designs: int
-    q2: float
+    q2: Between
 
     @property
     def trusted(self) -> bool:
         """Whether the surrogate predicts enough for indices."""
-        return self.q2 >= LEAST_Q2
+        return self.q2.value >= LEAST_Q2
 
 
 def least_designs(genome: Genome) -> int:
@@ -118,7 +118,8 @@ def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
         model = GaussianProcess(genome.features(points), objective.sign * costs[:, k], noise[:, k])
         others = [_resampled(model, k) for k in range(_RESAMPLED)]
         q2 = _predicted(model, genome)
-        first, total = _indices(model, others, genome) if q2 >= LEAST_Q2 else ([UNKNOWN] * len(genome),) * 2
+        unknown = [UNKNOWN] * len(genome)
+        first, total = _indices(model, others, genome) if q2.value >= LEAST_Q2 else (unknown, unknown)
         genes = tuple(
             GeneSensitivity(
                 name=gene.name,
@@ -147,20 +148,25 @@ def _known(outcome: Outcome) -> tuple[Array, Array, Array]:
     return points[chosen], costs[chosen], noise[chosen]
 
 
-def _predicted(model: GaussianProcess, genome: Genome) -> float:
+def _predicted(model: GaussianProcess, genome: Genome) -> Between:
     """Return the part of the variance over all ranges that the process predicts of designs left out.
 
     Each design counts for the part of the unit cube to which it is the nearest: most designs of a search lie
     close together, where each is told by its neighbours. The noise of a mean is nobody's to predict, and is
-    subtracted from both variances.
+    subtracted from both variances. The interval is that of a ratio of two weighted sums (W. G. Cochran,
+    Sampling Techniques, 3rd ed. (1977), Eq. 6.13).
     """
     drawn = qmc.Sobol(len(genome), rng=np.random.default_rng(3)).random_base2(12)
     _, nearest = cKDTree(model.points).query(genome.features(drawn))
     weight = np.bincount(nearest, minlength=len(model.points)) / len(drawn)
-    noise = float(weight @ model.noise)
-    missed = float(weight @ (model.left_out() / model.scale) ** 2) - noise
-    there = float(weight @ (model.values - weight @ model.values) ** 2) - noise
-    return 1.0 - max(missed, 0.0) / there if there > 0 else 0.0
+    missed = (model.left_out() / model.scale) ** 2 - model.noise
+    there = (model.values - weight @ model.values) ** 2 - model.noise
+    if weight @ there <= 0.0:
+        return Between(0.0, 0.0, 1.0)
+    ratio = float(weight @ missed / (weight @ there))
+    half = _NORMAL_95 * math.sqrt(float(weight**2 @ (missed - ratio * there) ** 2)) / float(weight @ there)
+    value, low, high = np.clip([1.0 - ratio, 1.0 - ratio - half, 1.0 - ratio + half], 0.0, 1.0)
+    return Between(float(value), float(low), float(high))
 
 
 def _changes(
@@ -253,7 +259,7 @@ def columns(found: tuple[Sensitivity, ...]) -> dict[str, list[Any]]:
     _spread(table, "first-order index", [gene.first for _, gene in rows])
     _spread(table, "total index", [gene.total for _, gene in rows])
     table["designs"] = [one.designs for one, _ in rows]
-    table["Q2 left out"] = [one.q2 for one, _ in rows]
+    _spread(table, "Q2 left out", [one.q2 for one, _ in rows])
     return table
 
 

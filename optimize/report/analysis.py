@@ -111,7 +111,10 @@ def sensitivity_table(found: Sensitivity) -> RenderableType:
         label = f"{gene.name} ({gene.unit})" if gene.unit else gene.name
         changes = (_signed(gene.changes[move]) for move in (-0.1, 0.1))
         table.add_row(Text(label), *changes, _index(gene.first), _index(gene.total))
-    predicts = f"predicts {max(found.q2, 0.0):.2f} of the variance of designs left out, their noise taken off"
+    predicts = (
+        f"predicts {found.q2.low:.2f} to {found.q2.high:.2f} of the variance of designs left out, "
+        "their noise taken off"
+    )
     words = [
         f"-10 %, +10 %: change of {found.objective} as the gene alone moves so far from the best design",
         f"alone, in all: parts of the variance of {found.objective} over all ranges, by the gene alone and "

@@ -106,7 +106,7 @@ def _indices(axis: Axes, one: Sensitivity) -> None:
     axis.set_xlabel(f"Sobol' index of {superscripts(one.objective)}")
     axis.set_xlim(0.0, 1.0)
     if not one.trusted:
-        words = f"{max(one.q2, 0):.2f} of the variance of designs left out,\nless than {LEAST_Q2:g}"
+        words = f"{one.q2.value:.2f} of the variance of designs left out,\nless than {LEAST_Q2:g}"
         axis.text(0.5, 0.5, f"not given: the surrogate predicts\n{words}", ha="center", va="center",
                   color="0.4", fontsize=9, transform=axis.transAxes)  # fmt: skip
         return
