@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cases
-from cases.statistics import Claim, Shown
-from optimize.problem.problem import Problem
+from tisim import cases
+from tisim.cases.statistics import Claim, Shown
+from tisim.optimize.problem.problem import Problem
 from tisim import InputError, Scene
 from tisim.accuracy import Quantity
 from tisim.engine.batches import Progress

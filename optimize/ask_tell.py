@@ -14,22 +14,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from optimize.beginning import Beginning
-from optimize.designs_csv import GENERATION, WHETHER_ASKED, Given, check_headings, design_of, naming, rows
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.experiments import Values, known, row_values
-from optimize.hall_of_fame import Hall
-from optimize.methods.base import find
-from optimize.methods.individual import Individual
-from optimize.outcome import Design, Outcome
-from optimize.problem.calls import check_design
-from optimize.problem.feasibility import penalised
-from optimize.problem.genome import AnyGene, Genome
-from optimize.problem.objective import Objective
-from optimize.problem.problem import Problem
-from optimize.settings import METHOD, Settings, fit, identity
-from optimize.surrogate.ranking import best
-from optimize.tables import error_of
+from tisim.optimize.beginning import Beginning
+from tisim.optimize.designs_csv import GENERATION, WHETHER_ASKED, Given, check_headings, design_of, naming, rows
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.experiments import Values, known, row_values
+from tisim.optimize.hall_of_fame import Hall
+from tisim.optimize.methods.base import find
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.outcome import Design, Outcome
+from tisim.optimize.problem.calls import check_design
+from tisim.optimize.problem.feasibility import penalised
+from tisim.optimize.problem.genome import AnyGene, Genome
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.settings import METHOD, Settings, fit, identity
+from tisim.optimize.surrogate.ranking import best
+from tisim.optimize.tables import error_of
 from tisim.errors import InputError, Words, is_number, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file
@@ -141,7 +141,7 @@ class AskTell:
 
     @property
     def outcome(self) -> Outcome:
-        """What has been found so far, as of a search, for ``to_frame`` and ``optimize.sensitivity``."""
+        """What has been found so far, as of a search, for ``to_frame`` and ``tisim.optimize.sensitivity``."""
         found = Outcome(self.problem, self.settings, identity(self.problem, self.settings, {}))
         strings = self._ranked()
         for string in strings:

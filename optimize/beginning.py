@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from optimize.designs_csv import Given, designs
-from optimize.experiments import experiments
-from optimize.methods.individual import Individual
-from optimize.problem.problem import Problem
-from optimize.storage.record import canonical
-from optimize.surrogate.ranking import best
+from tisim.optimize.designs_csv import Given, designs
+from tisim.optimize.experiments import experiments
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.storage.record import canonical
+from tisim.optimize.surrogate.ranking import best
 
 RUN_AGAIN = 6
 """Number of the best designs of a warm start that are run before generation 0."""

@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from optimize.evaluation.ensemble import Ensemble
-from optimize.hall_of_fame import not_dominated
-from optimize.methods.individual import Individual
-from optimize.problem.problem import Problem
-from optimize.settings import Settings
-from optimize.surrogate.noise import moments
-from optimize.surrogate.ranking import best
+from tisim.optimize.evaluation.ensemble import Ensemble
+from tisim.optimize.hall_of_fame import not_dominated
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.settings import Settings
+from tisim.optimize.surrogate.noise import moments
+from tisim.optimize.surrogate.ranking import best
 from tisim.numerics.skewed import Moments
 from tisim.numerics.statistics import CONFIDENCE
 

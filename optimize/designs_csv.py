@@ -13,10 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from optimize.problem.gene_values import Named
-from optimize.problem.given_genes import FixedGene
-from optimize.problem.problem import Problem
-from optimize.tables import ERROR, FRESH_STARTS, HIGH, LOW
+from tisim.optimize.problem.gene_values import Named
+from tisim.optimize.problem.given_genes import FixedGene
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.tables import ERROR, FRESH_STARTS, HIGH, LOW
 from tisim.errors import InputError, is_number, must
 from tisim.files import regular_file
 

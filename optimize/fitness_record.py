@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 import tisim
-from optimize.evaluation.function_evaluator import FunctionEvaluator
-from optimize.problem.problem import Problem
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
+from tisim.optimize.problem.problem import Problem
 from tisim.backend import runtime
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file

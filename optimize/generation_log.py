@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from optimize.methods.individual import Individual
-from optimize.problem.problem import Problem
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.problem import Problem
 
 
 def statistics(

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from deap import tools
 
-from optimize.methods.individual import Individual
+from tisim.optimize.methods.individual import Individual
 
 
 class Hall:

@@ -10,15 +10,15 @@ import numpy as np
 from deap import tools
 from numpy.typing import NDArray
 
-from optimize.beginning import NOTHING, Beginning
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.frames import data_frame
-from optimize.hall_of_fame import compromise
-from optimize.methods.individual import Individual
-from optimize.problem.gene_values import Value
-from optimize.problem.problem import Problem
-from optimize.settings import Settings, search_name
-from optimize.tables import best_columns, design_columns, error_of, interval_of_value, logbook_columns, units
+from tisim.optimize.beginning import NOTHING, Beginning
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.frames import data_frame
+from tisim.optimize.hall_of_fame import compromise
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.gene_values import Value
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.settings import Settings, search_name
+from tisim.optimize.tables import best_columns, design_columns, error_of, interval_of_value, logbook_columns, units
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -12,20 +12,20 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from optimize.beginning import NOTHING, Beginning
-from optimize.conclusion import concluded, proven, reserve
-from optimize.evaluation.ensemble import Ensemble
-from optimize.evaluation.runs import Evaluator
-from optimize.generation_log import statistics
-from optimize.hall_of_fame import Hall
-from optimize.methods.base import find
-from optimize.methods.individual import Individual
-from optimize.outcome import Outcome, Progress, Stopped
-from optimize.problem.feasibility import penalised
-from optimize.problem.problem import Problem
-from optimize.search_records import searches, store
-from optimize.settings import Settings, fit, identity
-from optimize.storage.cache import Cache
+from tisim.optimize.beginning import NOTHING, Beginning
+from tisim.optimize.conclusion import concluded, proven, reserve
+from tisim.optimize.evaluation.ensemble import Ensemble
+from tisim.optimize.evaluation.runs import Evaluator
+from tisim.optimize.generation_log import statistics
+from tisim.optimize.hall_of_fame import Hall
+from tisim.optimize.methods.base import find
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.outcome import Outcome, Progress, Stopped
+from tisim.optimize.problem.feasibility import penalised
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.search_records import searches, store
+from tisim.optimize.settings import Settings, fit, identity
+from tisim.optimize.storage.cache import Cache
 from tisim.errors import RunError
 
 MOST_REFUSED = 200

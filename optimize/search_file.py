@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optimize.frames import data_frame
-from optimize.search_folder import SEARCH_FILE
-from optimize.search_records import searches
-from optimize.storage.cache import Cache, existing
-from optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE, descriptions
-from optimize.storage.runs_table import RunsTable
-from optimize.tables import error_of
+from tisim.optimize.frames import data_frame
+from tisim.optimize.search_folder import SEARCH_FILE
+from tisim.optimize.search_records import searches
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE, descriptions
+from tisim.optimize.storage.runs_table import RunsTable
+from tisim.optimize.tables import error_of
 from tisim.errors import must
 from tisim.files.regular_file import is_folder
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import deap
 
-from optimize.experiments import table_of
-from optimize.outcome import Outcome
-from optimize.problem.problem import Problem
-from optimize.storage.cache import Cache
-from optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE
-from optimize.storage.record import canonical
-from optimize.tables import best_columns, logbook_columns, units
+from tisim.optimize.experiments import table_of
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE
+from tisim.optimize.storage.record import canonical
+from tisim.optimize.tables import best_columns, logbook_columns, units
 from tisim.io.run_folder import versions
 
 WARM_START = "warm_start"

@@ -11,21 +11,21 @@ from typing import Any
 
 from rich.console import Console
 
-from optimize.beginning import NOTHING, Beginning
-from optimize.designs_csv import Given
-from optimize.evaluation.executors import evaluator_for
-from optimize.evaluation.runs import Evaluator, start_seed
-from optimize.methods.individual import Individual
-from optimize.outcome import Outcome, Progress
-from optimize.problem.problem import Problem
-from optimize.report import report
-from optimize.report.analysis import Analysis
-from optimize.report.display import Display
-from optimize.search import search
-from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN_FILE, check, check_problem, results_of
-from optimize.settings import Settings, fit, identity, proposed
-from optimize.storage.cache import Cache
-from optimize.warm_start import warmed
+from tisim.optimize.beginning import NOTHING, Beginning
+from tisim.optimize.designs_csv import Given
+from tisim.optimize.evaluation.executors import evaluator_for
+from tisim.optimize.evaluation.runs import Evaluator, start_seed
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.outcome import Outcome, Progress
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.report import report
+from tisim.optimize.report.analysis import Analysis
+from tisim.optimize.report.display import Display
+from tisim.optimize.search import search
+from tisim.optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN_FILE, check, check_problem, results_of
+from tisim.optimize.settings import Settings, fit, identity, proposed
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.warm_start import warmed
 from tisim.backend import runtime
 from tisim.console import err, print_stopping
 from tisim.console import out as standard_output

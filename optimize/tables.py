@@ -9,11 +9,11 @@ from typing import Any
 
 from deap import tools
 
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.methods.individual import Individual
-from optimize.problem.calls import constraint_value
-from optimize.problem.objective import Objective
-from optimize.problem.problem import Problem
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.calls import constraint_value
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.problem import Problem
 
 FRESH_STARTS = ", fresh starts"
 ERROR, LOW, HIGH = "std. error", "95 % low", "95 % high"

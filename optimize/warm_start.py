@@ -15,23 +15,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optimize.beginning import Beginning
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.experiments import restored
-from optimize.methods.individual import Individual
-from optimize.problem.calls import check_design
-from optimize.problem.genes import Choice, Gene
-from optimize.problem.genome import AnyGene
-from optimize.problem.given_genes import DependentGene
-from optimize.problem.objective import Objective
-from optimize.problem.problem import Problem
-from optimize.search_records import WARM_START, searches
-from optimize.settings import Settings, identity
-from optimize.storage.cache import Cache
-from optimize.storage.record import canonical
-from optimize.storage.runs_table import RunsTable
-from optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
-from optimize.surrogate.selection import representative
+from tisim.optimize.beginning import Beginning
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.experiments import restored
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.calls import check_design
+from tisim.optimize.problem.genes import Choice, Gene
+from tisim.optimize.problem.genome import AnyGene
+from tisim.optimize.problem.given_genes import DependentGene
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.search_records import WARM_START, searches
+from tisim.optimize.settings import Settings, identity
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.record import canonical
+from tisim.optimize.storage.runs_table import RunsTable
+from tisim.optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
+from tisim.optimize.surrogate.selection import representative
 from tisim.errors import InputError, is_number
 
 

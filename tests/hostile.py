@@ -107,7 +107,7 @@ def mutated(random: Random) -> dict[str, Any]:
 def valid() -> tuple[dict[str, Any], ...]:
     """Plain data of scenes: those of all cases, every stepper and control, every start, every effect by
     itself where it needs no other."""
-    from cases.case import every
+    from tisim.cases.case import every
 
     base = scene([[0, 0, 0], [1, 0, 0]], [[0, 0, 0]] * 2, quantities={"temperature": 300.0})
     tables_ = [flow(grains=3).to_dict(), base.to_dict()]

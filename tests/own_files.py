@@ -19,7 +19,7 @@ class Pull(Force):
 PROBLEM = """
 import numpy as np
 
-from optimize import Gene, Genome, Problem
+from tisim.optimize import Gene, Genome, Problem
 from tisim import Box, Cloud, Scene
 from tisim.steppers import FixedStep, Verlet
 
@@ -48,8 +48,8 @@ SEARCH = {
 METHOD = '''
 """Steps from the best design so far."""
 import numpy as np
-from optimize.methods.base import SearchMethod
-from optimize.methods.individual import Individual
+from tisim.optimize.methods.base import SearchMethod
+from tisim.optimize.methods.individual import Individual
 from tisim.components.component import Checked
 
 

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from cases.case import every
+from tisim.cases.case import every
 from tests.judged import check_message
 from tisim import InputError
 

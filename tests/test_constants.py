@@ -56,7 +56,7 @@ def test_a_name_stands_for_one_value():
 
 
 def test_a_second_value_is_found():
-    assert ambiguous({"tisim.a": "MOST, LEAST = 3, 1", "optimize.b": "MOST: int = 4"}) == {"MOST"}
-    assert ambiguous({"cases.blast.a": "FEW = 3", "cases.blast.b": "FEW = 4"}) == {"FEW"}
-    assert ambiguous({"cases.blast.a": "FEW = 3", "tisim.b": "FEW = 4"}) == {"FEW"}
-    assert ambiguous({"cases.blast.a": "FEW = 3", "cases.capture.a": "FEW = 4"}) == set()
+    assert ambiguous({"tisim.a": "MOST, LEAST = 3, 1", "tisim.optimize.b": "MOST: int = 4"}) == {"MOST"}
+    assert ambiguous({"tisim.cases.blast.a": "FEW = 3", "tisim.cases.blast.b": "FEW = 4"}) == {"FEW"}
+    assert ambiguous({"tisim.cases.blast.a": "FEW = 3", "tisim.b": "FEW = 4"}) == {"FEW"}
+    assert ambiguous({"tisim.cases.blast.a": "FEW = 3", "tisim.cases.capture.a": "FEW = 4"}) == set()

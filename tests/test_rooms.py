@@ -48,7 +48,7 @@ def test_listing_cases_loads_no_figures_checks_or_inverse_problems():
     while ahead:
         reached |= ahead
         ahead = set().union(*(EARLY[module] for module in ahead)) - reached
-    assert "cases.case" in reached
+    assert "tisim.cases.case" in reached
     inside = [module for module in reached if module.startswith("cases.")]
     assert not [module for module in inside if module.endswith((".figures", ".checks", ".problem"))]
 

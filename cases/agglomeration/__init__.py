@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.agglomeration.accuracy import quantities
-from cases.agglomeration.scene import SIZES, TITLE, fields_scene_for, scene_for
-from cases.case import Case, Late
+from tisim.cases.agglomeration.accuracy import quantities
+from tisim.cases.agglomeration.scene import SIZES, TITLE, fields_scene_for, scene_for
+from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="agglomeration",
@@ -12,9 +12,9 @@ CASE = Case(
     source="T. I. Zohdi, Proc. R. Soc. Lond. A 460 (2004) 3421-3445",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.agglomeration.checks", "check"),
+    check=Late("tisim.cases.agglomeration.checks", "check"),
     quantities=quantities,
-    problem=Late("cases.agglomeration.problem", "problem"),
+    problem=Late("tisim.cases.agglomeration.problem", "problem"),
     variants=("paper", "fragmenting", "fields"),
     scenes={"fields": fields_scene_for},
 )

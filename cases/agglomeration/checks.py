@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 import tisim
-from cases.agglomeration import field_checks
-from cases.agglomeration import scene as agglomeration
-from cases.case import Check
+from tisim.cases.agglomeration import field_checks
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.case import Check
 from tisim import Particles, Result, Scene
 from tisim.effects import Agglomeration, Effect, Heating, Impact
 from tisim.operators import Fragmentation

@@ -22,9 +22,9 @@ import numpy as np
 from scipy.constants import epsilon_0, mu_0
 
 import tisim
-from cases.agglomeration import fields
-from cases.agglomeration import scene as agglomeration
-from cases.case import Check
+from tisim.cases.agglomeration import fields
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.case import Check
 from tisim import Particles, Scene
 from tisim.effects import CARBONYL_IRON, Agglomeration, Impact
 from tisim.steppers import FixedStep, Stepper, Verlet

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 
 from scipy.constants import epsilon_0, mu_0
 
-from optimize.problem.genome import Gene
+from tisim.optimize.problem.genome import Gene
 from tisim.effects import CARBONYL_IRON, DipoleDipole, Effect, FroehlichMoment, Lorentz, NearField
 from tisim.packing import EqualSizes, GrainClass
 from tisim.sources import ElectricField, MagneticField

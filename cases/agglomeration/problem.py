@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cases.agglomeration.fields import FIELD_GENES
-from cases.agglomeration.scene import SIZES, TITLE, scene
-from cases.case import size_named
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.problem import Problem
+from tisim.cases.agglomeration.fields import FIELD_GENES
+from tisim.cases.agglomeration.scene import SIZES, TITLE, scene
+from tisim.cases.case import size_named
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.problem import Problem
 from tisim import Result
 from tisim.errors import must
 from tisim.plotting.cloud import cloud

@@ -1,6 +1,6 @@
 """The six best strings that Z04 publishes (tables 1-3), run here, beside the values it gives them.
 
-    python -m cases.agglomeration.published [--grains 1000] [--starts 48] [--sensitivity]
+    python -m tisim.cases.agglomeration.published [--grains 1000] [--starts 48] [--sensitivity]
 
 With ``--sensitivity`` the first string is run again with one assumption changed at a time.
 """
@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.table import Table
 
 import tisim
-from cases.agglomeration.problem import cost
-from cases.agglomeration.published_strings import PUBLISHED_COSTS, designs
-from cases.agglomeration.scene import scene
+from tisim.cases.agglomeration.problem import cost
+from tisim.cases.agglomeration.published_strings import PUBLISHED_COSTS, designs
+from tisim.cases.agglomeration.scene import scene
 from tisim import Scene
 from tisim.numerics.statistics import half_width
 from tisim.steppers import ApproachTime, Verlet

@@ -1,8 +1,8 @@
 """What each kind of gene adds to the search for the largest grains, at equal budget.
 
-    python -m cases.agglomeration.what_fields_add [--size small] [--runs 400] [--searches 5] [--method NAME]
+    python -m tisim.cases.agglomeration.what_fields_add [--size small] [--runs 400] [--searches 5] [--method NAME]
         [--starts N] [--fresh 64] [--out what_fields_add.png]
-    python -m cases.agglomeration.what_fields_add --one-flow [--size small] [--fresh 256]
+    python -m tisim.cases.agglomeration.what_fields_add --one-flow [--size small] [--fresh 256]
 
 Each kind is searched several times, from other seeds; genes that are left out are those of no charge and no
 field. The best design of each search is then run from fresh starts that no search has seen, the same for
@@ -27,14 +27,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
 
-import optimize
+from tisim import optimize
 import tisim
-from cases.agglomeration import fields
-from cases.agglomeration.problem import GENES, UNBREAKABLE, cost, problem
-from cases.agglomeration.scene import BEST, SIZES, scene
-from cases.case import size_named
-from cases.runs import OTHER_STARTS, sound
-from optimize import Gene, Genome, Problem
+from tisim.cases.agglomeration import fields
+from tisim.cases.agglomeration.problem import GENES, UNBREAKABLE, cost, problem
+from tisim.cases.agglomeration.scene import BEST, SIZES, scene
+from tisim.cases.case import size_named
+from tisim.cases.runs import OTHER_STARTS, sound
+from tisim.optimize import Gene, Genome, Problem
 from tisim import Scene
 from tisim.analysis import Mean
 from tisim.numerics.statistics import CONFIDENCE

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cases.avalanche.accuracy import quantities
-from cases.avalanche.scene import TITLE, scene_for
-from cases.avalanche.sizes import SIZES
-from cases.case import Case, Late
+from tisim.cases.avalanche.accuracy import quantities
+from tisim.cases.avalanche.scene import TITLE, scene_for
+from tisim.cases.avalanche.sizes import SIZES
+from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="avalanche",
@@ -13,11 +13,11 @@ CASE = Case(
     source="L21 section 4.4",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.avalanche.checks", "check"),
+    check=Late("tisim.cases.avalanche.checks", "check"),
     quantities=quantities,
     cost_size="small",
-    problem=Late("cases.avalanche.problem", "problem"),
+    problem=Late("tisim.cases.avalanche.problem", "problem"),
     variants=("calibrate",),
-    calibration=Late("cases.avalanche.problem", "calibration"),
-    figures=Late("cases.avalanche.figures", "figures"),
+    calibration=Late("tisim.cases.avalanche.problem", "calibration"),
+    figures=Late("tisim.cases.avalanche.figures", "figures"),
 )

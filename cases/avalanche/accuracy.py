@@ -3,7 +3,7 @@ of the heap, over random starts."""
 
 from __future__ import annotations
 
-from cases.avalanche.measures import grains_volume, heap_volume, overlap, repose
+from tisim.cases.avalanche.measures import grains_volume, heap_volume, overlap, repose
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 

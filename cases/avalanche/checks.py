@@ -7,15 +7,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cases.avalanche.comparison import of, steeper_by
-from cases.avalanche.measures import load_on_walls
-from cases.avalanche.published import SLOPES, larger
-from cases.avalanche.scaling import attraction, moment, moment_eigenvalues, ratio, weight
-from cases.avalanche.scene import DIAMETERS, FLUX, RELAXATION, magnetism
-from cases.avalanche.sizes import DEFAULT
-from cases.avalanche.stages import Avalanche, avalanches
-from cases.case import Check
-from cases.statistics import Claim, Shown
+from tisim.cases.avalanche.comparison import of, steeper_by
+from tisim.cases.avalanche.measures import load_on_walls
+from tisim.cases.avalanche.published import SLOPES, larger
+from tisim.cases.avalanche.scaling import attraction, moment, moment_eigenvalues, ratio, weight
+from tisim.cases.avalanche.scene import DIAMETERS, FLUX, RELAXATION, magnetism
+from tisim.cases.avalanche.sizes import DEFAULT
+from tisim.cases.avalanche.stages import Avalanche, avalanches
+from tisim.cases.case import Check
+from tisim.cases.statistics import Claim, Shown
 from tisim import Particles, Result, Scene, run
 from tisim.analysis import Mean
 from tisim.steppers import FixedStep, Verlet

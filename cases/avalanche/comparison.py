@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cases.avalanche.stages import Avalanche
+from tisim.cases.avalanche.stages import Avalanche
 
 
 def of(runs: Sequence[Avalanche], diameter: float, field: float) -> list[Avalanche]:

@@ -11,14 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-from cases.avalanche.comparison import of
-from cases.avalanche.measures import filled_parts, profile
-from cases.avalanche.published import SLOPES
-from cases.avalanche.scaling import ratio
-from cases.avalanche.scene import DIAMETERS, FLUX
-from cases.avalanche.sizes import SIZES
-from cases.avalanche.stages import Avalanche, avalanches
-from cases.case import size_named
+from tisim.cases.avalanche.comparison import of
+from tisim.cases.avalanche.measures import filled_parts, profile
+from tisim.cases.avalanche.published import SLOPES
+from tisim.cases.avalanche.scaling import ratio
+from tisim.cases.avalanche.scene import DIAMETERS, FLUX
+from tisim.cases.avalanche.sizes import SIZES
+from tisim.cases.avalanche.stages import Avalanche, avalanches
+from tisim.cases.case import size_named
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain

@@ -22,8 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cases.granular_bench import measured
-from cases.granular_bench.measured import Measurement
+from tisim.cases.granular_bench import measured
+from tisim.cases.granular_bench.measured import Measurement
 from tisim.errors import InputError, must
 
 ANGLE_UNITS = {"angle_of_repose": "degrees"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cases.case import Size
+from tisim.cases.case import Size
 
 
 @dataclass(frozen=True)

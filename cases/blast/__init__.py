@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.blast.accuracy import quantities
-from cases.blast.scene import SIZES, TITLE, scene_for
-from cases.case import Case, Late
+from tisim.cases.blast.accuracy import quantities
+from tisim.cases.blast.scene import SIZES, TITLE, scene_for
+from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="blast",
@@ -12,10 +12,10 @@ CASE = Case(
     source="T. I. Zohdi, Comput. Methods Appl. Mech. Engrg. 308 (2016) 47-72",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.blast.checks", "check"),
+    check=Late("tisim.cases.blast.checks", "check"),
     quantities=quantities,
-    problem=Late("cases.blast.problem", "problem"),
+    problem=Late("tisim.cases.blast.problem", "problem"),
     variants=("ellipsoid",),
-    pictures=Late("cases.blast.figures", "pictures"),
-    figures=Late("cases.blast.figures", "figures"),
+    pictures=Late("tisim.cases.blast.figures", "pictures"),
+    figures=Late("tisim.cases.blast.figures", "figures"),
 )

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cases.blast.accuracy import half_axes
-from cases.blast.scene import AIR, ENERGY, FLUX, MASS, RADIUS, SPECIFIC_CHARGE, SPEED, scene
-from cases.blast.shape import ellipsoid
-from cases.case import Check
+from tisim.cases.blast.accuracy import half_axes
+from tisim.cases.blast.scene import AIR, ENERGY, FLUX, MASS, RADIUS, SPECIFIC_CHARGE, SPEED, scene
+from tisim.cases.blast.shape import ellipsoid
+from tisim.cases.case import Check
 from tisim import Result, run
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cases.case import Size, size_named
+from tisim.cases.case import Size, size_named
 from tisim import Blast, Cloud, RandomInBall, Scene
 from tisim.effects import (
     ChowDrag,

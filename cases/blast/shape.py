@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cases.blast.scene import SPECIFIC_CHARGE, SPEED
+from tisim.cases.blast.scene import SPECIFIC_CHARGE, SPEED
 from tisim.scene.initial_state import Arrays
 
 

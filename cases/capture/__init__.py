@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cases.capture.scene import SIZES, scene_for
-from cases.case import Case, Late
+from tisim.cases.capture.scene import SIZES, scene_for
+from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="capture",
@@ -11,10 +11,10 @@ CASE = Case(
     source="R. J. Baars, thesis, Utrecht University (2016), chapter 6",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.capture.statistics", "check"),
-    quantities=Late("cases.capture.accuracy", "quantities"),
-    problem=Late("cases.capture.problem", "problem"),
+    check=Late("tisim.cases.capture.statistics", "check"),
+    quantities=Late("tisim.cases.capture.accuracy", "quantities"),
+    problem=Late("tisim.cases.capture.problem", "problem"),
     variants=("fraction", "hard", "throughput"),
-    pictures=Late("cases.capture.figures", "pictures"),
-    figures=Late("cases.capture.figures", "figures"),
+    pictures=Late("tisim.cases.capture.figures", "pictures"),
+    figures=Late("tisim.cases.capture.figures", "figures"),
 )

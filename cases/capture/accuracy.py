@@ -3,7 +3,7 @@ random starts."""
 
 from __future__ import annotations
 
-from cases.capture.statistics import fraction
+from tisim.cases.capture.statistics import fraction
 from tisim import Scene
 from tisim.accuracy import Quantity
 

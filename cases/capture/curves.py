@@ -11,8 +11,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cases.capture import scene as capture
-from cases.capture.statistics import (
+from tisim.cases.capture import scene as capture
+from tisim.cases.capture.statistics import (
     ANGLES,
     ASPECTS,
     Settings,

@@ -12,7 +12,7 @@ from itertools import islice, product
 
 import numpy as np
 
-from cases.capture.scene import (
+from tisim.cases.capture.scene import (
     DENSITY,
     DIAMETER,
     SATURATION_MAGNETISATION,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cases.case import Size, size_named
+from tisim.cases.case import Size, size_named
 from tisim import Cloud, RandomAroundCylinder, Scene
 from tisim.components.component import Vector
 from tisim.effects import FixedMoment, Magnetophoresis

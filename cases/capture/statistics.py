@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from cases.capture import scene as capture
-from cases.case import Check
-from cases.runs import sound
-from cases.statistics import Claim
+from tisim.cases.capture import scene as capture
+from tisim.cases.case import Check
+from tisim.cases.runs import sound
+from tisim.cases.statistics import Claim
 from tisim import Result, Scene, run
 from tisim.analysis import Mean
 from tisim.engine.batches import Progress

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.capture import CASE as CAPTURE
-from cases.cascade.scene import SIZES, scene_for
-from cases.case import Case, Late
+from tisim.cases.capture import CASE as CAPTURE
+from tisim.cases.cascade.scene import SIZES, scene_for
+from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="cascade",
@@ -12,9 +12,9 @@ CASE = Case(
     source="R. J. Baars, thesis, Utrecht University (2016), section 6.4.5",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.cascade.statistics", "check"),
+    check=Late("tisim.cases.cascade.statistics", "check"),
     # A stage is a run of capture.
     quantities=CAPTURE.quantities,
     pictures=CAPTURE.pictures,
-    figures=Late("cases.cascade.figures", "figures"),
+    figures=Late("tisim.cases.cascade.figures", "figures"),
 )

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cases.cascade.scene import Cascade
-from cases.runs import sound
+from tisim.cases.cascade.scene import Cascade
+from tisim.cases.runs import sound
 from tisim import run
 from tisim.engine.batches import Progress
 

@@ -16,8 +16,8 @@ from typing import Literal
 
 import numpy as np
 
-from cases.capture import scene as capture
-from cases.case import Size, size_named
+from tisim.cases.capture import scene as capture
+from tisim.cases.case import Size, size_named
 from tisim import RandomAroundCylinder, Scene
 from tisim.sources import MagneticCylinders
 

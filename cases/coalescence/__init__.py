@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.case import Case, Late
-from cases.coalescence.accuracy import quantities
-from cases.coalescence.scene import SIZES, TITLE, scene_for
+from tisim.cases.case import Case, Late
+from tisim.cases.coalescence.accuracy import quantities
+from tisim.cases.coalescence.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
     name="coalescence",
@@ -12,8 +12,8 @@ CASE = Case(
     source="L21 section 4.2",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.coalescence.checks", "check"),
+    check=Late("tisim.cases.coalescence.checks", "check"),
     quantities=quantities,
     cost_size="small",
-    figures=Late("cases.coalescence.figures", "figures"),
+    figures=Late("tisim.cases.coalescence.figures", "figures"),
 )

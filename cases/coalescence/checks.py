@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from cases.case import Check
-from cases.coalescence.published import (
+from tisim.cases.case import Check
+from tisim.cases.coalescence.published import (
     AXES,
     BOUND,
     DENSITY,
@@ -18,11 +18,11 @@ from cases.coalescence.published import (
     ROTATIONS,
     SPACING,
 )
-from cases.coalescence.regime import COMPARED, regime
-from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
-from cases.coalescence.scaling import critical_spin, mean_density
-from cases.coalescence.scene import DEFAULT, scene
-from cases.statistics import Claim, Shown
+from tisim.cases.coalescence.regime import COMPARED, regime
+from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
+from tisim.cases.coalescence.scaling import critical_spin, mean_density
+from tisim.cases.coalescence.scene import DEFAULT, scene
+from tisim.cases.statistics import Claim, Shown
 from tisim.analysis import Mean
 
 ROUNDING = 1e-11

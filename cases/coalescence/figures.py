@@ -10,23 +10,23 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cases.coalescence.measures import clusters_of, part
-from cases.coalescence.published import (
+from tisim.cases.coalescence.measures import clusters_of, part
+from tisim.cases.coalescence.published import (
     DENSITY,
     DIAMETERS,
     MAGNETISATIONS,
     SURFACE_ENERGY,
 )
-from cases.coalescence.regime import ACCELERATION
-from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_all_magnetisations, of_magnetisation
-from cases.coalescence.scaling import (
+from tisim.cases.coalescence.regime import ACCELERATION
+from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_all_magnetisations, of_magnetisation
+from tisim.cases.coalescence.scaling import (
     attraction,
     dmt_cohesion,
     mutual_gravity,
     surface_cohesion,
     surface_weight,
 )
-from cases.coalescence.scene import SIZES
+from tisim.cases.coalescence.scene import SIZES
 from tisim.analysis import voronoi_by_shell
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, directions, panel, project

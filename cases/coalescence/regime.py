@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.constants import G
 
-from cases.coalescence.published import (
+from tisim.cases.coalescence.published import (
     AXES,
     DENSITY,
     DIAMETERS,
@@ -18,7 +18,7 @@ from cases.coalescence.published import (
     ROTATIONS,
     SPACING,
 )
-from cases.coalescence.scaling import (
+from tisim.cases.coalescence.scaling import (
     PACKED,
     attraction,
     critical_spin,
@@ -28,9 +28,9 @@ from cases.coalescence.scaling import (
     spin_when_packed,
     surface_weight,
 )
-from cases.coalescence.scene import DEFAULT, IMPACT, ROTATION, scale_of, step, thermal_speed, young
-from cases.granular_bench.closed_forms import hertz_depth, hertz_overlap, reduced
-from cases.statistics import Shown
+from tisim.cases.coalescence.scene import DEFAULT, IMPACT, ROTATION, scale_of, step, thermal_speed, young
+from tisim.cases.granular_bench.closed_forms import hertz_depth, hertz_overlap, reduced
+from tisim.cases.statistics import Shown
 
 ACCELERATION = 5e-6
 """At the surface of L21's asteroids, m/s^2; section 4.6."""

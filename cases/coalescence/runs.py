@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cases.case import Size
-from cases.coalescence.measures import Asteroid, Conserved, Gathering
-from cases.coalescence.published import MAGNETISATIONS, NUMBER
-from cases.coalescence.scene import scale_of, scene
-from cases.runs import sound
+from tisim.cases.case import Size
+from tisim.cases.coalescence.measures import Asteroid, Conserved, Gathering
+from tisim.cases.coalescence.published import MAGNETISATIONS, NUMBER
+from tisim.cases.coalescence.scene import scale_of, scene
+from tisim.cases.runs import sound
 from tisim import Scene, Simulation
 from tisim.engine.batches import Progress
 from tisim.errors import must

@@ -13,7 +13,7 @@ import math
 
 from scipy.constants import G
 
-from cases.dipoles import attraction_in_line
+from tisim.cases.dipoles import attraction_in_line
 
 PACKED = 0.6
 """Grains of a pile fill about this part of it."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cases.case import Case, Late
-from cases.concentration.scene import SIZES, scene_for
+from tisim.cases.case import Case, Late
+from tisim.cases.concentration.scene import SIZES, scene_for
 
 CASE = Case(
     name="concentration",
@@ -11,8 +11,8 @@ CASE = Case(
     source="R. J. Baars, thesis, Utrecht University (2016), section 6.4.6",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.concentration.statistics", "check"),
-    quantities=Late("cases.concentration.accuracy", "quantities"),
-    pictures=Late("cases.concentration.figures", "pictures"),
-    figures=Late("cases.concentration.figures", "figures"),
+    check=Late("tisim.cases.concentration.statistics", "check"),
+    quantities=Late("tisim.cases.concentration.accuracy", "quantities"),
+    pictures=Late("tisim.cases.concentration.figures", "pictures"),
+    figures=Late("tisim.cases.concentration.figures", "figures"),
 )

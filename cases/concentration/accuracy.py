@@ -3,7 +3,7 @@ are, over random starts."""
 
 from __future__ import annotations
 
-from cases.concentration.statistics import chain
+from tisim.cases.concentration.statistics import chain
 from tisim import Scene
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import usual

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cases.case import Case, Late
-from cases.granular_bench.accuracy import quantities
-from cases.granular_bench.scene import BED, SIZES, TITLE
-from cases.granular_bench.sizes import scene_for
+from tisim.cases.case import Case, Late
+from tisim.cases.granular_bench.accuracy import quantities
+from tisim.cases.granular_bench.scene import BED, SIZES, TITLE
+from tisim.cases.granular_bench.sizes import scene_for
 
 CASE = Case(
     name="granular_bench",
@@ -13,11 +13,11 @@ CASE = Case(
     source="Y. C. Chung and J. Y. Ooi, Granul. Matter 13 (2011) 643-656, and others",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.granular_bench.checks", "check"),
+    check=Late("tisim.cases.granular_bench.checks", "check"),
     quantities=quantities,
     cost_size=BED,
-    problem=Late("cases.granular_bench.problem", "problem"),
+    problem=Late("tisim.cases.granular_bench.problem", "problem"),
     variants=("calibrate",),
-    calibration=Late("cases.granular_bench.problem", "calibration"),
-    figures=Late("cases.granular_bench.figures", "figures"),
+    calibration=Late("tisim.cases.granular_bench.problem", "calibration"),
+    figures=Late("tisim.cases.granular_bench.figures", "figures"),
 )

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.constants import g as STANDARD_GRAVITY
 
-from cases.granular_bench.closed_forms import hertz_duration, reduced
-from cases.granular_bench.scene import (
+from tisim.cases.granular_bench.closed_forms import hertz_duration, reduced
+from tisim.cases.granular_bench.scene import (
     DENSITY,
     DIAMETER,
     LAW,

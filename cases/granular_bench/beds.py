@@ -19,9 +19,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.constants import g as STANDARD_GRAVITY
 
-from cases.granular_bench.measures import discharge, heap, repose
-from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
-from cases.runs import sound
+from tisim.cases.granular_bench.measures import discharge, heap, repose
+from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
+from tisim.cases.runs import sound
 from tisim import Result, run
 from tisim.analysis import Mean
 from tisim.engine.batches import Progress

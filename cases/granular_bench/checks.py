@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from cases.case import Check
-from cases.granular_bench import adhesion, beams, motions, particle_tests
-from cases.granular_bench.closed_forms import (
+from tisim.cases.case import Check
+from tisim.cases.granular_bench import adhesion, beams, motions, particle_tests
+from tisim.cases.granular_bench.closed_forms import (
     bridge_force,
     bridge_rupture,
     dmt_pull_off,
@@ -21,10 +21,10 @@ from cases.granular_bench.closed_forms import (
     sliding_impact,
     sliding_limit,
 )
-from cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, force_curves, rebound
-from cases.granular_bench.mindlin_impact import oblique_impacts
-from cases.granular_bench.shear_cell import expected_ratio, sheared_beds
-from cases.runs import sound
+from tisim.cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, force_curves, rebound
+from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
+from tisim.cases.granular_bench.shear_cell import expected_ratio, sheared_beds
+from tisim.cases.runs import sound
 from tisim import Scene, run
 
 BOUND = 1e-3

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cases.granular_bench import adhesion, beams, motions, particle_tests
-from cases.granular_bench.checks import rebounds
-from cases.granular_bench.closed_forms import (
+from tisim.cases.granular_bench import adhesion, beams, motions, particle_tests
+from tisim.cases.granular_bench.checks import rebounds
+from tisim.cases.granular_bench.closed_forms import (
     bridge_force,
     bridge_rupture,
     dmt_pull_off,
@@ -20,15 +20,15 @@ from cases.granular_bench.closed_forms import (
     jkr_force,
     jkr_stretch,
 )
-from cases.granular_bench.impacts import (
+from tisim.cases.granular_bench.impacts import (
     ParticleImpact,
     Rebound,
     by_id,
     force_curves,
     simulation_of,
 )
-from cases.granular_bench.mindlin_impact import oblique_impacts
-from cases.runs import sound
+from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
+from tisim.cases.runs import sound
 from tisim import run
 from tisim.plotting.style import empty, letters, plain
 

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cases.granular_bench.impacts import ParticleImpact
-from cases.granular_bench.substances import SUBSTANCES
+from tisim.cases.granular_bench.impacts import ParticleImpact
+from tisim.cases.granular_bench.substances import SUBSTANCES
 
 PROFILE_POINTS = 20_000
 """So many steps are taken in the time of an elastic impact."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cases.granular_bench.closed_forms import hertz_force, hertz_overlap
+from tisim.cases.granular_bench.closed_forms import hertz_force, hertz_overlap
 from tisim import Material, Particles, Scene
 from tisim.effects import (
     Granular,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cases.granular_bench.impacts import ParticleImpact
+from tisim.cases.granular_bench.impacts import ParticleImpact
 
 RESTITUTIONS = (0.2, 0.4, 0.6, 0.8, 1.0)
 IMPACT_ANGLES = (2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 60.0, 70.0, 80.0, 85.0)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cases.case import Size
+from tisim.cases.case import Size
 from tisim import Cloud, GrainClass, Material, RandomInCylinder, Scene
 from tisim.effects import (
     Granular,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.case import size_named
-from cases.granular_bench.bed import bed
-from cases.granular_bench.scene import BED, SIZES, scene
+from tisim.cases.case import size_named
+from tisim.cases.granular_bench.bed import bed
+from tisim.cases.granular_bench.scene import BED, SIZES, scene
 from tisim import Scene
 
 

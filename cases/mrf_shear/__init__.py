@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.case import Case, Late
-from cases.mrf_shear.accuracy import quantities
-from cases.mrf_shear.scene import SIZES, TITLE, scene_for
+from tisim.cases.case import Case, Late
+from tisim.cases.mrf_shear.accuracy import quantities
+from tisim.cases.mrf_shear.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
     name="mrf_shear",
@@ -12,10 +12,10 @@ CASE = Case(
     source="T. Leps, PhD thesis, Univ. of Maryland (2021), chapter 2",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.mrf_shear.checks", "check"),
+    check=Late("tisim.cases.mrf_shear.checks", "check"),
     quantities=quantities,
     cost_size="small",
-    problem=Late("cases.mrf_shear.problem", "problem"),
+    problem=Late("tisim.cases.mrf_shear.problem", "problem"),
     variants=("front", "bounded", "field"),
-    figures=Late("cases.mrf_shear.figures", "figures"),
+    figures=Late("tisim.cases.mrf_shear.figures", "figures"),
 )

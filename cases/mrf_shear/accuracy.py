@@ -3,8 +3,8 @@ and how deep grains overlap."""
 
 from __future__ import annotations
 
-from cases.mrf_shear.measures import shear_stress
-from cases.runs import overlap
+from tisim.cases.mrf_shear.measures import shear_stress
+from tisim.cases.runs import overlap
 from tisim import Scene
 from tisim.accuracy import Quantity
 

@@ -6,15 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from cases.case import Check
-from cases.mrf_shear import published
-from cases.mrf_shear.flow_curve import AS_PUBLISHED, COMPARED, MIXED, VARIATIONS, Curve
-from cases.mrf_shear.measures import magnetised_part, order, raft_force
-from cases.mrf_shear.regime import regime
-from cases.mrf_shear.runs import cells, paired
-from cases.mrf_shear.scene import LOWER, RATES, UPPER
-from cases.runs import overlap
-from cases.statistics import Claim, Shown
+from tisim.cases.case import Check
+from tisim.cases.mrf_shear import published
+from tisim.cases.mrf_shear.flow_curve import AS_PUBLISHED, COMPARED, MIXED, VARIATIONS, Curve
+from tisim.cases.mrf_shear.measures import magnetised_part, order, raft_force
+from tisim.cases.mrf_shear.regime import regime
+from tisim.cases.mrf_shear.runs import cells, paired
+from tisim.cases.mrf_shear.scene import LOWER, RATES, UPPER
+from tisim.cases.runs import overlap
+from tisim.cases.statistics import Claim, Shown
 from tisim import Result
 from tisim.analysis import Mean
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cases.mixtures import classes
-from cases.mrf_shear import published
-from cases.mrf_shear.published import MICRO
+from tisim.cases.mixtures import classes
+from tisim.cases.mrf_shear import published
+from tisim.cases.mrf_shear.published import MICRO
 from tisim import GrainClass
 from tisim.effects import CARBONYL_IRON
 

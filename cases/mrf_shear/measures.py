@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cases.mrf_shear.regime import magnetisation
-from cases.mrf_shear.scene import LOWER, UPPER
+from tisim.cases.mrf_shear.regime import magnetisation
+from tisim.cases.mrf_shear.scene import LOWER, UPPER
 from tisim import Result
 from tisim.analysis import (
     cluster_shapes,

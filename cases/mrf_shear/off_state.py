@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cases.mrf_shear import published
+from tisim.cases.mrf_shear import published
 
 RANDOM_PACKING = 0.64
 """The part of the space that equal spheres fill in a random close packing."""

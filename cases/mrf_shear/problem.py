@@ -12,14 +12,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cases.case import searched_size
-from cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS, mixture
-from cases.mrf_shear.measures import extent, flux, shear_stress, volume_fraction
-from cases.mrf_shear.off_state import off_state_viscosity
-from cases.mrf_shear.scene import SEARCHED, SIZES, SWEPT, TITLE, scene
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.objective import Objective
-from optimize.problem.problem import Problem
+from tisim.cases.case import searched_size
+from tisim.cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS, mixture
+from tisim.cases.mrf_shear.measures import extent, flux, shear_stress, volume_fraction
+from tisim.cases.mrf_shear.off_state import off_state_viscosity
+from tisim.cases.mrf_shear.scene import SEARCHED, SIZES, SWEPT, TITLE, scene
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.problem import Problem
 from tisim import Cloud, Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cases.mrf_shear.measures import shear_stress
-from cases.mrf_shear.scene import MAGNETISING_TIME, scene
-from cases.runs import sound
+from tisim.cases.mrf_shear.measures import shear_stress
+from tisim.cases.mrf_shear.scene import MAGNETISING_TIME, scene
+from tisim.cases.runs import sound
 from tisim import Result, Scene, run
 from tisim.analysis import Mean
 from tisim.engine.batches import Progress

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from cases.case import Size, size_named
-from cases.mixtures import magnetorheological
-from cases.mrf_shear import published
-from cases.mrf_shear.grains import DENSITY, MONODISPERSE, number_of, smallest
-from cases.mrf_shear.published import MICRO
+from tisim.cases.case import Size, size_named
+from tisim.cases.mixtures import magnetorheological
+from tisim.cases.mrf_shear import published
+from tisim.cases.mrf_shear.grains import DENSITY, MONODISPERSE, number_of, smallest
+from tisim.cases.mrf_shear.published import MICRO
 from tisim import Box, Cloud, GrainClass, Material, RandomInDomain, Scene
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import Vector

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.case import Case, Late
-from cases.spin_up.accuracy import quantities
-from cases.spin_up.scene import SIZES, TITLE, scene_for
+from tisim.cases.case import Case, Late
+from tisim.cases.spin_up.accuracy import quantities
+from tisim.cases.spin_up.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
     name="spin_up",
@@ -12,7 +12,7 @@ CASE = Case(
     source="L21 section 4.3",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.spin_up.checks", "check"),
+    check=Late("tisim.cases.spin_up.checks", "check"),
     quantities=quantities,
-    figures=Late("cases.spin_up.figures", "figures"),
+    figures=Late("tisim.cases.spin_up.figures", "figures"),
 )

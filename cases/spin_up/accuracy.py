@@ -3,8 +3,8 @@ over random starts."""
 
 from __future__ import annotations
 
-from cases.coalescence.accuracy import overlap
-from cases.coalescence.measures import Asteroid
+from tisim.cases.coalescence.accuracy import overlap
+from tisim.cases.coalescence.measures import Asteroid
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 

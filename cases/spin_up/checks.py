@@ -6,15 +6,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cases.case import Check
-from cases.coalescence.measures import Conserved
-from cases.coalescence.published import MAGNETISATIONS
-from cases.coalescence.scaling import critical_spin
-from cases.spin_up.published import DEFORMATION, DISRUPTION
-from cases.spin_up.regime import regime
-from cases.spin_up.scene import DEFAULT
-from cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
-from cases.statistics import Claim, Shown
+from tisim.cases.case import Check
+from tisim.cases.coalescence.measures import Conserved
+from tisim.cases.coalescence.published import MAGNETISATIONS
+from tisim.cases.coalescence.scaling import critical_spin
+from tisim.cases.spin_up.published import DEFORMATION, DISRUPTION
+from tisim.cases.spin_up.regime import regime
+from tisim.cases.spin_up.scene import DEFAULT
+from tisim.cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
+from tisim.cases.statistics import Claim, Shown
 from tisim.analysis import Mean
 
 ROUNDING = 1e-11

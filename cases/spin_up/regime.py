@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from cases.coalescence.published import DENSITY, DIAMETERS, MAGNETISATIONS
-from cases.coalescence.regime import impact_depth, magnetic_depth
-from cases.coalescence.scaling import free_fall, mean_density
-from cases.coalescence.scene import scale_of, step
-from cases.spin_up.scene import DEFAULT, NUMBERS
-from cases.statistics import Shown
+from tisim.cases.coalescence.published import DENSITY, DIAMETERS, MAGNETISATIONS
+from tisim.cases.coalescence.regime import impact_depth, magnetic_depth
+from tisim.cases.coalescence.scaling import free_fall, mean_density
+from tisim.cases.coalescence.scene import scale_of, step
+from tisim.cases.spin_up.scene import DEFAULT, NUMBERS
+from tisim.cases.statistics import Shown
 
 
 def regime() -> Iterator[Shown]:

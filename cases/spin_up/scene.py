@@ -14,9 +14,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from cases.case import Size, size_named
-from cases.coalescence import scene as coalescence
-from cases.coalescence.published import DIAMETERS, MAGNETISATIONS
+from tisim.cases.case import Size, size_named
+from tisim.cases.coalescence import scene as coalescence
+from tisim.cases.coalescence.published import DIAMETERS, MAGNETISATIONS
 from tisim import Scene
 
 TITLE = "A rubble pile of magnetised grains is spun up until it breaks"

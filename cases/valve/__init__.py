@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cases.case import Case, Late
-from cases.valve.accuracy import quantities
-from cases.valve.scene import TITLE, scene_for
-from cases.valve.sizes import SIZES
+from tisim.cases.case import Case, Late
+from tisim.cases.valve.accuracy import quantities
+from tisim.cases.valve.scene import TITLE, scene_for
+from tisim.cases.valve.sizes import SIZES
 
 CASE = Case(
     name="valve",
@@ -13,9 +13,9 @@ CASE = Case(
     source="T. Leps, PhD thesis, Univ. of Maryland (2021), section 3.4.4",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.valve.checks", "check"),
+    check=Late("tisim.cases.valve.checks", "check"),
     quantities=quantities,
-    problem=Late("cases.valve.problem", "problem"),
+    problem=Late("tisim.cases.valve.problem", "problem"),
     variants=("front", "field", "never"),
-    figures=Late("cases.valve.figures", "figures"),
+    figures=Late("tisim.cases.valve.figures", "figures"),
 )

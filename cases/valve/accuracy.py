@@ -3,8 +3,8 @@ in the field, and how deep grains overlap."""
 
 from __future__ import annotations
 
-from cases.runs import overlap
-from cases.valve.measures import flow_rate
+from tisim.cases.runs import overlap
+from tisim.cases.valve.measures import flow_rate
 from tisim import Scene
 from tisim.accuracy import Quantity
 

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cases.case import Check
-from cases.statistics import Claim, Shown
-from cases.valve.measures import drag_pressure, held_pressure, unhindered_rate
-from cases.valve.runs import ARRESTED, Flow, left, left_of
-from cases.valve.sizes import GRADIENT, LENGTH
-from cases.valve.studies import ValveRuns, by_throat
+from tisim.cases.case import Check
+from tisim.cases.statistics import Claim, Shown
+from tisim.cases.valve.measures import drag_pressure, held_pressure, unhindered_rate
+from tisim.cases.valve.runs import ARRESTED, Flow, left, left_of
+from tisim.cases.valve.sizes import GRADIENT, LENGTH
+from tisim.cases.valve.studies import ValveRuns, by_throat
 from tisim.analysis import Mean
 
 STARTS = 6

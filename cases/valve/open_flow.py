@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cases.mrf_shear.off_state import RANDOM_PACKING, relative_viscosity
-from cases.valve import published
-from cases.valve.duct import Duct
+from tisim.cases.mrf_shear.off_state import RANDOM_PACKING, relative_viscosity
+from tisim.cases.valve import published
+from tisim.cases.valve.duct import Duct
 
 
 def resistance(duct: Duct) -> float:

@@ -11,18 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cases.case import searched_size
-from cases.mrf_shear.grains import equal
-from cases.mrf_shear.scene import SWEPT
-from cases.valve import published
-from cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
-from cases.valve.open_flow import open_flow
-from cases.valve.runs import ARRESTED
-from cases.valve.scene import TITLE, scene
-from cases.valve.sizes import GRADIENT, SEARCHED, SIZES, D
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.objective import Objective
-from optimize.problem.problem import Problem
+from tisim.cases.case import searched_size
+from tisim.cases.mrf_shear.grains import equal
+from tisim.cases.mrf_shear.scene import SWEPT
+from tisim.cases.valve import published
+from tisim.cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
+from tisim.cases.valve.open_flow import open_flow
+from tisim.cases.valve.runs import ARRESTED
+from tisim.cases.valve.scene import TITLE, scene
+from tisim.cases.valve.sizes import GRADIENT, SEARCHED, SIZES, D
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.problem import Problem
 from tisim import Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cases.runs import sound
-from cases.valve.measures import duct_of, rate
+from tisim.cases.runs import sound
+from tisim.cases.valve.measures import duct_of, rate
 from tisim import Observer, Result, Scene, Simulation
 from tisim.analysis import Mean
 from tisim.engine.batches import Progress

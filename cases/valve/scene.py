@@ -14,14 +14,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cases.case import size_named
-from cases.mixtures import VALVE_GRAINS
-from cases.mrf_shear import published as shear
-from cases.mrf_shear.grains import number_of, smallest
-from cases.mrf_shear.scene import SUSCEPTIBILITY, iron
-from cases.valve import published
-from cases.valve.duct import Duct
-from cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
+from tisim.cases.case import size_named
+from tisim.cases.mixtures import VALVE_GRAINS
+from tisim.cases.mrf_shear import published as shear
+from tisim.cases.mrf_shear.grains import number_of, smallest
+from tisim.cases.mrf_shear.scene import SUSCEPTIBILITY, iron
+from tisim.cases.valve import published
+from tisim.cases.valve.duct import Duct
+from tisim.cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
 from tisim import Box, Cloud, GrainClass, Scene
 from tisim.effects import (
     Granular,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from cases.case import Size
-from cases.mixtures import FINE_VALVE_GRAINS, VALVE_GRAINS, classes
-from cases.mrf_shear.grains import equal
-from cases.valve import published
+from tisim.cases.case import Size
+from tisim.cases.mixtures import FINE_VALVE_GRAINS, VALVE_GRAINS, classes
+from tisim.cases.mrf_shear.grains import equal
+from tisim.cases.valve import published
 
 D = published.LARGEST
 """Diameter of the coarse grains, m: that of the largest of L21."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cases.case import Case, Late
-from cases.vibration.accuracy import quantities
-from cases.vibration.scene import SIZES, TITLE, scene_for
+from tisim.cases.case import Case, Late
+from tisim.cases.vibration.accuracy import quantities
+from tisim.cases.vibration.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
     name="vibration",
@@ -12,10 +12,10 @@ CASE = Case(
     source="T. I. Zohdi, J. Vib. Acoust. (2013), doi 10.1115/1.4023251",
     sizes=SIZES,
     scene=scene_for,
-    check=Late("cases.vibration.checks", "check"),
+    check=Late("tisim.cases.vibration.checks", "check"),
     quantities=quantities,
-    pictures=Late("cases.vibration.figures", "pictures"),
-    figures=Late("cases.vibration.figures", "figures"),
-    problem=Late("cases.vibration.problem", "problem"),
+    pictures=Late("tisim.cases.vibration.figures", "pictures"),
+    figures=Late("tisim.cases.vibration.figures", "figures"),
+    problem=Late("tisim.cases.vibration.problem", "problem"),
     variants=("resonate", "avoid"),
 )

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cases.vibration.closed_forms import response
+from tisim.cases.vibration.closed_forms import response
 from tisim import Open, Result, Scene
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import displacement

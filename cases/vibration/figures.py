@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cases.case import size_named
-from cases.vibration import scene as vibration
-from cases.vibration.accuracy import constants
-from cases.vibration.closed_forms import resonances, response
-from cases.vibration.response import (
+from tisim.cases.case import size_named
+from tisim.cases.vibration import scene as vibration
+from tisim.cases.vibration.accuracy import constants
+from tisim.cases.vibration.closed_forms import resonances, response
+from tisim.cases.vibration.response import (
     BEAT_DRIVE,
     FAST,
     SLOW,

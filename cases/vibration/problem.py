@@ -11,12 +11,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cases.vibration import scene as vibration
-from cases.vibration.closed_forms import resonances
-from cases.vibration.response import peak
-from cases.vibration.scene import CHARGE, FIELD, MASS
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.problem import Problem
+from tisim.cases.vibration import scene as vibration
+from tisim.cases.vibration.closed_forms import resonances
+from tisim.cases.vibration.response import peak
+from tisim.cases.vibration.scene import CHARGE, FIELD, MASS
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.problem import Problem
 from tisim import Result, Scene
 from tisim.errors import must
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cases.case import Size, size_named
+from tisim.cases.case import Size, size_named
 from tisim import Cloud, Lattice, Scene
 from tisim.effects import Lorentz, NearField, Tether, TruncatedNearField
 from tisim.operators import PeakDisplacement

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.stats import qmc, sobol_indices, uniform
 
-from optimize.methods.individual import Individual
-from optimize.outcome import Outcome
-from optimize.problem.gene_values import Value
-from optimize.problem.genome import Genome
-from optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
-from optimize.surrogate.draws import Draws
-from optimize.surrogate.gaussian_process import GaussianProcess
-from optimize.surrogate.selection import representative
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.problem.gene_values import Value
+from tisim.optimize.problem.genome import Genome
+from tisim.optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
+from tisim.optimize.surrogate.draws import Draws
+from tisim.optimize.surrogate.gaussian_process import GaussianProcess
+from tisim.optimize.surrogate.selection import representative
 from tisim.errors import Words, must
 
 Array = NDArray[np.float64]

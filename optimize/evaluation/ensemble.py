@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from optimize.evaluation.estimate import FitnessEstimate, converged_after
-from optimize.evaluation.runs import Evaluator, Runs, Sample
-from optimize.problem.objective import Objective
-from optimize.problem.problem import Problem
-from optimize.problem.statistic import Others
-from optimize.storage.cache import Cache
-from optimize.storage.record import canonical
+from tisim.optimize.evaluation.estimate import FitnessEstimate, converged_after
+from tisim.optimize.evaluation.runs import Evaluator, Runs, Sample
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.problem.statistic import Others
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.record import canonical
 from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.numerics.skewed import Moments, shared_skewness

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from optimize.problem.function import FunctionCall, FunctionResult
+from tisim.optimize.problem.function import FunctionCall, FunctionResult
 
 
 class FunctionEvaluator:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from optimize.problem.calls import FaultyProblem, constraint_value, make_scene, values_of
-from optimize.problem.problem import Problem
-from optimize.storage.cache import Cache
-from optimize.storage.record import Record, canonical, evaluation_key
+from tisim.optimize.problem.calls import FaultyProblem, constraint_value, make_scene, values_of
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.record import Record, canonical, evaluation_key
 from tisim import InputError, RunError
 
 if TYPE_CHECKING:

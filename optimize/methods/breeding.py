@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from deap import base, tools
 
-from optimize.methods.breeding_settings import Breeding
-from optimize.methods.individual import Individual
-from optimize.problem.genome import SearchBox
+from tisim.optimize.methods.breeding_settings import Breeding
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.genome import SearchBox
 
 
 class Breeder:

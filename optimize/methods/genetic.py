@@ -9,15 +9,15 @@ import numpy as np
 from deap import tools
 from pydantic import Field, model_validator
 
-from optimize.methods.base import SearchMethod
-from optimize.methods.gaussian_process import missing, sobol
-from optimize.methods.individual import Individual
-from optimize.methods.operators import GeneticOperator, Operators
-from optimize.problem.genome import Genome
-from optimize.surrogate.acquisition import Worth
-from optimize.surrogate.belief import Belief
-from optimize.surrogate.gaussian_process import Array
-from optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
+from tisim.optimize.methods.base import SearchMethod
+from tisim.optimize.methods.gaussian_process import missing, sobol
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.methods.operators import GeneticOperator, Operators
+from tisim.optimize.problem.genome import Genome
+from tisim.optimize.surrogate.acquisition import Worth
+from tisim.optimize.surrogate.belief import Belief
+from tisim.optimize.surrogate.gaussian_process import Array
+from tisim.optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
 from tisim.components.component import Checked
 from tisim.errors import must
 

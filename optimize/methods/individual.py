@@ -7,9 +7,9 @@ from functools import cache
 
 from deap import base
 
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.problem.constraint import InequalityConstraint
-from optimize.problem.feasibility import total_violation
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.problem.constraint import InequalityConstraint
+from tisim.optimize.problem.feasibility import total_violation
 
 
 @cache

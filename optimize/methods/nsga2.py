@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from optimize.methods.genetic import BreedingOptions, Genetic, GeneticOptions
-from optimize.problem.genome import Genome
+from tisim.optimize.methods.genetic import BreedingOptions, Genetic, GeneticOptions
+from tisim.optimize.problem.genome import Genome
 
 
 class Nsga2(Genetic):

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from optimize.methods.breeding_settings import Breeding
-from optimize.methods.individual import Individual
-from optimize.methods.zohdi import Zohdi
-from optimize.problem.genome import Genome, SearchBox
+from tisim.optimize.methods.breeding_settings import Breeding
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.methods.zohdi import Zohdi
+from tisim.optimize.problem.genome import Genome, SearchBox
 
 
 class RestartOptions(Breeding):

@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 from deap import tools
 
-from optimize.methods.base import SearchMethod
-from optimize.methods.breeding import Breeder
-from optimize.methods.breeding_settings import Breeding
-from optimize.methods.individual import Individual
-from optimize.problem.genome import Genome
+from tisim.optimize.methods.base import SearchMethod
+from tisim.optimize.methods.breeding import Breeder
+from tisim.optimize.methods.breeding_settings import Breeding
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.genome import Genome
 
 
 class Zohdi(SearchMethod):

@@ -20,9 +20,9 @@ from tisim.errors import InputError, Words, abbreviated, must, printable
 from tisim.files.python_file import OWN_PACKAGES
 
 if TYPE_CHECKING:
-    from optimize.problem.constraint import InequalityConstraint
-    from optimize.problem.objective import Objective
-    from optimize.problem.problem import Problem
+    from tisim.optimize.problem.constraint import InequalityConstraint
+    from tisim.optimize.problem.objective import Objective
+    from tisim.optimize.problem.problem import Problem
     from tisim import Scene
 
 OWN_FOLDERS = tuple(Path(__file__).parents[2] / name for name in sorted(OWN_PACKAGES))

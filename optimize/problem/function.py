@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from optimize.problem.calls import FaultyProblem, call_function
+from tisim.optimize.problem.calls import FaultyProblem, call_function
 from tisim.engine.result import Status
 from tisim.errors import InputError, abbreviated, must
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from optimize.problem.statistic import MEAN, Statistic
+from tisim.optimize.problem.statistic import MEAN, Statistic
 from tisim.errors import must
 
 

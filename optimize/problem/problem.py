@@ -8,15 +8,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from optimize.problem.calls import function_name
-from optimize.problem.constraint import DesignConstraint, InequalityConstraint, ResultConstraint
-from optimize.problem.fingerprint import fingerprint
-from optimize.problem.function import PlainFunction, ValueOf
-from optimize.problem.gene_values import Value
-from optimize.problem.genome import AnyGene, Genome
-from optimize.problem.given_genes import DependentGene
-from optimize.problem.objective import Objective
-from optimize.problem.statistic import Misfit
+from tisim.optimize.problem.calls import function_name
+from tisim.optimize.problem.constraint import DesignConstraint, InequalityConstraint, ResultConstraint
+from tisim.optimize.problem.fingerprint import fingerprint
+from tisim.optimize.problem.function import PlainFunction, ValueOf
+from tisim.optimize.problem.gene_values import Value
+from tisim.optimize.problem.genome import AnyGene, Genome
+from tisim.optimize.problem.given_genes import DependentGene
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.statistic import Misfit
 from tisim.errors import InputError, must
 from tisim.files import python_file, regular_file
 from tisim.files.python_file import sha256

@@ -12,12 +12,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from optimize.analysis import calibration as calibrating
-from optimize.analysis import sensitivity as sensing
-from optimize.analysis.calibration import Calibration
-from optimize.analysis.sensitivity import LEAST_Q2, Between, Sensitivity
-from optimize.outcome import Outcome
-from optimize.report.report import columns_csv, picture, text
+from tisim.optimize.analysis import calibration as calibrating
+from tisim.optimize.analysis import sensitivity as sensing
+from tisim.optimize.analysis.calibration import Calibration
+from tisim.optimize.analysis.sensitivity import LEAST_Q2, Between, Sensitivity
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.report.report import columns_csv, picture, text
 from tisim.files.atomic import replace_file
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _late(name: str, of: Calibration | tuple[Sensitivity, ...]) -> Callable[[], 
     """Return what draws a figure, for which matplotlib is loaded only then."""
 
     def draw() -> Figure:
-        from optimize.report import analysis_figures
+        from tisim.optimize.report import analysis_figures
 
         figure: Figure = getattr(analysis_figures, name)(of)
         return figure

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.evaluation.runs import Evaluator
-from optimize.outcome import Outcome, Progress
-from optimize.problem.problem import Problem
-from optimize.search import search
-from optimize.search_folder import check_problem, resume_or_clear
-from optimize.settings import Settings, fit, identity, proposed
-from optimize.storage.cache import Cache
+from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.evaluation.runs import Evaluator
+from tisim.optimize.outcome import Outcome, Progress
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.search import search
+from tisim.optimize.search_folder import check_problem, resume_or_clear
+from tisim.optimize.settings import Settings, fit, identity, proposed
+from tisim.optimize.storage.cache import Cache
 from tisim import RunError
 from tisim.console import plain_table
 from tisim.errors import must

@@ -7,17 +7,17 @@ from types import TracebackType
 
 from rich.console import Console
 
-from optimize.outcome import Progress
-from optimize.problem.gene_values import Value, brief
-from optimize.problem.problem import Problem
-from optimize.settings import Settings
+from tisim.optimize.outcome import Progress
+from tisim.optimize.problem.gene_values import Value, brief
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.settings import Settings
 from tisim.console import progress_bar
 
 
 class Display:
     """A display shows the progress of a search of a problem; it is a context manager.
 
-    Pass ``generation`` and ``step`` to ``optimize.search.search`` as on_generation and on_progress.
+    Pass ``generation`` and ``step`` to ``tisim.optimize.search.search`` as on_generation and on_progress.
     """
 
     def __init__(self, problem: Problem, settings: Settings, console: Console) -> None:

@@ -14,9 +14,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.outcome import Outcome
-from optimize.tables import interval_of_value
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.tables import interval_of_value
 from tisim.plotting.style import empty, letters, plain, scale_of, superscripts
 
 _FRONT_COLOUR, _MANY_STARTS_COLOUR, _FEW_STARTS_COLOUR, _CHOSEN_COLOUR = (

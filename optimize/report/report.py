@@ -14,8 +14,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from optimize.outcome import Outcome
-from optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_strings
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_strings
 from tisim.console import TERMINAL_WIDTH
 from tisim.files import pictures
 from tisim.files.atomic import replace_file
@@ -173,13 +173,13 @@ def picture(path: Path, draw: Callable[[], Figure]) -> list[Path]:
 
 
 def _convergence(outcome: Outcome) -> Figure:
-    from optimize.report.convergence import convergence_figure
+    from tisim.optimize.report.convergence import convergence_figure
 
     return convergence_figure(outcome)
 
 
 def _front(outcome: Outcome) -> Figure:
-    from optimize.report.front import front_figure
+    from tisim.optimize.report.front import front_figure
 
     return front_figure(outcome)
 

@@ -18,12 +18,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from optimize.storage import hdf5_store
-from optimize.storage.hdf5_store import Content
-from optimize.storage.journal import Journal, Mark, TableRows
-from optimize.storage.record import Record
-from optimize.storage.runs_table import RunsTable, tabulated
-from optimize.storage.table import Hdf5Table
+from tisim.optimize.storage import hdf5_store
+from tisim.optimize.storage.hdf5_store import Content
+from tisim.optimize.storage.journal import Journal, Mark, TableRows
+from tisim.optimize.storage.record import Record
+from tisim.optimize.storage.runs_table import RunsTable, tabulated
+from tisim.optimize.storage.table import Hdf5Table
 from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.ownership import ensure_writable

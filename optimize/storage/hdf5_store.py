@@ -19,9 +19,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from optimize.storage import older
-from optimize.storage.runs_table import KINDS, RunsTable, tabulated
-from optimize.storage.table import (
+from tisim.optimize.storage import older
+from tisim.optimize.storage.runs_table import KINDS, RunsTable, tabulated
+from tisim.optimize.storage.table import (
     Hdf5Table,
     dataset_names,
     read_tables,

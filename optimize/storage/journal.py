@@ -17,9 +17,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from optimize.storage import older
-from optimize.storage.record import Record, plain
-from optimize.storage.table import Hdf5Table
+from tisim.optimize.storage import older
+from tisim.optimize.storage.record import Record, plain
+from tisim.optimize.storage.table import Hdf5Table
 from tisim.files.atomic import append_at
 from tisim.files.framing import Scan, frame, scan
 from tisim.files.regular_file import content, file_status, open_descriptor

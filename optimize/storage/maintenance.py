@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from optimize.storage import hdf5_store, salvage
-from optimize.storage.cache import Cache, existing_files, file_content
-from optimize.storage.hdf5_store import Content
-from optimize.storage.journal import Journal, Mark
-from optimize.storage.record import Record
+from tisim.optimize.storage import hdf5_store, salvage
+from tisim.optimize.storage.cache import Cache, existing_files, file_content
+from tisim.optimize.storage.hdf5_store import Content
+from tisim.optimize.storage.journal import Journal, Mark
+from tisim.optimize.storage.record import Record
 from tisim.files.atomic import locked
 
 

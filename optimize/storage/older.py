@@ -15,8 +15,8 @@ from typing import Any
 import h5py
 from pydantic import BaseModel, ConfigDict
 
-from optimize.storage.record import Integer64, Record, canonical
-from optimize.storage.table import Hdf5Table
+from tisim.optimize.storage.record import Integer64, Record, canonical
+from tisim.optimize.storage.table import Hdf5Table
 
 FORMAT = "tisim evaluations 1"
 _TEXT = ("key", "problem", "reason", "design", "work")

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optimize.storage.record import Gene, Record, canonical, plain
-from optimize.storage.table import text_column
+from tisim.optimize.storage.record import Gene, Record, canonical, plain
+from tisim.optimize.storage.table import text_column
 
 Column = NDArray[Any]
 KINDS: Mapping[str, Any] = {

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import h5py
 
-from optimize.storage import hdf5_store, older
-from optimize.storage.runs_table import RunsTable, tabulated
-from optimize.storage.table import Hdf5Table, read_tables
+from tisim.optimize.storage import hdf5_store, older
+from tisim.optimize.storage.runs_table import RunsTable, tabulated
+from tisim.optimize.storage.table import Hdf5Table, read_tables
 from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.checksum import verified
@@ -47,7 +47,7 @@ def repair(path: Path, lock: Path) -> None:
 
 
 def _salvage(old: bytes) -> bytes | None:
-    command = [sys.executable, "-m", "optimize.storage.salvage"]
+    command = [sys.executable, "-m", "tisim.optimize.storage.salvage"]
     try:
         process = subprocess.run(command, input=old, capture_output=True, timeout=TIME_LIMIT, check=False)
     except subprocess.TimeoutExpired:

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from optimize.storage.record import canonical
+from tisim.optimize.storage.record import canonical
 from tisim.errors import must
 
 _OWN_ATTRIBUTES = ("columns", "crc32")

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import norm
 
-from optimize.surrogate.belief import Belief
-from optimize.surrogate.gaussian_process import Array
-from optimize.surrogate.selection import beaten_by
+from tisim.optimize.surrogate.belief import Belief
+from tisim.optimize.surrogate.gaussian_process import Array
+from tisim.optimize.surrogate.selection import beaten_by
 
 _CONFIDENCE = 1.0
 """Standard deviations between the mean and the bound that several costs are judged by."""

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.stats import yeojohnson
 
-from optimize.methods.individual import Individual
-from optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
-from optimize.surrogate.selection import representative, thinned
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
+from tisim.optimize.surrogate.selection import representative, thinned
 
 MOST_LEARNED = 500
 """Designs from which a process is made, at most."""

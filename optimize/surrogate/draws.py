@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from optimize.surrogate.gaussian_process import Array, GaussianProcess
+from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess
 
 _COSINES = 512
 """Cosines of which a function is a sum."""

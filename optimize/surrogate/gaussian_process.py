@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
-from optimize.surrogate.selection import representative
+from tisim.optimize.surrogate.selection import representative
 
 Array = NDArray[np.float64]
 

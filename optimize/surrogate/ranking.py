@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from optimize.methods.individual import Individual
-from optimize.problem.genome import Genome
-from optimize.surrogate.belief import Belief, all_exact
-from optimize.surrogate.selection import beaten_by
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.genome import Genome
+from tisim.optimize.surrogate.belief import Belief, all_exact
+from tisim.optimize.surrogate.selection import beaten_by
 
 _UNSEEN = 1e-4
 """A nugget below this part of the variance of all costs is taken for no noise, where noise is not known."""

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from optimize.methods.individual import Individual
-from optimize.problem.genome import Genome
-from optimize.surrogate.acquisition import Worth
-from optimize.surrogate.belief import Belief
-from optimize.surrogate.gaussian_process import Array
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.genome import Genome
+from tisim.optimize.surrogate.acquisition import Worth
+from tisim.optimize.surrogate.belief import Belief
+from tisim.optimize.surrogate.gaussian_process import Array
 
 _FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-3
 """Half-widths of the region in the unit cube: at first, the largest, and that at which it has converged."""

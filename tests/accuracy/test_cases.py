@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cases.agglomeration import scene as agglomeration
-from cases.blast import scene as blast
-from cases.case import every
-from cases.vibration import scene as vibration
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.blast import scene as blast
+from tisim.cases.case import every
+from tisim.cases.vibration import scene as vibration
 from tests.scenes import simulate
 from tisim import Box, Particles
 from tisim.accuracy.quantity import estimate

@@ -25,7 +25,7 @@ from tisim.effects import Impact
 from tisim.effects import Agglomeration
 effects = [Impact(hardness=1e6), Agglomeration()]
 if full:
-    from cases.agglomeration import scene as agglomeration
+    from tisim.cases.agglomeration import scene as agglomeration
     effects = agglomeration.scene({**agglomeration.BEST, "hardness": 1e6}, 0).effects
 scenes = [
     Scene(
@@ -36,7 +36,7 @@ scenes = [
 ]
 """
 VIBRATION = """
-from cases.vibration.scene import RATIOS, scene
+from tisim.cases.vibration.scene import RATIOS, scene
 scenes = [scene(ratio, duration=1e-4) for ratio in RATIOS]
 """
 IMPACT = "effects.impact."

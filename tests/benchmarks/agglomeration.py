@@ -26,9 +26,9 @@ import agglomeration_numba as peer
 import numba
 import numpy as np
 
-from cases.agglomeration.problem import cost
-from cases.agglomeration.published_strings import designs
-from cases.agglomeration.scene import DURATION, scene
+from tisim.cases.agglomeration.problem import cost
+from tisim.cases.agglomeration.published_strings import designs
+from tisim.cases.agglomeration.scene import DURATION, scene
 from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime

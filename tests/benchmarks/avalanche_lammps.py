@@ -25,8 +25,8 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from cases.avalanche.measures import grains_volume, heap_volume, repose  # noqa: E402
-from cases.avalanche.scene import (  # noqa: E402
+from tisim.cases.avalanche.measures import grains_volume, heap_volume, repose  # noqa: E402
+from tisim.cases.avalanche.scene import (  # noqa: E402
     DIAMETERS,
     GRAVITY,
     IRON_DESIGN,
@@ -38,7 +38,7 @@ from cases.avalanche.scene import (  # noqa: E402
     time_unit,
     young,
 )
-from cases.avalanche.sizes import Cell  # noqa: E402
+from tisim.cases.avalanche.sizes import Cell  # noqa: E402
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402

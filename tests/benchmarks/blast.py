@@ -19,7 +19,7 @@ import blast_numba as peer
 import numba
 import numpy as np
 
-from cases.blast.scene import AIR, FLUX, VISCOSITY, scene
+from tisim.cases.blast.scene import AIR, FLUX, VISCOSITY, scene
 from tests.benchmarks.turns import rest, spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime

@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
-from cases.avalanche.measures import repose
-from cases.avalanche.problem import EXAMPLE, KNOWN, other_runs
+from tisim.cases.avalanche.measures import repose
+from tisim.cases.avalanche.problem import EXAMPLE, KNOWN, other_runs
 from tisim.analysis import Mean
 
 

@@ -16,11 +16,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
-from cases.mrf_shear import published
-from cases.mrf_shear.grains import LARGE_RADIUS
-from cases.mrf_shear.measures import shear_stress
-from cases.mrf_shear.scene import SEARCHED, impact_step, scene
-from cases.runs import overlap, sound
+from tisim.cases.mrf_shear import published
+from tisim.cases.mrf_shear.grains import LARGE_RADIUS
+from tisim.cases.mrf_shear.measures import shear_stress
+from tisim.cases.mrf_shear.scene import SEARCHED, impact_step, scene
+from tisim.cases.runs import overlap, sound
 from tisim.analysis import Mean
 
 

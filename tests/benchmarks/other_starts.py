@@ -18,9 +18,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
-from cases.case import every
-from cases.runs import OTHER_STARTS
-from optimize import Problem
+from tisim.cases.case import every
+from tisim.cases.runs import OTHER_STARTS
+from tisim.optimize import Problem
 from tisim import Result
 from tisim.analysis import Mean
 

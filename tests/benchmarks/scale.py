@@ -26,8 +26,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import tisim
-from cases.agglomeration.scene import BEST
-from cases.agglomeration.scene import scene as agglomeration
+from tisim.cases.agglomeration.scene import BEST
+from tisim.cases.agglomeration.scene import scene as agglomeration
 from tisim.backend import memory, runtime
 from tisim.effects import Gravity, Walls
 from tisim.geometry import Plane

@@ -27,9 +27,9 @@ import near_field
 import numpy as np
 
 import tisim
-from cases.agglomeration import CASE as AGGLOMERATION
-from cases.blast.scene import scene as blast
-from cases.capture.scene import scene as capture
+from tisim.cases.agglomeration import CASE as AGGLOMERATION
+from tisim.cases.blast.scene import scene as blast
+from tisim.cases.capture.scene import scene as capture
 from tisim.backend import runtime
 
 SECONDS = 1.0

@@ -32,17 +32,17 @@ import numpy as np
 from search_peers import ONE, SEVERAL, Spent
 from search_problems import TASKS, Task
 
-import optimize
+from tisim import optimize
 import tisim
-from optimize import Problem
-from optimize.evaluation.evaluator import BatchEvaluator
-from optimize.evaluation.function_evaluator import FunctionEvaluator
-from optimize.evaluation.runs import Evaluator, start_seed
-from optimize.methods.base import every
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
-from optimize.surrogate.selection import beaten_by
+from tisim.optimize import Problem
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
+from tisim.optimize.evaluation.runs import Evaluator, start_seed
+from tisim.optimize.methods.base import every
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.surrogate.selection import beaten_by
 from tisim.analysis import Mean
 
 FRESH = 10**6

@@ -9,18 +9,18 @@ import numpy as np
 from scipy.constants import elementary_charge, proton_mass
 
 import tisim
-from cases.agglomeration.problem import problem as agglomeration
-from cases.avalanche.problem import problem as avalanche
-from cases.blast.problem import problem as blast
-from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH
-from cases.capture.problem import STREAM_GENES
-from cases.capture.problem import problem as capture
-from cases.mrf_shear.problem import problem as mrf_shear
-from cases.valve.problem import problem as valve
-from cases.vibration.problem import GENES as VIBRATION_GENES
-from cases.vibration.problem import closed_form
-from cases.vibration.problem import problem as vibration
-from optimize import Gene, Genome, Objective, Problem
+from tisim.cases.agglomeration.problem import problem as agglomeration
+from tisim.cases.avalanche.problem import problem as avalanche
+from tisim.cases.blast.problem import problem as blast
+from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH
+from tisim.cases.capture.problem import STREAM_GENES
+from tisim.cases.capture.problem import problem as capture
+from tisim.cases.mrf_shear.problem import problem as mrf_shear
+from tisim.cases.valve.problem import problem as valve
+from tisim.cases.vibration.problem import GENES as VIBRATION_GENES
+from tisim.cases.vibration.problem import closed_form
+from tisim.cases.vibration.problem import problem as vibration
+from tisim.optimize import Gene, Genome, Objective, Problem
 from tisim.effects import Lorentz
 from tisim.sources import MagneticField
 from tisim.steppers import Boris, FixedStep

@@ -20,10 +20,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from cases.agglomeration import scene as agglomeration
-from cases.agglomeration.published_strings import designs
-from cases.capture import scene as capture
-from cases.vibration import scene as vibration
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.agglomeration.published_strings import designs
+from tisim.cases.capture import scene as capture
+from tisim.cases.vibration import scene as vibration
 from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime

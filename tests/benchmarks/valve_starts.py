@@ -14,8 +14,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import tisim
-from cases.valve.runs import ARRESTED, flows, left, left_of
-from cases.valve.scene import FIELD, scene
+from tisim.cases.valve.runs import ARRESTED, flows, left, left_of
+from tisim.cases.valve.scene import FIELD, scene
 
 
 def main() -> None:

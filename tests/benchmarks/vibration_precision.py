@@ -29,7 +29,7 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from cases.vibration import scene as vibration
+from tisim.cases.vibration import scene as vibration
 from tisim import Simulation
 from tisim.backend import runtime
 from tisim.plotting.style import empty, letters, plain

@@ -4,7 +4,7 @@ import inspect
 
 import pytest
 
-from cases.case import Late, every
+from tisim.cases.case import Late, every
 from tisim import InputError
 
 INVERSE = [name for name, case in every().items() if case.problem]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import mu_0
 
-from cases.dipoles import attraction_in_line
+from tisim.cases.dipoles import attraction_in_line
 
 
 def test_the_attraction_is_the_slope_of_the_energy():

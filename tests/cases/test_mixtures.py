@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cases import mixtures
+from tisim.cases import mixtures
 from tisim.packing.grains import draw, masses
 
 

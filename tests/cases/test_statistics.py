@@ -1,7 +1,7 @@
 """Means, claims and checks: what they hold, and what is shown of them."""
 
-from cases.case import Check
-from cases.statistics import Claim, Shown
+from tisim.cases.case import Check
+from tisim.cases.statistics import Claim, Shown
 from tisim.analysis import Mean
 
 

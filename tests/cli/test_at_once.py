@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from cases import case as catalogue
-from cases.case import Case, Size
+from tisim.cases import case as catalogue
+from tisim.cases.case import Case, Size
 from tests.accuracy.scenes import only, oscillator
 from tisim.files import lock
 

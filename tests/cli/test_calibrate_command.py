@@ -4,8 +4,8 @@ import csv
 
 import pytest
 
-from cases.case import Size
-from cases.granular_bench import scene as draw_down
+from tisim.cases.case import Size
+from tisim.cases.granular_bench import scene as draw_down
 
 SMALL = {"number": 250, "silo": 4.0, "outlet": 5.0, "disc": 5.0, "drop": 3.0, "duration": 0.6}
 SEARCH = [

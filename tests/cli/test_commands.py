@@ -1,7 +1,7 @@
 """The commands that tell something: cases, explain, check, doctor."""
 
-from cases import case as catalogue
-from cases.case import Case, Check
+from tisim.cases import case as catalogue
+from tisim.cases.case import Case, Check
 
 
 def test_cases_explain_and_version(tisim):

@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 from typer.main import get_command
 
-from cases.case import every
+from tisim.cases.case import every
 from tests.accuracy.scenes import only, oscillator
 from tests.own_files import LAW
 from tisim import InputError

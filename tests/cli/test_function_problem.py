@@ -7,7 +7,7 @@ import pytest
 from tisim.cli.main import main
 
 TEXT = """
-from optimize import Choice, Gene, Problem
+from tisim.optimize import Choice, Gene, Problem
 
 
 def worth(design):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from optimize.storage.cache import Cache
+from tisim.optimize.storage.cache import Cache
 from tests.own_files import LAW, PROBLEM
 
 SEARCH = ["optimize", "my_drift.py", "--out", "s"]
@@ -71,7 +71,7 @@ def test_methods_are_compared_on_a_problem(tisim, own_file):
 
 
 CASE = """
-from cases.case import Case, Check, Size
+from tisim.cases.case import Case, Check, Size
 
 
 def check():
@@ -88,7 +88,7 @@ CASE = Case(
 def test_what_is_only_shown_is_not_judged(tisim, own_file):
     more = "Shown('three', 3.0, 'more')", "Check('one', 1.0, 2.0, 0.0)"
     wrong = CASE.replace("4.0, 0.0)", "\n    yield ".join(("4.0, 0.0)", *more)))
-    own_file("my_case.py", PROBLEM + "from cases.statistics import Shown\n" + wrong)
+    own_file("my_case.py", PROBLEM + "from tisim.cases.statistics import Shown\n" + wrong)
     code, out, err = tisim("check", "my_case.py")
     assert code == 1
     assert "1 of 2 checks failed" in err

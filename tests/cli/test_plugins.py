@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from optimize.storage.cache import Cache
+from tisim.optimize.storage.cache import Cache
 from tests.own_files import LAW, METHOD, PROBLEM
 from tisim import Scene
 

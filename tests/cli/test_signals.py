@@ -75,7 +75,7 @@ def test_run_saves_a_checkpoint(tisim, toml, tmp_path, monkeypatch, press_ctrl_c
 
 @pytest.mark.long
 def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c):
-    monkeypatch.setattr("cases.case.every", lambda: {CASE.name: CASE})
+    monkeypatch.setattr("tisim.cases.case.every", lambda: {CASE.name: CASE})
     press_ctrl_c(monkeypatch, after=9, number=signal.SIGTERM)
     code, _, err = tisim("compare", "drift", "--methods", "random", "--out", "c")
     assert code == 143

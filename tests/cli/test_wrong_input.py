@@ -10,7 +10,7 @@ from typing import get_args, get_type_hints
 import pytest
 from typer.main import get_command
 
-from cases.case import every
+from tisim.cases.case import every
 from tisim.cli.main import app
 
 CASES = ", ".join(sorted(every()))

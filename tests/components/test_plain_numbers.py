@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tisim
-from optimize import Gene
+from tisim.optimize import Gene
 from tisim.effects import Gravity
 from tisim.steppers import Collocation, FixedStep
 

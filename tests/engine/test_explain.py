@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from cases.agglomeration.scene import BEST
-from cases.agglomeration.scene import scene as agglomeration
-from cases.vibration.scene import scene as vibration
+from tisim.cases.agglomeration.scene import BEST
+from tisim.cases.agglomeration.scene import scene as agglomeration
+from tisim.cases.vibration.scene import scene as vibration
 from tests.effects.contact.grains import heap
 from tests.interactions.test_self_consistent import Potential
 from tests.scenes import scene

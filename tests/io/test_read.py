@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import tisim
-from optimize.storage import hdf5_store
-from optimize.storage.cache import Cache
+from tisim.optimize.storage import hdf5_store
+from tisim.optimize.storage.cache import Cache
 from tests.accuracy.scenes import oscillator
 from tests.scenes import compiled, flow, scene
 from tisim import InputError, Recording, Result, Scene, Status
@@ -180,7 +180,7 @@ def test_rows_of_a_study(tmp_path):
         (
             "search.h5",
             hdf5_store.build_image([], {}),
-            "a search is read by `optimize.read`",
+            "a search is read by `tisim.optimize.read`",
         ),
         (".", None, r"folder must be one with a whole run or study \(what an interrupted run has left"),
     ],

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from optimize.storage.cache import Cache
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import RunError
 
@@ -82,8 +82,8 @@ def limited(path, size):
 
 def search(path):
     """A search that names each evaluation as soon as it counts as finished."""
-    from optimize.search import search as run
-    from optimize.settings import Settings
+    from tisim.optimize.search import search as run
+    from tisim.optimize.settings import Settings
 
     announce()
     with Cache(path) as cache:
@@ -125,8 +125,8 @@ class Asleep:
 
 def asleep():
     """Two worker processes that are busy, and a parent that waits for them."""
-    from optimize.evaluation.executors.processes import Processes
-    from optimize.evaluation.executors.worker import WorkerSettings
+    from tisim.optimize.evaluation.executors.processes import Processes
+    from tisim.optimize.evaluation.executors.worker import WorkerSettings
 
     pool = Processes(2)
     futures = [pool.submit([Asleep()], WorkerSettings()) for _ in range(2)]
@@ -138,7 +138,7 @@ def asleep():
 
 def tisim(*arguments):
     """The command, naming each evaluation."""
-    from cases import case
+    from tisim.cases import case
     from tests.optimize.drift_case import CASE
     from tisim.cli.main import main
 

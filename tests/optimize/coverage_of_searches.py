@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import optimize
-from optimize import Gene, Problem
+from tisim import optimize
+from tisim.optimize import Gene, Problem
 
 GENES = (Gene("x", "", 0.0, 1.0), Gene("y", "", 0.0, 1.0))
 

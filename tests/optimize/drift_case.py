@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cases.case import Case, Size
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.problem import Problem
+from tisim.cases.case import Case, Size
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.problem import Problem
 from tisim import Box, Cloud, Scene
 from tisim.steppers import FixedStep, Verlet
 

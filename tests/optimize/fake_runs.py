@@ -8,11 +8,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.methods.individual import Individual
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.problem import Problem
-from optimize.storage.record import Record, evaluation_key
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.storage.record import Record, evaluation_key
 
 
 class FakeScene:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-import optimize
-from optimize.problem.genes import Gene
-from optimize.problem.problem import Problem
+from tisim import optimize
+from tisim.optimize.problem.genes import Gene
+from tisim.optimize.problem.problem import Problem
 
 
 def noisy(design, seed):

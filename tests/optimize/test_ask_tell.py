@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-import optimize
-from optimize import AskTell, Choice, DesignConstraint, Gene, Genome, Objective, ResultConstraint
-from optimize.ask_tell import SAME
-from optimize.methods.base import every
-from optimize.search import search
-from optimize.settings import Settings
+from tisim import optimize
+from tisim.optimize import AskTell, Choice, DesignConstraint, Gene, Genome, Objective, ResultConstraint
+from tisim.optimize.ask_tell import SAME
+from tisim.optimize.methods.base import every
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
 

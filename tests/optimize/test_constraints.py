@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-import optimize
-from optimize import Gene, Objective, Problem, ResultConstraint
+from tisim import optimize
+from tisim.optimize import Gene, Objective, Problem, ResultConstraint
 
 GENES = (Gene("x", "m", 0.0, 1.0), Gene("y", "m", 0.0, 1.0))
 

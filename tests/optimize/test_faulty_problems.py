@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError, RunError
 

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import optimize
-from optimize.problem.fingerprint import fingerprint
+from tisim import optimize
+from tisim.optimize.problem.fingerprint import fingerprint
 from tests.optimize.drift_case import problem
 from tisim import InputError
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import optimize
+from tisim import optimize
 import tisim
-from optimize import FitnessRecord, Gene, Genome, Objective, Problem
+from tisim.optimize import FitnessRecord, Gene, Genome, Objective, Problem
 from tisim import InputError, RunError
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity

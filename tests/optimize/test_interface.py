@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import optimize
+from tisim import optimize
 from tests.optimize.drift_case import distance, problem
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
@@ -100,7 +100,7 @@ def test_other_threads_wait_until_a_search_is_over(monkeypatch):
 
     outcomes, fake = [], fake_problem()
     with ThreadPoolExecutor(1) as other:
-        monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
+        monkeypatch.setattr("tisim.optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
         optimize.run(replace(fake, scene=look), **SMALL)
         assert outcomes
         assert not any(outcomes)

@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from optimize.storage.cache import Cache, existing
-from optimize.storage.maintenance import verify
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import verify
 from tests.optimize.cache_files import PIPE, worker
 from tisim import InputError
 from tisim.files import lock

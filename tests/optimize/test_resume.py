@@ -2,10 +2,10 @@ import random
 
 import pytest
 
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
-from optimize.storage.maintenance import verify
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.maintenance import verify
 from tests.optimize.cache_files import PIPE, worker
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 

@@ -6,14 +6,14 @@ import random
 import numpy as np
 import pytest
 
-from optimize.evaluation.ensemble import FRESH, EnsembleSettings
-from optimize.evaluation.runs import start_seed
-from optimize.methods.operators import GeneticOperator
-from optimize.search import search
-from optimize.search_records import searches
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
-from optimize.storage.maintenance import verify
+from tisim.optimize.evaluation.ensemble import FRESH, EnsembleSettings
+from tisim.optimize.evaluation.runs import start_seed
+from tisim.optimize.methods.operators import GeneticOperator
+from tisim.optimize.search import search
+from tisim.optimize.search_records import searches
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.maintenance import verify
 from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
 from tisim import InputError, RunError
 

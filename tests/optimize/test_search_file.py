@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-import optimize
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.objective import Objective
-from optimize.search import search
-from optimize.search_folder import SEARCH_FILE
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim import optimize
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.search import search
+from tisim.optimize.search_folder import SEARCH_FILE
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
 

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.hall_of_fame import Hall, compromise
-from optimize.methods.individual import Individual
-from optimize.outcome import Outcome
-from optimize.problem.objective import Objective
-from optimize.report import report
-from optimize.report.front import front_figure, others
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache, existing
-from optimize.storage.maintenance import compact, verify
-from optimize.storage.record import Record
+from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.hall_of_fame import Hall, compromise
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.report import report
+from tisim.optimize.report.front import front_figure, others
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import compact, verify
+from tisim.optimize.storage.record import Record
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import optimize
-from optimize.problem.constraint import DesignConstraint
-from optimize.report import report
-from optimize.report.analysis import Analysis
-from optimize.storage.cache import Cache, existing
-from optimize.storage.maintenance import verify
+from tisim import optimize
+from tisim.optimize.problem.constraint import DesignConstraint
+from tisim.optimize.report import report
+from tisim.optimize.report.analysis import Analysis
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import verify
 from tests.optimize.cache_files import PIPE, worker
 from tests.optimize.shared_case import problem, searched
 from tisim import InputError

@@ -5,21 +5,21 @@ import math
 import numpy as np
 import pytest
 
-import optimize
-from optimize.beginning import Beginning
-from optimize.designs_csv import designs
-from optimize.experiments import combined, experiments, restored, table_of
-from optimize.methods.base import every
-from optimize.methods.cma_es import CmaEs
-from optimize.methods.individual import Individual
-from optimize.problem.constraint import ResultConstraint
-from optimize.problem.genes import Choice, Gene
-from optimize.problem.given_genes import DependentGene, FixedGene
-from optimize.problem.objective import Objective
-from optimize.problem.problem import Problem
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim import optimize
+from tisim.optimize.beginning import Beginning
+from tisim.optimize.designs_csv import designs
+from tisim.optimize.experiments import combined, experiments, restored, table_of
+from tisim.optimize.methods.base import every
+from tisim.optimize.methods.cma_es import CmaEs
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.constraint import ResultConstraint
+from tisim.optimize.problem.genes import Choice, Gene
+from tisim.optimize.problem.given_genes import DependentGene, FixedGene
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.problem import Problem
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
 from tests.optimize.methods.test_methods import method_named, quiet, worth
 from tisim import InputError
@@ -119,7 +119,7 @@ def test_best_csv_can_be_given(tmp_path):
     bowls = fake_problem(2, met_at=0.6)
     with Cache(tmp_path / "met.h5") as cache:
         outcome = search(bowls, FakeEvaluator(), cache, Settings(generations=2))
-    from optimize.report.report import met_csv
+    from tisim.optimize.report.report import met_csv
 
     (tmp_path / "met.csv").write_bytes(met_csv(outcome))
     assert len(designs(tmp_path / "met.csv", bowls)) > 0

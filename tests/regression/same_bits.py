@@ -39,7 +39,7 @@ RUNS = (
 def fingerprint(name: str, size: str, part: float) -> str:
     """SHA-256, hexadecimal, of what one case gives from its start number 1."""
     import tisim
-    from cases.case import every
+    from tisim.cases.case import every
     from tisim.io.reader import frames
 
     scene = every()[name].scene(size, 1)
@@ -66,7 +66,7 @@ def _add(digest: Any, arrays: dict[str, np.ndarray]) -> None:
 
 def checked(name: str) -> dict[str, str]:
     """All numbers that the checks of a case find, by what they are of, bit by bit."""
-    from cases.case import every
+    from tisim.cases.case import every
 
     return {item.name: repr(item) for item in every()[name].check()}
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, FILTER_PARTICLES, FLOW_SPEED
-from cases.capture.problem import GENES, problem
+from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, FILTER_PARTICLES, FLOW_SPEED
+from tisim.cases.capture.problem import GENES, problem
 from tisim.backend import runtime
 
 CAUGHT = {

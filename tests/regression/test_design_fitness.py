@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.blast import problem as blast
-from cases.vibration import problem as vibration
+from tisim.cases.blast import problem as blast
+from tisim.cases.vibration import problem as vibration
 from tisim.backend import runtime
 
 VIBRATION = {

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import tisim
-from optimize import FitnessRecord
+from tisim.optimize import FitnessRecord
 from tests.regression import fitness_record
 from tisim.scene.scene import PHYSICS_VERSION
 

@@ -142,14 +142,14 @@ def _rows(path: Path) -> list[str]:
 
 
 def _record(k: int):
-    from optimize.storage.record import Record
+    from tisim.optimize.storage.record import Record
 
     values = {"fitness": 1 / (k + 3)}
     return Record(f"{k:064x}", "soak", values, True, "", k, {"x": k / 7}, {"steps": k}, 0.1, 1e9 + k)
 
 
 def _journal(folder: Path) -> Path:
-    from optimize.storage.cache import Cache
+    from tisim.optimize.storage.cache import Cache
 
     cache = Cache(folder / "search.h5")
     for k in range(20):
@@ -158,7 +158,7 @@ def _journal(folder: Path) -> Path:
 
 
 def _search(folder: Path) -> Path:
-    from optimize.storage.cache import Cache
+    from tisim.optimize.storage.cache import Cache
 
     with Cache(folder / "search.h5") as cache:
         for k in range(20):
@@ -168,7 +168,7 @@ def _search(folder: Path) -> Path:
 
 
 def _records(path: Path) -> list[str]:
-    from optimize.storage.cache import existing
+    from tisim.optimize.storage.cache import existing
 
     cache = existing(path.parent / "search.h5")
     tables = [repr(cache.table(name)) for name in cache.tables()]
@@ -234,7 +234,7 @@ def _measurements(folder: Path) -> Path:
 
 
 def _calibration(path: Path) -> list[str]:
-    from cases.granular_bench.measured import read
+    from tisim.cases.granular_bench.measured import read
 
     return [repr(sorted(read(path).items()))]
 

@@ -15,8 +15,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from optimize.storage.cache import Cache, existing
-from optimize.storage.maintenance import verify
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import verify
 from tests.soak.counts import Counts
 from tisim.backend.kernel_cache import LOCKS
 from tisim.backend.runtime import cores

@@ -116,7 +116,7 @@ def init(
 
     threads : CPU threads; 0 for all cores. arithmetic : "strict" or "fast"; see ``Runtime``.
     Raises InputError when a setting is unknown or the device is absent. A change of settings waits until what
-    ``tisim.run``, ``tisim.accuracy.study`` or ``optimize.run`` do in other threads is over. It invalidates
+    ``tisim.run``, ``tisim.accuracy.study`` or ``tisim.optimize.run`` do in other threads is over. It invalidates
     every Simulation made before; those say so when used. Raises RunError in a process that was forked from
     one where Taichi had been started.
     """

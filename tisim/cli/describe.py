@@ -35,7 +35,7 @@ Everything = Annotated[
 
 def cases() -> None:
     """List the cases."""
-    from cases.case import every
+    from tisim.cases.case import every
 
     for case in every().values():
         out().print(Text.assemble((case.name, "bold"), f"  {case.title}\n    {case.source}"))

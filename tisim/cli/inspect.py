@@ -77,7 +77,7 @@ def plot(
 
 def _pictures(trajectory: Frames) -> dict[str, Figure]:
     """Return the figures of a trajectory by the names of their files."""
-    from cases.case import every
+    from tisim.cases.case import every
     from tisim.plotting import loads, time_series
 
     drawn = {

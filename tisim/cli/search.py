@@ -113,11 +113,11 @@ def optimize(
 
     All goes to search.h5. The same command, given again, goes on where it was stopped.
     """
-    from optimize.beginning import Beginning
-    from optimize.evaluation.executors import evaluator_for
-    from optimize.search_folder import SEARCH_FILE, resume_or_clear
-    from optimize.session import session
-    from optimize.settings import Settings, fit, proposed, without_dependent_options
+    from tisim.optimize.beginning import Beginning
+    from tisim.optimize.evaluation.executors import evaluator_for
+    from tisim.optimize.search_folder import SEARCH_FILE, resume_or_clear
+    from tisim.optimize.session import session
+    from tisim.optimize.settings import Settings, fit, proposed, without_dependent_options
 
     problem, defaults = targets.inverse_problem(case, size, variant, measured)
     problem = problem.fix(**scene_arguments.assignments(fixed or (), "--fix"))
@@ -182,10 +182,10 @@ def compare(
 
     The same command, given again, goes on where it was stopped; other methods and numbers take in its runs.
     """
-    from optimize.evaluation.executors import evaluator_for
-    from optimize.report import comparison
-    from optimize.settings import without_dependent_options
-    from optimize.storage.cache import Cache
+    from tisim.optimize.evaluation.executors import evaluator_for
+    from tisim.optimize.report import comparison
+    from tisim.optimize.settings import without_dependent_options
+    from tisim.optimize.storage.cache import Cache
 
     problem, defaults = targets.inverse_problem(case, size, variant, measured)
     problem = problem.fix(**scene_arguments.assignments(fixed or (), "--fix"))
@@ -230,8 +230,8 @@ def cache(
     compact: Annotated[bool, typer.Option("--compact", help="Drop what is damaged or double.")] = False,
 ) -> None:
     """List the evaluations in a search's file; verify or compact it."""
-    from optimize.report.cache_summary import summary
-    from optimize.storage import maintenance
+    from tisim.optimize.report.cache_summary import summary
+    from tisim.optimize.storage import maintenance
 
     if compact:
         print(f"{maintenance.compact(file)} evaluations kept")

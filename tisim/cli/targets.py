@@ -17,8 +17,8 @@ from tisim.files import python_file
 from tisim.scene import plugins
 
 if TYPE_CHECKING:
-    from cases.case import Case
-    from optimize.problem.problem import Problem
+    from tisim.cases.case import Case
+    from tisim.optimize.problem.problem import Problem
 
 
 OWN_FILE = "or your own NAME.py with a CASE"
@@ -30,7 +30,7 @@ def case(target: str, alternatives: str = OWN_FILE) -> Case:
 
     alternatives : what may be given beside a name, for the message.
     """
-    from cases.case import Case, every
+    from tisim.cases.case import Case, every
 
     if not is_python_file(target):
         known = every()
@@ -74,7 +74,7 @@ def is_python_file(target: str) -> bool:
 def _problem(
     module: ModuleType, target: str, size: str | None, variant: str | None
 ) -> tuple[Problem, Mapping[str, Any]]:
-    from optimize.problem.problem import Problem
+    from tisim.optimize.problem.problem import Problem
 
     must(isinstance(module.PROBLEM, Problem), f"PROBLEM of {target}", "an optimize.Problem", module.PROBLEM)
     must(size is None, "--size", "given for a case only", size)

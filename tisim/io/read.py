@@ -61,7 +61,7 @@ def _read_hdf5(path: Path) -> Any:
 
     with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", READABLE)), "r") as file:
         kind = str(file.attrs.get("format", "none"))
-    rule = f"{READABLE}; a search is read by `optimize.read`, and listed by `tisim cache`"
+    rule = f"{READABLE}; a search is read by `tisim.optimize.read`, and listed by `tisim cache`"
     must(not kind.startswith(SEARCH_FORMAT), "file to read", rule, Words(f"{path}, of a search"))
     readers: dict[str, Callable[[Path], Any]] = {
         RESULT: run_folder.read_result,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from optimize.evaluation.evaluator import BatchEvaluator
-from optimize.evaluation.function_evaluator import FunctionEvaluator
-from optimize.evaluation.runs import Evaluator
-from optimize.problem.problem import Problem
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
+from tisim.optimize.evaluation.runs import Evaluator
+from tisim.optimize.problem.problem import Problem
 from tisim.backend import runtime
 from tisim.errors import must
 
@@ -45,17 +45,17 @@ def evaluator_named(
         runtime.init(device, precision, threads, arithmetic)
         return BatchEvaluator()
     # Imported late: nobody needs the one for the other, and Dask may not be there at all.
-    from optimize.evaluation.executors.remote import Remote
-    from optimize.evaluation.executors.worker import WorkerSettings
+    from tisim.optimize.evaluation.executors.remote import Remote
+    from tisim.optimize.evaluation.executors.worker import WorkerSettings
 
     worker_settings = WorkerSettings(device, precision, threads, arithmetic)
     if kind == "processes":
-        from optimize.evaluation.executors.processes import Processes
+        from tisim.optimize.evaluation.executors.processes import Processes
 
         able = rest.isdecimal() and len(rest) < 5 and int(rest) >= 1
         must(able, "executor", "processes:N with N >= 1 and of at most 4 digits", name)
         return Remote(Processes(int(rest)), worker_settings)
-    from optimize.evaluation.executors.dask_cluster import DaskCluster
+    from tisim.optimize.evaluation.executors.dask_cluster import DaskCluster
 
     must(rest.startswith("//") and len(rest) > 2, "executor", RULE, name)
     return Remote(DaskCluster(rest[2:]), worker_settings)

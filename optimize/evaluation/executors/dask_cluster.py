@@ -9,8 +9,8 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from optimize.evaluation.executors import handshake, worker
-from optimize.evaluation.executors.worker import Answer, WorkerSettings
+from tisim.optimize.evaluation.executors import handshake, worker
+from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
 from tisim import InputError, RunError, Scene
 from tisim.errors import must
 

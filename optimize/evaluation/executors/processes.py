@@ -10,9 +10,9 @@ import threading
 from collections.abc import Iterator, Sequence
 from multiprocessing import resource_tracker
 
-from optimize.evaluation.executors import worker
-from optimize.evaluation.executors.remote import Lost
-from optimize.evaluation.executors.worker import Answer, WorkerSettings
+from tisim.optimize.evaluation.executors import worker
+from tisim.optimize.evaluation.executors.remote import Lost
+from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
 from tisim import RunError, Scene
 from tisim.backend import runtime
 

@@ -6,8 +6,8 @@ import concurrent.futures as cf
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
-from optimize.evaluation.executors import handshake
-from optimize.evaluation.executors.worker import Answer, WorkerSettings
+from tisim.optimize.evaluation.executors import handshake
+from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
 from tisim import Result, RunError, Scene
 
 UNITS = 2

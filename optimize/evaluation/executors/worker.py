@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any
 
-from optimize.evaluation.evaluator import BatchEvaluator
-from optimize.evaluation.executors import handshake
-from optimize.evaluation.function_evaluator import FunctionEvaluator
-from optimize.problem.function import FunctionCall
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.evaluation.executors import handshake
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
+from tisim.optimize.problem.function import FunctionCall
 from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
 from tisim.files import python_file

@@ -8,10 +8,10 @@ from scipy.constants import epsilon_0, mu_0
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from cases.agglomeration import CASE, field_checks, fields
-from cases.agglomeration.problem import problem
-from cases.agglomeration.scene import BEST, HALF_SIDE, scene
-from cases.agglomeration.what_fields_add import (
+from tisim.cases.agglomeration import CASE, field_checks, fields
+from tisim.cases.agglomeration.problem import problem
+from tisim.cases.agglomeration.scene import BEST, HALF_SIDE, scene
+from tisim.cases.agglomeration.what_fields_add import (
     FELT,
     KINDS_OF_GENES,
     Found,

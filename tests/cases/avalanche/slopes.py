@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cases.avalanche.scene import DIAMETERS
+from tisim.cases.avalanche.scene import DIAMETERS
 
 WIDTH = 6
 """Of the cells of these slopes, in diameters."""

@@ -5,17 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.avalanche import figures as drawing
-from cases.avalanche.calving import STRIP, strips_of
-from cases.avalanche.checks import of_avalanches
-from cases.avalanche.comparison import of, steeper_by
-from cases.avalanche.figures import figures
-from cases.avalanche.measures import load_on_walls
-from cases.avalanche.scaling import CONTRAST, moment_eigenvalues
-from cases.avalanche.scene import DIAMETERS, FLUX, GRAVITY, RELAXATION
-from cases.avalanche.sizes import DEFAULT, SIZES, Cell
-from cases.avalanche.stages import Avalanche, avalanches
-from cases.case import Size
+from tisim.cases.avalanche import figures as drawing
+from tisim.cases.avalanche.calving import STRIP, strips_of
+from tisim.cases.avalanche.checks import of_avalanches
+from tisim.cases.avalanche.comparison import of, steeper_by
+from tisim.cases.avalanche.figures import figures
+from tisim.cases.avalanche.measures import load_on_walls
+from tisim.cases.avalanche.scaling import CONTRAST, moment_eigenvalues
+from tisim.cases.avalanche.scene import DIAMETERS, FLUX, GRAVITY, RELAXATION
+from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
+from tisim.cases.avalanche.stages import Avalanche, avalanches
+from tisim.cases.case import Size
 from tests.cases.avalanche.slopes import WIDTH, block, leaning
 from tisim import InputError
 

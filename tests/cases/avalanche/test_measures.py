@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.avalanche.measures import (
+from tisim.cases.avalanche.measures import (
     filled_parts,
     grains_volume,
     heap_volume,
@@ -14,7 +14,7 @@ from cases.avalanche.measures import (
     repose,
     two_slopes,
 )
-from cases.avalanche.scene import DIAMETERS, GRAVITY
+from tisim.cases.avalanche.scene import DIAMETERS, GRAVITY
 from tests.cases.avalanche.slopes import WIDTH, block, leaning
 
 D = DIAMETERS[0]

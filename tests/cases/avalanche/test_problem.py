@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import optimize
+from tisim import optimize
 import tisim
-from cases.avalanche.measured import MeasuredProfile, area, read
-from cases.avalanche.measures import profile, repose
-from cases.avalanche.problem import EXAMPLE, KNOWN, calibration, measured, other_runs, simulated
-from cases.case import every
-from cases.granular_bench.measured import Measurement
-from optimize import Misfit
-from optimize.tables import met_columns
+from tisim.cases.avalanche.measured import MeasuredProfile, area, read
+from tisim.cases.avalanche.measures import profile, repose
+from tisim.cases.avalanche.problem import EXAMPLE, KNOWN, calibration, measured, other_runs, simulated
+from tisim.cases.case import every
+from tisim.cases.granular_bench.measured import Measurement
+from tisim.optimize import Misfit
+from tisim.optimize.tables import met_columns
 from tests.cases.avalanche.slopes import leaning
 from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
 from tisim import InputError

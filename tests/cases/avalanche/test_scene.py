@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.constants import mu_0
 
-from cases.avalanche.calving import pictures
-from cases.avalanche.published import SLOPES, larger
-from cases.avalanche.scaling import attraction, moment, ratio, weight
-from cases.avalanche.scene import (
+from tisim.cases.avalanche.calving import pictures
+from tisim.cases.avalanche.published import SLOPES, larger
+from tisim.cases.avalanche.scaling import attraction, moment, ratio, weight
+from tisim.cases.avalanche.scene import (
     DIAMETERS,
     FLUX,
     GRAVITY,
@@ -18,7 +18,7 @@ from cases.avalanche.scene import (
     time_unit,
     young,
 )
-from cases.avalanche.sizes import DEFAULT, SIZES, Cell
+from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
 from tests.cases.avalanche.slopes import block
 from tisim.analysis import contacts
 from tisim.effects import Walls

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cases.blast.accuracy import half_axes
-from cases.blast.scene import ENERGY, FLUX, NEIGHBOURS, NUMBER, SPECIFIC_CHARGE, SPEED, scene
-from cases.blast.shape import contacts
+from tisim.cases.blast.accuracy import half_axes
+from tisim.cases.blast.scene import ENERGY, FLUX, NEIGHBOURS, NUMBER, SPECIFIC_CHARGE, SPEED, scene
+from tisim.cases.blast.shape import contacts
 from tests.scenes import simulate
 
 SMALL = 200

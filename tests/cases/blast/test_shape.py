@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from cases.blast import CASE
-from cases.blast import scene as blast
-from cases.blast.problem import DURATION, TARGET_FLUX, details, field, misfit, problem, start
-from cases.blast.shape import ball, contacts, ellipsoid, extents, moments, principal_half_axes
-from optimize.evaluation.evaluator import BatchEvaluator
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim.cases.blast import CASE
+from tisim.cases.blast import scene as blast
+from tisim.cases.blast.problem import DURATION, TARGET_FLUX, details, field, misfit, problem, start
+from tisim.cases.blast.shape import ball, contacts, ellipsoid, extents, moments, principal_half_axes
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tisim import InputError, Result, Status
 
 

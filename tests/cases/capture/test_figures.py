@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.capture import curves, figures
-from cases.capture import scene as capture
-from cases.capture.curves import TIMES
-from cases.capture.statistics import ANGLES, ASPECTS
+from tisim.cases.capture import curves, figures
+from tisim.cases.capture import scene as capture
+from tisim.cases.capture.curves import TIMES
+from tisim.cases.capture.statistics import ANGLES, ASPECTS
 
 
 def mean_of(n):

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from cases.capture import problem as filters
-from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
-from cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
-from cases.statistics import Claim
-from optimize.evaluation.evaluator import BatchEvaluator
-from optimize.evaluation.runs import start_seed
-from optimize.report.comparison import FRESH
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim.cases.capture import problem as filters
+from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
+from tisim.cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
+from tisim.cases.statistics import Claim
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.evaluation.runs import start_seed
+from tisim.optimize.report.comparison import FRESH
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tisim import InputError, Result, Status, run
 from tisim.analysis import Mean
 from tisim.sources import MagneticCylinders, MagneticField

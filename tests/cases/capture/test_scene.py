@@ -6,9 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from cases.capture import CASE, curves, figures, statistics
-from cases.capture import scene as capture
-from cases.statistics import Claim
+from tisim.cases.capture import CASE, curves, figures, statistics
+from tisim.cases.capture import scene as capture
+from tisim.cases.statistics import Claim
 from tisim import Recording, run
 from tisim.analysis import Mean
 from tisim.io.reader import frames

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.capture.statistics import fraction
-from cases.cascade import CASE, capture_times
-from cases.cascade.capture_times import captured_at, time_to
-from cases.cascade.scene import Cascade
+from tisim.cases.capture.statistics import fraction
+from tisim.cases.cascade import CASE, capture_times
+from tisim.cases.cascade.capture_times import captured_at, time_to
+from tisim.cases.cascade.scene import Cascade
 from tisim import RandomAroundCylinder, run
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cases.cascade import figures
+from tisim.cases.cascade import figures
 
 
 def test_cascades_in_time_and_their_ratio(monkeypatch):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cases.coalescence.checks import check
+from tisim.cases.coalescence.checks import check
 
 
 @pytest.mark.slow

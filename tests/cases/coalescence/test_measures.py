@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cases.coalescence.measures import (
+from tisim.cases.coalescence.measures import (
     Asteroid,
     Conserved,
     Gathering,

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.constants import G
 
-from cases.case import Check
-from cases.coalescence.checks import of_agglomeration, of_conservation, of_structure, of_the_cloud
-from cases.coalescence.figures import asteroids, figures, forces, growth, shells, table
-from cases.coalescence.measures import Conserved, Gathering
-from cases.coalescence.published import MAGNETISATIONS
-from cases.coalescence.regime import COMPARED, regime, rotation_over_gravity
-from cases.coalescence.runs import CloudRun, clouds, of_magnetisation
-from cases.coalescence.scene import scene
+from tisim.cases.case import Check
+from tisim.cases.coalescence.checks import of_agglomeration, of_conservation, of_structure, of_the_cloud
+from tisim.cases.coalescence.figures import asteroids, figures, forces, growth, shells, table
+from tisim.cases.coalescence.measures import Conserved, Gathering
+from tisim.cases.coalescence.published import MAGNETISATIONS
+from tisim.cases.coalescence.regime import COMPARED, regime, rotation_over_gravity
+from tisim.cases.coalescence.runs import CloudRun, clouds, of_magnetisation
+from tisim.cases.coalescence.scene import scene
 from tests.cases.coalescence.test_measures import row, state_of
 from tisim import InputError
 

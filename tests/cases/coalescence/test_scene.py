@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.constants import Boltzmann, G, mu_0
 
-from cases.coalescence import published
-from cases.coalescence.scaling import (
+from tisim.cases.coalescence import published
+from tisim.cases.coalescence.scaling import (
     attraction,
     critical_spin,
     dmt_cohesion,
@@ -16,7 +16,7 @@ from cases.coalescence.scaling import (
     spin_when_packed,
     surface_weight,
 )
-from cases.coalescence.scene import (
+from tisim.cases.coalescence.scene import (
     DEFAULT,
     ROTATION,
     SIZES,

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from cases.concentration import figures
+from tisim.cases.concentration import figures
 
 
 def test_curves_of_concentrated_samples():

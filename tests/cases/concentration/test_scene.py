@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.capture.scene import SATURATION_MOMENTS
-from cases.concentration import CASE
-from cases.concentration.scene import DENSITY, DISTANCE, SIZES, coupling, longest, scene, scene_for, side
-from cases.concentration.statistics import (
+from tisim.cases.capture.scene import SATURATION_MOMENTS
+from tisim.cases.concentration import CASE
+from tisim.cases.concentration.scene import DENSITY, DISTANCE, SIZES, coupling, longest, scene, scene_for, side
+from tisim.cases.concentration.statistics import (
     CAPTURE,
     CHAINS,
     DENSE,
@@ -19,7 +19,7 @@ from cases.concentration.statistics import (
     held_fraction,
     results,
 )
-from cases.statistics import Claim
+from tisim.cases.statistics import Claim
 from tisim import Particles, RunError, Simulation, run
 from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.granular_bench.accuracy import quantities
-from cases.granular_bench.bed import bed, centre_height, impact_time, linear_stiffness, side_load
-from cases.granular_bench.sizes import scene_for
-from cases.runs import overlap
+from tisim.cases.granular_bench.accuracy import quantities
+from tisim.cases.granular_bench.bed import bed, centre_height, impact_time, linear_stiffness, side_load
+from tisim.cases.granular_bench.sizes import scene_for
+from tisim.cases.runs import overlap
 
 
 def test_quantities_of_a_bed():

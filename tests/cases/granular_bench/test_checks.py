@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.granular_bench import checks, particle_tests
-from cases.granular_bench.checks import BOUND, check, rebounds
-from cases.granular_bench.mindlin_impact import oblique_impacts
-from cases.granular_bench.shear_cell import expected_ratio
+from tisim.cases.granular_bench import checks, particle_tests
+from tisim.cases.granular_bench.checks import BOUND, check, rebounds
+from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
+from tisim.cases.granular_bench.shear_cell import expected_ratio
 
 
 @pytest.mark.slow

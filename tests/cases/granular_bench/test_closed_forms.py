@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from cases.granular_bench.closed_forms import (
+from tisim.cases.granular_bench.closed_forms import (
     HERTZ_DURATION,
     HERTZ_MEAN_DEPTH,
     bridge_force,
@@ -16,8 +16,8 @@ from cases.granular_bench.closed_forms import (
     jkr_stretch,
     reduced,
 )
-from cases.granular_bench.impacts import ParticleImpact
-from cases.granular_bench.mindlin_impact import oblique_impacts
+from tisim.cases.granular_bench.impacts import ParticleImpact
+from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
 
 
 def test_hertz():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.granular_bench.plate import DRAWN, DROPPED, rebound, scene_with_plate, sliding
-from cases.granular_bench.scene import scene
+from tisim.cases.granular_bench.plate import DRAWN, DROPPED, rebound, scene_with_plate, sliding
+from tisim.cases.granular_bench.scene import scene
 from tests.scenes import by_id
 from tisim.effects import Walls
 

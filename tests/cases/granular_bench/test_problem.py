@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import optimize
+from tisim import optimize
 import tisim
-from cases.case import every
-from cases.granular_bench import problem as calibrating
-from cases.granular_bench.measured import Measurement, read
-from cases.granular_bench.problem import (
+from tisim.cases.case import every
+from tisim.cases.granular_bench import problem as calibrating
+from tisim.cases.granular_bench.measured import Measurement, read
+from tisim.cases.granular_bench.problem import (
     EXAMPLES,
     KNOWN,
     SIMULATED,

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.granular_bench import shear_cell
-from cases.granular_bench.scene import DENSITY, DIAMETER
-from cases.granular_bench.shear_cell import (
+from tisim.cases.granular_bench import shear_cell
+from tisim.cases.granular_bench.scene import DENSITY, DIAMETER
+from tisim.cases.granular_bench.shear_cell import (
     CELL_AREA,
     CELL_LENGTH,
     CELL_SIDES,
@@ -22,7 +22,7 @@ from cases.granular_bench.shear_cell import (
     seen,
     sheared_beds,
 )
-from cases.granular_bench.shear_figure import shear_figure, shear_table
+from tisim.cases.granular_bench.shear_figure import shear_figure, shear_table
 from tisim import RunError
 from tisim.analysis import contacts
 from tisim.engine.result import Status

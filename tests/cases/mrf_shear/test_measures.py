@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.constants import mu_0
 
-from cases.mrf_shear import checks, published
-from cases.mrf_shear.flow_curve import Curve, table
-from cases.mrf_shear.grains import LARGE_RADIUS
-from cases.mrf_shear.measures import (
+from tisim.cases.mrf_shear import checks, published
+from tisim.cases.mrf_shear.flow_curve import Curve, table
+from tisim.cases.mrf_shear.grains import LARGE_RADIUS
+from tisim.cases.mrf_shear.measures import (
     area,
     magnetised_part,
     order,
@@ -18,10 +18,10 @@ from cases.mrf_shear.measures import (
     shear_stress,
     volume_fraction,
 )
-from cases.mrf_shear.regime import approach_time, magnetisation, mason_number, regime, stokes_time
-from cases.mrf_shear.runs import paired
-from cases.mrf_shear.scene import LOWER, UPPER, scene
-from cases.runs import overlap
+from tisim.cases.mrf_shear.regime import approach_time, magnetisation, mason_number, regime, stokes_time
+from tisim.cases.mrf_shear.runs import paired
+from tisim.cases.mrf_shear.scene import LOWER, UPPER, scene
+from tisim.cases.runs import overlap
 from tisim.analysis import Mean
 
 R, UM = LARGE_RADIUS, 1e-6

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from cases.mrf_shear.off_state import (
+from tisim.cases.mrf_shear.off_state import (
     RANDOM_PACKING,
     closest_packing,
     off_state_viscosity,
     relative_viscosity,
 )
-from cases.mrf_shear.published import OIL_VISCOSITY
+from tisim.cases.mrf_shear.published import OIL_VISCOSITY
 
 BETA = RANDOM_PACKING
 

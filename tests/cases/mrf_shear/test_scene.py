@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cases.case import every
-from cases.mrf_shear import published
-from cases.mrf_shear.flow_curve import COMPARED, VARIATIONS
-from cases.mrf_shear.grains import (
+from tisim.cases.case import every
+from tisim.cases.mrf_shear import published
+from tisim.cases.mrf_shear.flow_curve import COMPARED, VARIATIONS
+from tisim.cases.mrf_shear.grains import (
     DENSITY,
     LARGE_RADIUS,
     MONODISPERSE,
@@ -14,8 +14,8 @@ from cases.mrf_shear.grains import (
     mixture,
     number_of,
 )
-from cases.mrf_shear.runs import magnetised
-from cases.mrf_shear.scene import MAGNETISING_TIME, RATES, SIDES, impact_step, scene
+from tisim.cases.mrf_shear.runs import magnetised
+from tisim.cases.mrf_shear.scene import MAGNETISING_TIME, RATES, SIDES, impact_step, scene
 from tisim import InputError
 from tisim.effects import PrescribedMotion
 from tisim.operators import JoinGroup

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cases.spin_up.checks import check
+from tisim.cases.spin_up.checks import check
 
 
 @pytest.mark.slow

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.coalescence.measures import Asteroid, Conserved
-from cases.spin_up import stages
-from cases.spin_up.checks import at_least, of_conservation, of_spins
-from cases.spin_up.figures import against_spin, figures, piles, table
-from cases.spin_up.published import DEFORMATION, DISRUPTION
-from cases.spin_up.regime import regime
-from cases.spin_up.scene import NUMBERS, SIZES, scene_for
-from cases.spin_up.stages import RATES, SpinStep, SpinUp, spin_ups, turn
+from tisim.cases.coalescence.measures import Asteroid, Conserved
+from tisim.cases.spin_up import stages
+from tisim.cases.spin_up.checks import at_least, of_conservation, of_spins
+from tisim.cases.spin_up.figures import against_spin, figures, piles, table
+from tisim.cases.spin_up.published import DEFORMATION, DISRUPTION
+from tisim.cases.spin_up.regime import regime
+from tisim.cases.spin_up.scene import NUMBERS, SIZES, scene_for
+from tisim.cases.spin_up.stages import RATES, SpinStep, SpinUp, spin_ups, turn
 from tests.cases.coalescence.test_measures import block, state_of
 from tisim import InputError
 

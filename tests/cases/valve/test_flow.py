@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cases.runs import overlap
-from cases.valve.measures import clusters, drag_pressure, held_pressure, unhindered_rate
-from cases.valve.runs import FLOW_LOOKS, flows
-from cases.valve.scene import scene
+from tisim.cases.runs import overlap
+from tisim.cases.valve.measures import clusters, drag_pressure, held_pressure, unhindered_rate
+from tisim.cases.valve.runs import FLOW_LOOKS, flows
+from tisim.cases.valve.scene import scene
 
 UM = 1e-6
 SMALL_VALVE = {"throat": 176 * UM, "bore": 308 * UM, "length": 400 * UM, "flowing": 6e-5, "lasting": 3e-4}

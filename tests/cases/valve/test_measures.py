@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.constants import mu_0
 
-from cases.runs import overlap
-from cases.valve.measures import (
+from tisim.cases.runs import overlap
+from tisim.cases.valve.measures import (
     attraction,
     clusters,
     drag,
@@ -16,9 +16,9 @@ from cases.valve.measures import (
     oil_of,
     unhindered_rate,
 )
-from cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
-from cases.valve.scene import scene
-from cases.valve.sizes import THROATS
+from tisim.cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
+from tisim.cases.valve.scene import scene
+from tisim.cases.valve.sizes import THROATS
 from tests.cases.valve.states import at_rest, result_of
 
 R, UM = 22e-6, 1e-6

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.case import every
-from cases.runs import OTHER_STARTS, sound
-from cases.valve import published
-from cases.valve.measures import duct_of, pressure_at_rest, unhindered_rate
-from cases.valve.open_flow import open_flow
-from cases.valve.problem import (
+from tisim.cases.case import every
+from tisim.cases.runs import OTHER_STARTS, sound
+from tisim.cases.valve import published
+from tisim.cases.valve.measures import duct_of, pressure_at_rest, unhindered_rate
+from tisim.cases.valve.open_flow import open_flow
+from tisim.cases.valve.problem import (
     BOUND,
     MISSED,
     MOST_ACROSS,
@@ -21,8 +21,8 @@ from cases.valve.problem import (
     volume_rate,
     width,
 )  # fmt: skip
-from cases.valve.runs import ARRESTED
-from optimize.settings import Settings, proposed
+from tisim.cases.valve.runs import ARRESTED
+from tisim.optimize.settings import Settings, proposed
 from tests.cases.valve.states import result_of
 from tisim import InputError
 from tisim.sources import MagneticField

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.vibration.problem import (
+from tisim.cases.vibration.problem import (
     DRIVE,
     VARIANTS,
     closed_form,
@@ -14,11 +14,11 @@ from cases.vibration.problem import (
     problem,
     scene,
 )
-from cases.vibration.scene import CHARGE, MASS, SEARCH_SETTINGS
-from optimize.evaluation.evaluator import BatchEvaluator
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim.cases.vibration.scene import CHARGE, MASS, SEARCH_SETTINGS
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tisim import InputError
 
 DESIGNS = {

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from cases.vibration import scene as vibration
-from cases.vibration.accuracy import constants
-from cases.vibration.closed_forms import response
-from cases.vibration.figures import FLOOR, resonance_figure, table
-from cases.vibration.response import (
+from tisim.cases.vibration import scene as vibration
+from tisim.cases.vibration.accuracy import constants
+from tisim.cases.vibration.closed_forms import response
+from tisim.cases.vibration.figures import FLOOR, resonance_figure, table
+from tisim.cases.vibration.response import (
     FAST,
     SLOW,
     CentreOfGravityHistory,

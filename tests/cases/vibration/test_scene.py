@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cases.vibration.checks import deviation
-from cases.vibration.scene import RATIOS, SPACING, near_fields, scene
+from tisim.cases.vibration.checks import deviation
+from tisim.cases.vibration.scene import RATIOS, SPACING, near_fields, scene
 from tests.scenes import simulate
 
 

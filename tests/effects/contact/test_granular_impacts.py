@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from cases.granular_bench.closed_forms import hertz_depth, hertz_duration
+from tisim.cases.granular_bench.closed_forms import hertz_depth, hertz_duration
 from tests.effects.contact.grains import AWAY, CAPACITY, FLOOR, USUAL, WORLDS, grains, run
 from tests.scenes import by_id, compiled, fixed
 from tisim import Simulation

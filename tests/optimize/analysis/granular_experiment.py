@@ -11,9 +11,9 @@ import sys
 
 import numpy as np
 
-import optimize
-from optimize import Gene, Misfit, Objective, Problem
-from optimize.analysis.misfit_shape import Evidence, fit
+from tisim import optimize
+from tisim.optimize import Gene, Misfit, Objective, Problem
+from tisim.optimize.analysis.misfit_shape import Evidence, fit
 
 GENES = (
     Gene("friction", "", 0.05, 1.0),

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-import optimize
+from tisim import optimize
 import tisim
-from optimize import Gene, Genome, Misfit, Objective, Problem
-from optimize.evaluation.executors import evaluator_named
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim.optimize import Gene, Genome, Misfit, Objective, Problem
+from tisim.optimize.evaluation.executors import evaluator_named
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.analysis.granular_experiment import GENES as GRANULAR_GENES
 from tests.scenes import by_id, scene
 from tisim import Material

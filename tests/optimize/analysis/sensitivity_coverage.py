@@ -8,8 +8,8 @@ import sys
 
 import numpy as np
 
-import optimize
-from optimize import Gene, Problem
+from tisim import optimize
+from tisim.optimize import Gene, Problem
 
 
 def ishigami(x):

@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-import optimize
-from optimize import Choice, Gene, Problem
-from optimize.analysis.misfit_shape import Evidence, coefficients, fit
-from optimize.report.analysis import Analysis
+from tisim import optimize
+from tisim.optimize import Choice, Gene, Problem
+from tisim.optimize.analysis.misfit_shape import Evidence, coefficients, fit
+from tisim.optimize.report.analysis import Analysis
 from tests.optimize.analysis.granular_experiment import (
     coverage,
     interval_of,

@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-import optimize
-from optimize import Choice, Gene, Objective, Problem
-from optimize.analysis import sensitivity
-from optimize.report.analysis import Analysis, sensitivity_table
-from optimize.surrogate.draws import Draws
-from optimize.surrogate.gaussian_process import GaussianProcess, Parameters
+from tisim import optimize
+from tisim.optimize import Choice, Gene, Objective, Problem
+from tisim.optimize.analysis import sensitivity
+from tisim.optimize.report.analysis import Analysis, sensitivity_table
+from tisim.optimize.surrogate.draws import Draws
+from tisim.optimize.surrogate.gaussian_process import GaussianProcess, Parameters
 from tisim import InputError
 
 ANGLES = [Gene(f"x{k}", "", -math.pi, math.pi) for k in (1, 2, 3)]

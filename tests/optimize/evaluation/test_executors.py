@@ -18,17 +18,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from optimize.evaluation import executors
-from optimize.evaluation.evaluator import BatchEvaluator
-from optimize.evaluation.executors import dask_cluster, handshake
-from optimize.evaluation.executors import worker as working
-from optimize.evaluation.executors.processes import Processes
-from optimize.evaluation.executors.remote import Lost, Remote, units
-from optimize.evaluation.executors.worker import Answer, WorkerSettings
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
-from optimize.storage.maintenance import verify
+from tisim.optimize.evaluation import executors
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.evaluation.executors import dask_cluster, handshake
+from tisim.optimize.evaluation.executors import worker as working
+from tisim.optimize.evaluation.executors.processes import Processes
+from tisim.optimize.evaluation.executors.remote import Lost, Remote, units
+from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.maintenance import verify
 from tests.optimize.cache_files import worker
 from tests.optimize.drift_case import problem, scene
 from tests.optimize.evaluation import light_worker
@@ -223,7 +223,7 @@ def test_stopped_it_leaves_no_process():
 @pytest.fixture
 def light(monkeypatch):
     """Processes that do what they are told and compile nothing; see light_worker.py."""
-    monkeypatch.setattr("optimize.evaluation.executors.worker.serve", light_worker.serve)
+    monkeypatch.setattr("tisim.optimize.evaluation.executors.worker.serve", light_worker.serve)
     with closing(Remote(Processes(2), WorkerSettings())) as evaluator:
         yield evaluator.pool
 
@@ -358,7 +358,7 @@ def test_unknown_executors_are_refused(name, message):
 
 def test_nobody_at_the_address(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("optimize.evaluation.executors.dask_cluster.CONNECT_S", 0.3)
+    monkeypatch.setattr("tisim.optimize.evaluation.executors.dask_cluster.CONNECT_S", 0.3)
     with pytest.raises(InputError, match="must be the address of a running Dask scheduler; received '127"):
         executors.evaluator_named("dask://127.0.0.1:9")
 

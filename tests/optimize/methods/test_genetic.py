@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from deap import base, tools
 
-from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.methods.base import find
-from optimize.methods.individual import Individual
-from optimize.methods.operators import GeneticOperator
-from optimize.problem.genes import Choice
-from optimize.problem.genome import Gene, Genome
-from optimize.search import search
-from optimize.settings import Settings, identity
+from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.methods.base import find
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.methods.operators import GeneticOperator
+from tisim.optimize.problem.genes import Choice
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings, identity
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.methods.base import every, find
-from optimize.methods.cma_es import EDGE, drawn_of, folded, within
-from optimize.methods.individual import Individual
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.methods.base import every, find
+from tisim.optimize.methods.cma_es import EDGE, drawn_of, folded, within
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from optimize.methods.base import every, find
-from optimize.settings import Settings, identity
+from tisim.optimize.methods.base import every, find
+from tisim.optimize.settings import Settings, identity
 from tests.optimize.fake_runs import fake_problem
 from tests.own_files import METHOD
 from tisim import InputError

@@ -5,12 +5,12 @@ import math
 
 import pytest
 
-import optimize
-from optimize import DesignConstraint, Gene, Problem, ResultConstraint
-from optimize.evaluation.runs import Runs, Sample
-from optimize.problem.calls import constraint_value, make_scene
-from optimize.problem.function import FunctionCall
-from optimize.tables import best_columns
+from tisim import optimize
+from tisim.optimize import DesignConstraint, Gene, Problem, ResultConstraint
+from tisim.optimize.evaluation.runs import Runs, Sample
+from tisim.optimize.problem.calls import constraint_value, make_scene
+from tisim.optimize.problem.function import FunctionCall
+from tisim.optimize.tables import best_columns
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError
 

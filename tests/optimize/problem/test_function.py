@@ -9,10 +9,10 @@ import sys
 
 import pytest
 
-import optimize
-from optimize import Choice, FitnessRecord, Gene, Objective, Problem
-from optimize.problem.function import PlainFunction
-from optimize.storage.cache import existing
+from tisim import optimize
+from tisim.optimize import Choice, FitnessRecord, Gene, Objective, Problem
+from tisim.optimize.problem.function import PlainFunction
+from tisim.optimize.storage.cache import existing
 from tests.optimize.function_case import noisy, rosenbrock
 from tisim import InputError, RunError
 
@@ -122,7 +122,7 @@ def test_neither_taichi_nor_a_device_is_started():
         "import optimize; from tests.optimize.function_case import rosenbrock; "
         "from tisim.backend import runtime; "
         "problem = optimize.Problem.of_function(rosenbrock, [optimize.Gene(n, '', -2, 2) for n in 'xy']); "
-        "optimize.run(problem, generations=2); print(runtime.generation())"
+        "tisim.optimize.run(problem, generations=2); print(runtime.generation())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "0\n"

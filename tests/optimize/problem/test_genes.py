@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-import optimize
-from optimize import Choice, DependentGene, FixedGene, Gene, Genome
+from tisim import optimize
+from tisim.optimize import Choice, DependentGene, FixedGene, Gene, Genome
 from tisim import InputError
 
 BLADES = Gene("blades", "", 2, 7, integer=True)

@@ -7,13 +7,13 @@ import pytest
 from scipy.stats import beta, norm
 from scipy.stats.mstats import hdquantiles
 
-import optimize
-from optimize import Expectation, Gene, Misfit, Objective, Problem, Quantile, WorstOf
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.evaluation.executors import evaluator_for
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
+from tisim import optimize
+from tisim.optimize import Expectation, Gene, Misfit, Objective, Problem, Quantile, WorstOf
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.evaluation.executors import evaluator_for
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tisim import InputError
 
 RNG = np.random.default_rng(5)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from cases import case as catalogue
-from optimize.evaluation.runs import start_seed
-from optimize.problem.objective import Objective
-from optimize.report import comparison
-from optimize.report.comparison import FRESH, compare, plan, settings_of
-from optimize.storage.cache import Cache
+from tisim.cases import case as catalogue
+from tisim.optimize.evaluation.runs import start_seed
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.report import comparison
+from tisim.optimize.report.comparison import FRESH, compare, plan, settings_of
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.drift_case import CASE
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tests.optimize.test_several import OBJECTIVES

@@ -6,14 +6,14 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-import optimize
-from optimize import Choice, DependentGene, DesignConstraint, FixedGene, Gene, Problem
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.outcome import Outcome
-from optimize.report import report
-from optimize.report.display import Display
-from optimize.settings import Settings
-from optimize.storage.record import Record
+from tisim import optimize
+from tisim.optimize import Choice, DependentGene, DesignConstraint, FixedGene, Gene, Problem
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.report import report
+from tisim.optimize.report.display import Display
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.record import Record
 from tests.optimize.fake_runs import fake_record
 
 GENES = (

@@ -6,19 +6,19 @@ import pytest
 from matplotlib.image import imread
 from rich.console import Console
 
-import optimize
-from cases.agglomeration.problem import problem as agglomeration
-from optimize import Gene, Problem
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.methods.individual import Individual
-from optimize.outcome import Outcome, Progress
-from optimize.problem.objective import Objective
-from optimize.report import convergence, report
-from optimize.report.display import Display
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
-from optimize.tables import best_columns
+from tisim import optimize
+from tisim.cases.agglomeration.problem import problem as agglomeration
+from tisim.optimize import Gene, Problem
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.outcome import Outcome, Progress
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.report import convergence, report
+from tisim.optimize.report.display import Display
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.tables import best_columns
 from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
 from tisim import RunError
 

@@ -2,9 +2,9 @@ import multiprocessing
 
 import pytest
 
-from optimize.storage import cache as cache_module
-from optimize.storage.cache import Cache, existing
-from optimize.storage.maintenance import compact, verify
+from tisim.optimize.storage import cache as cache_module
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import compact, verify
 from tests.optimize.cache_files import journal_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError

@@ -5,9 +5,9 @@ import shutil
 import h5py
 import pytest
 
-from optimize.storage.cache import Cache, existing
-from optimize.storage.journal import Journal
-from optimize.storage.maintenance import compact, verify
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.journal import Journal
+from tisim.optimize.storage.maintenance import compact, verify
 from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
@@ -344,7 +344,7 @@ def test_reading_what_is_damaged_ends_in_any_case(path, monkeypatch):
     before = SPOILT["without the checksum"](path.read_bytes())
     path.write_bytes(before)
     with monkeypatch.context() as patch:
-        patch.setattr("optimize.storage.salvage.TIME_LIMIT", 1e-3)
+        patch.setattr("tisim.optimize.storage.salvage.TIME_LIMIT", 1e-3)
         with pytest.raises(InputError, match=r"cache\.h5 must be a whole HDF5 file written by a cache"):
             compact(path)
     assert path.read_bytes() == before

@@ -3,8 +3,8 @@ import time
 
 import pytest
 
-from optimize.storage.cache import Cache
-from optimize.storage.maintenance import verify
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.maintenance import verify
 from tests.optimize.cache_files import worker
 from tests.optimize.fake_runs import fake_record
 

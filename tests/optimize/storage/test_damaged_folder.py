@@ -5,9 +5,9 @@ import os
 import h5py
 import pytest
 
-from cases import case as catalogue
-from cases.case import Case, Size
-from optimize.storage.cache import Cache
+from tisim.cases import case as catalogue
+from tisim.cases.case import Case, Size
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.cache_files import journal_of
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim.cli.main import main
@@ -46,7 +46,7 @@ def command(tmp_path, monkeypatch, capsys):
     """Runs a command: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
-    monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
+    monkeypatch.setattr("tisim.optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
 
     def run(words):
         with pytest.raises(SystemExit) as exit_:

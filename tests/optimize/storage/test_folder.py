@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from cases import case as catalogue
-from cases.case import Case, Size
-from optimize.problem.genome import Genome
-from optimize.search_folder import SEARCH_FILES, resume_or_clear
-from optimize.search_records import searches
-from optimize.storage.cache import Cache
+from tisim.cases import case as catalogue
+from tisim.cases.case import Case, Size
+from tisim.optimize.problem.genome import Genome
+from tisim.optimize.search_folder import SEARCH_FILES, resume_or_clear
+from tisim.optimize.search_records import searches
+from tisim.optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
 from tisim.cli.main import main
@@ -32,7 +32,7 @@ def optimize(tmp_path, monkeypatch, capsys):
     """Runs a search in a fresh folder with more arguments: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
-    monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
+    monkeypatch.setattr("tisim.optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
 
     def command(*arguments):
         with pytest.raises(SystemExit) as exit_:
@@ -164,7 +164,7 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
                     resume_or_clear(tmp_path / "s", None, overwrite=True)
             return super().evaluate(scenes, progress)
 
-    monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", Joined)
+    monkeypatch.setattr("tisim.optimize.evaluation.executors.BatchEvaluator", Joined)
     assert optimize("--generations", 3)[0] == 0
     assert interrupted
     assert optimize("--generations", 3, "--overwrite")[0] == 0

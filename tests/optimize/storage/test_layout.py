@@ -9,16 +9,16 @@ import h5py
 import numpy as np
 import pytest
 
-from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.problem.genome import Gene, Genome
-from optimize.problem.objective import Objective
-from optimize.search import search
-from optimize.settings import Settings
-from optimize.storage import hdf5_store
-from optimize.storage.cache import FOLD_BYTES, FOLD_SHARE, Cache, existing
-from optimize.storage.maintenance import compact, verify
-from optimize.storage.record import Record
-from optimize.storage.runs_table import RunsTable, tabulated
+from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.problem.genome import Gene, Genome
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage import hdf5_store
+from tisim.optimize.storage.cache import FOLD_BYTES, FOLD_SHARE, Cache, existing
+from tisim.optimize.storage.maintenance import compact, verify
+from tisim.optimize.storage.record import Record
+from tisim.optimize.storage.runs_table import RunsTable, tabulated
 from tests.optimize.cache_files import journal_of, lock_of, payloads
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
@@ -94,7 +94,7 @@ def test_h5py_alone_tells_what_every_column_is(path):
 
 
 def test_the_file_is_there_from_the_beginning_and_follows(path, monkeypatch):
-    monkeypatch.setattr("optimize.storage.cache.FOLD_BYTES", 3000)
+    monkeypatch.setattr("tisim.optimize.storage.cache.FOLD_BYTES", 3000)
     seen = []
 
     class Watched(FakeEvaluator):
@@ -290,7 +290,7 @@ def test_a_hundred_thousand_runs_are_opened_in_less_than_a_second(path):
 
 
 def test_all_that_is_written_is_a_few_times_what_is_stored(path, written, monkeypatch):
-    monkeypatch.setattr("optimize.storage.cache.FOLD_BYTES", 3000)
+    monkeypatch.setattr("tisim.optimize.storage.cache.FOLD_BYTES", 3000)
     log, totals = {"gen": [], "best": []}, []
     cache = Cache(path)
     for number in range(120):

@@ -9,12 +9,12 @@ import h5py
 import numpy as np
 import pytest
 
-from optimize.search import search
-from optimize.search_records import searches
-from optimize.settings import Settings
-from optimize.storage.cache import Cache
-from optimize.storage.maintenance import compact, verify
-from optimize.storage.record import canonical
+from tisim.optimize.search import search
+from tisim.optimize.search_records import searches
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.maintenance import compact, verify
+from tisim.optimize.storage.record import canonical
 from tests.optimize.cache_files import hurt, journal_of
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim.files.checksum import with_checksum

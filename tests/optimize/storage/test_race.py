@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
-from optimize.evaluation.runs import start_seed
-from optimize.problem.objective import Objective
-from optimize.search import search
-from optimize.settings import Settings
+from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
+from tisim.optimize.evaluation.runs import start_seed
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, fake_problem
 
 DESIGNS = [{"x0": x} for x in (0.10, 0.12, 0.5, 0.9)]

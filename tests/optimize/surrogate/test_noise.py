@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from optimize import Gene, Genome, Objective
-from optimize.evaluation.estimate import FitnessEstimate
-from optimize.methods.individual import Individual
-from optimize.surrogate.noise import LEAST_DESIGNS, moments
+from tisim.optimize import Gene, Genome, Objective
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.surrogate.noise import LEAST_DESIGNS, moments
 
 GENOME = Genome((Gene("x", "", 0.0, 1.0), Gene("y", "", 0.0, 1.0)))
 
