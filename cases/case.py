@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tisim import cases
 from tisim.cases.statistics import Claim, Shown
 from tisim.optimize.problem.problem import Problem
-from tisim import InputError, Scene
+
+from tisim import InputError, Scene, cases
 from tisim.accuracy import Quantity
 from tisim.engine.batches import Progress
 from tisim.errors import must
@@ -164,5 +164,6 @@ class Case:
 
 def every() -> dict[str, Case]:
     """Return all cases by their names."""
-    modules = (importlib.import_module(f"cases.{m.name}") for m in pkgutil.iter_modules(cases.__path__))
+    found = pkgutil.iter_modules(cases.__path__, f"{cases.__name__}.")
+    modules = (importlib.import_module(module.name) for module in found)
     return {module.CASE.name: module.CASE for module in modules if hasattr(module, "CASE")}

@@ -21,7 +21,7 @@ from tisim.engine import reference
 from tisim.engine.reference import Declaration, Entry
 
 PACKAGES = ("tisim", "tisim.effects", "tisim.sources", "tisim.operators", "tisim.steppers", "tisim.packing",
-            "tisim.accuracy", "tisim.analysis", "optimize")  # fmt: skip
+            "tisim.accuracy", "tisim.analysis", "tisim.optimize")  # fmt: skip
 """Those with public names."""
 NAMES = {entry.name for entry in reference.entries()}
 """Of all parts, as scene files have them."""

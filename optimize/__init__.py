@@ -1,6 +1,6 @@
-"""optimize: inverse design, a search for the scene whose result is wanted.
+"""tisim.optimize: inverse design, a search for the scene whose result is wanted.
 
-Names are loaded when they are first asked for; __init__.pyi lists them. ``tisim.optimize.run(problem)`` searches.
+Names are loaded when they are first asked for; __init__.pyi lists them. ``optimize.run(problem)`` searches.
 """
 
 import lazy_loader

@@ -13,9 +13,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-
 from tisim.optimize.beginning import Beginning
-from tisim.optimize.designs_csv import GENERATION, WHETHER_ASKED, Given, check_headings, design_of, naming, rows
+from tisim.optimize.designs_csv import (
+    GENERATION,
+    WHETHER_ASKED,
+    Given,
+    check_headings,
+    design_of,
+    naming,
+    rows,
+)
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.experiments import Values, known, row_values
 from tisim.optimize.hall_of_fame import Hall
@@ -30,6 +37,7 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.settings import METHOD, Settings, fit, identity
 from tisim.optimize.surrogate.ranking import best
 from tisim.optimize.tables import error_of
+
 from tisim.errors import InputError, Words, is_number, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file

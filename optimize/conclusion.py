@@ -18,6 +18,7 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.settings import Settings
 from tisim.optimize.surrogate.noise import moments
 from tisim.optimize.surrogate.ranking import best
+
 from tisim.numerics.skewed import Moments
 from tisim.numerics.statistics import CONFIDENCE
 

@@ -17,6 +17,7 @@ from tisim.optimize.problem.gene_values import Named
 from tisim.optimize.problem.given_genes import FixedGene
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.tables import ERROR, FRESH_STARTS, HIGH, LOW
+
 from tisim.errors import InputError, is_number, must
 from tisim.files import regular_file
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-import tisim
 from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.problem.problem import Problem
+
+import tisim
 from tisim.backend import runtime
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file

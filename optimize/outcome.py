@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from deap import tools
 from numpy.typing import NDArray
-
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.frames import data_frame
@@ -18,7 +17,14 @@ from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.gene_values import Value
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.settings import Settings, search_name
-from tisim.optimize.tables import best_columns, design_columns, error_of, interval_of_value, logbook_columns, units
+from tisim.optimize.tables import (
+    best_columns,
+    design_columns,
+    error_of,
+    interval_of_value,
+    logbook_columns,
+    units,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -26,6 +26,7 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.search_records import searches, store
 from tisim.optimize.settings import Settings, fit, identity
 from tisim.optimize.storage.cache import Cache
+
 from tisim.errors import RunError
 
 MOST_REFUSED = 200

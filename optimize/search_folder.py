@@ -30,6 +30,7 @@ from tisim.optimize.search_records import searches
 from tisim.optimize.settings import IDENTITY_FORMAT, of_the_problem, search_name
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.record import canonical
+
 from tisim import InputError
 from tisim.errors import abbreviated, must
 from tisim.files import lock, ownership, regular_file

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.designs_csv import Given
 from tisim.optimize.evaluation.executors import evaluator_for
@@ -22,10 +21,18 @@ from tisim.optimize.report import report
 from tisim.optimize.report.analysis import Analysis
 from tisim.optimize.report.display import Display
 from tisim.optimize.search import search
-from tisim.optimize.search_folder import SEARCH_FILE, SEARCH_FILES, SHOWN_FILE, check, check_problem, results_of
+from tisim.optimize.search_folder import (
+    SEARCH_FILE,
+    SEARCH_FILES,
+    SHOWN_FILE,
+    check,
+    check_problem,
+    results_of,
+)
 from tisim.optimize.settings import Settings, fit, identity, proposed
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.warm_start import warmed
+
 from tisim.backend import runtime
 from tisim.console import err, print_stopping
 from tisim.console import out as standard_output

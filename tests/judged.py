@@ -55,7 +55,11 @@ def nothing_runs() -> Iterator[list[Scene]]:
         raise RunError(ACCEPTED)
 
     with ExitStack() as patches:
-        for place in ("tisim.cli.run.Simulation", "tisim.cli.cost._measure", "tisim.optimize.session.session"):
+        for place in (
+            "tisim.cli.run.Simulation",
+            "tisim.cli.cost._measure",
+            "tisim.optimize.session.session",
+        ):
             patches.enter_context(patch(place, accept))
         patches.enter_context(patch("tisim.backend.runtime.init", Runtime))
         yield scenes

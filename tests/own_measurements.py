@@ -4,8 +4,8 @@ problem."""
 import os
 
 import pytest
-
 from tisim.cases.case import every
+
 from tests.judged import check_message
 from tisim import InputError
 

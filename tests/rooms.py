@@ -2,7 +2,7 @@
 
     python tests/rooms.py [FOLDER]
 
-A room is a package or a module of tisim, optimize or cases, the longest name in ``ROOMS`` that a module's
+A room is a package or a module of tisim, the longest name in ``ROOMS`` that a module's
 begins with. A module imports from its own room and from those that stand before it; what a function imports
 when it is called may come from above only where ``LATE`` names it. Imports for type checkers do not count.
 """
@@ -23,17 +23,19 @@ ROOMS = (
     "tisim.plotting", "tisim", "tisim.accuracy",
     "tisim.optimize.problem", "tisim.optimize.storage", "tisim.optimize.evaluation",
     "tisim.optimize.methods.individual", "tisim.optimize.surrogate", "tisim.optimize.methods",
-    "tisim.optimize.fitness_record", "tisim.optimize.frames", "tisim.optimize.hall_of_fame", "tisim.optimize.generation_log",
-    "tisim.optimize.tables", "tisim.optimize.designs_csv", "tisim.optimize.experiments", "tisim.optimize.beginning",
-    "tisim.optimize.settings",
-    "tisim.optimize.outcome", "tisim.optimize.search_records", "tisim.optimize.search_folder", "tisim.optimize.search_file",
+    "tisim.optimize.fitness_record", "tisim.optimize.frames", "tisim.optimize.hall_of_fame",
+    "tisim.optimize.generation_log", "tisim.optimize.tables", "tisim.optimize.designs_csv",
+    "tisim.optimize.experiments", "tisim.optimize.beginning", "tisim.optimize.settings",
+    "tisim.optimize.outcome", "tisim.optimize.search_records", "tisim.optimize.search_folder",
+    "tisim.optimize.search_file",
     "tisim.optimize.warm_start", "tisim.optimize.ask_tell",
     "tisim.optimize.conclusion", "tisim.optimize.search", "tisim.optimize.analysis",
-    "tisim.optimize.report", "tisim.optimize.session", "optimize",
-    "cases", "tisim.cases.statistics", "tisim.cases.case", "tisim.cases.runs", "tisim.cases.capture", "cases.*", "tisim.cli",
+    "tisim.optimize.report", "tisim.optimize.session", "tisim.optimize",
+    "tisim.cases", "tisim.cases.statistics", "tisim.cases.case", "tisim.cases.runs", "tisim.cases.capture",
+    "tisim.cases.*", "tisim.cli",
     "tisim.__main__",
 )  # fmt: skip
-"""From the ground up. ``cases.*`` is every other case: each is a room of its own beside the others."""
+"""From the ground up. ``tisim.cases.*`` is every other case: each is a room of its own beside the others."""
 LATE = {
     ("tisim.io.run_folder", "tisim.plotting.cloud"),
     ("tisim.io.read", "tisim.accuracy.storage"),
@@ -44,17 +46,20 @@ Imports = dict[str, set[str]]
 
 
 def modules(folder: Path) -> dict[str, Path]:
-    """All modules of the three packages by name."""
-    files = [file for package in ("tisim", "optimize", "cases") for file in (folder / package).rglob("*.py")]
-    names = (".".join(file.relative_to(folder).with_suffix("").parts) for file in files)
-    return {name.removesuffix(".__init__"): file for name, file in zip(names, files, strict=True)}
+    """All modules of tisim by name; optimize and cases are folders beside it."""
+    names: dict[str, Path] = {}
+    for package in ("tisim", "optimize", "cases"):
+        for file in (folder / package).rglob("*.py"):
+            name = ".".join(file.relative_to(folder).with_suffix("").parts).removesuffix(".__init__")
+            names[name if package == "tisim" else f"tisim.{name}"] = file
+    return names
 
 
 def room(module: str) -> int:
     """The place in ``ROOMS`` of the room of a module."""
     homes = [name for name in ROOMS if module == name or module.startswith(f"{name}.")]
-    case = homes == ["cases"] and module != "cases"
-    return ROOMS.index("cases.*" if case else max(homes, key=len))
+    home = max(homes, key=len)
+    return ROOMS.index("tisim.cases.*" if home == "tisim.cases" != module else home)
 
 
 def imports(folder: Path) -> tuple[Imports, Imports]:

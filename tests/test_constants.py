@@ -30,8 +30,8 @@ FILES = rooms.modules(Path(__file__).parents[1])
 
 def owner(module):
     """The case that a module is of; "" for what all of them read."""
-    package = ".".join(module.split(".")[:2])
-    return package if f"{package}.scene" in FILES and package.startswith("cases.") else ""
+    package = ".".join(module.split(".")[:3])
+    return package if f"{package}.scene" in FILES and package.startswith("tisim.cases.") else ""
 
 
 def ambiguous(files):

@@ -33,7 +33,7 @@ def test_no_imports_go_in_circles():
     assert rooms.floors(EARLY)
 
 
-CASES = {name for name in EARLY if name.startswith("cases.") and f"{name}.scene" in EARLY}
+CASES = {name for name in EARLY if name.startswith("tisim.cases.") and f"{name}.scene" in EARLY}
 
 
 def test_modules_of_a_case_do_not_import_its_package():
@@ -49,8 +49,26 @@ def test_listing_cases_loads_no_figures_checks_or_inverse_problems():
         reached |= ahead
         ahead = set().union(*(EARLY[module] for module in ahead)) - reached
     assert "tisim.cases.case" in reached
-    inside = [module for module in reached if module.startswith("cases.")]
+    inside = [module for module in reached if module.startswith("tisim.cases.")]
     assert not [module for module in inside if module.endswith((".figures", ".checks", ".problem"))]
+
+
+def test_the_folders_beside_tisim_are_imported_as_parts_of_it():
+    """Under two names a module would be loaded twice, and a class of one not be that of the other."""
+    root = Path(__file__).parents[1]
+    files = [
+        file
+        for folder in ("tisim", "optimize", "cases", "tests", "docs")
+        for file in (root / folder).rglob("*.py")
+    ]
+    found = set()
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            found |= {file for name in names if name.partition(".")[0] in ("optimize", "cases")}
+    assert len(files) > 1000
+    assert found == set()
 
 
 def test_a_circle_is_found():

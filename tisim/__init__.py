@@ -3,8 +3,14 @@
 Names are loaded when they are first asked for, so that ``import tisim`` is quick; __init__.pyi lists them.
 """
 
+from pathlib import Path
+
 import lazy_loader
 
 from tisim.version import __version__ as __version__
+
+if not (Path(__file__).parent / "optimize").is_dir():
+    # A checkout has tisim.optimize and tisim.cases beside this folder, an installed tisim inside it.
+    __path__.append(str(Path(__file__).parents[1]))
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

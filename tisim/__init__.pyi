@@ -5,6 +5,9 @@ from . import (
     analysis as analysis,
 )
 from . import (
+    cases as cases,
+)
+from . import (
     effects as effects,
 )
 from . import (
@@ -12,6 +15,9 @@ from . import (
 )
 from . import (
     operators as operators,
+)
+from . import (
+    optimize as optimize,
 )
 from . import (
     packing as packing,

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-
-import tisim
 from tisim.cases.agglomeration import field_checks
 from tisim.cases.agglomeration import scene as agglomeration
 from tisim.cases.case import Check
+
+import tisim
 from tisim import Particles, Result, Scene
 from tisim.effects import Agglomeration, Effect, Heating, Impact
 from tisim.operators import Fragmentation

@@ -18,8 +18,8 @@ import math
 from collections.abc import Mapping
 
 from scipy.constants import epsilon_0, mu_0
-
 from tisim.optimize.problem.genome import Gene
+
 from tisim.effects import CARBONYL_IRON, DipoleDipole, Effect, FroehlichMoment, Lorentz, NearField
 from tisim.packing import EqualSizes, GrainClass
 from tisim.sources import ElectricField, MagneticField

@@ -13,6 +13,7 @@ from typing import Any
 from tisim.cases.agglomeration import fields
 from tisim.cases.agglomeration.published_strings import designs
 from tisim.cases.case import Size, size_named
+
 from tisim import Box, Cloud, Scene
 from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
 from tisim.operators import Cooling, Fragmentation

@@ -1,7 +1,7 @@
 """What each kind of gene adds to the search for the largest grains, at equal budget.
 
-    python -m tisim.cases.agglomeration.what_fields_add [--size small] [--runs 400] [--searches 5] [--method NAME]
-        [--starts N] [--fresh 64] [--out what_fields_add.png]
+    python -m tisim.cases.agglomeration.what_fields_add [--size small] [--runs 400] [--searches 5]
+        [--method NAME] [--starts N] [--fresh 64] [--out what_fields_add.png]
     python -m tisim.cases.agglomeration.what_fields_add --one-flow [--size small] [--fresh 256]
 
 Each kind is searched several times, from other seeds; genes that are left out are those of no charge and no
@@ -26,16 +26,15 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
-
-from tisim import optimize
-import tisim
 from tisim.cases.agglomeration import fields
 from tisim.cases.agglomeration.problem import GENES, UNBREAKABLE, cost, problem
 from tisim.cases.agglomeration.scene import BEST, SIZES, scene
 from tisim.cases.case import size_named
 from tisim.cases.runs import OTHER_STARTS, sound
 from tisim.optimize import Gene, Genome, Problem
-from tisim import Scene
+
+import tisim
+from tisim import Scene, optimize
 from tisim.analysis import Mean
 from tisim.numerics.statistics import CONFIDENCE
 from tisim.plotting.style import empty, legend_above, plain

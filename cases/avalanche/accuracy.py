@@ -4,6 +4,7 @@ of the heap, over random starts."""
 from __future__ import annotations
 
 from tisim.cases.avalanche.measures import grains_volume, heap_volume, overlap, repose
+
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 

@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-
 from tisim.cases.avalanche.measured import MeasuredProfile, Target, read
 from tisim.cases.avalanche.measures import profile, repose
 from tisim.cases.avalanche.scene import IRON_DESIGN, TITLE, scene
@@ -27,6 +26,7 @@ from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.problem.statistic import Misfit
+
 from tisim import Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud

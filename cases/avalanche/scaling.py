@@ -8,9 +8,9 @@ import math
 import numpy as np
 from scipy.constants import mu_0
 from scipy.linalg import eigvalsh
-
 from tisim.cases.avalanche.scene import CUTOFF, DENSITY, FLUX, GRAVITY, SUSCEPTIBILITY
 from tisim.cases.dipoles import attraction_in_line
+
 from tisim.analysis import nearest_image
 from tisim.scene.initial_state import Arrays
 

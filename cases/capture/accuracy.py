@@ -4,6 +4,7 @@ random starts."""
 from __future__ import annotations
 
 from tisim.cases.capture.statistics import fraction
+
 from tisim import Scene
 from tisim.accuracy import Quantity
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from itertools import islice, product
 
 import numpy as np
-
 from tisim.cases.capture.scene import (
     DENSITY,
     DIAMETER,
@@ -20,6 +19,7 @@ from tisim.cases.capture.scene import (
     TEMPERATURE,
     VISCOSITY,
 )
+
 from tisim import Cloud, RandomInBox, Scene
 from tisim.components.component import Vector
 from tisim.effects import LangevinMoment, Magnetophoresis

@@ -12,8 +12,8 @@ radius wide and together the whole layer around it, in which ``part`` chooses.
 from __future__ import annotations
 
 import numpy as np
-
 from tisim.cases.case import Size, size_named
+
 from tisim import Cloud, RandomAroundCylinder, Scene
 from tisim.components.component import Vector
 from tisim.effects import FixedMoment, Magnetophoresis

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
 from tisim.cases.cascade.scene import Cascade
 from tisim.cases.runs import sound
+
 from tisim import run
 from tisim.engine.batches import Progress
 

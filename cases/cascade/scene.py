@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
 from tisim.cases.capture import scene as capture
 from tisim.cases.case import Size, size_named
+
 from tisim import RandomAroundCylinder, Scene
 from tisim.sources import MagneticCylinders
 

@@ -9,6 +9,7 @@ from tisim.cases.capture.statistics import CHECK_REPEATS
 from tisim.cases.cascade.capture_times import CAPTURED_SHARE, captured_at, time_to
 from tisim.cases.cascade.scene import STAGE, Cascade, Orientation
 from tisim.cases.statistics import Claim
+
 from tisim.analysis import Mean
 
 PUBLISHED_TIMES = {25: (1100.0, 500.0), 125: (12.5, 5.5)}

@@ -4,6 +4,7 @@ agglomerated, and how dense the asteroid is, over random starts."""
 from __future__ import annotations
 
 from tisim.cases.coalescence.measures import Asteroid, Gathering
+
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 from tisim.analysis import largest_overlap

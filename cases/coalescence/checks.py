@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-
 from tisim.cases.case import Check
 from tisim.cases.coalescence.published import (
     AXES,
@@ -23,6 +22,7 @@ from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisati
 from tisim.cases.coalescence.scaling import critical_spin, mean_density
 from tisim.cases.coalescence.scene import DEFAULT, scene
 from tisim.cases.statistics import Claim, Shown
+
 from tisim.analysis import Mean
 
 ROUNDING = 1e-11

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
 from tisim.cases.coalescence.measures import clusters_of, part
 from tisim.cases.coalescence.published import (
     DENSITY,
@@ -27,6 +26,7 @@ from tisim.cases.coalescence.scaling import (
     surface_weight,
 )
 from tisim.cases.coalescence.scene import SIZES
+
 from tisim.analysis import voronoi_by_shell
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, directions, panel, project

@@ -4,6 +4,7 @@ are, over random starts."""
 from __future__ import annotations
 
 from tisim.cases.concentration.statistics import chain
+
 from tisim import Scene
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import usual

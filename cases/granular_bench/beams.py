@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
 from tisim.cases.granular_bench.closed_forms import beam_deflection
+
 from tisim import Particles, Scene
 from tisim.effects import Lorentz, ParallelBond
 from tisim.sources import ElectricField

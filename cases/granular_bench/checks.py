@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-
 from tisim.cases.case import Check
 from tisim.cases.granular_bench import adhesion, beams, motions, particle_tests
 from tisim.cases.granular_bench.closed_forms import (
@@ -25,6 +24,7 @@ from tisim.cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, f
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
 from tisim.cases.granular_bench.shear_cell import expected_ratio, sheared_beds
 from tisim.cases.runs import sound
+
 from tisim import Scene, run
 
 BOUND = 1e-3

@@ -12,10 +12,10 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
-
 from tisim.cases.granular_bench.closed_forms import hertz_depth, hertz_duration, reduced
 from tisim.cases.granular_bench.substances import SUBSTANCES
 from tisim.cases.runs import sound
+
 from tisim import Material, Particles, Result, Scene, Simulation
 from tisim.effects import Granular, HertzMaterial, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane

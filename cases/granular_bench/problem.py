@@ -25,6 +25,7 @@ from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.problem.statistic import Misfit
+
 from tisim import Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tisim.cases.case import size_named
 from tisim.cases.granular_bench.bed import bed
 from tisim.cases.granular_bench.scene import BED, SIZES, scene
+
 from tisim import Scene
 
 

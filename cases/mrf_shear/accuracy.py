@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from tisim.cases.mrf_shear.measures import shear_stress
 from tisim.cases.runs import overlap
+
 from tisim import Scene
 from tisim.accuracy import Quantity
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from tisim.cases.mixtures import classes
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.published import MICRO
+
 from tisim import GrainClass
 from tisim.effects import CARBONYL_IRON
 

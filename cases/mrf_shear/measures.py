@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from tisim.cases.mrf_shear.regime import magnetisation
 from tisim.cases.mrf_shear.scene import LOWER, UPPER
+
 from tisim import Result
 from tisim.analysis import (
     cluster_shapes,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from tisim.cases.coalescence.accuracy import overlap
 from tisim.cases.coalescence.measures import Asteroid
+
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 

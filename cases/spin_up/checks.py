@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-
 from tisim.cases.case import Check
 from tisim.cases.coalescence.measures import Conserved
 from tisim.cases.coalescence.published import MAGNETISATIONS
@@ -15,6 +14,7 @@ from tisim.cases.spin_up.regime import regime
 from tisim.cases.spin_up.scene import DEFAULT
 from tisim.cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
 from tisim.cases.statistics import Claim, Shown
+
 from tisim.analysis import Mean
 
 ROUNDING = 1e-11

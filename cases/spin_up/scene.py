@@ -17,6 +17,7 @@ from typing import Any
 from tisim.cases.case import Size, size_named
 from tisim.cases.coalescence import scene as coalescence
 from tisim.cases.coalescence.published import DIAMETERS, MAGNETISATIONS
+
 from tisim import Scene
 
 TITLE = "A rubble pile of magnetised grains is spun up until it breaks"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from tisim.cases.runs import overlap
 from tisim.cases.valve.measures import flow_rate
+
 from tisim import Scene
 from tisim.accuracy import Quantity
 

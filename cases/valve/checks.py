@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-
 from tisim.cases.case import Check
 from tisim.cases.statistics import Claim, Shown
 from tisim.cases.valve.measures import drag_pressure, held_pressure, unhindered_rate
 from tisim.cases.valve.runs import ARRESTED, Flow, left, left_of
 from tisim.cases.valve.sizes import GRADIENT, LENGTH
 from tisim.cases.valve.studies import ValveRuns, by_throat
+
 from tisim.analysis import Mean
 
 STARTS = 6

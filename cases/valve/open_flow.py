@@ -8,7 +8,6 @@ The size of grains does not count in it: that is what jams are about.
 from __future__ import annotations
 
 import numpy as np
-
 from tisim.cases.mrf_shear.off_state import RANDOM_PACKING, relative_viscosity
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct

@@ -23,6 +23,7 @@ from tisim.cases.valve.sizes import GRADIENT, SEARCHED, SIZES, D
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
+
 from tisim import Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud

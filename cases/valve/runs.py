@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
 from tisim.cases.runs import sound
 from tisim.cases.valve.measures import duct_of, rate
+
 from tisim import Observer, Result, Scene, Simulation
 from tisim.analysis import Mean
 from tisim.engine.batches import Progress

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-
 from tisim.cases.vibration.closed_forms import response
+
 from tisim import Open, Result, Scene
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import displacement

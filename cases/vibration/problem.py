@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.closed_forms import resonances
 from tisim.cases.vibration.response import peak
 from tisim.cases.vibration.scene import CHARGE, FIELD, MASS
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.problem import Problem
+
 from tisim import Result, Scene
 from tisim.errors import must
 

@@ -16,8 +16,8 @@ of the centre of gravity.
 from __future__ import annotations
 
 import numpy as np
-
 from tisim.cases.case import Size, size_named
+
 from tisim import Cloud, Lattice, Scene
 from tisim.effects import Lorentz, NearField, Tether, TruncatedNearField
 from tisim.operators import PeakDisplacement

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field, model_validator
-
 from tisim.optimize.evaluation.estimate import FitnessEstimate, converged_after
 from tisim.optimize.evaluation.runs import Evaluator, Runs, Sample
 from tisim.optimize.problem.objective import Objective
@@ -16,6 +15,7 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.problem.statistic import Others
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.record import canonical
+
 from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.numerics.skewed import Moments, shared_skewness

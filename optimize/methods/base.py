@@ -15,6 +15,7 @@ from tisim.optimize import methods
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
 from tisim.optimize.problem.problem import checksum_of
+
 from tisim.components.component import Checked
 from tisim.errors import must
 

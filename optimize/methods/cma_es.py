@@ -8,10 +8,10 @@ import numpy as np
 from deap import cma
 from numpy.typing import NDArray
 from pydantic import Field
-
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
+
 from tisim.components.component import Checked
 
 EDGE = 0.05

@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 from deap import tools
 from pydantic import Field, model_validator
-
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.gaussian_process import missing, sobol
 from tisim.optimize.methods.individual import Individual
@@ -18,6 +17,7 @@ from tisim.optimize.surrogate.acquisition import Worth
 from tisim.optimize.surrogate.belief import Belief
 from tisim.optimize.surrogate.gaussian_process import Array
 from tisim.optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
+
 from tisim.components.component import Checked
 from tisim.errors import must
 

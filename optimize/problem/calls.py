@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tisim.errors import InputError, Words, abbreviated, must, printable
-from tisim.files.python_file import OWN_PACKAGES
+from tisim.files.python_file import own_folders
 
 if TYPE_CHECKING:
     from tisim.optimize.problem.constraint import InequalityConstraint
     from tisim.optimize.problem.objective import Objective
     from tisim.optimize.problem.problem import Problem
+
     from tisim import Scene
 
-OWN_FOLDERS = tuple(Path(__file__).parents[2] / name for name in sorted(OWN_PACKAGES))
 SOURCES = (".py", ".pyc", ".so", ".pyd")
 """Files with these endings are opened by imports."""
 SYSTEM = tuple(map(Path, ("/usr", "/lib", "/etc", "/dev", "/proc", "/sys")))
@@ -186,7 +186,7 @@ def _files_read() -> Iterator[set[Path]]:
 
 def _is_of_user(path: Path) -> bool:
     """Return whether a file is neither installed, nor the system's, nor kept by a program in the home."""
-    installed = Path(sys.prefix), Path(sys.base_prefix), *OWN_FOLDERS
+    installed = Path(sys.prefix), Path(sys.base_prefix), *own_folders()
     home = os.environ.get("HOME") or os.environ.get("USERPROFILE") or "."
     kept = tuple(Path(home) / name for name in (".cache", ".config", ".local", ".matplotlib"))
     metadata = any(part.endswith((".egg-info", ".dist-info")) for part in path.parts)

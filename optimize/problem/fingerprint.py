@@ -26,7 +26,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from tisim.errors import InputError, abbreviated
-from tisim.files.python_file import OWN_PACKAGES, sha256
+from tisim.files.python_file import is_own, sha256
 
 BY_REPR = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
 """Types whose ``repr`` says all of a value."""
@@ -210,7 +210,7 @@ def _of_user(item: Callable[..., Any] | type | types.ModuleType) -> bool:
     of tisim, nor of Python, nor installed."""
     whose = item.__name__ if isinstance(item, types.ModuleType) else getattr(item, "__module__", None) or ""
     root = whose.partition(".")[0]
-    if root in OWN_PACKAGES or root in sys.stdlib_module_names - {"__main__"}:
+    if is_own(whose) or root in sys.stdlib_module_names - {"__main__"}:
         return False
     module = sys.modules.get(whose)
     path = getattr(module, "__file__", None)

@@ -9,6 +9,7 @@ from typing import Any
 
 from tisim.optimize.problem.calls import FaultyProblem, error_told
 from tisim.optimize.problem.gene_values import Named, Value, check_name, plain_value
+
 from tisim.errors import InputError, abbreviated, must
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-
 from tisim.optimize.problem.statistic import MEAN, Statistic
+
 from tisim.errors import must
 
 

@@ -17,6 +17,7 @@ from tisim.optimize.problem.genome import AnyGene, Genome
 from tisim.optimize.problem.given_genes import DependentGene
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.statistic import Misfit
+
 from tisim.errors import InputError, must
 from tisim.files import python_file, regular_file
 from tisim.files.python_file import sha256

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from rich.table import Table
-
 from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.evaluation.runs import Evaluator
@@ -22,6 +21,7 @@ from tisim.optimize.search import search
 from tisim.optimize.search_folder import check_problem, resume_or_clear
 from tisim.optimize.settings import Settings, fit, identity, proposed
 from tisim.optimize.storage.cache import Cache
+
 from tisim import RunError
 from tisim.console import plain_table
 from tisim.errors import must

@@ -24,6 +24,7 @@ from tisim.optimize.storage.journal import Journal, Mark, TableRows
 from tisim.optimize.storage.record import Record
 from tisim.optimize.storage.runs_table import RunsTable, tabulated
 from tisim.optimize.storage.table import Hdf5Table
+
 from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.ownership import ensure_writable

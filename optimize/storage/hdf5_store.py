@@ -18,7 +18,6 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-
 from tisim.optimize.storage import older
 from tisim.optimize.storage.runs_table import KINDS, RunsTable, tabulated
 from tisim.optimize.storage.table import (
@@ -28,6 +27,7 @@ from tisim.optimize.storage.table import (
     write_column,
     write_table,
 )
+
 from tisim import InputError
 from tisim.errors import must
 from tisim.files import regular_file

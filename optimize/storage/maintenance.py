@@ -11,6 +11,7 @@ from tisim.optimize.storage.cache import Cache, existing_files, file_content
 from tisim.optimize.storage.hdf5_store import Content
 from tisim.optimize.storage.journal import Journal, Mark
 from tisim.optimize.storage.record import Record
+
 from tisim.files.atomic import locked
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-
 from tisim.optimize.storage.record import canonical
+
 from tisim.errors import must
 
 _OWN_ATTRIBUTES = ("columns", "crc32")

@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import norm
-
 from tisim.optimize.surrogate.belief import Belief
 from tisim.optimize.surrogate.gaussian_process import Array
 from tisim.optimize.surrogate.selection import beaten_by

@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
 from tisim.optimize.surrogate.belief import MOST_LEARNED, costs_and_noise
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess
 from tisim.optimize.surrogate.selection import representative
+
 from tisim.numerics.skewed import Moments
 
 LEAST_DESIGNS = 10

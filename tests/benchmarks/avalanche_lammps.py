@@ -39,6 +39,7 @@ from tisim.cases.avalanche.scene import (  # noqa: E402
     young,
 )
 from tisim.cases.avalanche.sizes import Cell  # noqa: E402
+
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402

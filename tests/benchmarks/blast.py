@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import blast_numba as peer
 import numba
 import numpy as np
-
 from tisim.cases.blast.scene import AIR, FLUX, VISCOSITY, scene
+
 from tests.benchmarks.turns import rest, spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime

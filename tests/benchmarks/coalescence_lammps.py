@@ -31,6 +31,7 @@ sys.path.insert(0, str(ROOT))
 from tisim.cases.coalescence import scene as cloud  # noqa: E402
 from tisim.cases.coalescence.measures import Asteroid, Conserved, Gathering  # noqa: E402
 from tisim.cases.runs import sound  # noqa: E402
+
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402

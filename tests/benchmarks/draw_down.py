@@ -18,10 +18,17 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
+from tisim.cases.granular_bench.problem import (
+    EXAMPLES,
+    KNOWN,
+    SIMULATED,
+    UNCERTAINTIES,
+    calibration_to,
+    other_runs,
+)
+from tisim.optimize.evaluation.estimate import FitnessEstimate
 
 import tisim
-from tisim.cases.granular_bench.problem import EXAMPLES, KNOWN, SIMULATED, UNCERTAINTIES, calibration_to, other_runs
-from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.analysis import Mean
 
 FRICTIONS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.0)

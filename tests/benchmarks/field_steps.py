@@ -17,11 +17,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-
-import tisim
 from tisim.cases.agglomeration import fields
 from tisim.cases.agglomeration.problem import cost, problem
 from tisim.cases.agglomeration.scene import scene
+
+import tisim
 from tisim.analysis import Mean
 
 STRONGEST = {"surface_charge": 4e-3, "magnetic_field": 1.0, "hardness": 1e5, "friction": 0.01}

@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tisim.cases.capture.problem import captured, problem
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.report.comparison import FRESH
+
 from tisim import run
 from tisim.analysis import Mean
 

@@ -13,10 +13,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-
-import tisim
 from tisim.cases.avalanche.measures import repose
 from tisim.cases.avalanche.problem import EXAMPLE, KNOWN, other_runs
+
+import tisim
 from tisim.analysis import Mean
 
 

@@ -37,6 +37,7 @@ from tisim.cases.mrf_shear.measures import order, shear_stress  # noqa: E402
 from tisim.cases.mrf_shear.regime import magnetisation  # noqa: E402
 from tisim.cases.mrf_shear.scene import BEFORE, CUT, SEARCHED, STRAIN, SUSCEPTIBILITY, scene  # noqa: E402
 from tisim.cases.runs import sound  # noqa: E402
+
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402

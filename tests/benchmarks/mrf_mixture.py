@@ -15,11 +15,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-
-import tisim
 from tisim.cases.mrf_shear.flow_curve import AS_PUBLISHED, MIXED, VARIATIONS, Curve
 from tisim.cases.mrf_shear.runs import grouped
 from tisim.cases.mrf_shear.scene import RATES, SEARCHED, SWEPT, scene
+
+import tisim
 from tisim.analysis import Mean
 
 

@@ -16,11 +16,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-
-import tisim
 from tisim.cases.case import every
 from tisim.cases.runs import OTHER_STARTS
 from tisim.optimize import Problem
+
+import tisim
 from tisim import Result
 from tisim.analysis import Mean
 

@@ -24,10 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import granular_bed
 import numpy as np
 from matplotlib.axes import Axes
-
-import tisim
 from tisim.cases.agglomeration.scene import BEST
 from tisim.cases.agglomeration.scene import scene as agglomeration
+
+import tisim
 from tisim.backend import memory, runtime
 from tisim.effects import Gravity, Walls
 from tisim.geometry import Plane

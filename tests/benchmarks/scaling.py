@@ -25,11 +25,11 @@ import dipole_dipole
 import granular_bed
 import near_field
 import numpy as np
-
-import tisim
 from tisim.cases.agglomeration import CASE as AGGLOMERATION
 from tisim.cases.blast.scene import scene as blast
 from tisim.cases.capture.scene import scene as capture
+
+import tisim
 from tisim.backend import runtime
 
 SECONDS = 1.0

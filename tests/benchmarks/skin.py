@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tisim.cases.avalanche import scene as avalanche
 from tisim.cases.avalanche.sizes import DEFAULT
 from tisim.cases.mrf_shear import scene as mrf_shear
+
 from tests.benchmarks.turns import spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime

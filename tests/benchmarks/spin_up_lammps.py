@@ -32,6 +32,7 @@ from tisim.cases.runs import sound  # noqa: E402
 from tisim.cases.spin_up.checks import at_least  # noqa: E402
 from tisim.cases.spin_up.scene import DEFAULT, NUMBERS, SETTLED, scene  # noqa: E402
 from tisim.cases.spin_up.stages import RATES, SpinStep, SpinUp, stage_ends, turn  # noqa: E402
+
 from tests.benchmarks import coalescence_lammps, lammps_peer  # noqa: E402
 from tests.benchmarks.coalescence_lammps import FIELDS, run_each, state_of  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402

@@ -28,8 +28,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numba
 import numpy as np
 from scipy.integrate import solve_ivp
-
 from tisim.cases.vibration import scene as vibration
+
 from tisim import Simulation
 from tisim.backend import runtime
 from tisim.plotting.style import empty, letters, plain

@@ -3,8 +3,8 @@
 import inspect
 
 import pytest
-
 from tisim.cases.case import Late, every
+
 from tisim import InputError
 
 INVERSE = [name for name, case in every().items() if case.problem]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.constants import mu_0
-
 from tisim.cases.dipoles import attraction_in_line
 
 

@@ -2,6 +2,7 @@
 
 from tisim.cases.case import Check
 from tisim.cases.statistics import Claim, Shown
+
 from tisim.analysis import Mean
 
 

@@ -8,9 +8,9 @@ import signal
 from dataclasses import replace
 
 import pytest
+from tisim.cases.case import every
 from typer.main import get_command
 
-from tisim.cases.case import every
 from tests.accuracy.scenes import only, oscillator
 from tests.own_files import LAW
 from tisim import InputError

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
+
 from tests.files.full_disk import files_of_at_most
 from tests.files.test_growing_hdf5 import STILL
 from tests.files.test_growing_hdf5 import frame as grown

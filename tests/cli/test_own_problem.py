@@ -4,8 +4,8 @@ import csv
 from pathlib import Path
 
 import pytest
-
 from tisim.optimize.storage.cache import Cache
+
 from tests.own_files import LAW, PROBLEM
 
 SEARCH = ["optimize", "my_drift.py", "--out", "s"]

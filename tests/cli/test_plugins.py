@@ -4,8 +4,8 @@ import json
 import re
 
 import pytest
-
 from tisim.optimize.storage.cache import Cache
+
 from tests.own_files import LAW, METHOD, PROBLEM
 from tisim import Scene
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tisim.optimize import Gene
 
 import tisim
-from tisim.optimize import Gene
 from tisim.effects import Gravity
 from tisim.steppers import Collocation, FixedStep
 

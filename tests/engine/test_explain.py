@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rich.console import Console
-
 from tisim.cases.agglomeration.scene import BEST
 from tisim.cases.agglomeration.scene import scene as agglomeration
 from tisim.cases.vibration.scene import scene as vibration
+
 from tests.effects.contact.grains import heap
 from tests.interactions.test_self_consistent import Potential
 from tests.scenes import scene

@@ -54,7 +54,7 @@ FAULTS = {
     "def f():\n    return nothing\n\nf()\n": "line 2: NameError: name 'nothing' is not defined",
     "import no_such_module_at_all\n": "line 1: ModuleNotFoundError: No module named 'no_such_module_at_all'",
     "import sys\nsys.exit(3)\n": "line 2: SystemExit: 3",
-    "from tisim.optimize import Gene\n\nGene('a', 'm', 2, 1)\n": "line 3: InputError: range of gene a must be",
+    "from tisim.optimize import Gene\nGene('a', 'm', 2, 1)\n": "line 2: InputError: range of gene a must be",
 }
 
 

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-
-import tisim
 from tisim.optimize.storage import hdf5_store
 from tisim.optimize.storage.cache import Cache
+
+import tisim
 from tests.accuracy.scenes import oscillator
 from tests.scenes import compiled, flow, scene
 from tisim import InputError, Recording, Result, Scene, Status

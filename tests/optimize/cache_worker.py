@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from tisim.optimize.storage.cache import Cache
+
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import RunError
 
@@ -139,6 +140,7 @@ def asleep():
 def tisim(*arguments):
     """The command, naming each evaluation."""
     from tisim.cases import case
+
     from tests.optimize.drift_case import CASE
     from tisim.cli.main import main
 

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from tisim import optimize
-import tisim
 from tisim.optimize import FitnessRecord, Gene, Genome, Objective, Problem
-from tisim import InputError, RunError
+
+import tisim
+from tisim import InputError, RunError, optimize
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity
 from tisim.steppers import FixedStep, Verlet

@@ -9,10 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tisim import optimize
 from tests.optimize.drift_case import distance, problem
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
-from tisim import InputError
+from tisim import InputError, optimize
 from tisim.backend import runtime
 
 SMALL = {

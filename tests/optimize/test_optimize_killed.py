@@ -5,9 +5,9 @@ import subprocess
 import time
 
 import pytest
-
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import verify
+
 from tests.optimize.cache_files import PIPE, worker
 from tisim import InputError
 from tisim.files import lock

@@ -1,11 +1,11 @@
 import random
 
 import pytest
-
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.maintenance import verify
+
 from tests.optimize.cache_files import PIPE, worker
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 

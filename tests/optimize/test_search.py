@@ -5,7 +5,6 @@ import random
 
 import numpy as np
 import pytest
-
 from tisim.optimize.evaluation.ensemble import FRESH, EnsembleSettings
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.methods.operators import GeneticOperator
@@ -14,6 +13,7 @@ from tisim.optimize.search_records import searches
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.maintenance import verify
+
 from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
 from tisim import InputError, RunError
 

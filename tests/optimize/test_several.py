@@ -5,7 +5,6 @@ import csv
 import numpy as np
 import pytest
 from matplotlib.image import imread
-
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.hall_of_fame import Hall, compromise
@@ -19,6 +18,7 @@ from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import compact, verify
 from tisim.optimize.storage.record import Record
+
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
 

@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tisim.cases.agglomeration.problem import cost
 from tisim.cases.agglomeration.scene import scene
 from tisim.optimize import FitnessRecord, Gene, Genome, Objective, Problem
+
 from tisim.backend import runtime
 
 FILE = Path(__file__).with_name("fitness.json")

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-import tisim
 from tisim.cases.blast import problem as blast
 from tisim.cases.vibration import problem as vibration
+
+import tisim
 from tisim.backend import runtime
 
 VIBRATION = {

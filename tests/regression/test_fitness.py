@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tisim.optimize import FitnessRecord
 
 import tisim
-from tisim.optimize import FitnessRecord
 from tests.regression import fitness_record
 from tisim.scene.scene import PHYSICS_VERSION
 

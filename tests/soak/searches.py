@@ -17,6 +17,7 @@ from pathlib import Path
 
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import verify
+
 from tests.soak.counts import Counts
 from tisim.backend.kernel_cache import LOCKS
 from tisim.backend.runtime import cores

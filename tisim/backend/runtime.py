@@ -115,10 +115,10 @@ def init(
     """Start Taichi with these settings, or keep it as it is when they have not changed.
 
     threads : CPU threads; 0 for all cores. arithmetic : "strict" or "fast"; see ``Runtime``.
-    Raises InputError when a setting is unknown or the device is absent. A change of settings waits until what
-    ``tisim.run``, ``tisim.accuracy.study`` or ``tisim.optimize.run`` do in other threads is over. It invalidates
-    every Simulation made before; those say so when used. Raises RunError in a process that was forked from
-    one where Taichi had been started.
+    Raises InputError when a setting is unknown or the device is absent. A change of settings waits until
+    ``tisim.run``, ``tisim.accuracy.study`` and ``tisim.optimize.run`` in other threads have returned. It
+    invalidates every Simulation made before; those say so when used. Raises RunError in a process that was
+    forked from one where Taichi had been started.
     """
     require_own_process()
     requested = Runtime(device, precision, threads or cores(), arithmetic)

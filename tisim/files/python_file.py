@@ -21,8 +21,8 @@ from typing import Any
 
 from tisim.errors import InputError, abbreviated, must, printable
 
-OWN_PACKAGES = frozenset({"tisim", "optimize", "cases"})
-"""These packages have a version that says what they compute."""
+OWN_PACKAGES = ("tisim", "tisim.optimize", "tisim.cases")
+"""These packages have a version that says what they compute. The last two may lie beside the first."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,17 @@ class PythonFile:
     def checksum(self) -> str:
         """Return the SHA-256 of the text, hex."""
         return sha256(self.text)
+
+
+def is_own(module: str) -> bool:
+    """Return whether a module, by its name, is one of tisim's."""
+    return module == "tisim" or module.startswith("tisim.")
+
+
+@functools.cache
+def own_folders() -> tuple[Path, ...]:
+    """Return the folders of OWN_PACKAGES."""
+    return tuple(Path(importlib.import_module(name).__path__[0]) for name in OWN_PACKAGES)
 
 
 def sha256(text: bytes) -> str:
@@ -116,7 +127,7 @@ def module_checksums(*items: Any) -> dict[str, str]:
 
 def _add(module: str, item: Any, result: dict[str, str]) -> None:
     root = module.partition(".")[0]
-    if root in OWN_PACKAGES or root in sys.stdlib_module_names or root == "pydantic" or module in result:
+    if is_own(module) or root in sys.stdlib_module_names or root == "pydantic" or module in result:
         return
     if module not in _current:
         result[module] = _file_checksum(module, item)

@@ -6,6 +6,7 @@ from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.evaluation.runs import Evaluator
 from tisim.optimize.problem.problem import Problem
+
 from tisim.backend import runtime
 from tisim.errors import must
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from tisim.optimize.evaluation.executors import handshake, worker
 from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
+
 from tisim import InputError, RunError, Scene
 from tisim.errors import must
 

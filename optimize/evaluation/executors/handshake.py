@@ -7,17 +7,14 @@ import platform
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import version
-from importlib.util import find_spec
-from pathlib import Path
 from textwrap import shorten
 
 from tisim import InputError, __version__
 from tisim.backend import runtime
 from tisim.errors import must
+from tisim.files.python_file import OWN_PACKAGES, own_folders
 from tisim.scene import plugins
 from tisim.scene.scene import PHYSICS_VERSION
-
-PACKAGES = ("tisim", "optimize", "cases")
 
 
 def program() -> dict[str, str]:
@@ -43,13 +40,14 @@ def program() -> dict[str, str]:
 @cache
 def source() -> str:
     """Return the first 12 digits of a SHA-256 of all source files: a version may have been edited."""
+    files = {
+        f"{package.replace('.', '/')}/{path.relative_to(folder).as_posix()}": path
+        for package, folder in zip(OWN_PACKAGES, own_folders(), strict=True)
+        for path in folder.rglob("*.py")
+    }
     digest = hashlib.sha256()
-    for package in PACKAGES:
-        spec = find_spec(package)
-        for folder in sorted(spec.submodule_search_locations or ()) if spec else ():
-            for path in sorted(Path(folder).rglob("*.py")):
-                digest.update(path.relative_to(folder).as_posix().encode() + b"\0")
-                digest.update(path.read_bytes() + b"\0")
+    for name, path in sorted(files.items()):
+        digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:12]
 
 

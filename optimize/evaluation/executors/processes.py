@@ -13,6 +13,7 @@ from multiprocessing import resource_tracker
 from tisim.optimize.evaluation.executors import worker
 from tisim.optimize.evaluation.executors.remote import Lost
 from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
+
 from tisim import RunError, Scene
 from tisim.backend import runtime
 

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from tisim.optimize.evaluation.executors import handshake
 from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
+
 from tisim import Result, RunError, Scene
 
 UNITS = 2

@@ -16,6 +16,7 @@ from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.evaluation.executors import handshake
 from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.problem.function import FunctionCall
+
 from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
 from tisim.files import python_file

@@ -1,7 +1,6 @@
 """Slopes of grains that are made, not run."""
 
 import numpy as np
-
 from tisim.cases.avalanche.scene import DIAMETERS
 
 WIDTH = 6

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from tisim.cases.avalanche import figures as drawing
 from tisim.cases.avalanche.calving import STRIP, strips_of
 from tisim.cases.avalanche.checks import of_avalanches
@@ -16,6 +15,7 @@ from tisim.cases.avalanche.scene import DIAMETERS, FLUX, GRAVITY, RELAXATION
 from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
 from tisim.cases.avalanche.stages import Avalanche, avalanches
 from tisim.cases.case import Size
+
 from tests.cases.avalanche.slopes import WIDTH, block, leaning
 from tisim import InputError
 

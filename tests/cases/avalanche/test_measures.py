@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from tisim.cases.avalanche.measures import (
     filled_parts,
     grains_volume,
@@ -15,6 +14,7 @@ from tisim.cases.avalanche.measures import (
     two_slopes,
 )
 from tisim.cases.avalanche.scene import DIAMETERS, GRAVITY
+
 from tests.cases.avalanche.slopes import WIDTH, block, leaning
 
 D = DIAMETERS[0]

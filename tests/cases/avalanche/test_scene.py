@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.constants import mu_0
-
 from tisim.cases.avalanche.calving import pictures
 from tisim.cases.avalanche.published import SLOPES, larger
 from tisim.cases.avalanche.scaling import attraction, moment, ratio, weight
@@ -19,6 +18,7 @@ from tisim.cases.avalanche.scene import (
     young,
 )
 from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
+
 from tests.cases.avalanche.slopes import block
 from tisim.analysis import contacts
 from tisim.effects import Walls

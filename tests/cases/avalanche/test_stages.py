@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from tisim.cases.avalanche import stages
 from tisim.cases.avalanche.scene import DIAMETERS, FLUX, REST
 from tisim.cases.avalanche.stages import avalanches
+
 from tests.cases.avalanche.test_scene import TINY
 from tisim import RunError
 from tisim.effects import Walls

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from tisim.cases.blast import CASE
 from tisim.cases.blast import scene as blast
 from tisim.cases.blast.problem import DURATION, TARGET_FLUX, details, field, misfit, problem, start
@@ -11,6 +10,7 @@ from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
+
 from tisim import InputError, Result, Status
 
 

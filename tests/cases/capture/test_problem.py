@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from tisim.cases.capture import problem as filters
 from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
 from tisim.cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
@@ -13,6 +12,7 @@ from tisim.optimize.report.comparison import FRESH
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
+
 from tisim import InputError, Result, Status, run
 from tisim.analysis import Mean
 from tisim.sources import MagneticCylinders, MagneticField

@@ -1,7 +1,6 @@
 """What the case coalescence must show."""
 
 import pytest
-
 from tisim.cases.coalescence.checks import check
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from tisim.cases.coalescence.measures import (
     Asteroid,
     Conserved,

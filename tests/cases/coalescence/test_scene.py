@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.constants import Boltzmann, G, mu_0
-
 from tisim.cases.coalescence import published
 from tisim.cases.coalescence.scaling import (
     attraction,
@@ -27,6 +26,7 @@ from tisim.cases.coalescence.scene import (
     step,
     thermal_speed,
 )
+
 from tisim.analysis import contacts
 from tisim.effects import PermanentMoment, SelfGravity, TreeGravity, TruncatedDipoleDipole
 

@@ -4,10 +4,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from tisim.cases.capture.scene import SATURATION_MOMENTS
 from tisim.cases.concentration import CASE
-from tisim.cases.concentration.scene import DENSITY, DISTANCE, SIZES, coupling, longest, scene, scene_for, side
+from tisim.cases.concentration.scene import (
+    DENSITY,
+    DISTANCE,
+    SIZES,
+    coupling,
+    longest,
+    scene,
+    scene_for,
+    side,
+)
 from tisim.cases.concentration.statistics import (
     CAPTURE,
     CHAINS,
@@ -20,6 +28,7 @@ from tisim.cases.concentration.statistics import (
     results,
 )
 from tisim.cases.statistics import Claim
+
 from tisim import Particles, RunError, Simulation, run
 from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-
-import tisim
 from tisim.cases.granular_bench.plate import DRAWN, DROPPED, rebound, scene_with_plate, sliding
 from tisim.cases.granular_bench.scene import scene
+
+import tisim
 from tests.scenes import by_id
 from tisim.effects import Walls
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-
 from tisim.cases.mrf_shear.measures import order, raft_force, shear_rate, shear_stress
 from tisim.cases.mrf_shear.scene import LOWER, UPPER, scene
 from tisim.cases.runs import overlap
+
 from tests.scenes import simulate
 
 UM = 1e-6

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from tisim.cases.mrf_shear.off_state import (
     RANDOM_PACKING,
     closest_packing,

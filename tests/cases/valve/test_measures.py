@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.constants import mu_0
-
 from tisim.cases.runs import overlap
 from tisim.cases.valve.measures import (
     attraction,
@@ -19,6 +18,7 @@ from tisim.cases.valve.measures import (
 from tisim.cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
 from tisim.cases.valve.scene import scene
 from tisim.cases.valve.sizes import THROATS
+
 from tests.cases.valve.states import at_rest, result_of
 
 R, UM = 22e-6, 1e-6

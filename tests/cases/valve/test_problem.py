@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-
-import tisim
 from tisim.cases.case import every
 from tisim.cases.runs import OTHER_STARTS, sound
 from tisim.cases.valve import published
@@ -23,6 +21,8 @@ from tisim.cases.valve.problem import (
 )  # fmt: skip
 from tisim.cases.valve.runs import ARRESTED
 from tisim.optimize.settings import Settings, proposed
+
+import tisim
 from tests.cases.valve.states import result_of
 from tisim import InputError
 from tisim.sources import MagneticField

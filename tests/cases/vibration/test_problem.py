@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-
-import tisim
 from tisim.cases.vibration.problem import (
     DRIVE,
     VARIANTS,
@@ -19,6 +17,8 @@ from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
+
+import tisim
 from tisim import InputError
 
 DESIGNS = {

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.accuracy import constants
 from tisim.cases.vibration.closed_forms import response
@@ -17,6 +16,7 @@ from tisim.cases.vibration.response import (
     slow_scenes,
     vertex,
 )
+
 from tisim.effects import Gravity
 
 CONSTANTS = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,

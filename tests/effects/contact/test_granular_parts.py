@@ -6,8 +6,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import gamma
-
 from tisim.cases.granular_bench import closed_forms
+
 from tests.effects.contact.compositions import NEUTRAL, alone, along, grains, loaded
 from tests.effects.contact.grains import run
 from tests.scenes import by_id

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from tisim.cases.granular_bench.closed_forms import hertz_overlap
+
 from tests.effects.contact.grains import CAPACITY, FLOOR, USUAL, WORLDS, grains, run
 from tests.scenes import compiled
 

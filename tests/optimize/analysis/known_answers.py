@@ -14,17 +14,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from tisim import optimize
-import tisim
 from tisim.optimize import Gene, Genome, Misfit, Objective, Problem
 from tisim.optimize.evaluation.executors import evaluator_named
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
+
+import tisim
 from tests.optimize.analysis.granular_experiment import GENES as GRANULAR_GENES
 from tests.scenes import by_id, scene
-from tisim import Material
+from tisim import Material, optimize
 from tisim.effects import (
     DipoleDipole,
     Granular,

@@ -4,11 +4,10 @@ import csv
 
 import numpy as np
 import pytest
-
-from tisim import optimize
 from tisim.optimize import Choice, Gene, Problem
 from tisim.optimize.analysis.misfit_shape import Evidence, coefficients, fit
 from tisim.optimize.report.analysis import Analysis
+
 from tests.optimize.analysis.granular_experiment import (
     coverage,
     interval_of,
@@ -17,7 +16,7 @@ from tests.optimize.analysis.granular_experiment import (
     searched,
     searched_coverage,
 )
-from tisim import InputError
+from tisim import InputError, optimize
 
 SETS = 200
 

@@ -2,12 +2,12 @@ import math
 
 import numpy as np
 import pytest
-
 from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from tisim.optimize.evaluation.estimate import converged_after
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
+
 from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError, RunError
 from tisim.numerics.skewed import interval

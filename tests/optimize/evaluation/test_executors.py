@@ -17,7 +17,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from tisim.optimize.evaluation import executors
 from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.evaluation.executors import dask_cluster, handshake
@@ -29,6 +28,7 @@ from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.maintenance import verify
+
 from tests.optimize.cache_files import worker
 from tests.optimize.drift_case import problem, scene
 from tests.optimize.evaluation import light_worker
@@ -469,10 +469,8 @@ def test_one_edited_source_file_makes_another_program(tmp_path, monkeypatch):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     ours = handshake.source.__wrapped__()
 
-    def find_spec(name):
-        return SimpleNamespace(submodule_search_locations=[str(tmp_path / name)])
-
-    monkeypatch.setattr(handshake, "find_spec", find_spec)
+    folders = tuple(tmp_path / name for name in ("tisim", "optimize", "cases"))
+    monkeypatch.setattr(handshake, "own_folders", lambda: folders)
     assert handshake.source.__wrapped__() == ours
     with (tmp_path / "tisim" / "effects" / "drag.py").open("a") as file:
         file.write("\n")

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-
 from tisim.optimize.methods.breeding import Breeder
 from tisim.optimize.methods.breeding_settings import Breeding
+
 from tests.optimize.fake_runs import bowl
 from tisim import InputError
 

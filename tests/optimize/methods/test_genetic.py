@@ -6,7 +6,6 @@ import random
 import numpy as np
 import pytest
 from deap import base, tools
-
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.base import find
@@ -16,6 +15,7 @@ from tisim.optimize.problem.genes import Choice
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings, identity
+
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
 

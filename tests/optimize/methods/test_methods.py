@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.base import every, find
@@ -11,6 +10,7 @@ from tisim.optimize.methods.individual import Individual
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
+
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
 

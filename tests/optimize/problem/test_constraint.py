@@ -4,15 +4,14 @@ import functools
 import math
 
 import pytest
-
-from tisim import optimize
 from tisim.optimize import DesignConstraint, Gene, Problem, ResultConstraint
 from tisim.optimize.evaluation.runs import Runs, Sample
 from tisim.optimize.problem.calls import constraint_value, make_scene
 from tisim.optimize.problem.function import FunctionCall
 from tisim.optimize.tables import best_columns
+
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, FakeScene, fake_problem
-from tisim import InputError
+from tisim import InputError, optimize
 
 FIRST = DesignConstraint("first", lambda design: design["x0"], "m", at_most=0.5)
 

@@ -8,13 +8,12 @@ import subprocess
 import sys
 
 import pytest
-
-from tisim import optimize
 from tisim.optimize import Choice, FitnessRecord, Gene, Objective, Problem
 from tisim.optimize.problem.function import PlainFunction
 from tisim.optimize.storage.cache import existing
+
 from tests.optimize.function_case import noisy, rosenbrock
-from tisim import InputError, RunError
+from tisim import InputError, RunError, optimize
 
 TWO = (Gene("x", "", -2.0, 2.0), Gene("y", "", -1.0, 3.0))
 ONE = (Gene("x", "", 0.0, 1.0),)

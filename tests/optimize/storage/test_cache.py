@@ -1,10 +1,10 @@
 import multiprocessing
 
 import pytest
-
 from tisim.optimize.storage import cache as cache_module
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import compact, verify
+
 from tests.optimize.cache_files import journal_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError

@@ -4,10 +4,10 @@ import os
 
 import h5py
 import pytest
-
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
 from tisim.optimize.storage.cache import Cache
+
 from tests.optimize.cache_files import journal_of
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim.cli.main import main

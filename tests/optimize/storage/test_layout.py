@@ -8,7 +8,6 @@ import time
 import h5py
 import numpy as np
 import pytest
-
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
@@ -19,6 +18,7 @@ from tisim.optimize.storage.cache import FOLD_BYTES, FOLD_SHARE, Cache, existing
 from tisim.optimize.storage.maintenance import compact, verify
 from tisim.optimize.storage.record import Record
 from tisim.optimize.storage.runs_table import RunsTable, tabulated
+
 from tests.optimize.cache_files import journal_of, lock_of, payloads
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
