@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from tisim.components.component import Checked, Component
-from tisim.engine import reference
-from tisim.engine.reference import Declaration, Entry
+from tisim.describe import reference
+from tisim.describe.reference import Declaration, Entry
 
 PACKAGES = ("tisim", "tisim.effects", "tisim.sources", "tisim.operators", "tisim.steppers", "tisim.packing",
             "tisim.accuracy", "tisim.analysis", "tisim.optimize")  # fmt: skip

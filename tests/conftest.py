@@ -18,16 +18,16 @@ from tisim.errors import InputError
 from tisim.files import python_file
 
 ON_DEVICES = (
-    *("numerics/test_elementary.py", "numerics/test_philox.py", "neighbours/test_half_list.py"),
+    *("numerics/test_elementary.py", "numerics/test_philox.py", "pairs/test_half_list.py"),
     *("effects/contact/test_hertz_mindlin.py", "effects/contact/test_granular_impacts.py"),
     *("effects/contact/test_walls.py", "effects/contact/test_contact.py", "effects/pair/test_near_field.py"),
     *("effects/pair/test_mie.py", "effects/external/test_drag.py", "effects/impact/test_impact.py"),
     *("effects/magnetic/test_dipole_dipole.py", "effects/magnetic/test_cutoff.py"),
     *("effects/magnetic/test_ewald.py", "effects/magnetic/test_sweeps.py"),
-    *("steppers/test_verlet.py", "steppers/test_conservation.py", "interactions/test_beyond_contact.py"),
+    *("steppers/test_verlet.py", "steppers/test_conservation.py", "pairs/test_beyond_contact.py"),
     *("effects/test_contract.py", "operators/test_contract.py", "steppers/test_contract.py"),
     *("operators/test_passage.py", "operators/test_peak_displacement.py", "test_testing.py"),
-    *("interactions/test_vacated_slots.py", "interactions/test_cell_tree.py"),
+    *("population/test_vacated_slots.py", "effects/gravitation/test_cell_tree.py"),
     *("effects/gravitation/test_tree_gravity.py", "effects/pair/test_virial.py"),
     *("effects/magnetic/test_moment.py", "effects/magnetic/test_froehlich.py"),
     *("effects/magnetic/test_permanent_moment.py", "effects/constraint/test_prescribed_motion.py"),

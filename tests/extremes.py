@@ -19,6 +19,7 @@ import numpy as np
 from tests.hostile import materials, with_needed
 from tisim import Clump, Scene, steppers
 from tisim.components import serialization
+from tisim.describe.explain import known_effects
 from tisim.effects import (
     Agglomeration,
     DerivedQuantity,
@@ -39,7 +40,6 @@ from tisim.effects import (
 )
 from tisim.effects.magnetic.moment import MOMENT
 from tisim.engine.assembly import needed_fields
-from tisim.engine.explain import known_effects
 from tisim.packing.clump import clump_columns, sphere_columns
 from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Source
 

@@ -13,8 +13,8 @@ from tests.scenes import flow, scene
 from tisim import Blast, Cloud, Material, RandomAroundCylinder, RandomInBox, steppers
 from tisim.components import serialization
 from tisim.components.component import Component
+from tisim.describe.explain import known_effects
 from tisim.effects import Effect
-from tisim.engine.explain import known_effects
 from tisim.sources import MagneticField
 from tisim.steppers import DriftLimit, FixedStep, Stepper
 

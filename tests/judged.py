@@ -17,7 +17,7 @@ from tisim.backend.runtime import Runtime
 from tisim.cli.main import main
 from tisim.engine.assembly import measured
 from tisim.engine.monitor import REASONS
-from tisim.worlds.status import WorldStatus
+from tisim.state.status import WorldStatus
 
 ACCEPTED = "accepted"
 """What a command says in place of running."""

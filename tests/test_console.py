@@ -7,7 +7,7 @@ from tisim import Simulation
 from tisim.compiling import compiling, is_compiling
 from tisim.console import Compiling, progress_bar
 from tisim.effects import Tether
-from tisim.worlds.launched_program import LaunchedProgram
+from tisim.program.launched_program import LaunchedProgram
 
 
 def test_a_bar_says_while_kernels_are_compiled():

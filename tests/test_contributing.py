@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.test_guides import SNIPPET
-from tisim.engine import reference
+from tisim.describe import reference
 from tisim.scene import plugins
 
 TEXT = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tisim.engine import reference
+from tisim.describe import reference
 
 DOCS = Path(__file__).parents[1] / "docs"
 

@@ -8,6 +8,7 @@ from tests.scenes import compiled, fixed, flow, scene
 from tests.throwaway import SoftShell
 from tisim import InputError, Scene
 from tisim.backend.taichi import ti
+from tisim.describe.explain import known_effects
 from tisim.effects import (
     DipoleDipole,
     EwaldDipoleDipole,
@@ -25,10 +26,11 @@ from tisim.effects import (
     Virial,
     option,
 )
-from tisim.engine.explain import known_effects
-from tisim.interactions.loads import FORCE
+from tisim.forces.loads import FORCE
 from tisim.operators import Capture, JoinGroup, Operator, Outflow
+from tisim.program.phases import PerParticle
 from tisim.sources import MagneticCylinders, MagneticField, MagneticSpheres
+from tisim.state.fields import Field
 from tisim.steppers import (
     Boris,
     Brownian,
@@ -46,8 +48,6 @@ from tisim.steppers import (
 from tisim.steppers.common import BeginStep
 from tisim.steppers.verlet import Advance
 from tisim.testing import assert_contracts, assert_fields, assert_lists, assert_pair_forces, assert_reach
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle
 
 SHELL = SoftShell(stiffness=1.0, width=0.3)
 

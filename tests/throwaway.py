@@ -7,7 +7,7 @@ from tisim.backend.taichi import ti
 from tisim.effects import Force, PairForce, parameter
 from tisim.numerics import elementary, philox
 from tisim.operators import Operator
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 K_E = 8.9875517873681764e9
 """Coulomb's constant, N m^2/C^2."""

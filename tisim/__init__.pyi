@@ -29,8 +29,6 @@ from . import (
     steppers as steppers,
 )
 from .backend.runtime import init as init
-from .components.materials import Material as Material
-from .components.materials import MaterialPair as MaterialPair
 from .engine.measure_series import MeasureSeries as MeasureSeries
 from .engine.observer import Observer as Observer
 from .engine.result import Result as Result
@@ -45,6 +43,8 @@ from .errors import StartWarning as StartWarning
 from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.read import read as read
 from .io.recording import Recording as Recording
+from .materials.materials import Material as Material
+from .materials.materials import MaterialPair as MaterialPair
 from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
 from .packing.clump import Clump as Clump
 from .packing.grains import GrainClass as GrainClass

@@ -16,7 +16,7 @@ from tisim.analysis import (
     mean_coordination,
     periodic_sides,
 )
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects import PrescribedMotion, StokesDrag, Translation
 from tisim.operators import JoinGroup
 from tisim.scene.initial_state import Arrays

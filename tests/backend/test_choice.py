@@ -11,7 +11,7 @@ import pytest
 from tisim import InputError
 from tisim.backend import choice, processor
 from tisim.backend.taichi import BACKEND
-from tisim.engine.diagnostics import llvm_version
+from tisim.describe.diagnostics import llvm_version
 
 ROOT = Path(__file__).parents[2]
 BOTH = ["taichi", "quadrants"]
@@ -56,7 +56,7 @@ def test_the_table_has_the_llvm_that_is_in_each_package():
     """The one in use by itself, the other in a process of its own."""
     assert int(llvm_version().split(".")[0]) == choice.LLVM[BACKEND]
     (other,) = (name for name in BOTH if name != BACKEND)
-    code = "from tisim.engine.diagnostics import llvm_version as v; print(v())"
+    code = "from tisim.describe.diagnostics import llvm_version as v; print(v())"
     assert int(python(code, TISIM_BACKEND=other).stdout.split(".")[0]) == choice.LLVM[other]
 
 

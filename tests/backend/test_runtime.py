@@ -19,7 +19,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.engine import diagnostics
+from tisim.describe import diagnostics
 from tisim.engine.batches import Batches, rounded
 
 

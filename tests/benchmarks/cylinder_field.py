@@ -23,8 +23,8 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.sources import Cylinder, MagneticCylinders
 from tisim.sources.sampling import TILE_POINTS
-from tisim.worlds.bound import connected
-from tisim.worlds.parameter_table import ParameterTable
+from tisim.state.bound import connected
+from tisim.state.parameter_table import ParameterTable
 
 RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
 

@@ -10,7 +10,8 @@ largest. TISIM_BACKEND names the kernel compiler. What tisim as it is stands bes
 
 - hertz/history, granular: LAMMPS's gran/hertz/history, which has two roots less a contact as its damping is
   simpler, and its granular style with the same law (python -m pip install ".[bench]");
-- skin=0.1: lists with this skin, in diameters; schedule=world, team or particle: see tisim/worlds/program.py;
+- skin=0.1: lists with this skin, in diameters;
+- schedule=world, team or particle: see tisim/program/program.py;
 - order=random: grains in random order, which the package sorts; order=unsorted: it does not;
 - lanes=1: so many pairs are computed at once.
 
@@ -37,7 +38,8 @@ from tests.benchmarks.turns import rest
 from tisim.backend import runtime
 from tisim.effects import Granular, Gravity, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
-from tisim.interactions import listed_pairs, spatial_sort
+from tisim.pairs import listed_pairs
+from tisim.population import spatial_sort
 from tisim.steppers import FixedStep, Verlet
 
 WIDTH, STEP, YOUNG, POISSON, RESTITUTION, FRICTION = 20.0, 1e-4, 1e6, 0.3, 0.5, 0.5

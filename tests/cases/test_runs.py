@@ -7,7 +7,7 @@ import pytest
 from tisim.cases.runs import overlap, sound
 
 from tisim import Box, RunError, ShearedBox
-from tisim.components.domain import Open
+from tisim.domains.domain import Open
 from tisim.engine.result import Status
 
 

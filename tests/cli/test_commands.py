@@ -46,18 +46,18 @@ def doctor(tisim, monkeypatch, taichi, quadrants):
         name: {scene: 1e-3 * ms for scene, ms in zip(("charges", "grains in contact"), each, strict=False)}
         for name, each in times.items()
     }
-    monkeypatch.setattr("tisim.engine.diagnostics.step_times_of", measured.get)
+    monkeypatch.setattr("tisim.describe.diagnostics.step_times_of", measured.get)
     code, out, _ = tisim("doctor")
     assert code == 0
     return " ".join(out.split())
 
 
 def test_doctor(tisim, monkeypatch):
-    monkeypatch.setattr("tisim.engine.diagnostics.BACKEND", "taichi")
+    monkeypatch.setattr("tisim.describe.diagnostics.BACKEND", "taichi")
     monkeypatch.setenv("TISIM_BACKEND", "taichi")
     zen_3 = {"vendor_id": "AuthenticAMD", "cpu family": "25", "model": "1"}
     zen_4 = {**zen_3, "model": "17"}
-    monkeypatch.setattr("tisim.engine.diagnostics.processor", lambda: zen_4)
+    monkeypatch.setattr("tisim.describe.diagnostics.processor", lambda: zen_4)
     monkeypatch.setattr("tisim.backend.processor.processor", lambda: zen_4)
     out = doctor(tisim, monkeypatch, (3.0, 0.2), (1.0, 0.1))
     for word in ("backend", "LLVM", "processor", "cores", "memory", "cuda", "numpy"):
@@ -71,7 +71,7 @@ def test_doctor(tisim, monkeypatch):
     out = doctor(tisim, monkeypatch, (1.0, 0.1), ())
     assert "not compared quadrants is not installed" in out
     assert "python -m pip install 'quadrants>=" in out
-    monkeypatch.setattr("tisim.engine.diagnostics.processor", lambda: zen_3)
+    monkeypatch.setattr("tisim.describe.diagnostics.processor", lambda: zen_3)
     monkeypatch.delenv("TISIM_BACKEND")
     out = doctor(tisim, monkeypatch, (3.0, 0.2), (1.0, 0.1))
     assert "faster here: set TISIM_BACKEND=quadrants" in out

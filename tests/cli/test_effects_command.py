@@ -7,7 +7,7 @@ from textwrap import fill
 import pytest
 
 from tests.own_files import LAW
-from tisim.engine import reference
+from tisim.describe import reference
 
 
 def test_the_index_has_a_whole_line_for_each(tisim):

@@ -6,8 +6,8 @@ import pytest
 
 from tisim.backend.launcher import Launcher
 from tisim.backend.taichi import ti
-from tisim.worlds.launches import Visit
-from tisim.worlds.state import State
+from tisim.program.launches import Visit
+from tisim.state.state import State
 
 
 def assert_launches(simulation, steps, each):

@@ -11,8 +11,8 @@ from tests import extremes
 from tests.scenes import fixed, scene, simulate
 from tests.throwaway import K_E, WORLDS, Coulomb, RandomKicks, Trap, charges, run
 from tisim import InputError, Scene, Simulation
+from tisim.describe.explain import known_effects
 from tisim.effects import Agglomeration, ContactFriction, Force, Impact, PairForce, Tether
-from tisim.engine.explain import known_effects
 
 
 def test_forces_are_their_numpy_twin(rng):

@@ -14,8 +14,8 @@ from tisim.effects import Gravity, Impact, Lorentz, Mie, NearField, Tether
 from tisim.engine.assembly import needed_fields
 from tisim.operators import Cooling
 from tisim.sources import ElectricField
+from tisim.state.fields import Field, resolve_fields
 from tisim.steppers import IterationControl, Trapezoid, Verlet
-from tisim.worlds.fields import Field, resolve_fields
 
 CORE, SHELL = Mie(name="core", epsilon=1.0), Mie(name="shell", epsilon=0.3, n=9, m=4, cutoff=2.0)
 ONE = ([[0, 0, 0]], [[0, 0, 0]])
@@ -159,7 +159,7 @@ def test_a_failure_says_which_of_them():
 
 @pytest.mark.long
 def test_explain_lists_them_by_name():
-    from tisim.engine.explain import explain
+    from tisim.describe.explain import explain
 
     shells = SoftShell(stiffness=1.0, width=1e-3), SoftShell(name="outer", stiffness=0.1, width=2e-3)
     explanation = explain(one(*shells))

@@ -10,16 +10,16 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree, collected
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.worlds import team
-from tisim.worlds.fields import CORE
-from tisim.worlds.launched_program import LaunchedProgram
-from tisim.worlds.launches import tasks_of
-from tisim.worlds.phases import Phase, Repeat
-from tisim.worlds.state import State
-from tisim.worlds.status import NEVER, WorldStatus
-from tisim.worlds.team import Teams
-from tisim.worlds.team_trials import FIRST_ALONE, TRIAL_COST, TeamTrials
-from tisim.worlds.world_program import in_pieces, in_shares, world_programs
+from tisim.program import team
+from tisim.program.launched_program import LaunchedProgram
+from tisim.program.launches import tasks_of
+from tisim.program.phases import Phase, Repeat
+from tisim.program.team import Teams
+from tisim.program.team_trials import FIRST_ALONE, TRIAL_COST, TeamTrials
+from tisim.program.world_program import in_pieces, in_shares, world_programs
+from tisim.state.fields import CORE
+from tisim.state.state import State
+from tisim.state.status import NEVER, WorldStatus
 
 WORLDS, STEPS, ITEMS = 5, 60, 1000
 

@@ -13,8 +13,8 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.effects import DipoleDipole, NearField
 from tisim.engine.allocation import Allocation
 from tisim.engine.schedule_choice import choose, members
-from tisim.worlds.phases import Phase
-from tisim.worlds.team import MOST_LOOKS, Teams
+from tisim.program.phases import Phase
+from tisim.program.team import MOST_LOOKS, Teams
 
 TWO_THREADS = SimpleNamespace(device="cpu", threads=2)
 

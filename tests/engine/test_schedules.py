@@ -8,8 +8,8 @@ from tests.effects.test_contract import kicked
 from tests.scenes import GRAIN, compiled, flow, simulate
 from tisim import InputError, Simulation
 from tisim.engine import compiled_worlds
-from tisim.worlds import team
-from tisim.worlds.team import Teams
+from tisim.program import team
+from tisim.program.team import Teams
 
 WORLDS = [
     flow(seed=1, grains=150),

@@ -5,7 +5,7 @@ import pytest
 
 from tests.geometry.test_mesh_files import VERTICES, read
 from tisim import MeshWarning, geometry
-from tisim.engine.explained_parts import explained
+from tisim.describe.explained_parts import explained
 from tisim.geometry.mesh_check import MeshCheck
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)

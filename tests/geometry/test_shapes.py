@@ -11,7 +11,7 @@ from tisim.backend.memory import collected
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.component import Component, option
-from tisim.worlds.parameter_table import ParameterTable
+from tisim.state.parameter_table import ParameterTable
 
 POINTS = 300
 LISTS = ("planes", "discs", "spheres", "cylinders", "cones", "boxes")

@@ -104,7 +104,7 @@ BONDED = {
     ),
 }  # fmt: skip
 """The same of what holds grains together."""
-MOTION = "tisim/effects/motion"
+MOTION = "tisim/effects/walls"
 MOVING = "tests/effects/contact/test_moving_walls.py::test_"
 WALLS = {
     "walls": (
@@ -214,16 +214,16 @@ SUMS = {
         f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
     ),
     "dipoles_within_bodies": (
-        "tisim/neighbours/half_list.py", "if ti.static(not self.within_bodies):", "if ti.static(True):",
+        "tisim/pairs/half_list.py", "if ti.static(not self.within_bodies):", "if ti.static(True):",
         f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
     ),
     "contacts_within_bodies": (
-        "tisim/interactions/force_sum.py", "apart = not self.half_list.joined(w, i, j)", "apart = True",
+        "tisim/forces/force_sum.py", "apart = not self.half_list.joined(w, i, j)", "apart = True",
         f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
     ),
     "exports_of_two_sorts_of_laws": (
-        "tisim/interactions/listed_pairs.py", "self.exported.read(w, m) + term", "term",
-        "tests/interactions/test_short_ranged.py::test_contacts_within_a_far_cut_off_are_those_of_the_twin",
+        "tisim/pairs/listed_pairs.py", "self.exported.read(w, m) + term", "term",
+        "tests/pairs/test_short_ranged.py::test_contacts_within_a_far_cut_off_are_those_of_the_twin",
     ),
     "shifted_cut_off": (
         f"{MAGNETIC}/dipole_pairs.py", "slope = 12.0 * x", "slope = 11.9 * x",
@@ -234,7 +234,8 @@ SUMS = {
         f"{DIPOLES}rigid_bodies.py::test_a_cut_off_beyond_all_is_a_sum_over_all_pairs",
     ),
     "moments_without_end": (
-        "tisim/interactions/self_consistent.py", "ti.select(first, self.effect.largest_change(w), tolerance)",
+        "tisim/self_consistent/self_consistent.py",
+        "ti.select(first, self.effect.largest_change(w), tolerance)",
         "ti.select(first, 1e300, tolerance)",
         f"{DIPOLES}sweeps.py::test_two_that_are_pressed_into_each_other_stop_where_their_moments_lose_their_end",
     ),
@@ -251,7 +252,7 @@ SUMS = {
         f"{DIPOLES}ewald.py::test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name",
     ),
     "virial": (
-        "tisim/interactions/loads.py", "= -0.5 * separation[a]", "= 0.5 * separation[a]",
+        "tisim/forces/loads.py", "= -0.5 * separation[a]", "= 0.5 * separation[a]",
         "tests/effects/pair/test_virial.py::test_contacts_in_shear_have_the_virial_of_their_twin",
     ),
     "gravity_by_a_tree": (

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.collisions.test_collision_rounds import laws as merging
+from tests.collisions.test_collision_rounds import run as run_merging
 from tests.effects.test_contract import charges
 from tests.effects.test_contract import run as run_charges
-from tests.interactions.test_collision_rounds import laws as merging
-from tests.interactions.test_collision_rounds import run as run_merging
 from tests.judged import check_message
 from tests.scenes import DENSITY, RADIUS, by_id, compiled, energy, momentum, scene
 from tisim import InputError

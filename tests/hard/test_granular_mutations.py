@@ -16,7 +16,7 @@ from tisim.effects.contact.granular.parts import ContactPart
 from tisim.scene import plugins
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("tisim.effects.contact.", "tisim.effects.motion.")
+ROOMS = ("tisim.effects.contact.", "tisim.effects.walls.")
 UNBROKEN = {"granular", "fixed"}
 """The first is its parts, each of which is broken; the second does nothing."""
 

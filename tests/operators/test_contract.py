@@ -11,8 +11,8 @@ from tisim import Box, Simulation, run
 from tisim.backend.taichi import ti
 from tisim.effects import Agglomeration, Impact
 from tisim.operators import Operator
+from tisim.state.fields import Field
 from tisim.steppers import ApproachTime, Verlet
-from tisim.worlds.fields import Field
 
 
 class Census(Operator):

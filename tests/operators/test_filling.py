@@ -8,8 +8,8 @@ from tests.numerics.test_philox import twin
 from tests.scenes import by_id, compiled, fixed, scene
 from tisim import GrainClass, InputError, Material, MeasureSeries, Particles, Recording, Scene, Simulation
 from tisim.backend.taichi import ti
+from tisim.describe.explained_parts import explained
 from tisim.effects import Force, Gravity, PairForce, parameter
-from tisim.engine.explained_parts import explained
 from tisim.geometry import Plane
 from tisim.io import run_folder
 from tisim.io.export import export
@@ -21,7 +21,7 @@ from tisim.packing import EqualSizes, UniformSizes
 from tisim.plotting.cloud import start_and_end
 from tisim.plotting.movie import movie
 from tisim.plotting.time_series import clouds, history, quantities
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 pytestmark = pytest.mark.long
 

@@ -13,7 +13,7 @@ from tests.soak.apart import Apart, Outcome
 from tisim import InputError, Scene, Simulation, StartWarning
 from tisim.backend import runtime
 from tisim.engine.monitor import REASONS
-from tisim.worlds.status import WorldStatus
+from tisim.state.status import WorldStatus
 
 STEPS = 50
 """Of a run, at most."""

@@ -5,8 +5,8 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.worlds.bound import connected
-from tisim.worlds.parameter_table import ParameterTable
+from tisim.state.bound import connected
+from tisim.state.parameter_table import ParameterTable
 
 WORLDS = 4
 _bound: dict = {}

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from tests.interactions.test_self_consistent import cloud
-from tests.interactions.test_short_ranged import shells
+from tests.pairs.test_short_ranged import shells
 from tests.scenes import scene, simulate
+from tests.self_consistent.test_self_consistent import cloud
 from tests.throwaway import SoftShell, SoftShellOfAll, Trap
 from tisim import Scene
 from tisim.backend.taichi import ti
 from tisim.effects import parameter
+from tisim.program.phases import PerParticle, Phase, Repeat
+from tisim.state.fields import Field
 from tisim.steppers import Controller, Step, Stepper
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle, Phase, Repeat
 
 
 class Begin(Phase):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.errors import must
 
 Sides = Sequence[float] | np.ndarray | None

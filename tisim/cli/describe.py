@@ -58,7 +58,7 @@ def explain(
     everything: Everything = False, variant: SceneVariant = None,
 ) -> None:  # fmt: skip
     """Describe a scene: its effects, materials, stepper and critical time steps, and the size of the rest."""
-    from tisim.engine.explain import brief, explain, render
+    from tisim.describe.explain import brief, explain, render
 
     runtime.init(device, precision)
     _, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or (), variant)
@@ -92,7 +92,7 @@ def check(
 
 def doctor() -> None:
     """Say what this machine is to tisim, and what the other backend would give."""
-    from tisim.engine.diagnostics import findings
+    from tisim.describe.diagnostics import findings
 
     table = plain_table()
     with err().status("measuring"):

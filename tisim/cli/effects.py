@@ -15,7 +15,7 @@ from tisim.cli.options import Plugins
 from tisim.console import out, plain_table
 
 if TYPE_CHECKING:
-    from tisim.engine.reference import Entry
+    from tisim.describe.reference import Entry
 
 Name = Annotated[
     str | None,
@@ -32,7 +32,7 @@ LEAST_WIDTH = 20
 
 def effects(name: Name = None, plugins: Plugins = None) -> None:
     """List effects, sources, operators, steppers, step controls, placements and others, or explain one."""
-    from tisim.engine import reference
+    from tisim.describe import reference
 
     groups = reference.groups()
     if name is None:
@@ -48,7 +48,7 @@ def effects(name: Name = None, plugins: Plugins = None) -> None:
 
 def _print_list(entries: Sequence[Entry]) -> None:
     """Print a line for each entry, family by family: whole into a file, as much as fits on a terminal."""
-    from tisim.engine.reference import FAMILIES
+    from tisim.describe.reference import FAMILIES
 
     width = out().width if out().is_terminal else None
     columns = [max(map(len, column)) for column in zip(*map(_names, entries), strict=True)]

@@ -65,7 +65,7 @@ def new(what: What, name: Name, kind: Kind = None) -> None:
 
 def _check_name(what: str, name: str) -> None:
     """Raise InputError where Python, or a scene for its parts, would take the name for something else."""
-    from tisim.engine import reference
+    from tisim.describe import reference
 
     must(find_spec(name) is None, "name", "one that no other module has", name)
     of_scene = USES[what] == SCENE_COMMAND

@@ -112,7 +112,6 @@ from .contact.power_law import Contact as Contact
 from .contact.power_law import ContactLaw as ContactLaw
 from .contact.softening import ContactSoftening as ContactSoftening
 from .contact.surface import SurfaceContact as SurfaceContact
-from .contact.walls import Walls as Walls
 from .external.drag import (
     ChowDrag as ChowDrag,
 )
@@ -204,13 +203,14 @@ from .magnetic.mutual_moment import (
     MutualMoment as MutualMoment,
 )
 from .magnetic.permanent_moment import PermanentMoment as PermanentMoment
-from .motion.base import Fixed as Fixed
-from .motion.base import Motion as Motion
-from .motion.oscillation import Oscillation as Oscillation
-from .motion.rotation import Rotation as Rotation
-from .motion.servo import Servo as Servo
-from .motion.translation import Translation as Translation
 from .pair.mie import Mie as Mie
 from .pair.near_field import NearField as NearField
 from .pair.near_field import TruncatedNearField as TruncatedNearField
 from .pair.virial import Virial as Virial
+from .walls.motion import Fixed as Fixed
+from .walls.motion import Motion as Motion
+from .walls.oscillation import Oscillation as Oscillation
+from .walls.rotation import Rotation as Rotation
+from .walls.servo import Servo as Servo
+from .walls.translation import Translation as Translation
+from .walls.walls import Walls as Walls

@@ -8,12 +8,12 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected, require_memory
 from tisim.engine.assembly import Assembly, declared, needed_fields, picks_pairs
 from tisim.engine.loading import check_newcomers
-from tisim.neighbours.half_list import ListSizes
+from tisim.pairs.half_list import ListSizes
 from tisim.scene.scene import Scene
-from tisim.worlds.bound import connected
-from tisim.worlds.fields import resolve_fields
-from tisim.worlds.parameter_table import ParameterTable
-from tisim.worlds.state import State
+from tisim.state.bound import connected
+from tisim.state.fields import resolve_fields
+from tisim.state.parameter_table import ParameterTable
+from tisim.state.state import State
 
 COPIES = 3
 """The fields of particles are in memory so many times: on the device, for what is asked for, and to go back

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from tisim.backend.taichi import ti
-from tisim.components.domain import Domain
+from tisim.collisions.collision_rounds import Rounds
+from tisim.collisions.contact_list import ClearContacts, ContactList, FindContacts
+from tisim.domains.domain import Domain
 from tisim.effects.base import (
     Constraint,
     DerivedQuantity,
@@ -17,35 +19,33 @@ from tisim.effects.base import (
     PairForce,
     SelfConsistentQuantity,
 )
-from tisim.interactions import spatial_sort
-from tisim.interactions.collision_rounds import Rounds
-from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts
-from tisim.interactions.contact_memory import ContactMemory, memory_fields
-from tisim.interactions.failure_attribution import FailureAttribution
-from tisim.interactions.force_sum import SumForces, SumTrialForces, turning
-from tisim.interactions.listed_pairs import ExportedTerms, fuse, sum_phases
-from tisim.interactions.loads import FORCE, TORQUE
-from tisim.interactions.memory_advance import AdvanceParticles, advance_phases
-from tisim.interactions.pair_chunks import PairChunks
-from tisim.interactions.rearrangement import StoreBefore, acting, active, rearrange
-from tisim.interactions.rebuild_pairs import update_pairs
-from tisim.interactions.self_consistent import SelfConsistentSolver, solver
-from tisim.interactions.spatial_sort import SpatialSort
-from tisim.interactions.vacated_slots import VacatedSlots
-from tisim.neighbours.half_list import HalfList, ListSizes
-from tisim.neighbours.lists import NeighbourLists
-from tisim.neighbours.near_list import NearList, update_near_list
+from tisim.forces.failure_attribution import FailureAttribution
+from tisim.forces.force_sum import SumForces, SumTrialForces, turning
+from tisim.forces.loads import FORCE, TORQUE
 from tisim.operators.base import Operator
+from tisim.pairs.contact_memory import ContactMemory, memory_fields
+from tisim.pairs.half_list import HalfList, ListSizes
+from tisim.pairs.listed_pairs import ExportedTerms, fuse, sum_phases
+from tisim.pairs.lists import NeighbourLists
+from tisim.pairs.memory_advance import AdvanceParticles, advance_phases
+from tisim.pairs.near_list import NearList, update_near_list
+from tisim.pairs.pair_chunks import PairChunks
+from tisim.pairs.rebuild_pairs import update_pairs
+from tisim.population import spatial_sort
+from tisim.population.rearrangement import StoreBefore, acting, active, rearrange
+from tisim.population.spatial_sort import SpatialSort
+from tisim.population.vacated_slots import VacatedSlots
+from tisim.program.occasion import Enter, EnterAfterEvents, Occasion
+from tisim.program.phases import Item
+from tisim.self_consistent.self_consistent import SelfConsistentSolver, solver
+from tisim.state.bound import Bound, Peers
+from tisim.state.fields import Field
+from tisim.state.state import State
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import EndStep, FinishStep, FirstStep
 from tisim.steppers.constraints import begin_constraints
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.step_control import FixedStep, StepControl
-from tisim.worlds.bound import Bound, Peers
-from tisim.worlds.fields import Field
-from tisim.worlds.occasion import Enter, EnterAfterEvents, Occasion
-from tisim.worlds.phases import Item
-from tisim.worlds.state import State
 
 INTEGER = 4
 """Bytes of an index."""

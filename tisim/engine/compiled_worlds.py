@@ -17,15 +17,15 @@ from tisim.engine.allocation import Allocation
 from tisim.engine.assembly import Assembly
 from tisim.engine.schedule_choice import choose, members, work_of
 from tisim.errors import InputError, RunError, must
-from tisim.neighbours.half_list import ListSizes
+from tisim.pairs.half_list import ListSizes
+from tisim.program.launched_program import LaunchedProgram
+from tisim.program.occasion import Occasion
+from tisim.program.program import Program
+from tisim.program.team import Teams
+from tisim.program.world_program import world_programs
 from tisim.scene.scene import Scene
-from tisim.worlds.finite import FiniteCheck
-from tisim.worlds.launched_program import LaunchedProgram
-from tisim.worlds.occasion import Occasion
-from tisim.worlds.program import Program
-from tisim.worlds.status import NEVER, WorldStatus
-from tisim.worlds.team import Teams
-from tisim.worlds.world_program import world_programs
+from tisim.state.finite import FiniteCheck
+from tisim.state.status import NEVER, WorldStatus
 
 
 class CompiledWorlds:

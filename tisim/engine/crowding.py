@@ -15,11 +15,11 @@ from scipy.spatial import cKDTree
 
 from tisim.backend import runtime
 from tisim.backend.memory import LISTS_PART
+from tisim.collisions.contact_list import CONTACTS_PER_PARTICLE
 from tisim.effects.base import Constraint, PairEvent, Pairwise
-from tisim.effects.contact.walls import Walls
+from tisim.effects.walls.walls import Walls
 from tisim.errors import InputError, StartWarning
-from tisim.interactions.contact_list import CONTACTS_PER_PARTICLE
-from tisim.interactions.contact_memory import PARTNERS
+from tisim.pairs.contact_memory import PARTNERS
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 

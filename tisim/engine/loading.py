@@ -11,11 +11,11 @@ from tisim.backend import runtime
 from tisim.components.ranges import WHOLE
 from tisim.effects.base import Constraint, Effect, PairEvent, Pairwise
 from tisim.errors import InputError, Words, must
-from tisim.interactions.pair_chunks import PairChunks
+from tisim.pairs.pair_chunks import PairChunks
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.fields import CORE, SHARED, Field
-from tisim.worlds.status import NO_ONE, WorldStatus
+from tisim.state.fields import CORE, SHARED, Field
+from tisim.state.status import NO_ONE, WorldStatus
 
 ROUNDED_SIDE = 1e-6
 """By this part a law may reach farther than half a side, as single precision rounds."""

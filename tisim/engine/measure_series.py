@@ -8,7 +8,7 @@ import numpy as np
 
 from tisim.engine.observer import Observer, next_due
 from tisim.errors import is_number, must
-from tisim.worlds.status import WorldStatus
+from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:
     from tisim.engine.simulation import Simulation

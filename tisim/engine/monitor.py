@@ -9,8 +9,8 @@ import numpy as np
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import RUNNING, Status
 from tisim.errors import RunError
-from tisim.neighbours.half_list import ListSizes
-from tisim.worlds.status import ASKED, NO_ONE, WorldStatus
+from tisim.pairs.half_list import ListSizes
+from tisim.state.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

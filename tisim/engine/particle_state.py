@@ -12,9 +12,9 @@ from tisim.engine.crowding import check_places, warn_of_overlaps
 from tisim.engine.loading import check_field, check_start
 from tisim.engine.monitor import Monitor
 from tisim.errors import Words, must
-from tisim.interactions.loads import FORCE, TORQUE
+from tisim.forces.loads import FORCE, TORQUE
 from tisim.scene.initial_state import check_sizes
-from tisim.worlds.status import NEVER, WorldStatus
+from tisim.state.status import NEVER, WorldStatus
 
 if TYPE_CHECKING:
     from tisim.engine.simulation import Simulation

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tisim.worlds.status import WorldStatus
+from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,8 +1,8 @@
 """Which schedule worlds run on unless one is given, by the work of a step."""
 
 from tisim.backend.runtime import Runtime
-from tisim.worlds.phases import Item, nested
-from tisim.worlds.state import State
+from tisim.program.phases import Item, nested
+from tisim.state.state import State
 
 TEAM_FROM = 2000
 """Worlds with the work of so many particles are shared by threads, where there are more of these than worlds.

@@ -17,11 +17,11 @@ from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
 from tisim.errors import InputError, RunError, Words, is_number, is_whole, must
-from tisim.neighbours import near_list
+from tisim.pairs import near_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.placed_together import placed_together
 from tisim.scene.scene import Scene
-from tisim.worlds.status import NEVER, WorldStatus
+from tisim.state.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
 """The first is the wall time (s) between looks at progress, at Ctrl-C and at whether every quantity is

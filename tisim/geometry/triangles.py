@@ -184,7 +184,7 @@ class TriangulatedSurface(Shape):
     @ti.func
     def search(self, r, reach, best, search: ti.template(), found, number):  # type: ignore[valid-type]
         """Return what ``search.consider`` makes of all triangles that may be within ``reach`` (m) of r, one
-        after another, from ``best`` on; see tisim/effects/contact/wall_search.py."""
+        after another, from ``best`` on; see tisim/effects/walls/wall_search.py."""
         dims, low, high = self.cells(), self.cell(r - reach), self.cell(r + reach)
         # With nothing within reach there is no cell to look at.
         for x in range(low[0], ti.select(reach > 0.0, high[0] + 1, low[0])):

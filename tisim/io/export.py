@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, temporary_name
 from tisim.io.reader import Frame, Frames, frames, world_count

@@ -19,10 +19,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.errors import Words, must
 from tisim.scene.initial_state import Arrays
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 VERSION = (1, 1)
 ABSENT = -1

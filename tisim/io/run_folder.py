@@ -33,7 +33,7 @@ from tisim.io.reader import RESULT, frames, refuse_damage, world_count
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.fields import SHARED, resolve_fields
+from tisim.state.fields import SHARED, resolve_fields
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

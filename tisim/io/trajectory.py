@@ -37,7 +37,7 @@ from tisim.io import h5md
 from tisim.io.reader import Frame, frames, world_count
 from tisim.io.recorder import Recorder
 from tisim.scene.scene import Scene
-from tisim.worlds.fields import Field, resolve_fields
+from tisim.state.fields import Field, resolve_fields
 
 if TYPE_CHECKING:
     from tisim.io.recording import Recording

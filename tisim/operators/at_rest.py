@@ -11,7 +11,7 @@ from tisim.numerics.ieee import finite
 from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.base import parameter
 from tisim.operators.insertion import Insertion
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 LOOKS = 10
 """Grains are looked at so many times while they have to be at rest."""

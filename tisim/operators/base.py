@@ -14,9 +14,9 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
-from tisim.worlds.bound import Bound
-from tisim.worlds.state import State
-from tisim.worlds.world_action import WorldAction
+from tisim.program.world_action import WorldAction
+from tisim.state.bound import Bound
+from tisim.state.state import State
 
 __all__ = ["Operator", "WorldAction", "option", "parameter"]
 

@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint
 from tisim.geometry.plane import Plane
 from tisim.operators.base import Operator, option
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class BehindPlanes(Operator):

@@ -8,8 +8,8 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint, PairEvent
 from tisim.operators.base import Operator
 from tisim.sources.magnetic.magnets import Magnets
-from tisim.worlds.bound import Peers
-from tisim.worlds.fields import Field
+from tisim.state.bound import Peers
+from tisim.state.fields import Field
 
 
 class Capture(Operator):

@@ -8,8 +8,8 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, parameter
 from tisim.effects.impact.heating import Heating
 from tisim.operators.base import Operator
-from tisim.worlds.bound import Peers
-from tisim.worlds.fields import Field
+from tisim.state.bound import Peers
+from tisim.state.fields import Field
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """This is the constant of Stefan and Boltzmann, W/(m^2 K^4), exact in SI to these digits; Z04 uses 5.67e-8.

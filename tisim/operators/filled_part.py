@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint, parameter
 from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.filled_region import FilledRegion
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class FilledPart(FilledRegion, AtIntervals):

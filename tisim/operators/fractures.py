@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.worlds.bound import Bound
-from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
-from tisim.worlds.prefix_sum import PrefixSum
-from tisim.worlds.state import State
-from tisim.worlds.status import WorldStatus
-from tisim.worlds.world_action import WorldAction
+from tisim.program.phases import Item, PerParticle, Phase, Repeat
+from tisim.program.prefix_sum import PrefixSum
+from tisim.program.world_action import WorldAction
+from tisim.state.bound import Bound
+from tisim.state.state import State
+from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:
     from tisim.operators.fragmentation import Fragmentation

@@ -14,10 +14,10 @@ from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.operators.base import Operator, parameter
 from tisim.operators.fractures import Fractures
-from tisim.worlds.bound import Bound, Peers
-from tisim.worlds.fields import Field
-from tisim.worlds.state import State
-from tisim.worlds.world_action import WorldAction
+from tisim.program.world_action import WorldAction
+from tisim.state.bound import Bound, Peers
+from tisim.state.fields import Field
+from tisim.state.state import State
 
 
 class Fragmentation(ImpactLaw, Operator):

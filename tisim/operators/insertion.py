@@ -10,8 +10,8 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.components.material_law import UsesMaterials
-from tisim.components.materials import Materials
+from tisim.materials.material_law import UsesMaterials
+from tisim.materials.materials import Materials
 from tisim.numerics import philox
 from tisim.numerics.quaternions import random_orientation
 from tisim.numerics.random_streams import INSERTION
@@ -20,9 +20,9 @@ from tisim.operators.filled_region import FilledRegion
 from tisim.operators.grain_shapes import GrainShapes
 from tisim.operators.tried_place import TriedPlace
 from tisim.packing.grains import check_quantities, class_materials, quantity
-from tisim.worlds.bound import Bound
-from tisim.worlds.state import State
-from tisim.worlds.world_action import WorldAction
+from tisim.program.world_action import WorldAction
+from tisim.state.bound import Bound
+from tisim.state.state import State
 
 MOST_TRIES = 20_000
 """A draw of Philox has room for so many tries of a grain in a step."""

@@ -11,7 +11,7 @@ from tisim.errors import must
 from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.base import option, parameter
 from tisim.operators.behind_planes import BehindPlanes
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 NEARLY = 1e-6
 """A step that ends before a time by this part of its length has reached it: rounding leaves that."""

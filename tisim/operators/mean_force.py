@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.operators.base import Operator, parameter
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 
 class MeanForce(Operator):

@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.operators.base import parameter
 from tisim.operators.behind_planes import BehindPlanes
 from tisim.operators.outflow import Outflow
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 
 class Passage(BehindPlanes):

@@ -7,7 +7,7 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
 from tisim.operators.base import Operator
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 START_POSITION = Field("origin", "m", 3, "mean", default="position")
 """The position of a particle at the start."""

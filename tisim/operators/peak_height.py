@@ -9,7 +9,7 @@ from tisim.components.directed import Directed
 from tisim.effects import Vector
 from tisim.operators.base import Operator, parameter
 from tisim.operators.peak_displacement import START_POSITION
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 
 class PeakHeight(Directed, Operator):

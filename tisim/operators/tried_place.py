@@ -8,10 +8,10 @@ from tisim.backend import runtime
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.worlds.bound import Bound
-from tisim.worlds.phases import Item, Phase, Repeat
-from tisim.worlds.state import State
-from tisim.worlds.world_action import WorldAction
+from tisim.program.phases import Item, Phase, Repeat
+from tisim.program.world_action import WorldAction
+from tisim.state.bound import Bound
+from tisim.state.state import State
 
 if TYPE_CHECKING:
     from tisim.operators.insertion import Insertion

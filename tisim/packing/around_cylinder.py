@@ -9,8 +9,8 @@ from pydantic import field_validator
 from scipy.spatial import cKDTree
 
 from tisim.components.component import Vector, option, parameter
-from tisim.components.domain import Domain
 from tisim.components.ranges import check_direction, check_resolved
+from tisim.domains.domain import Domain
 from tisim.errors import InputError, must
 from tisim.geometry.directions import along_axis
 from tisim.packing.placement import Placement

@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Component, Text, Vector, option, parameter
-from tisim.components.materials import Materials
 from tisim.components.ranges import LEAST, MOST
 from tisim.errors import must
+from tisim.materials.materials import Materials
 from tisim.numerics.random_streams import GRAIN_SIZES
 from tisim.packing.clump import Clump
 from tisim.packing.size_laws import EqualSizes

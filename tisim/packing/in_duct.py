@@ -10,8 +10,8 @@ from pydantic import model_validator
 from scipy.spatial import cKDTree
 
 from tisim.components.component import Vector, parameter
-from tisim.components.domain import Domain
 from tisim.components.ranges import check_resolved
+from tisim.domains.domain import Domain
 from tisim.errors import InputError, must
 from tisim.packing.placement import Placement
 

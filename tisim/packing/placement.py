@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Component, Vector, option, parameter
-from tisim.components.domain import Domain
 from tisim.components.ranges import PARTICLES, check_direction, check_resolved
+from tisim.domains.domain import Domain
 from tisim.errors import Words, must
 from tisim.geometry.directions import along_axis
 from tisim.packing import region

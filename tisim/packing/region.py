@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tisim.components.component import Vector
-from tisim.components.domain import NO_AXIS, Axes, Domain
+from tisim.domains.domain import NO_AXIS, Axes, Domain
 from tisim.errors import InputError, must
 from tisim.geometry import round_box
 

@@ -12,7 +12,7 @@ from tisim.geometry import round_box
 from tisim.numerics import philox
 from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
 from tisim.packing.region import Region
-from tisim.worlds.launches import iterations_of_task
+from tisim.program.launches import iterations_of_task
 
 MAX_CONSECUTIVE_FAILURES = 5_000
 """After so many failures in a row places are no longer tried everywhere, only where there is room."""
@@ -43,7 +43,7 @@ def _add(
     cell; -1 where there is none. packings : the first sphere of each, the one after the last, its first
     level, and then how many found room. regions : the corner and sides of the region of the largest sphere,
     and of the smallest, and whether each axis is periodic, round and walled. task : a thread takes so many
-    iterations of a loop at least (tisim/worlds/launches.py).
+    iterations of a loop at least (tisim/program/launches.py).
     """
     for iteration in range(packings.shape[0] * task):
         if iteration % task == 0:

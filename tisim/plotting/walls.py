@@ -9,11 +9,11 @@ from itertools import combinations, product
 import numpy as np
 from scipy.spatial.transform import Rotation as Turn
 
-from tisim.effects.contact.walls import Walls
-from tisim.effects.motion.base import Fixed, Motion
-from tisim.effects.motion.oscillation import Oscillation
-from tisim.effects.motion.rotation import Rotation
-from tisim.effects.motion.translation import Translation
+from tisim.effects.walls.motion import Fixed, Motion
+from tisim.effects.walls.oscillation import Oscillation
+from tisim.effects.walls.rotation import Rotation
+from tisim.effects.walls.translation import Translation
+from tisim.effects.walls.walls import Walls
 from tisim.geometry.box import BoxSurface
 from tisim.geometry.cone import ConicalSurface
 from tisim.geometry.cylinder import CylindricalSurface

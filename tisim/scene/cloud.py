@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Text, Vector, option, parameter
-from tisim.components.domain import Domain
-from tisim.components.materials import Materials
 from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory
+from tisim.domains.domain import Domain
 from tisim.errors import Words, must
+from tisim.materials.materials import Materials
 from tisim.packing.grains import (
     GrainClass,
     check_quantities,

@@ -10,11 +10,11 @@ from pydantic import ConfigDict, field_serializer, field_validator, model_valida
 
 from tisim.components.arrays import Numbers, RowsOrNone, equal, frozen
 from tisim.components.component import Component, Text, option, parameter
-from tisim.components.domain import Box, Domain, Open
-from tisim.components.materials import Materials
 from tisim.components.plain_numbers import DEEPEST, broken_rule, plain
 from tisim.components.ranges import MOST, limits
+from tisim.domains.domain import Box, Domain, Open
 from tisim.errors import InputError, Words, abbreviated, must
+from tisim.materials.materials import Materials
 from tisim.packing.clump import Clump, clump_columns, sphere_columns
 from tisim.packing.tried_places import Packing
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tisim.components import serialization
 from tisim.components.component import Component
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Effect
 from tisim.errors import InputError, Words, abbreviated, did_you_mean, must, printable
 from tisim.scene import plugins

@@ -12,14 +12,14 @@ from pydantic import field_validator, model_validator
 
 from tisim.components import serialization
 from tisim.components.component import Component, Text, option, parameter
-from tisim.components.domain import Box, Domain, Open
 from tisim.components.json_text import json_pieces
-from tisim.components.material_law import UsesMaterials
-from tisim.components.materials import Material, MaterialPair, Materials
-from tisim.components.sheared_box import ShearedBox
+from tisim.domains.domain import Box, Domain, Open
+from tisim.domains.sheared_box import ShearedBox
 from tisim.effects.base import Effect
 from tisim.errors import InputError, Words, abbreviated, must
 from tisim.files import python_file
+from tisim.materials.material_law import UsesMaterials
+from tisim.materials.materials import Material, MaterialPair, Materials
 from tisim.scene import plain_data, plugins
 from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
-from tisim.worlds.bound import Bound, Peers
+from tisim.state.bound import Bound, Peers
 
 __all__ = ["Source", "option", "parameter", "sources"]
 

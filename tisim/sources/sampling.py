@@ -13,8 +13,8 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import Effect
 from tisim.errors import must
 from tisim.sources.base import Source
-from tisim.worlds.bound import Peers, connected
-from tisim.worlds.parameter_table import ParameterTable
+from tisim.state.bound import Peers, connected
+from tisim.state.parameter_table import ParameterTable
 
 TILE_POINTS = 16
 """So many points are taken at once on a CPU."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import StepperHints
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import (
     Constraint,
     DerivedQuantity,
@@ -22,9 +22,9 @@ from tisim.effects.base import (
 )
 from tisim.errors import must
 from tisim.sources.base import Source
+from tisim.state.fields import Field
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import MOST_STEPS, StepControl
-from tisim.worlds.fields import Field
 
 
 def single(effect: Effect) -> bool:

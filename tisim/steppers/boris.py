@@ -6,7 +6,9 @@ from typing import ClassVar, Self
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force
-from tisim.interactions.loads import FORCE
+from tisim.forces.loads import FORCE
+from tisim.program.phases import PerParticle, Phase
+from tisim.state.fields import Field
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import (
     AdvanceClock,
@@ -23,8 +25,6 @@ from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_j
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import Controller, FixedStep
 from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_fields
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle, Phase
 
 
 class Boris(Stepper):

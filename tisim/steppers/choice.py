@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tisim.components.accuracy_parameter import three_digits
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent, PairForce, kinks
 from tisim.errors import Words, must
 from tisim.operators.base import Operator

@@ -3,10 +3,10 @@
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import compensated_sum, finite, rounded_vector
+from tisim.program.phases import PerParticle, Phase
+from tisim.state.fields import Field
+from tisim.state.status import WorldStatus
 from tisim.steppers.context import StepContext
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle, Phase
-from tisim.worlds.status import WorldStatus
 
 POSITION_ROUNDING = Field("position_rounding", "m", 3, "keep", scratch=True)
 """This field is what rounding has taken from a particle's displacements so far; in single precision only."""

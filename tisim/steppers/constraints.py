@@ -4,10 +4,10 @@ from typing import Any
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint
+from tisim.program.phases import PerParticle
+from tisim.state.bound import Bound
+from tisim.state.state import State
 from tisim.steppers.context import StepContext
-from tisim.worlds.bound import Bound
-from tisim.worlds.phases import PerParticle
-from tisim.worlds.state import State
 
 Constraints = tuple[Bound[Constraint], ...]
 

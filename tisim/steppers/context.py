@@ -9,12 +9,12 @@ from tisim.effects.base import Constraint, Effect, Force, kinks
 from tisim.operators.base import Operator
 
 if TYPE_CHECKING:
-    from tisim.components.domain import Domain
-    from tisim.interactions.force_sum import SumForces
-    from tisim.neighbours.lists import NeighbourLists
-    from tisim.worlds.bound import Bound, Peers
-    from tisim.worlds.phases import Item
-    from tisim.worlds.state import State
+    from tisim.domains.domain import Domain
+    from tisim.forces.force_sum import SumForces
+    from tisim.pairs.lists import NeighbourLists
+    from tisim.program.phases import Item
+    from tisim.state.bound import Bound, Peers
+    from tisim.state.state import State
 
 
 @dataclass(frozen=True)

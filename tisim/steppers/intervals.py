@@ -6,10 +6,10 @@ end anywhere: where each particle is on its way is in its own clock.
 """
 
 from tisim.backend.taichi import ti
+from tisim.program.phases import Phase
+from tisim.state.fields import Field
+from tisim.state.status import WorldStatus
 from tisim.steppers.context import StepContext
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import Phase
-from tisim.worlds.status import WorldStatus
 
 LAUNCH_ATTEMPTS = 2**20
 """A launch has at most so many intervals, and so many attempts at a step, of all particles together: about a

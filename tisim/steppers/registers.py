@@ -4,7 +4,7 @@ from copy import copy
 from typing import Any, TypeVar
 
 from tisim.backend.taichi import ti
-from tisim.worlds.state import State
+from tisim.state.state import State
 
 Part = TypeVar("Part")
 

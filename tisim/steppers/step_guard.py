@@ -19,10 +19,10 @@ from collections.abc import Sequence
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
-from tisim.interactions.force_sum import turning
+from tisim.forces.force_sum import turning
+from tisim.state.fields import Field
+from tisim.state.status import WorldStatus
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
-from tisim.worlds.fields import Field
-from tisim.worlds.status import WorldStatus
 
 STEP_LIMIT = 0.8
 """(omega dt)^2 must be below this; a leapfrog is stable where it is below 4."""

@@ -9,9 +9,11 @@ from typing import ClassVar, Self
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent
 from tisim.errors import must
+from tisim.program.phases import PerParticle, Phase
+from tisim.state.fields import Field
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import (
     BeginStep,
@@ -26,8 +28,6 @@ from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
 from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_fields
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle, Phase
 
 
 class Verlet(Stepper):

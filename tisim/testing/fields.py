@@ -6,14 +6,14 @@ from typing import Any
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import Effect, Force, PairEvent, PairForce
-from tisim.interactions.contact_memory import memory_fields
-from tisim.interactions.force_sum import turning
-from tisim.interactions.loads import FORCE, TORQUE
+from tisim.forces.force_sum import turning
+from tisim.forces.loads import FORCE, TORQUE
+from tisim.pairs.contact_memory import memory_fields
 from tisim.scene.scene import Scene
+from tisim.state.bound import Bound, Peers
+from tisim.state.fields import CORE
+from tisim.state.state import State
 from tisim.testing.uncompiled import allocated, offered
-from tisim.worlds.bound import Bound, Peers
-from tisim.worlds.fields import CORE
-from tisim.worlds.state import State
 
 
 @in_taichi_thread

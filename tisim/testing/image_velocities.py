@@ -7,7 +7,7 @@ import numpy as np
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.worlds.state import State
+from tisim.state.state import State
 
 STEPS_OF_SPEED = 8
 """Velocities are multiples of a power of two by this part of it: sums of a few of them are exact."""

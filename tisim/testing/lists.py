@@ -4,7 +4,7 @@ import numpy as np
 
 from tisim.engine.simulation import Simulation
 from tisim.errors import must
-from tisim.neighbours.neighbour_rows import ALL_PAIRS
+from tisim.pairs.neighbour_rows import ALL_PAIRS
 from tisim.scene.scene import Scene
 
 

@@ -11,10 +11,10 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import DerivedQuantity, PairForce
 from tisim.scene.scene import Scene
+from tisim.state.bound import Bound
+from tisim.state.state import State
 from tisim.testing.image_velocities import ImageVelocities, assert_same
 from tisim.testing.uncompiled import started
-from tisim.worlds.bound import Bound
-from tisim.worlds.state import State
 
 TOUCHING = 0.9
 """A law is evaluated where two particles are in the scene, and on the same line at this part of the distance

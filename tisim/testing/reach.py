@@ -10,9 +10,9 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import DerivedQuantity, PairForce, Pairwise
 from tisim.scene.scene import Scene
+from tisim.state.bound import Bound
+from tisim.state.state import State
 from tisim.testing.uncompiled import started
-from tisim.worlds.bound import Bound
-from tisim.worlds.state import State
 
 WITHIN = 0.9
 FARTHER = (1.001, 1.1, 2.0, 10.0, 100.0)

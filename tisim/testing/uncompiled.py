@@ -10,7 +10,7 @@ from tisim.engine.allocation import Allocation, parts
 from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.bound import Bound
+from tisim.state.bound import Bound
 
 
 @contextmanager

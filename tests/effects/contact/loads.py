@@ -7,8 +7,8 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import Force
 from tisim.engine.assembly import needed_fields
+from tisim.state.fields import CORE, resolve_fields
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
-from tisim.worlds.fields import CORE, resolve_fields
 
 WORLDS = 8
 """At a time: one number for all, so that each structure is compiled once."""

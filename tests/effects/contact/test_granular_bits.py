@@ -15,10 +15,10 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import parameter
 from tisim.engine import compiled_worlds
-from tisim.interactions import pair_chunks
-from tisim.neighbours.half_list import ListSizes
 from tisim.operators import Operator
-from tisim.worlds.team import Teams
+from tisim.pairs import pair_chunks
+from tisim.pairs.half_list import ListSizes
+from tisim.program.team import Teams
 
 # Grains overlap deeply at the start here, on purpose.
 pytestmark = [

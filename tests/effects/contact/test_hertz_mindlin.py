@@ -8,9 +8,9 @@ from tests.scenes import by_id, compiled
 from tisim import Material
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.components.materials import Materials, Touching
 from tisim.effects import Granular, RestitutionDamping
-from tisim.interactions.contact_memory import NO_PARTNER, PARTNERS
+from tisim.materials.materials import Materials, Touching
+from tisim.pairs.contact_memory import NO_PARTNER, PARTNERS
 
 # Grains overlap deeply at the start here, on purpose.
 pytestmark = pytest.mark.filterwarnings("ignore::tisim.errors.StartWarning")

@@ -15,7 +15,7 @@ from tisim.effects import (
     Translation,
     Walls,
 )
-from tisim.effects.motion.servo import MOST_RESISTANCE, QUANTA
+from tisim.effects.walls.servo import MOST_RESISTANCE, QUANTA
 from tisim.geometry import CylindricalSurface, Plane
 from tisim.io.reader import frames
 

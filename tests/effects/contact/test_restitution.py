@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 from tests.effects.contact.compositions import NEUTRAL, grains, loaded
 from tests.scenes import by_id, roundoff
 from tisim import Material
-from tisim.components.materials import Materials
 from tisim.effects import HertzMaterial, RestitutionDamping
+from tisim.materials.materials import Materials
 
 
 @pytest.mark.slow

@@ -10,8 +10,8 @@ from tisim.components.component import parameter
 from tisim.effects import Gravity
 from tisim.operators import Operator
 from tisim.sources import Source
+from tisim.state.fields import Field
 from tisim.steppers import Brownian, DriftLimit
-from tisim.worlds.fields import Field
 
 RADIUS, TEMPERATURE, VISCOSITY = 1e-7, 298.0, 1e-3
 HEAT = 1.380649e-23 * TEMPERATURE

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tests.interactions.test_short_ranged import grains, shells
+from tests.pairs.test_short_ranged import grains, shells
 from tests.scenes import compiled, scene, simulate
 from tests.steppers.charged import PUSH, W, charged, final, order
 from tests.steppers.charged import equal_steps as trapezoidal_steps

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.interactions.test_short_ranged import grains, shells
+from tests.pairs.test_short_ranged import grains, shells
 from tests.scenes import scene, simulate
 from tests.steppers.charged import PUSH, W, charged, equal_steps, final
 from tests.steppers.closed_forms import driven

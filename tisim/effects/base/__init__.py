@@ -5,7 +5,7 @@ Each kind of effect is made after a class of a file beside this one: ``effect.py
 methods a law of that kind defines, ``pairwise.py`` what is summed over pairs, and ``long_range.py`` what is
 summed over all others in another way. These are the rules for all of them:
 
-What a scene holds is plain data; what kernels hold is a bound object (tisim/worlds/bound.py).
+What a scene holds is plain data; what kernels hold is a bound object (tisim/state/bound.py).
 
 1. An effect is a frozen ``Component``: validated data, its source and equation in the docstring.
 2. Every float or Vector parameter may differ per world: in a kernel it is a function, ``self.name(w)``. So
@@ -43,7 +43,7 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    a ``SelfConsistentQuantity``; its ``force`` or ``response`` reads what they have come to, ``self.sum``.
 8. What changes the state between steps is an ``Operator`` (see tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It is handed each pair in ``contact`` with exclusive access
-   to both, earliest first (see tisim/interactions/collision_rounds.py); it may remove either.
+   to both, earliest first (see tisim/collisions/collision_rounds.py); it may remove either.
 10. A ``Constraint`` moves the particles that it holds, in place of the stepper, whatever the forces on them.
 11. ``connect`` returns what an effect wants to know of the other bound effects, ``peers.of(Heating)``;
     ``requires`` names the effects without which it means nothing, ``excludes`` those that it does not go
@@ -79,7 +79,7 @@ from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
 from tisim.effects.base.pair_force import PairForce, keeps_apart, kinks
 from tisim.effects.base.pairwise import Pairwise
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 __all__ = [
     "Constraint",

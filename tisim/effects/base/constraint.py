@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pair_event import PairEvent
 from tisim.numerics.quaternions import turned
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 BODY_MASS = Field("body_mass", "kg", 1, "keep", default="mass", minimum=0.0)
 """The mass of the rigid body that a particle is part of; that of the particle where it is of none."""

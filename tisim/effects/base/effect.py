@@ -12,11 +12,11 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import LawHints
-from tisim.worlds.bound import Peers
-from tisim.worlds.fields import Field
+from tisim.state.bound import Peers
+from tisim.state.fields import Field
 
 if TYPE_CHECKING:
-    from tisim.components.domain import Domain
+    from tisim.domains.domain import Domain
     from tisim.scene.scene import Scene
 
 

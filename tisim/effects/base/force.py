@@ -9,7 +9,7 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.base.effect import Effect
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 
 class Force(Effect):

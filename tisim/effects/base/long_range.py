@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 from tisim.effects.base.effect import Effect
 
 if TYPE_CHECKING:
-    from tisim.components.domain import Domain
-    from tisim.worlds.bound import Bound
-    from tisim.worlds.phases import Item
-    from tisim.worlds.state import State
+    from tisim.domains.domain import Domain
+    from tisim.program.phases import Item
+    from tisim.state.bound import Bound
+    from tisim.state.state import State
 
 
 class LongRangeSum(ABC):

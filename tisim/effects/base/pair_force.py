@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import is_device_function, ti
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pairwise import Pairwise
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation as Turn
 
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Field
 from tisim.effects.base.constraint import BODY_MASS
 from tisim.errors import Words, must

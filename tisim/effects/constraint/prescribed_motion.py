@@ -10,12 +10,12 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Constraint, Field, option
-from tisim.effects.motion.base import Fixed, Motion, MotionState
-from tisim.effects.motion.resultant import resultant, resultant_units
+from tisim.effects.walls.motion import Fixed, Motion, MotionState
+from tisim.effects.walls.resultant import resultant, resultant_units
 from tisim.errors import must
-from tisim.worlds.state import HEAVY
+from tisim.state.state import HEAVY
 
 REFERENCE = Field("reference_position", "m", 3, "keep", default="position")
 """Where a particle that moves as prescribed is at the time 0."""

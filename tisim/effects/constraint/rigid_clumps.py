@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Constraint, Effect, Field, PairForce
 from tisim.effects.constraint.clump_fields import (
     BODY,

@@ -11,7 +11,7 @@ from tisim.effects.base import parameter
 from tisim.effects.contact.normal import NormalContact, area, slip
 from tisim.effects.contact.surface import SurfaceContact
 from tisim.errors import must
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class ContactFriction(SurfaceContact):

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, PairForce, parameter
 from tisim.effects.base.critical_step import SLIDING, critical_step, smallest_grains
 from tisim.effects.contact.granular.spring import carried, tilted

@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
 from tisim.effects.contact.normal import NormalContact, area, strain
 from tisim.numerics.powers import Exponent, power
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class ContactLaw(Effect):

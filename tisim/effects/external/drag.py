@@ -20,7 +20,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, parameter
 from tisim.numerics import elementary
 from tisim.sources.base import Source, sources
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 LEAST_SPEED = 1e-30
 """This speed, in m/s, stands for zero where a direction is needed that then has no effect."""

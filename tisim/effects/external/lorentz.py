@@ -11,7 +11,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, option
 from tisim.sources.base import Source, sources
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class Lorentz(Force):

@@ -10,7 +10,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.effects.base import Effect, Force, parameter
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 
 class Tether(Force):

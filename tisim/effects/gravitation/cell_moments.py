@@ -9,10 +9,10 @@ from scipy.constants import G
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.interactions.cell_tree import FAN, LEAF, CellTree, OfTree, tree_memory
-from tisim.worlds.bound import Bound
-from tisim.worlds.occasion import OnOccasion
-from tisim.worlds.phases import Item, Phase, Repeat
+from tisim.effects.gravitation.cell_tree import FAN, LEAF, CellTree, OfTree, tree_memory
+from tisim.program.occasion import OnOccasion
+from tisim.program.phases import Item, Phase, Repeat
+from tisim.state.bound import Bound
 
 
 @ti.data_oriented

@@ -17,9 +17,9 @@ from tisim.effects.gravitation.tree_walk import TreeSum
 from tisim.errors import must
 
 if TYPE_CHECKING:
-    from tisim.components.domain import Domain
-    from tisim.worlds.bound import Bound
-    from tisim.worlds.state import State
+    from tisim.domains.domain import Domain
+    from tisim.state.bound import Bound
+    from tisim.state.state import State
 
 
 def fall_step(start: Mapping[str, np.ndarray]) -> float:

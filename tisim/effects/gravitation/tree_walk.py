@@ -12,11 +12,11 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
 from tisim.effects.gravitation.cell_moments import CellMoments
-from tisim.interactions.cell_tree import FAN, LEAF, CellTree
-from tisim.worlds.bound import Bound
-from tisim.worlds.occasion import OnOccasion
-from tisim.worlds.phases import MANY, Item, Phase
-from tisim.worlds.state import State
+from tisim.effects.gravitation.cell_tree import FAN, LEAF, CellTree
+from tisim.program.occasion import OnOccasion
+from tisim.program.phases import MANY, Item, Phase
+from tisim.state.bound import Bound
+from tisim.state.state import State
 
 
 @ti.data_oriented

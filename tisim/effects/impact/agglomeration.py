@@ -16,7 +16,7 @@ class Agglomeration(ImpactLaw):
 
         b = (b_i^3 + b_j^3)^(1/3),    at the centre of mass of the two
 
-    Each quantity of a particle follows its own rule (tisim.worlds.fields.Field.merge): sums add, means are
+    Each quantity of a particle follows its own rule (tisim.state.fields.Field.merge): sums add, means are
     weighted by mass, the radius b follows from the volume.
 
     Source: Z04 remark 2.1.

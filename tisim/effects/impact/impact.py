@@ -42,7 +42,7 @@ from tisim.effects.base import Force, PairEvent, PairForce, option, parameter
 from tisim.effects.impact.law import HOOKS, ImpactLaw
 from tisim.effects.impact.resting import rests, rounding, support
 from tisim.errors import must
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class Impact(PairEvent):

@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.law import ImpactLaw
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 
 class Reaction(ImpactLaw):

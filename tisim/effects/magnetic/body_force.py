@@ -11,7 +11,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, keeps_apart, parameter
 from tisim.sources.base import sources
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class MagneticBodyForce(Force):

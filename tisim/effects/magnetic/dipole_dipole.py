@@ -13,7 +13,7 @@ from tisim.effects.base import Effect, PairForce, parameter
 from tisim.effects.magnetic.dipole_pairs import DipolePairs, Dipoles, dipole_field
 from tisim.effects.magnetic.moment import MOMENT
 from tisim.effects.magnetic.permanent_moment import PermanentMoment
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 CUTOFFS = (10.0, 20.0, 30.0, 60.0)
 """These cut-offs, in radii, are worth a try."""

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.constants import mu_0
 from scipy.optimize import brentq
 
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.errors import must
 
 PAIR_COST = 10.0

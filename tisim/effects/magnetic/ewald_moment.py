@@ -13,10 +13,10 @@ from tisim.effects.magnetic.mutual_moment import LinearSpheres, independent
 from tisim.effects.magnetic.wave_sum import WaveSum
 
 if TYPE_CHECKING:
-    from tisim.components.domain import Domain
+    from tisim.domains.domain import Domain
     from tisim.effects.base import LongRange, LongRangeSum
-    from tisim.worlds.bound import Bound
-    from tisim.worlds.state import State
+    from tisim.state.bound import Bound
+    from tisim.state.state import State
 
 
 class EwaldMoment(EwaldPairs, SelfConsistentQuantity, Moment):

@@ -12,7 +12,7 @@ from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, LongRange, Vector, option, parameter
 from tisim.effects.magnetic.dipole_pairs import Dipoles
 from tisim.effects.magnetic.ewald_accuracy import WIDEST_DECAY, most_waves, screening_for, waves_for

@@ -13,7 +13,7 @@ from tisim.effects.base import Effect, Force, keeps_apart
 from tisim.effects.magnetic.moment import MOMENT
 from tisim.effects.magnetic.permanent_moment import PermanentMoment
 from tisim.sources.base import sources
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class Magnetophoresis(Force):

@@ -15,8 +15,8 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import DerivedQuantity, parameter
 from tisim.numerics.langevin import langevin_ratio
 from tisim.sources.base import sources
-from tisim.worlds.bound import Peers
-from tisim.worlds.fields import Field
+from tisim.state.bound import Peers
+from tisim.state.fields import Field
 
 MOMENT = Field("moment", "A m^2", 3, "sum")
 SATURATION = Field("saturation_moment", "A m^2", 1, "sum", default=None, minimum=0.0)

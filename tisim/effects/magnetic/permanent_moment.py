@@ -17,7 +17,7 @@ from tisim.numerics.quaternions import turned
 from tisim.numerics.random_streams import MOMENTS
 from tisim.operators.base import Operator
 from tisim.sources.base import Source
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class PermanentMoment(Operator):

@@ -11,11 +11,11 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
 from tisim.numerics import elementary
-from tisim.worlds.block_sum import BlockSums, PerBlock
-from tisim.worlds.bound import Bound
-from tisim.worlds.occasion import OnOccasion
-from tisim.worlds.phases import MANY, Item, PerParticle, Phase
-from tisim.worlds.state import State
+from tisim.program.block_sum import BlockSums, PerBlock
+from tisim.program.occasion import OnOccasion
+from tisim.program.phases import MANY, Item, PerParticle, Phase
+from tisim.state.bound import Bound
+from tisim.state.state import State
 
 
 @ti.data_oriented

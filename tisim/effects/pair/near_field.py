@@ -23,7 +23,7 @@ from tisim.components.accuracy_parameter import three_digits
 from tisim.effects.base import Effect, PairForce, option, parameter
 from tisim.effects.base.critical_step import critical_step
 from tisim.numerics.powers import Exponent, power
-from tisim.worlds.fields import Field
+from tisim.state.fields import Field
 
 CUTOFF_PARTS = (0.1, 0.2, 0.5, 1.0)
 """These cut-offs, as parts of the largest distance, are worth a try."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from tisim.effects.base import Effect, LongRange, PairEvent, PairForce
 from tisim.effects.constraint.rigid_clumps import RigidClumps
-from tisim.interactions.loads import VIRIAL
+from tisim.forces.loads import VIRIAL
 
 NAMES = tuple(f"virial_{a}{b}" for a, b in product("xyz", "xyz"))
 """Measures of a world have these names, in the order of the field."""

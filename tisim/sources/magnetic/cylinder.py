@@ -20,7 +20,7 @@ from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_frame import place, split_direction, split_magnetisation
 from tisim.sources.magnetic.cylinder_table import TabulatedEnds, table
 from tisim.sources.magnetic.magnets import Body, Magnets
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class Cylinder(Body):

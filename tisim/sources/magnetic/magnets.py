@@ -9,7 +9,7 @@ from scipy.constants import mu_0
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector
 from tisim.sources.base import Source, add_point, parameter
-from tisim.worlds.bound import Peers
+from tisim.state.bound import Peers
 
 
 class Body(Component):

@@ -9,11 +9,12 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from tisim.components.component import option, parameter
-from tisim.components.domain import Domain
+from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.errors import must
-from tisim.interactions.loads import FORCE
+from tisim.forces.loads import FORCE
 from tisim.operators.base import Operator
+from tisim.state.fields import Field
 from tisim.steppers.base import Stepper, single
 from tisim.steppers.brownian.coupled import BrownianDrift, Proceed, Scatter, Separate
 from tisim.steppers.brownian.drift_limit import DriftLimit
@@ -30,7 +31,6 @@ from tisim.steppers.brownian.vectorised import VectorisedBrownianSteps, vectoris
 from tisim.steppers.common import BeginStep
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.intervals import INTERVAL_FLAGS, INTERVAL_QUANTITIES, BeginIntervals
-from tisim.worlds.fields import Field
 
 LONGEST_RELAXATION = 0.2
 """Steps are at most this part of the time in which a spring draws a particle back."""

@@ -1,10 +1,10 @@
 """Brownian particles that feel each other: all take the same step, the longest that each of them allows."""
 
 from tisim.backend.taichi import ti
+from tisim.program.phases import PerParticle, Phase
 from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.common import advance_clock, apply_displacement
 from tisim.steppers.context import StepContext
-from tisim.worlds.phases import PerParticle, Phase
 
 
 @ti.data_oriented

@@ -11,8 +11,8 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.errors import must
 from tisim.numerics.ieee import finite
+from tisim.state.status import WorldStatus
 from tisim.steppers.step_control import SHORTEST_STEP, Controller
-from tisim.worlds.status import WorldStatus
 
 LARGEST_DRIFT = 1e9
 """The number of steps in one longest step is at most this: a particle by itself numbers them with 32 bits."""

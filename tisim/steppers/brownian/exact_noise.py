@@ -8,10 +8,10 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.errors import Words, must
-from tisim.interactions.pair_sum import PairSum
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle, Phase
-from tisim.worlds.status import WorldStatus
+from tisim.pairs.pair_sum import PairSum
+from tisim.program.phases import PerParticle, Phase
+from tisim.state.fields import Field
+from tisim.state.status import WorldStatus
 
 GAUSS = Field("gauss", "", 3, "keep", scratch=True)
 """This field holds the three standard normal numbers of a particle in a step."""

@@ -14,11 +14,11 @@ beta cannot suit all distances: by a quarter of D_ij in one of 5 % of spheres
 """
 
 from tisim.backend.taichi import ti
-from tisim.interactions.pair_sum import PairSum
+from tisim.pairs.pair_sum import PairSum
+from tisim.program.phases import Phase
+from tisim.state.fields import Field
+from tisim.state.status import WorldStatus
 from tisim.steppers.brownian.exact_noise import GAUSS, Draw
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import Phase
-from tisim.worlds.status import WorldStatus
 
 SUMS = (
     GAUSS,

@@ -7,13 +7,13 @@ intervals or steps a launch takes them through makes no difference to the noise 
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import compensated_sum, finite
+from tisim.program.phases import PerParticle
+from tisim.state.fields import Field
+from tisim.state.status import WorldStatus
 from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import LITTLE, OWN_CLOCK, EndIntervals, beginning, duration
 from tisim.steppers.registers import Registers
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle
-from tisim.worlds.status import WorldStatus
 
 OWN_BROWNIAN_FIELDS = (
     *OWN_CLOCK,

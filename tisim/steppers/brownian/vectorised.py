@@ -7,8 +7,8 @@ the same.
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
-from tisim.interactions.pair_sum import TILE
 from tisim.numerics.ieee import finite
+from tisim.pairs.pair_sum import TILE
 from tisim.steppers.brownian.independent import IndependentBrownianSteps, euler_step
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import beginning

@@ -8,10 +8,10 @@ Forces enter the inner product as the displacement that they would cause. Torque
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
+from tisim.program.block_sum import BlockSums, PerBlock
+from tisim.program.phases import Item, PerParticle
+from tisim.state.fields import Field
 from tisim.steppers.context import StepContext
-from tisim.worlds.block_sum import BlockSums, PerBlock
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import Item, PerParticle
 
 
 def memory_of_iterates(turning: bool) -> tuple[Field, ...]:

@@ -1,12 +1,12 @@
 """What implicit steppers have in common: attempts at a step, until one is accepted or all hope is lost."""
 
 from tisim.backend.taichi import ti
+from tisim.program.phases import Item, PerParticle, Phase, Repeat
+from tisim.state.status import WorldStatus
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.saved_state import SavedState
 from tisim.steppers.step_control import note_speed
-from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
-from tisim.worlds.status import WorldStatus
 
 RETRY, ACCEPTED, HOPELESS = range(3)
 """The verdict on an attempt is one of these: to be tried again with a shorter step, good, or given up for

@@ -6,8 +6,11 @@ from typing import ClassVar, Self
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairForce
-from tisim.interactions.force_sum import turning
-from tisim.interactions.loads import FORCE
+from tisim.forces.force_sum import turning
+from tisim.forces.loads import FORCE
+from tisim.program.block_sum import BlockSums
+from tisim.program.phases import Item
+from tisim.state.fields import Field
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
 from tisim.steppers.context import Buffer, Step, StepContext
@@ -26,9 +29,6 @@ from tisim.steppers.implicit.excursion import NoteExcursion, excursion_fields
 from tisim.steppers.implicit.saved_state import CHANGE, saved_fields
 from tisim.steppers.implicit.stage_control import StageControl
 from tisim.steppers.implicit.stages import Stages
-from tisim.worlds.block_sum import BlockSums
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import Item
 
 
 class Collocation(Stepper):

@@ -4,11 +4,11 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.numerics import elementary
+from tisim.program.block_sum import PerBlock
+from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, length
-from tisim.worlds.block_sum import PerBlock
-from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 
 
 class Forget(Phase):

@@ -2,9 +2,9 @@
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite, infinity
+from tisim.program.phases import Phase
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, report_failure
-from tisim.worlds.phases import Phase
 
 GUESS = 0.5
 """This is taken for the factor by which a sweep makes the error smaller where nothing is known of it, and at

@@ -9,8 +9,8 @@ displacement but the size of the motion so far, so that they may be added up ove
 from typing import Literal
 
 from tisim.backend.taichi import ti
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import PerParticle
+from tisim.program.phases import PerParticle
+from tisim.state.fields import Field
 
 Per = Literal["step", "run"]
 """This says what an error that is asked for is of: a step, over the displacement in it, or the end of a run,

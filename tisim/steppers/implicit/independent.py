@@ -6,13 +6,13 @@ many intervals or attempts a launch takes them through makes no difference to wh
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import compensated_sum, finite, infinity
+from tisim.program.phases import PerParticle
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER
 from tisim.steppers.implicit.excursion import note_excursion
 from tisim.steppers.implicit.saved_state import saved_fields
 from tisim.steppers.intervals import LITTLE, beginning, duration
 from tisim.steppers.registers import Registers
-from tisim.worlds.phases import PerParticle
 
 
 class IndependentSteps(PerParticle):

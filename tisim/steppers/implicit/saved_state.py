@@ -2,8 +2,8 @@
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
+from tisim.state.fields import Field
 from tisim.steppers.context import StepContext
-from tisim.worlds.fields import Field
 
 FORCE_BEFORE = Field("force_before", "N", 3, "keep", scratch=True)
 TORQUE_BEFORE = Field("torque_before", "N m", 3, "keep", scratch=True)

@@ -5,11 +5,11 @@ import numpy as np
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
+from tisim.state.fields import Field
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.lobatto import highest, integrals, leading, nodes
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.implicit.saved_state import SavedState
-from tisim.worlds.fields import Field
 
 
 @ti.data_oriented

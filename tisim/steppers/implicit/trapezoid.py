@@ -6,8 +6,11 @@ from typing import ClassVar, Literal, Self
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, Force, PairForce
-from tisim.interactions.force_sum import turning
-from tisim.interactions.loads import FORCE
+from tisim.forces.force_sum import turning
+from tisim.forces.loads import FORCE
+from tisim.program.block_sum import BlockSums
+from tisim.program.phases import Item
+from tisim.state.fields import Field
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
 from tisim.steppers.context import Buffer, Step, StepContext
@@ -32,9 +35,6 @@ from tisim.steppers.intervals import (
     BeginIntervals,
     EndIntervals,
 )
-from tisim.worlds.block_sum import BlockSums
-from tisim.worlds.fields import Field
-from tisim.worlds.phases import Item
 
 OWN_STEP_FIELDS = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
 """These are the fields of a particle that takes steps of its own: the length of the next one, and its

@@ -2,11 +2,11 @@
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite, infinity
+from tisim.program.block_sum import PerBlock
+from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, length, report_failure
-from tisim.worlds.block_sum import PerBlock
-from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 
 
 class Iteration(Repeat):

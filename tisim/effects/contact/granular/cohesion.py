@@ -6,8 +6,8 @@ import math
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.materials import Touching
 from tisim.effects.contact.granular.parts import Cohesion, Overlap
+from tisim.materials.materials import Touching
 
 
 class SJKR(Cohesion):

@@ -11,9 +11,9 @@ import numpy as np
 from tisim.errors import must
 
 if TYPE_CHECKING:
-    from tisim.components.materials import Materials, Touching
     from tisim.effects.base import Effect
     from tisim.effects.contact.granular.granular import Granular
+    from tisim.materials.materials import Materials, Touching
 
 
 def with_newcomers(start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> dict[str, np.ndarray]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.materials import Touching
 from tisim.effects.contact.granular.parts import Damping
+from tisim.materials.materials import Touching
 
 
 class ConstantDamping(Damping):

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.components.material_law import MaterialLaw
 from tisim.effects.base import Effect, Field, PairForce
 from tisim.effects.contact.granular.spring import midway
 from tisim.effects.contact.granular.step_limit import TRAVEL, inverse_masses, wall_inverse_masses
+from tisim.materials.material_law import MaterialLaw
 
 
 class GranularContact(MaterialLaw, PairForce):
@@ -56,7 +56,7 @@ class GranularContact(MaterialLaw, PairForce):
         """Return the force (N) and the couple (N m) on i, and what the contact remembers after a further dt
         (s), given ``past``.
 
-        pair : which materials touch (see tisim/components/material_law.py). normal : unit vector from i to
+        pair : which materials touch (see tisim/materials/material_law.py). normal : unit vector from i to
         the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses :
         inverse masses, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of the other
         past that of i. spinning : spin (rad/s) of the other relative to i. tilt, turn : how the contact turns

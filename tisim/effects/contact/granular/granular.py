@@ -10,9 +10,7 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component
-from tisim.components.domain import Domain
-from tisim.components.material_law import MaterialLaw
-from tisim.components.materials import Touching
+from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, option
 from tisim.effects.base.critical_step import (
     SLIDING,
@@ -40,6 +38,8 @@ from tisim.effects.contact.granular.parts import (
 )
 from tisim.effects.contact.granular.spring import carried, midway, projected
 from tisim.errors import Words, must
+from tisim.materials.material_law import MaterialLaw
+from tisim.materials.materials import Touching
 from tisim.numerics.vectors import piece
 
 if TYPE_CHECKING:

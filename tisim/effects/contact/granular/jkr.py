@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.components.materials import Touching
 from tisim.effects.contact.granular.jump import spread
 from tisim.effects.contact.granular.parts import NormalForce, Overlap
+from tisim.materials.materials import Touching
 from tisim.numerics.roots import cube_root
 
 LEAST_ROOT = 1e-9

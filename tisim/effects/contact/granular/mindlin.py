@@ -6,10 +6,10 @@ import math
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.materials import Touching
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular.parts import TangentialForce
 from tisim.effects.contact.granular.spring import slipping, unloaded
+from tisim.materials.materials import Touching
 
 
 class TangentialSpring(TangentialForce):

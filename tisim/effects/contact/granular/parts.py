@@ -1,6 +1,6 @@
 """The contracts of the parts of a granular contact law: what each sees of a contact, and what it gives.
 
-In all of them ``pair`` says which materials touch (see tisim/components/material_law.py), ``radius`` is R*
+In all of them ``pair`` says which materials touch (see tisim/materials/material_law.py), ``radius`` is R*
 and ``mass`` m*; 1/R* = 1/R_i + 1/R_j and 1/m* = 1/m_i + 1/m_j. ``limit`` is the normal force (N) that
 Coulomb's limit is taken of. A part that remembers something says how many values, in ``memory``; they are 0
 when a contact begins. Where the first three are a vector across the normal, ``vector``, they have turned with
@@ -17,8 +17,8 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.components.material_law import MaterialLaw
-from tisim.components.materials import Touching
+from tisim.materials.material_law import MaterialLaw
+from tisim.materials.materials import Touching
 
 Overlap = TypeVar("Overlap", float, np.ndarray)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.materials import Touching
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular.parts import RollingResistance
 from tisim.effects.contact.granular.spring import slipping, unloaded
+from tisim.materials.materials import Touching
 
 
 class RollingCDT(RollingResistance):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.materials import Touching
 from tisim.effects.contact.granular.parts import TwistingResistance
 from tisim.effects.contact.granular.spring import unloaded
+from tisim.materials.materials import Touching
 
 
 @ti.func

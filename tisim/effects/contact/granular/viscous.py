@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.materials import Touching
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular.parts import TangentialForce
+from tisim.materials.materials import Touching
 
 
 class ViscousFriction(TangentialForce):

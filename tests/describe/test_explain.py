@@ -1,0 +1,204 @@
+"""What explain says is what is compiled: nothing more is allocated, nothing less is listed."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+from tisim.cases.agglomeration.scene import BEST
+from tisim.cases.agglomeration.scene import scene as agglomeration
+from tisim.cases.vibration.scene import scene as vibration
+
+from tests.effects.contact.grains import heap
+from tests.scenes import scene
+from tests.self_consistent.test_self_consistent import Potential
+from tests.steppers.brownian.colloids import colloids
+from tests.throwaway import SoftShell
+from tisim import Material, MaterialPair, Simulation
+from tisim.backend import memory
+from tisim.backend.thread import in_taichi_thread
+from tisim.describe.explain import brief, explain, known_effects, render
+from tisim.describe.explained_parts import explained, explained_materials
+from tisim.effects import Granular, MindlinForce, RollingEPSD, Rotation, Walls
+from tisim.engine.allocation import Allocation
+from tisim.geometry import Plane
+from tisim.materials.materials import Materials
+from tisim.pairs.half_list import ListSizes
+from tisim.population.spatial_sort import SORTED_FROM
+from tisim.steppers import Collocation, Trapezoid
+
+pytestmark = pytest.mark.long
+
+
+def text(explanation):
+    stream = io.StringIO()
+    Console(file=stream, width=150).print(render(explanation))
+    return stream.getvalue()
+
+
+def test_whole_flow_leaves_nothing_out():
+    flow = agglomeration(BEST, 1, grains=60)
+    explanation = explain(flow)
+    assert [part.name for part in explanation.effects] == [effect.kind() for effect in flow.effects]
+    assert all(part.summary and part.source for part in explanation.effects)
+    names = {part.name for part in explanation.effects}
+    assert {part.name for part in explanation.absent_effects} == {k.kind() for k in known_effects()} - names
+    assert (explanation.particles, explanation.capacity) == (60, 60)
+    assert explanation.steps == pytest.approx(flow.duration / flow.stepper.control.longest)
+
+
+def test_absent_effects_and_fields():
+    whole = agglomeration(BEST, 1, grains=60)
+    explanation = explain(
+        whole.without(*(e.kind() for e in whole.effects if e.kind() not in ("impact", "friction")))
+    )
+    absent = {part.name for part in explanation.absent_effects}
+    assert {"heating", "cooling", "reaction", "fragmentation", "agglomeration"} <= absent
+    assert not absent & {"impact", "friction", "impact_law", "operator", "force"}
+    fields = dict(explanation.absent_fields)
+    assert "reaction" in fields["temperature"]
+    assert "fragmentation" in fields["pieces"]
+    assert not {item.name for item in explanation.memory} & set(fields)
+
+
+def test_without_any_effect_nothing_of_effects_is_compiled():
+    whole = agglomeration(BEST, 1, grains=60)
+    explanation = explain(whole.without(*(effect.kind() for effect in whole.effects)))
+    assert explanation.effects == ()
+    assert {
+        item.why for item in explanation.memory if item.bytes and not item.name.endswith(("table", "list"))
+    } == {"every scene"}
+    assert not {"OpenContacts*", "Bid*", "Resolve*", "MarkLive*", "SumForces"} & set(explanation.phases)
+
+
+@pytest.mark.slow
+def test_memory_is_what_is_allocated():
+    flow = agglomeration(BEST, 1, grains=60)
+    simulation = Simulation(flow)
+    sizes = {item.name: item.bytes for item in explain(flow).memory}
+    assert {name: sizes[name] for name in simulation.s.bytes()} == simulation.s.bytes()
+    assert sizes["position"] == 3 * sizes["radius"]
+    assert explain(flow).phases == tuple(simulation.program.names())
+    simulation.close()
+
+
+def pair(*effects, **more):
+    """Two particles that do not move, under these effects."""
+    return scene([[0.0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)), effects, **more)
+
+
+SHELL = SoftShell(stiffness=1.0, width=1.0)
+BESIDE = {
+    "impacts": (lambda: agglomeration(BEST, 1, grains=60), 60),
+    "grains": (lambda: heap(np.random.default_rng(1)), 40),
+    "sorted": (lambda: heap(np.random.default_rng(1)), SORTED_FROM),
+    "sweeps": (lambda: pair(Potential(strength=1.0), SHELL), 2),
+    "trapezoid": (lambda: pair(SHELL, stepper=Trapezoid(acceleration="anderson")), 2),
+    "collocation": (lambda: pair(SHELL, stepper=Collocation()), 2),
+    "diffusion": (lambda: colloids([[0.0, 0, 0]], together=True, hydrodynamics="rotne-prager"), 2),
+}
+"""Scenes, and room for particles, whose steps have all memory beside the state that there is."""
+
+
+@pytest.mark.parametrize("kind", BESIDE)
+@in_taichi_thread
+def test_memory_beside_the_state_is_what_is_allocated_for_a_step(kind):
+    made, capacity = BESIDE[kind]
+    with memory.collected() as trees:
+        allocation = Allocation(made(), 3, capacity)
+        with memory.collected() as beside:
+            allocation.assemble(ListSizes())
+    known = sum(buffer.memory.bytes() for buffer in allocation.assembly.buffers)
+    assert known == sum(tree.bytes for tree in beside) > 0
+    for tree in trees:
+        tree.destroy()
+
+
+def test_the_brief_form_fits_a_screen_and_counts_the_rest():
+    explanation = explain(agglomeration(BEST, 1, grains=60))
+    stream = io.StringIO()
+    Console(file=stream, width=100).print(brief(explanation))
+    output = stream.getvalue()
+    assert "hardness = 265480 Pa" in output
+    assert "heat_capacity = 1796.3 J/(kg K)" in output
+    assert f"{len(explanation.absent_effects)} other effects of tisim" in output
+    assert "temperature" not in output.split("Not compiled")[1]
+    assert len(output.splitlines()) < 40 < len(text(explanation).splitlines())
+
+
+def test_parameters_have_units_and_sources():
+    output = text(explain(agglomeration(BEST, 1, grains=60)))
+    assert "hardness = 265480 Pa" in output
+    assert "heat_capacity = 1796.3 J/(kg K)" in output
+    assert "Z04 Eq. (6.9)" in output
+    assert "Rounds" not in output
+    assert "Resolve*" in output
+
+
+def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
+    """By the names that a scene file gives them, with the numbers that kernels get."""
+    law = Granular(tangential=MindlinForce(), rolling=RollingEPSD(damping_ratio=0.2))
+    materials = {
+        "steel": Material(young=2e11, poisson=0.3, friction=0.4, rolling_friction=0.1),
+        "rubber": Material(young=2e8, poisson=0.49, friction=0.9, rolling_friction=0.2, stiffness=1.0),
+    }
+    walls = Walls(planes=[Plane()], motion=Rotation(rate=(0.0, 0.0, 2.0)))
+    table = {"rubber-steel": MaterialPair(friction=0.7)}
+    granular, body = explained(law), explained(walls)
+    assert [part.name for part in granular.all()] == [
+        "granular",
+        "granular.normal: hertz_material",
+        "granular.tangential: mindlin_force",
+        "granular.rolling: rolling_epsd",
+    ]
+    assert granular.parts[2].parameters[0][:2] == ("damping_ratio", "0.2")
+    assert [part.name for part in body.parts] == ["walls.motion: rotation"]
+    names = ["steel", "rubber", "steel-steel", "steel-rubber", "rubber-rubber"]
+    parts = tuple(explained_materials(Materials(materials, table)))
+    assert [part.name for part in parts] == names
+    mixed = {name: (float(value), text) for name, value, _, text in parts[3].parameters}
+    assert mixed["friction"] == (0.7, "given for the pair")
+    assert mixed["rolling_friction"] == (pytest.approx(0.02**0.5, rel=1e-5), "geometric mean")
+    expected = 1 / ((1 - 0.09) / 2e11 + (1 - 0.49**2) / 2e8)
+    assert mixed["E*"][0] == pytest.approx(expected, rel=1e-5)
+    # Of what one of them lacks there is nothing to tell.
+    assert "stiffness" not in mixed
+    bare = agglomeration(BEST, 1, grains=60)
+    explanation = explain(bare.without(*(effect.kind() for effect in bare.effects)))
+    assert explanation.materials == ()
+    output = text(replace(explanation, effects=(granular,), materials=parts))
+    assert "rolling_friction = 0.141421" in output
+    assert "granular.rolling: rolling_epsd" in output
+
+
+def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
+    """Z13: forces on charges, and nothing else; no fields, lists or phases of anything more."""
+    explanation = explain(vibration(sites=2))
+    effects = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}
+    assert {part.name for part in explanation.effects} == effects
+    absent = {part.name for part in explanation.absent_effects}
+    assert absent == {kind.kind() for kind in known_effects()} - effects
+    assert {"contact", "contact_friction", "impact", "heating", "cooling", "agglomeration"} <= absent
+    core = {"position", "velocity", "mass", "radius", "id"}
+    before = {"position_before", "velocity_before", "force_before", "iterate_change"}
+    more = {"parameter table", "sums of the iteration"}
+    assert {item.name for item in explanation.memory} == core | before | more | {"charge", "anchor", "force"}
+    fields = dict(explanation.absent_fields)
+    assert "heating" in fields["temperature"]
+    forbidden = ("list", "contact", "touch", "spin", "torque", "temperature", "heat")
+    memory_names = " ".join(item.name for item in explanation.memory)
+    assert not [word for word in forbidden if word in memory_names]
+    iteration = ["SumTrialForces**", "Correct**", "JudgeIteration**"]
+    step = [
+        "Begin",
+        "SaveState",
+        "ChooseTrapezoidStep*",
+        "PredictEnd*",
+        *iteration,
+        "RestoreState*",
+        "Decide*",
+        "AdvanceClock",
+        "FinishStep",
+    ]
+    assert list(explanation.phases) == step

@@ -1,0 +1,280 @@
+"""Lists of near pairs against brute force: every near pair is offered once, its larger member first."""
+
+import time
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from tests.scenes import fixed, scene
+from tisim import Box, Open, Simulation
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects import Agglomeration, Friction, Impact, PairEvent
+from tisim.engine import allocation
+from tisim.pairs import near_list
+from tisim.pairs.half_list import ListSizes
+from tisim.pairs.neighbour_rows import ALL_PAIRS
+from tisim.steppers import Verlet
+
+WORLDS, CAPACITY, STEPS, DT = 18, 300, 5, 1.0
+
+
+class Recorder(PairEvent):
+    """Counts how often each pair is looked at, and does nothing to it."""
+
+    latest: ClassVar = None
+
+    def connect(self, peers):
+        Recorder.latest = ti.field(ti.i32, (WORLDS, CAPACITY, CAPACITY))
+        return {"seen": Recorder.latest}
+
+    @ti.func
+    def contact(self, s, w, i, j, separation):
+        ti.atomic_add(self.seen[w, i, j], 1)
+        return -1.0
+
+
+DOMAINS = {
+    "joined": Box(low=(-1.0, -2.0, 0.0), high=(1.0, 2.0, 1.0)),
+    "control volume": Box(low=(-1.0, -2.0, 0.0), high=(1.0, 2.0, 1.0), images=False),
+    "slab": Box(low=(-1.0, -2.0, 0.0), high=(1.0, 2.0, 1.0), periodic=(True, False, True)),
+    "open": Open(),
+}
+SOME = [
+    pytest.param(
+        domain, id=name, marks=[pytest.mark.slow] if name in ("control volume", "open", "slab") else []
+    )
+    for name, domain in DOMAINS.items()
+]
+LOW, HIGH = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 2.0, 1.0])
+
+
+def clouds(rng):
+    """Name, positions, radii: what is easy, and what is hard for a cell list."""
+
+    def anywhere(n):
+        return rng.uniform(LOW, HIGH, (n, 3))
+
+    def faces(n):
+        """On fractions p/q of the sides, the faces of the box among them."""
+        q = rng.integers(1, 13, (n, 3))
+        return LOW + (HIGH - LOW) * rng.integers(0, q) / q
+
+    corner = np.where(rng.integers(0, 2, (200, 3)), LOW, np.nextafter(HIGH, LOW))
+    yield "equal", anywhere(300), 0.03
+    yield "equal and dense", anywhere(300), 0.15
+    yield "points", anywhere(300), 1e-6
+    for name in ("radii over three decades", "and again"):
+        yield name, anywhere(300), 2e-4 * 1e3 ** rng.uniform(0, 1, 300)
+    yield "one giant among dwarfs", anywhere(300), np.where(np.arange(300) == 150, 0.4, 4e-4)
+    yield "on faces of cells and box", faces(300), 0.02
+    yield "on faces, unequal", faces(300), 2e-4 * 1e3 ** rng.uniform(0, 1, 300)
+    yield "in the corners", corner, 0.01
+    yield "all in one cell", np.array([0.1, 0.2, 0.3]) + 1e-6 * rng.normal(size=(120, 3)), 1e-7
+    yield "all in one place", np.tile([[0.1, 0.2, 0.3]], (80, 1)), 0.01
+    yield "in a plane", anywhere(200) * [1, 1, 0] + [0, 0, 0.5], 0.02
+    yield "in a line", anywhere(200) * [1, 0, 0] + [0, 0, 0.5], 0.001
+    yield "one", anywhere(1), 0.1
+    yield "two", anywhere(2), 0.24
+    yield "last without a list", anywhere(near_list.SMALL_WORLD), 0.1
+    yield "first with a list", anywhere(near_list.SMALL_WORLD + 1), 0.1
+
+
+def motion(rng, n):
+    """Most drift along together; a few are much faster."""
+    v = np.array([0.3, 0.0, -0.2]) + rng.normal(size=(n, 3)) * 0.01
+    v[:: max(n // 5, 1)] += rng.normal(size=v[:: max(n // 5, 1)].shape) * 0.3
+    return v
+
+
+def near_pairs(position, radius, domain, horizon):
+    """Pairs (larger, smaller) with surfaces within the horizon, by a k-d tree."""
+    reach = 2 * radius.max() + horizon
+    low, high = domain.bounds()
+    periodic = np.array(domain.imaged())
+    side = (high - low)[periodic] if periodic.any() else np.array([])
+    if (reach > side / 2).any():
+        pairs = np.array(np.triu_indices(len(position), 1)).T
+    else:
+        places, sides = position.copy(), np.zeros(3)
+        if periodic.any():
+            places[:, periodic], sides[periodic] = np.mod(position - low, high - low)[:, periodic], side
+        tree = cKDTree(places, boxsize=sides if periodic.any() else None)
+        pairs = tree.query_pairs(reach, output_type="ndarray")
+    gap = position[pairs[:, 1]] - position[pairs[:, 0]]
+    gap[:, periodic] -= side * np.round(gap[:, periodic] / side)
+    near = np.linalg.norm(gap, axis=1) <= radius[pairs].sum(axis=1) + horizon
+    pairs = np.sort(pairs[near], axis=1)
+    swap = radius[pairs[:, 1]] > radius[pairs[:, 0]]
+    pairs[swap] = pairs[swap][:, ::-1]
+    return {tuple(pair) for pair in pairs.tolist()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("domain", SOME)
+def test_every_near_pair_is_offered_once_its_larger_member_first(rng, domain):
+    """At the start, and after each of several steps in which some move far and most do not."""
+    names, scenes = [], []
+    for name, position, radius in clouds(rng):
+        names.append(name)
+        n = len(position)
+        scenes.append(
+            scene(
+                position,
+                motion(rng, n) * 0.1,
+                (Recorder(),),
+                radius=radius if np.ndim(radius) else np.full(n, radius),
+                density=1.0,
+                domain=domain,
+                dt=DT,
+                steps=STEPS + 3,
+            )
+        )
+    simulation = Simulation(scenes[0], WORLDS, CAPACITY)
+    simulation.load(scenes)
+    counts_on_device = Recorder.latest
+    # Rows that were too short at first have been looked through in part.
+    in_taichi_thread(counts_on_device.fill)(0)
+    simulation.begin()
+    for step in range(STEPS):
+        counts = in_taichi_thread(counts_on_device.to_numpy)()
+        in_taichi_thread(counts_on_device.fill)(0)
+        for w, (name, result) in enumerate(zip(names, simulation.results(), strict=True)):
+            state, n = result.state, len(result.state["mass"])
+            table = counts[w, :n, :n]
+            owner, other = np.nonzero(table)
+            larger = state["radius"][owner] > state["radius"][other]
+            equal = state["radius"][owner] == state["radius"][other]
+            where = f"{name}, step {step}"
+            assert table.max(initial=0) <= 1, where
+            assert (larger | (equal & (owner < other))).all(), where
+            start = result.start
+            reach = start["radius"].max()
+            extent = np.ptp(start["position"], axis=0) + 2 * reach
+            if any(domain.joined()):
+                extent = np.where(domain.joined(), HIGH - LOW, extent)
+            spacing = (np.prod(extent) / n) ** (1 / 3)
+            horizon = near_list.HORIZON * spacing * (1 - 1e-12) if n > near_list.SMALL_WORLD else np.inf
+            near = near_pairs(state["position"], state["radius"], domain, min(horizon, 10.0))
+            missed = near - set(zip(owner.tolist(), other.tolist(), strict=True))
+            assert not missed, f"{where}: missed {sorted(missed)[:5]}"
+        grid = simulation.assembly.lists.near.grid
+        cells = in_taichi_thread(grid.total.to_numpy)()[: len(scenes)]
+        assert (cells <= grid.max_cells).all(), "cells beyond their memory"
+        row = simulation.assembly.lists.near.row
+        simulation.run(steps=1)
+        if simulation.assembly.lists.near.row > row:
+            # Rows that were too short have been looked through in part, and then again.
+            in_taichi_thread(counts_on_device.fill)(0)
+            simulation.run(steps=1)
+        assert (simulation.s.read("status")[: len(scenes)] == 0).all()
+    # A cell list is worth having: the equal cloud does not look at all its pairs.
+    assert counts[0].sum() < 0.1 * 300 * 299 / 2
+
+
+def crowd(rng, stepper, grains=300):
+    """Grains that collide and merge, and pass from lists to all pairs as they become few."""
+    return scene(
+        rng.uniform(-0.01, 0.01, (grains, 3)),
+        np.array([100.0, 0, 0]) + rng.uniform(-1, 1, (grains, 3)) * [100, 10, 10],
+        (Impact(hardness=2e6), Friction(coefficient=0.1), Agglomeration()),
+        radius=4e-4 * 4.0 ** rng.uniform(0, 1, grains),
+        domain=Box(low=(-0.01,) * 3, high=(0.01,) * 3, images=True),
+        stepper=stepper,
+        duration=4e-4,
+    )
+
+
+@pytest.fixture
+def outcome(monkeypatch):
+    """Run a scene with other settings of the near list, and room in its rows at first."""
+
+    def run(start, room=None, **settings):
+        with monkeypatch.context() as patch:
+            for name, value in settings.items():
+                assert hasattr(near_list, name)
+                patch.setattr(near_list, name, value)
+            if room:
+                patch.setattr(allocation, "ListSizes", lambda: ListSizes(near=room))
+            simulation = Simulation(start)
+            simulation.load([start])
+            simulation.run()
+            (result,) = simulation.results()
+            simulation.close()
+        return result
+
+    return run
+
+
+def same(a, b):
+    assert a.status.ok
+    assert b.status.ok
+    assert a.work == b.work
+    for name, values in a.state.items():
+        np.testing.assert_array_equal(values, b.state[name], err_msg=name)
+
+
+@pytest.mark.slow
+def test_results_do_not_depend_on_the_skin(rng, outcome):
+    """Lists made in every step, and too short for most grains: the same bits, adaptive steps among them."""
+    start = crowd(rng, Verlet())
+    usual = outcome(start)
+    assert usual.work["merges"] > 50
+    assert usual.work["impacts"] > usual.work["merges"]
+    same(usual, outcome(start, room=2, STEPS_OF_SKIN=0.0))
+
+
+@pytest.mark.slow
+def test_results_do_not_depend_on_lists_at_all(rng, outcome):
+    """With steps of one length, cell lists and looking at all pairs give the same bits."""
+    start = crowd(rng, fixed(4e-6))
+    usual = outcome(start)
+    assert usual.work["impacts"] > 100
+    same(usual, outcome(start, SMALL_WORLD=10**4))
+
+
+def falling_together(steps=40, dt=1e-4, radius=1e-4):
+    """Grains fall together from far apart until each has all others near it, and one of 20 times their
+    radius falls onto them."""
+    site = 14 * radius * (np.arange(5) - 2.0)
+    position = np.stack(np.meshgrid(site, site, site), axis=-1).reshape(-1, 3)
+    position += 0.3 * radius * np.sin(np.arange(375.0)).reshape(-1, 3)
+    velocity = -position / (steps * dt)
+    half = 200 * radius
+    return scene(
+        np.concatenate([position, [[0.0, 0.0, 60 * radius]]]),
+        np.concatenate([velocity, [[0.0, 0.0, -40 * radius / (steps * dt)]]]),
+        (Impact(hardness=1e12),),
+        radius=np.append(np.full(len(position), radius), 20 * radius),
+        density=2000.0,
+        domain=Box(low=(-half,) * 3, high=(half,) * 3),
+        dt=dt,
+        steps=steps,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("schedule", ["world", "particle"])
+def test_rows_that_overflow_grow_and_change_no_bit(schedule):
+    """Beside a world that looks at all pairs; grains of 20 times the size of others among them."""
+    start = falling_together()
+    simulation = Simulation(start, 2, schedule=schedule)
+    row = simulation.assembly.lists.near.row
+    simulation.load([start, start])
+    assert simulation.assembly.lists.near.row == row
+    simulation.s.write("listed_above", np.array([0, ALL_PAIRS]))
+    simulation.begin()
+    compiled = simulation.setup_s
+    began = time.perf_counter()
+    simulation.run()
+    seconds = time.perf_counter() - began
+    # Compiling steps for longer lists is no part of the time that a run takes.
+    assert simulation.setup_s > compiled
+    assert simulation.wall_s < seconds - (simulation.setup_s - compiled)
+    listed, all_pairs = simulation.results()
+    assert simulation.assembly.lists.near.row > max(row, 24)
+    assert listed.work["impacts"] > 50
+    same(listed, all_pairs)
+    simulation.close()

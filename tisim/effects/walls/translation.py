@@ -1,0 +1,48 @@
+"""Translation at a constant velocity, at once or from a time on, such as that of a gate."""
+
+import math
+from collections.abc import Sequence
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Vector, parameter
+from tisim.effects.walls.motion import Motion
+
+
+class Translation(Motion):
+    """The body rests where its shapes say until it begins to move, and has a constant velocity from then on.
+
+    x = v max(t - begin, 0)
+    """
+
+    velocity: Vector = parameter("m/s", "velocity v", examples=[(0.1, 0.0, 0.0)])
+    begin: float = parameter("s", "time at which the body begins to move", 0.0, ge=0)
+
+    def top_speed(self, extent: float) -> float:
+        return math.hypot(*self.velocity)
+
+    def shifts(self, duration: float) -> Sequence[Vector]:
+        x, y, z = (max(duration - self.begin, 0.0) * component for component in self.velocity)
+        return (0.0, 0.0, 0.0), (x, y, z)
+
+    @ti.func
+    def displacement(self, w, t):
+        """Return how far (m) the body is from where its shapes say."""
+        # In f64, whatever the precision: the way grows without bound.
+        moving = ti.max(t - ti.cast(self.begin(w), ti.f64), 0.0)
+        return ti.cast(ti.cast(self.velocity(w), ti.f64) * moving, float)
+
+    @ti.func
+    def to_body(self, kept, w, r, t):
+        return r - self.displacement(w, t)
+
+    @ti.func
+    def from_body(self, kept, w, r, t):
+        return r + self.displacement(w, t)
+
+    @ti.func
+    def velocity_at(self, kept, w, r, t):
+        return ti.select(t >= ti.cast(self.begin(w), ti.f64), 1.0, 0.0) * self.velocity(w)
+
+    @ti.func
+    def fastest(self, w, r, around):
+        return self.velocity(w).norm()

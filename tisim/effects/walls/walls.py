@@ -1,0 +1,196 @@
+"""Walls, which grains touch as they touch each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import model_validator
+
+from tisim.components.component import Component, Text
+from tisim.domains.domain import Domain
+from tisim.effects.base import Effect, Field, Force, option
+from tisim.effects.contact.granular.contact import GranularContact
+from tisim.effects.walls.motion import Fixed, Motion, MotionState
+from tisim.effects.walls.resultant import resultant, resultant_units
+from tisim.effects.walls.wall_contacts import WallContacts
+from tisim.effects.walls.wall_faces import check_faces
+from tisim.effects.walls.wall_ring import Bundling, Doubting
+from tisim.effects.walls.wall_search import CONTACTS, Faces
+from tisim.errors import Words, must
+from tisim.geometry.box import BoxSurface
+from tisim.geometry.cone import ConicalSurface
+from tisim.geometry.cylinder import CylindricalSurface
+from tisim.geometry.disc import Disc
+from tisim.geometry.plane import Plane
+from tisim.geometry.shape import Shape
+from tisim.geometry.sphere import SphericalSurface
+from tisim.geometry.surface import Surface
+from tisim.geometry.triangles import TriangulatedSurface
+from tisim.materials.material_law import UsesMaterials
+from tisim.materials.materials import Materials
+from tisim.state.bound import Peers
+
+if TYPE_CHECKING:
+    from tisim.scene.scene import Scene
+
+FIELDS = ("past", "surface_past", "loads", "touched", "clear")
+"""A grain remembers of a wall, where there is need: what its contacts with planes do, and with surfaces, the
+load, how many contacts there are, and where it was how far from the wall."""
+
+
+class Walls(WallContacts, UsesMaterials, Force):
+    """Walls hold grains back by the contact laws of the scene; together they are one rigid body, at rest or
+    in motion.
+
+    A wall is a grain of infinite radius and mass. Planes bound the space in which grains are: each is felt by
+    itself. Other surfaces have two sides, and rims; where they meet, at an edge or a seam, a grain feels the
+    nearer one, and at a concave edge both. What a contact remembers lies with the grain, and goes along with
+    it from one triangle to the next. None is felt through the periodic faces of a box: a surface at one must
+    be the same at the opposite one, as a floor is, or is refused.
+
+    Bodies that move by themselves, or whose forces are reported separately, are walls of their own names. The
+    result tells the force (N) and the torque (N m) of the grains on the body, about the origin or the centre
+    of its rotation, as ``measures["NAME_force_x"]`` and so on, and ``state["NAME_loads"]`` those of the body
+    on each grain.
+    """
+
+    fields = ("radius", "velocity", "spin")
+    depends_on_velocity: ClassVar[bool] = True
+    leapfrog: ClassVar[bool] = True
+    guards_steps: ClassVar[bool] = True
+    requires: ClassVar = (GranularContact,)
+
+    planes: tuple[Plane, ...] = option(
+        "planes; their number may differ per world, as that of others", (), examples=[(Plane(),)]
+    )
+    discs: tuple[Disc, ...] = option("flat discs", (), examples=[()])
+    spheres: tuple[SphericalSurface, ...] = option("spheres, from within or around", (), examples=[()])
+    cylinders: tuple[CylindricalSurface, ...] = option("cylinders, from within or around", (), examples=[()])
+    cones: tuple[ConicalSurface, ...] = option("cones, from within or around", (), examples=[()])
+    boxes: tuple[BoxSurface, ...] = option("boxes, from within or around", (), examples=[()])
+    surface: TriangulatedSurface | None = option("a surface of triangles, such as that of an STL file", None)
+    motion: Motion = option("how the body moves", Fixed())
+    material: Text | None = option("material of the walls; the first of the scene unless given", None)
+
+    @model_validator(mode="after")
+    def _there(self) -> Walls:
+        there = any(getattr(self, name) for name, _ in self.lists()) or self.surface is not None
+        must(there, self.label, "given a plane or a surface", Words("none"))
+        return self
+
+    def members(self) -> dict[str, Component]:
+        surface = {"surface": self.surface} if self.surface else {}
+        return {"motion": self.motion, **surface}
+
+    def check_materials(self, materials: Materials) -> None:
+        self.material_index(materials)
+
+    def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
+        effects = scene.acting()
+        for law in effects:
+            if isinstance(law, GranularContact):
+                law.suits_wall(start, effects, self.material_index(self._materials), self.label)
+        later = [effect.largest_newcomers()["radius"] for effect in effects]
+        radii = np.concatenate([start["radius"], *later])
+        reach = float(radii.max(initial=0.0))
+        check_faces(self._named_shapes(), self.motion, scene.domain, reach, scene.duration)
+
+    def _named_shapes(self) -> Iterator[tuple[str, Shape]]:
+        for name, _ in self.lists():
+            yield from ((f"{self.label}.{name}", shape) for shape in getattr(self, name))
+        if self.surface:
+            yield f"{self.label}.surface", self.surface
+
+    def critical_step(
+        self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
+    ) -> float | None:
+        # Its laws of contact tell it, of the materials of walls too.
+        return math.inf
+
+    def reached_speed(self, duration: float, extent: float) -> float:
+        return self.motion.top_speed(extent)
+
+    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+        laws = (law.may_stop(effects, domain) for law in effects if isinstance(law, GranularContact))
+        return ", or ".join(filter(None, laws))
+
+    def material_index(self, materials: Materials) -> int:
+        """Return the index of the material of the walls among those of a scene."""
+        return 0 if self.material is None else materials.index(self.material, f"{self.label}.material")
+
+    def kinds_of_surface(self) -> Iterator[str]:
+        """Yield the names of the lists of surfaces of which there are any."""
+        return (name for name, kind in self.lists() if issubclass(kind, Surface) and getattr(self, name))
+
+    @property
+    def touches_surfaces(self) -> bool:
+        """Return whether there are surfaces other than planes."""
+        return self.surface is not None or any(self.kinds_of_surface())
+
+    def overlaps(self, position: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """Return how deep (m) spheres at some places (m, shape (n, 3)) are in the wall at the time 0: what is
+        behind a plane by more than its diameter; shape (n,)."""
+        shapes = [shape for _, shape in self._named_shapes()]
+        places = position - np.array(self.motion.shift())
+        deepest: np.ndarray = radius - np.min([shape.distances(places) for shape in shapes], axis=0)
+        return deepest
+
+    def keeps(self, what: str) -> tuple[str, ...]:
+        kept = tuple(self.motion.quantities)
+        names = {"world_quantities": kept, "totals": ("resistance",) if kept else ()}
+        return tuple(f"{self.label}_{name}" for name in names.get(what, ()))
+
+    def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
+        values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
+        room = {"past": Plane.room(len(self.planes)) * values, "loads": 6}
+        if self.touches_surfaces:
+            room["surface_past"] = CONTACTS * (3 + values)
+        if self.touches_surfaces or self.motion.moves:
+            room["clear"] = 5
+        slots = (Field(f"{self.label}_{n}", "", 1, "keep", slots=size) for n, size in room.items() if size)
+        return *slots, Field(f"{self.label}_touched", "", 1, "keep", integer=True)
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        laws, begin = [], 0
+        for law in peers.of(GranularContact):
+            laws.append((law, begin, law.data.memory))
+            begin += law.data.memory
+        bound = peers.bound(self)
+        surfaces = tuple(getattr(bound, name) for name in self.kinds_of_surface())
+        faces = Faces(surfaces, bound.surface, self.surface is not None)
+        return {
+            "laws": tuple(laws),
+            "stride": begin,
+            "wall_material": self.material_index(self._materials),
+            "flat": bound.planes,
+            "has_planes": bool(self.planes),
+            "faces": faces,
+            "bundling": Bundling(faces),
+            "doubting": Doubting(),
+            "has_mesh": self.surface is not None,
+            "mesh": bound.surface,
+        }
+
+    def remembers(self, s: Any) -> dict[str, Any]:
+        def columns(names: Iterable[str]) -> dict[str, Any]:
+            return {name: getattr(s, f"{self.label}_{name}") for name in names}
+
+        present = {field.name for field in s.fields}
+        fields = [name for name in FIELDS if f"{self.label}_{name}" in present]
+        return {
+            "kept": MotionState(columns(self.motion.quantities)),
+            **columns(fields),
+            **(columns(["resistance"]) if self.motion.quantities else {}),
+        }
+
+    def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
+        loads = state[f"{self.label}_loads"]
+        centre = self.motion.centre_of_torque()
+        return resultant(self.label, state["position"], -loads[:, :3], -loads[:, 3:], centre)
+
+    def measured(self) -> dict[str, str]:
+        kept = {f"{self.label}_{name}": unit for name, unit in self.motion.quantities.items()}
+        return {**resultant_units(self.label), **kept}

@@ -1,0 +1,238 @@
+"""Force and torque on every particle."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Force, PairForce
+from tisim.forces.loads import Loads
+from tisim.numerics.ieee import finite
+from tisim.numerics.roots import estimates_roots
+from tisim.numerics.vectors import piece
+from tisim.pairs.listed_laws import ListedLaws
+from tisim.pairs.pair_sum import PairSum
+from tisim.program.occasion import Occasion
+from tisim.state.status import WorldStatus
+
+if TYPE_CHECKING:
+    from tisim.domains.domain import Domain
+    from tisim.pairs.pair_chunks import PairChunks
+    from tisim.state.bound import Bound, Peers
+    from tisim.state.state import State
+
+
+def turning(effects: Sequence[Effect]) -> bool:
+    """Return whether any of these exerts torques."""
+    return any(effect.turns(effects) for effect in effects if isinstance(effect, Force | PairForce))
+
+
+class SumForces(PairSum):
+    """This phase sets force[w, i] to the sum of the scene's forces on i: single, all pairs, near pairs; each
+    in a fixed order.
+
+    Where an effect of the scene exerts torques these are summed along with it: one vector of six, the load. A
+    particle that is ``fixed``, where the scene has that field, takes none. Where the scene has the field
+    ``virial`` nine more are summed: the half of i in that of its pairs. What pairs remember advances with the
+    sum.
+
+    trial : whether the state is one that may be given up. commits : whether what pairs remember may be
+    brought up to date with it.
+    """
+
+    trial: ClassVar[bool] = False
+    commits: ClassVar[bool] = True
+
+    def __init__(
+        self,
+        s: "State",
+        domain: "Bound[Domain]",
+        effects: "Peers",
+        pairs: "PairChunks | None",
+        derived_solvers: tuple[Any, ...],
+    ) -> None:
+        self.forces, self.pair_forces = effects.of(Force), effects.of(PairForce)
+        super().__init__(s, domain, self.pair_forces, pairs)
+        self.derived_solvers = derived_solvers
+        self.half_list: Any = pairs.half_list if pairs else None
+        self.turning = turning([effect.data for effect in effects])
+        self.has_fixed = any(field.name == "fixed" for field in s.fields)
+        self.loads = Loads(s, self.turning)
+        self.components = self.loads.components
+        # A listed pair comes to a force, torques on both, how far apart they are where that is of use, and
+        # what each law has it remember.
+        self.separation_begin = 9 if self.turning else 3
+        self.remembers = any(
+            effect.data.offers("load" if isinstance(effect.data, Force) else "interaction")
+            for effect in (*self.forces, *self.pair_forces)
+        )
+        able = all(effect.data.offers_inverse() for effect in self.long_ranged)
+        self.by_inverse = able and not self.turning and not self.loads.virial and estimates_roots()
+
+    @ti.func
+    def start(self, w, i, t):
+        return self.loads.summand(self.external_load(w, i, t), 0.0 * self.s.position[w, i])
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        taken = total
+        if ti.static(self.has_fixed):
+            for k in ti.static(range(self.loads.size)):
+                taken[k] = ti.select(self.is_free(w, i), total[k], 0.0)
+        self.loads.write(self.s, w, i, taken)
+        self.check(w, i, taken)
+
+    @ti.func
+    def single_particle(self, w, i, t):
+        """Set the force on i, at a time of its own, where particles do not feel each other."""
+        for solver in ti.static(self.derived_solvers):
+            solver.set(self.s, w, i, t)
+        self.loads.write(self.s, w, i, self.external_load(w, i, t))
+
+    @ti.func
+    def external_load(self, w, i, t):
+        """Return the sum of the forces on i that no other particle exerts, with their torques."""
+        s = self.s
+        total = self.loads.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
+        if self.is_free(w, i):
+            for effect in ti.static(self.forces):
+                total += self.load_by(effect, w, i, t)
+        return total
+
+    @ti.func
+    def write_sum(self, w, i, total):
+        self.loads.write(self.s, w, i, total)
+
+    @ti.func
+    def read_sum(self, w, i):
+        return self.loads.read(self.s, w, i)
+
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        return ListedLaws(laws, self.separation_begin + (3 if self.loads.virial else 0), self.commits)
+
+    @ti.func
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        values = ti.Vector.zero(self.s.real, laws.values)
+        for law, begin in ti.static(laws.placed):
+            force, torque_i, torque_j, memory = self.interaction(law, w, m, i, j, separation, distance, t)
+            for k in ti.static(range(3)):
+                values[k] += force[k]
+                if ti.static(self.turning):
+                    values[3 + k] += torque_i[k]
+                    values[6 + k] += torque_j[k]
+            if ti.static(self.commits):
+                for k in ti.static(range(law.memory)):
+                    values[begin + k] = memory[k]
+        if ti.static(self.loads.virial):
+            for k in ti.static(range(3)):
+                values[self.separation_begin + k] = separation[k]
+        return values
+
+    @ti.func
+    def interaction(self, law: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        """Return force, torques and new memory of one law between listed pair m; nothing where the two are of
+        one rigid body, within which it does not act."""
+        past = self.past(law, w, m)
+        force, torque_i, torque_j, memory = law.interaction(
+            self.s, w, i, j, separation, distance, past, self.elapsed_time(w), t
+        )
+        if ti.static(self.half_list.within_bodies and not law.within_bodies):
+            # What a law returns of two that lie in each other need not be finite.
+            apart = not self.half_list.joined(w, i, j)
+            force, torque_i = ti.select(apart, force, 0.0), ti.select(apart, torque_i, 0.0)
+            torque_j, memory = ti.select(apart, torque_j, 0.0), ti.select(apart, memory, 0.0)
+        return force, torque_i, torque_j, memory
+
+    @ti.func
+    def past(self, law: ti.template(), w, m):  # type: ignore[valid-type]
+        """Return what listed pair m remembers of one law; one 0 where that is nothing."""
+        past = ti.Vector.zero(self.s.real, max(1, law.memory))
+        if ti.static(law.memory > 0):
+            past = law.past.read(w, m)
+        return past
+
+    @ti.func
+    def pair_contributions(self, values):
+        force, loads = piece(values, 0, 3), self.loads
+        here, there = loads.wrench(force, force), loads.wrench(-force, force)
+        if ti.static(self.turning):
+            here = loads.wrench(force, piece(values, 3, 3))
+            there = loads.wrench(-force, piece(values, 6, 3))
+        separation = 0.0 * force
+        if ti.static(loads.virial):
+            separation = piece(values, self.separation_begin, 3)
+        return loads.summand(here, separation), loads.summand(there, -separation)
+
+    @ti.func
+    def write_memory(self, laws: ti.template(), w, m, values):  # type: ignore[valid-type]
+        if self.updates_memory(w):
+            for law, begin in ti.static(laws.remembering):
+                law.past.write(w, m, piece(values, begin, law.memory))
+
+    @ti.func
+    def elapsed_time(self, w):
+        """Return the time (s) since what particles remember was last brought up to date."""
+        s, now = self.s, self.s.occasion[w]
+        none = now == Occasion.START or now == Occasion.AFTER_EVENTS
+        step = ti.select(now == Occasion.AHEAD, s.step_ahead[w], s.dt[w])
+        return ti.cast(ti.select(none, 0.0, step), s.real)
+
+    @ti.func
+    def updates_memory(self, w):
+        """Return whether what particles remember is brought up to date with this sum."""
+        updates = False
+        if ti.static(self.commits):
+            occasion = self.s.occasion[w]
+            updates = occasion == Occasion.STEP or occasion == Occasion.START
+        return updates
+
+    @ti.func
+    def out_of_reach(self, laws: ti.template(), w, m):  # type: ignore[valid-type]
+        if self.updates_memory(w):
+            for law, _begin in ti.static(laws.remembering):
+                law.past.forget(w, m)
+
+    @ti.func
+    def is_free(self, w, i):
+        """Return whether forces may move i."""
+        free = True
+        if ti.static(self.has_fixed):
+            free = self.s.fixed[w, i] == 0
+        return free
+
+    @ti.func
+    def check(self, w, i, total):
+        if not finite(total.norm_sqr()):
+            if self.s.occasion[w] == Occasion.AHEAD:
+                # The law at fault is found by a sum over the step.
+                self.s.dt[w] = self.s.step_ahead[w]
+            self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
+
+    @ti.func
+    def load_by(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
+        """Return the force on i by one law that no other particle exerts, with its torque."""
+        force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.updates_memory(w))
+        return self.loads.wrench(force, torque)
+
+    @ti.func
+    def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
+        s = self.s
+        load = self.loads.wrench(
+            effect.pair_force(s, w, i, j, separation, distance, t),
+            effect.pair_torque(s, w, i, j, separation, distance, t),
+        )
+        return self.loads.summand(load, separation)
+
+    @ti.func
+    def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]
+        return effect.pair_force_by_inverse(self.s, w, i, j, separation, inverse, t)
+
+
+class SumTrialForces(SumForces):
+    """This phase sums the forces of a trial state, which may be one that is to be given up: whatever is not
+    finite may stay."""
+
+    trial, commits = True, False
+
+    @ti.func
+    def check(self, w, i, total):
+        pass

@@ -1,0 +1,187 @@
+"""The phases that sort particles into cells: in parallel, deterministic.
+
+Counts are integer sums, and each cell is sorted by index in the end: the order depends neither on the threads
+nor on what was there before.
+"""
+
+from typing import Any
+
+from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite
+from tisim.pairs.cell_grid import (
+    CELLS_PER_PARTICLE,
+    LEVELS,
+    SPARE_CELLS,
+    CellGrid,
+    OfBlocks,
+    OfCells,
+    OfGrid,
+    OfParticles,
+    next_number,
+)
+from tisim.program.phases import Phase
+from tisim.state.status import WorldStatus
+
+
+def measure_phases(grid: CellGrid, seer: Any) -> tuple[Phase, ...]:
+    """Return the phases that measure the particles; ``seer.reach(w, i)`` says how far one looks beyond the
+    surface of another (m)."""
+    return ResetGrid(grid), FindExtent(grid), MeasureLevels(grid, seer)
+
+
+def cell_phases(grid: CellGrid) -> tuple[Phase, ...]:
+    """Return the phases that sort the particles into cells; ``skin`` must be set."""
+    count = (ShapeGrid(grid), ClearCells(grid), CountInCells(grid))
+    return (*count, *grid.starts.phases(), PlaceInCells(grid), SortCells(grid))
+
+
+class ResetGrid(OfGrid):
+    """This phase forgets what is known of the particles."""
+
+    @ti.func
+    def run(self, w, _k):
+        g = self.g
+        g.smallest[w] = ti.math.inf
+        for k in ti.static(range(3)):
+            g.low[w, k], g.high[w, k] = ti.math.inf, -ti.math.inf
+        for level in range(LEVELS):
+            g.widest[w, level], g.largest[w, level], g.population[w, level] = 0.0, 0.0, 0
+
+
+class FindExtent(OfBlocks):
+    """This phase finds the smallest radius, and the corners of the box around all."""
+
+    @ti.func
+    def run(self, w, b):
+        g, s, first = self.g, self.s, self.begin(b)
+        low, high, smallest = s.position[w, first], s.position[w, first], s.radius[w, first]
+        for i in range(first, self.end(w, b)):
+            r, radius = s.position[w, i], s.radius[w, i]
+            # What is not finite belongs to no cell.
+            if not finite(ti.abs(r).sum() + radius):
+                s.fail(w, WorldStatus.NOT_FINITE, i)
+            low, high, smallest = ti.min(low, r), ti.max(high, r), ti.min(smallest, radius)
+        if smallest < g.smallest[w]:
+            ti.atomic_min(g.smallest[w], smallest)
+        for k in ti.static(range(3)):
+            if low[k] < g.low[w, k]:
+                ti.atomic_min(g.low[w, k], low[k])
+            if high[k] > g.high[w, k]:
+                ti.atomic_max(g.high[w, k], high[k])
+
+
+class MeasureLevels(OfBlocks):
+    """This phase finds how many particles each level has, their largest radius, and how far they are seen at
+    most."""
+
+    def __init__(self, grid: CellGrid, seer: Any) -> None:
+        super().__init__(grid)
+        self.seer = seer
+
+    @ti.func
+    def run(self, w, b):
+        g, s, population = self.g, self.s, 0
+        none = ti.cast(0.0, s.real)
+        largest, widest = none, none
+        # Those of one level that follow each other are told at once.
+        current = g.level(w, s.radius[w, self.begin(b)])
+        for i in range(self.begin(b), self.end(w, b)):
+            radius = s.radius[w, i]
+            near, level = radius + self.seer.reach(w, i), g.level(w, radius)
+            g.near[w, i] = near
+            if level != current:
+                self.note(w, current, population, largest, widest)
+                current, population, largest, widest = level, 0, none, none
+            population += 1
+            largest, widest = ti.max(largest, radius), ti.max(widest, near)
+        self.note(w, current, population, largest, widest)
+
+    @ti.func
+    def note(self, w, level, population, largest, widest):
+        g = self.g
+        ti.atomic_add(g.population[w, level], population)
+        if largest > g.largest[w, level]:
+            ti.atomic_max(g.largest[w, level], largest)
+        if widest > g.widest[w, level]:
+            ti.atomic_max(g.widest[w, level], widest)
+
+
+class ShapeGrid(OfGrid):
+    """This phase gives each level cells, as wide as two of its particles see each other and not too many."""
+
+    @ti.func
+    def run(self, w, _k):
+        g = self.g
+        low, extent, cells = g.domain.origin(w), g.extent(w), 0
+        for k in ti.static(range(3)):
+            if ti.static(g.joined[k]):
+                g.low[w, k], g.high[w, k] = low[k], low[k] + extent[k]
+        for level in range(LEVELS):
+            if g.population[w, level] > 0:
+                most = CELLS_PER_PARTICLE * g.population[w, level] + SPARE_CELLS
+                width = g.largest[w, level] + g.widest[w, level] + g.skin_along(w)
+                dims = g.divide(ti.min(extent / width, 1e3), most)
+                g.offset[w, level] = cells
+                for k in ti.static(range(3)):
+                    g.dims[w, level, k] = dims[k]
+                    g.cell[w, level, k] = ti.max(extent[k] / dims[k], width[k] * 1e-3)
+                cells += dims[0] * dims[1] * dims[2]
+        g.total[w] = cells
+
+
+class ClearCells(OfCells):
+    """This phase empties every cell."""
+
+    @ti.func
+    def run(self, w, c):
+        self.g.cell_start[w, c] = 0
+
+
+class CountInCells(OfParticles):
+    """This phase finds the cell of each particle, and counts those of each cell, in whatever order threads
+    come."""
+
+    @ti.func
+    def run(self, w, i):
+        g, s = self.g, self.s
+        level = g.level(w, s.radius[w, i])
+        c = g.cell_index(w, level, g.place(w, level, s.position[w, i]))
+        g.cell_of[w, i] = c
+        # One cell on, so that the sums up to each cell are where it begins.
+        g.rank[w, i] = next_number(g.cell_start, w, c + 1, ti.static(self.g.shared()))
+
+
+class PlaceInCells(OfParticles):
+    """This phase enters each particle in its cell, in the order in which they were counted."""
+
+    @ti.func
+    def run(self, w, i):
+        g = self.g
+        g.order[w, g.cell_start[w, g.cell_of[w, i]] + g.rank[w, i]] = i
+
+
+class SortCells(OfCells):
+    """This phase orders each cell by index."""
+
+    @ti.func
+    def size(self, w):
+        return self.g.total[w]
+
+    @ti.func
+    def run(self, w, c):
+        g = self.g
+        sort_row(g.order, w, g.cell_start[w, c], g.cell_start[w, c + 1])
+
+
+@ti.func
+def sort_row(column: ti.template(), w, begin, end):  # type: ignore[valid-type]
+    """Sort column[w, begin:end], a few integers, by insertion."""
+    for a in range(begin + 1, end):
+        value, b = column[w, a], a - 1
+        while b >= begin:
+            if column[w, b] > value:
+                column[w, b + 1] = column[w, b]
+                b -= 1
+            else:
+                break
+        column[w, b + 1] = value

@@ -1,0 +1,63 @@
+"""The lists of near pairs that a scene calls for, as steppers and operators see them: one object for all."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tisim.backend.taichi import ti
+from tisim.pairs.half_list import ListSizes
+from tisim.pairs.near_list import NearList
+from tisim.pairs.neighbour_rows import NeighbourRows
+from tisim.state.state import State
+
+if TYPE_CHECKING:
+    from tisim.pairs.pair_chunks import PairChunks
+
+
+@ti.data_oriented
+class NeighbourLists:
+    """The neighbour lists have to hear how far particles have moved: the list of events and step control,
+    ``near``, and the ``pairs`` of short-ranged forces."""
+
+    def __init__(self, s: State, near: NearList | None, pairs: "PairChunks | None") -> None:
+        self.s, self.near, self.pairs, self.watched = s, near, pairs, near is not None
+        self.lists = tuple(one for one in (near, pairs) if one is not None)
+
+    @ti.func
+    def moved(self, w):
+        """Note that particles have moved by at most ``displacement`` relative to the frame, along each
+        axis."""
+        for one in ti.static(self.lists):
+            one.moved(w)
+
+    @ti.func
+    def invalidate(self, w):
+        """Have all lists made anew: particles have been put elsewhere."""
+        for one in ti.static(self.lists):
+            one.invalidate(w)
+
+    @ti.func
+    def sure(self, w):
+        """Return the gap (m) between surfaces within which all pairs are offered to the step control; 0, for
+        no limit, where all pairs are."""
+        gap = ti.cast(0.0, self.s.real)
+        if ti.static(self.watched):
+            gap = self.near.sure(w)
+        return gap
+
+    def rows(self) -> tuple[NeighbourRows, ...]:
+        """Return the rows of each list."""
+        return tuple(one if isinstance(one, NeighbourRows) else one.half_list for one in self.lists)
+
+    def forget(self) -> None:
+        """Have all lists made anew before they are used again."""
+        for one in self.lists:
+            one.forget()
+
+    def wanted(self, sizes: ListSizes) -> ListSizes:
+        """Return sizes, ``sizes`` at least, in which the lists last made, which may have overflowed, have
+        room to spare."""
+        if self.pairs is not None:
+            sizes = sizes.joined(self.pairs.half_list.wanted())
+        if self.near is not None:
+            sizes = replace(sizes, near=max(sizes.near, self.near.wanted_row()))
+        return sizes

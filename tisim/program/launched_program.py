@@ -1,0 +1,169 @@
+"""Steps by launches: each phase is one loop over all particles of all worlds."""
+
+from tisim.backend import runtime
+from tisim.backend.launcher import Launcher
+from tisim.backend.mappings import require_mappings
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.errors import must
+from tisim.program.launches import TASK, Plan, Planner, Visit
+from tisim.program.phases import Item, Phase, Repeat
+from tisim.program.program import Program, StepRules
+from tisim.program.routes import NOWHERE, OVER, Fork, entry, launch_count
+from tisim.state.state import State
+from tisim.state.status import NEVER, WorldStatus
+
+PATIENCE = 8
+"""At most so many steps are launched before worlds are asked where they are."""
+LOOK_COST = 2.0
+"""Worlds are asked that often that the launches which find them waiting cost as much as asking does: twice
+what the launches of a step cost, in which a half of those that wait have waited."""
+LOOKS_PER_QUESTION = 4
+"""After so many looks a device that maps pages is asked whether it may go on: it takes a fraction of a ms."""
+PLACES = 48
+"""A step has at most so many places: worlds tell theirs by the bits of an integer."""
+SHARES = 256
+"""The share of worlds that wait for a repeat is told in this many parts."""
+
+
+@ti.data_oriented
+class LaunchedProgram(StepRules, Program):
+    """This program launches a kernel for the phases between one repeat and the next.
+
+    once : whether worlds go through the items once, whatever steps they take.
+    """
+
+    def __init__(
+        self, s: State, items: tuple[Item, ...], rest_every: int = NEVER, once: bool = False
+    ) -> None:
+        super().__init__(s, rest_every)
+        self.items, self.once, self.patience = items, once, 1
+        # A CPU has ended a launch when it returns, so what it says of it costs nothing.
+        self.asks, self.maps_pages = (runtime.current().device == name for name in ("cpu", "vulkan"))
+        # One task has one thread, which is faster without waking it.
+        self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
+        # The first place is that of worlds which wait for nothing.
+        launched = (Phase(), *items) if isinstance(next(iter(items), None), Repeat) else items
+        self.begin = entry(launched, 0, lambda _: OVER, 0)
+        planner = Planner(self)
+        self.plan: Plan = planner.step(launched)
+        self.loops = tuple(planner.loops)
+        self.allow, self.look = Launcher(self._allow), Launcher(self._look)
+        count = launch_count(launched)
+        must(count <= PLACES, "launches of a step", f"at most {PLACES}", count)
+
+    @in_taichi_thread
+    def advance(self, steps: int) -> None:
+        self.s.check()
+        found, looks = self.allow(steps), 0
+        while found:
+            if self.asks:
+                found = self._launch_asking(self.plan, found)
+                continue
+            if self.maps_pages and looks % LOOKS_PER_QUESTION == 0:
+                require_mappings()
+            looks += 1
+            for _ in range(min(self.patience, steps)):
+                self._launch(self.plan)
+            found = self.look()
+            self._learn(found)
+
+    def _launch(self, plan: Plan) -> None:
+        """Make the launches, unasked."""
+        for item in plan:
+            if isinstance(item, Visit):
+                item.launch.run(item.place)
+            else:
+                for _ in range(item.turns()):
+                    self._launch(item.plan)
+
+    def _launch_asking(self, plan: Plan, found: int) -> int:
+        """Make the launches, each repeat while there are worlds in it, and return where worlds are, as
+        ``_look`` does; ``found`` says where they were."""
+        for item in plan:
+            if isinstance(item, Visit):
+                found = item.launch.run_and_look(item.place)
+            else:
+                while found & item.bits:
+                    found = self._launch_asking(item.plan, found)
+        return found
+
+    def _learn(self, found: int) -> None:
+        """Learn from where worlds are after some steps, as ``_look`` tells it, how many steps and turns to
+        launch unasked."""
+        for loop in self.loops:
+            loop.learn(found)
+        few = (found >> PLACES) * self.patience <= LOOK_COST * SHARES
+        self.patience = min(self.patience + 1, PATIENCE) if few else self.patience // 2
+
+    @in_taichi_thread
+    def compile(self) -> None:
+        self.allow(0)
+        if not self.asks:
+            self.look()
+        self._compile(self.plan)
+
+    def _compile(self, plan: Plan) -> None:
+        for item in plan:
+            if isinstance(item, Visit):
+                launch = item.launch.run_and_look if self.asks else item.launch.run
+                launch(item.place)
+            else:
+                self._compile(item.plan)
+
+    @ti.kernel
+    def _allow(self, steps: ti.i32) -> ti.i64:
+        """Let worlds take steps, and return the places of those that do, a bit for each."""
+        places = ti.cast(0, ti.i64)
+        if ti.static(self.serial):
+            ti.loop_config(serialize=True)
+        for w in range(self.s.worlds):
+            self._allow_world(w, steps)
+            self.s.place[w] = ti.select(steps > 0, self._next_step(w), NOWHERE)
+            places |= self._bit(w)
+        return places
+
+    @ti.func
+    def _follow(self, route: ti.template(), w, place):  # type: ignore[valid-type]
+        """Return where a world goes on, from this place."""
+        there = NOWHERE
+        if ti.static(isinstance(route, Fork)):
+            ways = ti.static(route.ways)
+            if route.repeat.pending(w) > 0:
+                there = self._follow(ways[0], w, place)
+            else:
+                there = self._follow(ways[1], w, place)
+        elif ti.static(route != OVER):
+            there = place + route
+        elif ti.static(not self.once):
+            there = self._next_step(w)
+        return there
+
+    @ti.func
+    def _next_step(self, w):
+        """Return where a world begins its next step; nowhere, where it waits."""
+        return ti.select(self._waits(w), NOWHERE, self._follow(self.begin, w, 0))
+
+    @ti.func
+    def _goes_on(self, w):
+        return self.s.place[w] != NOWHERE and self.s.status[w] == WorldStatus.RUNNING
+
+    @ti.func
+    def _bit(self, w):
+        """Return the bit of where a world is; 0 for one that does not go on."""
+        bit = ti.cast(1, ti.i64) << ti.max(self.s.place[w], 0)
+        return ti.select(self._goes_on(w), bit, ti.cast(0, ti.i64))
+
+    @ti.kernel
+    def _look(self) -> ti.i64:
+        """Return the places at which there are worlds that go on, a bit for each, and which part of them is
+        not between two steps, in the bits above."""
+        places, going, waiting = ti.cast(0, ti.i64), 0, 0
+        if ti.static(self.serial):
+            ti.loop_config(serialize=True)
+        for w in range(self.s.worlds):
+            places |= self._bit(w)
+            going += ti.cast(self._goes_on(w), ti.i32)
+            waiting += ti.cast(self._goes_on(w) and self.s.place[w] > 0, ti.i32)
+        share = SHARES * ti.cast(waiting, ti.i64) // ti.max(going, 1)
+        return places | share << PLACES

@@ -1,0 +1,112 @@
+"""Sums over all items before each: by blocks, then over the blocks, so that no loop is as long as a world."""
+
+from math import isqrt
+from typing import Any
+
+from tisim.backend import runtime
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.program.phases import Phase
+from tisim.state.state import State
+
+LEAST_BLOCK = {"cpu": 4096}
+"""A block has at least so many items, on other devices 64; and as many as there are blocks."""
+
+
+@ti.data_oriented
+class PrefixSum:
+    """A prefix sum sets ``target[w, k]`` to ``source[w, 0] + ... + source[w, k]``, integers, for each item k.
+
+    items : a phase of the same extent and size. The two columns may be one. ``total[w]`` is the sum of all.
+    """
+
+    def __init__(self, s: State, items: Phase, source: Any, target: Any) -> None:
+        self.s, self.items, self.source, self.target = s, items, source, target
+        least = LEAST_BLOCK.get(runtime.current().device, 64)
+        self.block = max(least, isqrt(items.extent - 1) + 1)
+        self.blocks = -(-items.extent // self.block)
+        self.before, self.total = ti.field(ti.i32), ti.field(ti.i32)
+        builder = Builder()
+        builder.dense(ti.i, s.worlds).dense(ti.j, self.blocks).place(self.before)
+        builder.dense(ti.i, s.worlds).place(self.total)
+        self.tree = Tree(builder)
+
+    def bytes(self) -> int:
+        """Return the device memory that the sums of the blocks take, in bytes."""
+        return self.tree.bytes
+
+    def phases(self) -> tuple[Phase, ...]:
+        """Return the phases that make the sums; a single block takes one to compile and run."""
+        if self.blocks == 1:
+            return (SumAll(self),)
+        return SumBlocks(self), SumOverBlocks(self), AddToBlocks(self)
+
+    @ti.func
+    def number(self, w):
+        """Return the number of blocks in use."""
+        return (self.items.size(w) + self.block - 1) // self.block
+
+
+class SumAll(Phase):
+    """This phase makes the sums where all items are one block."""
+
+    def __init__(self, sums: PrefixSum) -> None:
+        self.sums = sums
+
+    @ti.func
+    def run(self, w, _k):
+        p, total = self.sums, 0
+        for k in range(p.items.size(w)):
+            total += p.source[w, k]
+            p.target[w, k] = total
+        p.total[w] = total
+
+
+class SumBlocks(Phase):
+    """This phase makes the sums within each block."""
+
+    light = False
+
+    def __init__(self, sums: PrefixSum) -> None:
+        self.sums, self.extent = sums, sums.blocks
+
+    @ti.func
+    def size(self, w):
+        return self.sums.number(w)
+
+    @ti.func
+    def run(self, w, b):
+        p, total = self.sums, 0
+        for k in range(b * p.block, ti.min((b + 1) * p.block, p.items.size(w))):
+            total += p.source[w, k]
+            p.target[w, k] = total
+        p.before[w, b] = total
+
+
+class SumOverBlocks(Phase):
+    """This phase finds the sum of all blocks before each."""
+
+    def __init__(self, sums: PrefixSum) -> None:
+        self.sums = sums
+
+    @ti.func
+    def run(self, w, _k):
+        p, total = self.sums, 0
+        for b in range(p.number(w)):
+            own = p.before[w, b]
+            p.before[w, b] = total
+            total += own
+        p.total[w] = total
+
+
+class AddToBlocks(SumBlocks):
+    """This phase adds to each block the sum of those before it."""
+
+    @ti.func
+    def run(self, w, b):
+        p = self.sums
+        before = p.before[w, b]
+        if before > 0:
+            for k in range(b * p.block, ti.min((b + 1) * p.block, p.items.size(w))):
+                p.target[w, k] = p.target[w, k] + before

@@ -1,0 +1,159 @@
+"""Sorting by whole numbers, in parallel: one digit after the other, from the lowest, each time stably."""
+
+from tisim.backend import runtime
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.program.phases import Item, Phase, Repeat
+from tisim.program.prefix_sum import PrefixSum
+from tisim.state.state import State
+
+DIGIT_BITS = 8
+BASE = 1 << DIGIT_BITS
+SORT_BLOCK = {"cpu": 1024}
+"""One task counts and moves so many items, one after the other; on other devices 64."""
+
+
+@ti.data_oriented
+class RadixSort:
+    """A radix sort orders items of each world by keys: ``order[w, k]`` is the item in place k.
+
+    Keys are set with ``set_key``; items of equal keys stay in the order of their numbers. The order depends
+    on the keys alone.
+
+    items : a phase of the same extent and size. bits : those that keys have, from the lowest on.
+    """
+
+    def __init__(self, s: State, items: Phase, bits: int) -> None:
+        self.s, self.items, self.capacity = s, items, items.extent
+        # An even number of passes ends where the first one began.
+        self.passes = 2 * -(-bits // (2 * DIGIT_BITS))
+        self.block = SORT_BLOCK.get(runtime.current().device, 64)
+        self.blocks = -(-items.extent // self.block)
+        self.key, self.order = ti.field(ti.i64), ti.field(ti.i32)
+        self.start, self.done = ti.field(ti.i32), ti.field(ti.i32)
+        builder = Builder()
+        # Two halves, between which items go to and fro.
+        for column in (self.key, self.order):
+            builder.dense(ti.i, s.worlds).dense(ti.j, 2 * self.capacity).place(column)
+        builder.dense(ti.i, s.worlds).dense(ti.j, BASE * self.blocks + 1).place(self.start)
+        builder.dense(ti.i, s.worlds).place(self.done)
+        self.tree = Tree(builder)
+        self.starts = PrefixSum(s, OfDigits(self), self.start, self.start)
+
+    def bytes(self) -> int:
+        """Return the device memory, in bytes."""
+        return self.tree.bytes + self.starts.bytes()
+
+    def phases(self) -> tuple[Item, ...]:
+        """Return the items that sort the worlds for which ``begin`` has been called."""
+        return (SortByDigits(self),)
+
+    @ti.func
+    def begin(self, w):
+        """Ask that a world be sorted, in the phase before keys are set."""
+        self.done[w] = 0
+
+    @ti.func
+    def set_key(self, w, k, key):
+        """Set the key of item k, at least 0; i64."""
+        self.key[w, k], self.order[w, k] = key, k
+
+    @ti.func
+    def digit(self, w, at):
+        """Return the digit of this pass of what is at a place of either half."""
+        return ti.cast(self.key[w, at] >> (DIGIT_BITS * self.done[w]) & (BASE - 1), ti.i32)
+
+    @ti.func
+    def half(self, w):
+        """Return where the half begins in which items are before this pass."""
+        return self.done[w] % 2 * self.capacity
+
+    @ti.func
+    def number(self, w):
+        """Return the number of blocks in use."""
+        return (self.items.size(w) + self.block - 1) // self.block
+
+
+class SortByDigits(Repeat):
+    """This item takes one digit after the other."""
+
+    def __init__(self, sort: RadixSort) -> None:
+        super().__init__((CountDigits(sort), *sort.starts.phases(), MoveByDigit(sort), EndPass(sort)))
+        self.sort, self.usual = sort, sort.passes
+
+    @ti.func
+    def pending(self, w):
+        return self.sort.passes - self.sort.done[w]
+
+
+class OfDigits(Phase):
+    """This phase works on each digit of each block, and what follows the last."""
+
+    def __init__(self, sort: RadixSort) -> None:
+        self.sort, self.extent = sort, BASE * sort.blocks + 1
+
+    @ti.func
+    def size(self, w):
+        return BASE * self.sort.number(w) + 1
+
+
+class OfDigitBlocks(Phase):
+    """This phase works on each block of items."""
+
+    light = False
+
+    def __init__(self, sort: RadixSort) -> None:
+        self.sort, self.extent = sort, sort.blocks
+
+    @ti.func
+    def size(self, w):
+        return self.sort.number(w)
+
+    @ti.func
+    def end(self, w, b):
+        """Return the item after the last of a block."""
+        return ti.min((b + 1) * self.sort.block, self.sort.items.size(w))
+
+
+class CountDigits(OfDigitBlocks):
+    """This phase counts how often each digit stands in a block."""
+
+    @ti.func
+    def run(self, w, b):
+        a, number = self.sort, self.sort.number(w)
+        if b == 0:
+            a.start[w, 0] = 0
+        # One on, so that the sums up to each are where its items begin.
+        for digit in range(BASE):
+            a.start[w, digit * number + b + 1] = 0
+        for k in range(b * a.block, self.end(w, b)):
+            at = a.digit(w, a.half(w) + k) * number + b + 1
+            a.start[w, at] = a.start[w, at] + 1
+
+
+class MoveByDigit(OfDigitBlocks):
+    """This phase moves the items of a block to where their digit belongs, in the order in which they are."""
+
+    @ti.func
+    def run(self, w, b):
+        a, number = self.sort, self.sort.number(w)
+        source = a.half(w)
+        target = a.capacity - source
+        for k in range(b * a.block, self.end(w, b)):
+            at = a.digit(w, source + k) * number + b
+            place = a.start[w, at]
+            a.start[w, at] = place + 1
+            a.key[w, target + place] = a.key[w, source + k]
+            a.order[w, target + place] = a.order[w, source + k]
+
+
+class EndPass(Phase):
+    """After this phase it is the turn of the next digit."""
+
+    def __init__(self, sort: RadixSort) -> None:
+        self.sort = sort
+
+    @ti.func
+    def run(self, w, _k):
+        self.sort.done[w] = self.sort.done[w] + 1

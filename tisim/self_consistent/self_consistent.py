@@ -1,0 +1,258 @@
+"""Sweeps that solve for a quantity which particles give each other, such as induced dipoles
+(``SelfConsistentQuantity``)."""
+
+from typing import Any
+
+import numpy as np
+
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.domains.domain import Domain
+from tisim.effects.base import DerivedQuantity, LongRange, SelfConsistentQuantity
+from tisim.effects.base.derived_quantity import SWEEPS
+from tisim.forces.derived import DerivedSolver
+from tisim.numerics.ieee import finite
+from tisim.numerics.vectors import piece
+from tisim.pairs.listed_laws import ListedLaws
+from tisim.pairs.listed_pairs import ExportedTerms, sum_phases
+from tisim.pairs.pair_chunks import PairChunks
+from tisim.pairs.pair_sum import PairSum
+from tisim.program.block_sum import BlockSums
+from tisim.program.occasion import OnOccasion
+from tisim.program.phases import Item, PerParticle, Phase, Repeat
+from tisim.self_consistent.sweep_mixing import MIXING_TERMS, ChooseMixing, CompareSweeps
+from tisim.state.bound import Bound
+from tisim.state.state import State
+from tisim.state.status import WorldStatus
+
+ROUNDING_UNITS = 4.0
+"""Changes of so many units in the last place count as none: sweeps in f32 may go on with them for ever."""
+
+
+class SelfConsistentSolver(DerivedSolver):
+    """A self-consistent solver finds a quantity that particles give each other: the values of the next sweep,
+    and whether there is one.
+
+    changes : the largest of a particle in this sweep, the last, and the one before. once : whether a step
+    makes one sweep while that suffices. mixed : whether sweeps are mixed with the last (sweep_mixing.py).
+    """
+
+    def __init__(
+        self,
+        s: State,
+        effect: Bound[Any],
+        domain: Bound[Domain],
+        pairs: PairChunks | None,
+    ) -> None:
+        super().__init__(s, effect)
+        self.domain, self.pairs = domain, pairs
+        listed = pairs is not None and effect.data.short_ranged
+        self.exported = ExportedTerms(pairs, self.components) if pairs and listed else None
+        self.once, self.most = effect.data.sweeps == 0, effect.data.sweeps or SWEEPS
+        self.mixed = effect.data.acceleration == "anderson"
+        self.next, *memory = (self.column() for _ in range(3 if self.mixed else 1))
+        self.pending, self.sweeps, self.unconverged = (ti.field(ti.i32) for _ in range(3))
+        self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
+        builder = Builder()
+        for column in (self.next, *memory):
+            builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
+        if self.mixed:
+            self.last, self.residual = memory
+            self.theta, self.unsolvable = ti.field(ti.f64), ti.field(ti.i32)
+            builder.dense(ti.i, s.worlds).place(self.theta)
+            builder.dense(ti.i, s.worlds).place(self.unsolvable)
+            self.sums = BlockSums(s, MIXING_TERMS)
+        for column in (self.pending, self.sweeps, self.unconverged, self.largest, *self.changes):
+            builder.dense(ti.i, s.worlds).place(column)
+        self.tree = Tree(builder)
+
+    def column(self) -> Any:
+        """Return a field of values of the quantity."""
+        return ti.Vector.field(3, self.s.real) if self.components == 3 else ti.field(self.s.real)
+
+    def phases(self, trial: bool = False) -> tuple[Item, ...]:
+        return BeginSweeps(self), SweepUntilConverged(self, trial)
+
+    def bytes(self) -> int:
+        """Return the device memory, in bytes."""
+        parts = (self.exported, self.sums if self.mixed else None)
+        return self.tree.bytes + sum(part.bytes() for part in parts if part)
+
+
+class BeginSweeps(OnOccasion, PerParticle):
+    """This phase asks for a sweep, from the last values, or from nothing where they have been lost."""
+
+    def __init__(self, solver: SelfConsistentSolver) -> None:
+        super().__init__(solver.s)
+        self.solver = solver
+
+    @ti.func
+    def run(self, w, i):
+        a = self.solver
+        if i == 0:
+            a.pending[w], a.sweeps[w], a.unconverged[w] = 1, 0, 0
+            a.largest[w] = 0.0
+            for change in ti.static(a.changes):
+                change[w] = 0.0
+        if not finite(a.size(a.value[w, i])):
+            a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
+
+
+class SweepUntilConverged(Repeat):
+    """This item repeats sweeps of a world until it has converged."""
+
+    def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
+        far = solver.effect.sum.phases() if isinstance(solver.effect.data, LongRange) else ()
+        sweep = (*far, *sum_phases(JacobiSweep(solver, trial), solver.exported))
+        mixing = (CompareSweeps(solver), ChooseMixing(solver)) if solver.mixed else ()
+        super().__init__((*sweep, *mixing, ReplaceValues(solver, trial), CheckConvergence(solver)))
+        self.solver, self.usual = solver, 1 if solver.once else 2
+
+    @ti.func
+    def pending(self, w):
+        return self.solver.pending[w]
+
+
+class JacobiSweep(PairSum):
+    """This sweep sets next_i = (1 - a) value_i + a response(sum_j influence(value_j))."""
+
+    def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
+        super().__init__(solver.s, solver.domain, (solver.effect,), solver.pairs)
+        self.solver, self.effect, self.trial = solver, solver.effect, trial
+        self.components = solver.components
+
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        return ListedLaws(laws, 2 * self.components, remember=False)
+
+    @ti.func
+    def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
+        return self.solver.packed(effect.influence(self.s, w, i, j, separation, distance, t))
+
+    @ti.func
+    def write_sum(self, w, i, total):
+        self.solver.next[w, i] = self.solver.unpacked(total)
+
+    @ti.func
+    def read_sum(self, w, i):
+        return self.solver.packed(self.solver.next[w, i])
+
+    @ti.func
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        here = self.term(self.effect, w, i, j, separation, distance, t)
+        there = self.term(self.effect, w, j, i, -separation, distance, t)
+        values = ti.Vector.zero(self.s.real, laws.values)
+        for k in ti.static(range(self.components)):
+            values[k], values[self.components + k] = here[k], there[k]
+        return values
+
+    @ti.func
+    def pair_contributions(self, values):
+        return piece(values, 0, self.components), piece(values, self.components, self.components)
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        a, part = self.solver, self.effect.relaxation(w)
+        new = self.effect.response(self.s, w, i, a.unpacked(total), t)
+        a.next[w, i] = (1.0 - part) * a.value[w, i] + part * new
+        size = a.size(new)
+        largest = size
+        if ti.static(a.once):
+            # Where a field has been switched off, what was is the measure of what is left.
+            largest = ti.max(size, a.size(a.value[w, i]))
+        if largest > a.largest[w]:
+            ti.atomic_max(a.largest[w], largest)
+        if ti.static(not self.trial):
+            self.check(w, i, size)
+
+    @ti.func
+    def check(self, w, i, size):
+        """Fail a world by what is not finite: in the first sweep it never was finite; what becomes so later
+        has not converged."""
+        if not finite(size):
+            if self.solver.sweeps[w] == 0:
+                self.s.fail_by_effect(w, i, self.effect.index)
+            else:
+                fail_to_converge(self.s, w, i, self.effect)
+
+
+class ReplaceValues(PerParticle):
+    """This phase puts the new values in the place of the old, and compares the two."""
+
+    def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
+        super().__init__(solver.s)
+        self.solver, self.effect, self.trial = solver, solver.effect, trial
+        real = np.float64 if solver.s.real == ti.f64 else np.float32
+        self.least = ROUNDING_UNITS * float(np.finfo(real).eps)
+
+    @ti.func
+    def run(self, w, i):
+        a = self.solver
+        new, residual = a.next[w, i], a.next[w, i] - a.value[w, i]
+        change, unsolvable = a.size(residual), False
+        a.value[w, i] = new
+        if ti.static(a.mixed):
+            if a.theta[w] != 0.0:
+                a.value[w, i] = new - ti.cast(a.theta[w], self.s.real) * (new - a.last[w, i])
+            a.last[w, i], a.residual[w, i] = new, residual
+            unsolvable = a.unsolvable[w] > 0
+        if change > a.changes[0][w]:
+            ti.atomic_max(a.changes[0][w], change)
+        on = change > ti.max(self.effect.relaxation(w) * self.tolerance(w), self.least) * a.largest[w]
+        if on and not unsolvable and a.sweeps[w] + 1 < a.most:
+            ti.atomic_max(a.unconverged[w], 1)
+        elif on or unsolvable:
+            if ti.static(self.trial):
+                # Forces that are not finite: the step is given up.
+                a.value[w, i] *= ti.math.nan
+            else:
+                fail_to_converge(self.s, w, i, self.effect)
+
+    @ti.func
+    def tolerance(self, w):
+        """Return the change, over the largest value, up to which there is no other sweep."""
+        tolerance = self.effect.tolerance(w)
+        if ti.static(self.solver.once):
+            first = self.solver.sweeps[w] == 0
+            tolerance = ti.select(first, self.effect.largest_change(w), tolerance)
+        return tolerance
+
+
+@ti.func
+def fail_to_converge(s, w, i, effect: ti.template()):  # type: ignore[valid-type]
+    s.fail(w, WorldStatus.NOT_CONVERGED, i)
+    ti.atomic_min(s.failing_effect[w], effect.index)
+
+
+class CheckConvergence(Phase):
+    """This phase decides by the changes of a sweep whether there is another."""
+
+    def __init__(self, solver: SelfConsistentSolver) -> None:
+        self.solver = solver
+
+    @ti.func
+    def run(self, w, _k):
+        a, s = self.solver, self.solver.s
+        s.mutual_sweeps[w] += 1
+        now, last, before = ti.static(a.changes)
+        if before[w] > 0.0 and finite(now[w]):
+            # Of two sweeps: where others act as much along as against, changes grow by turns.
+            s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
+        s.sweep_change[w] = now[w] / ti.select(a.largest[w] > 0.0, a.largest[w], 1.0)
+        before[w], last[w], now[w] = last[w], now[w], 0.0
+        a.sweeps[w] += 1
+        a.pending[w] = a.unconverged[w]
+        a.unconverged[w] = 0
+        if ti.static(not a.once):
+            a.largest[w] = 0.0
+
+
+def solver(
+    s: State, effect: Bound[DerivedQuantity], domain: Bound[Domain], pairs: PairChunks | None
+) -> DerivedSolver:
+    """Return what solves for the quantity of an effect."""
+    return (
+        SelfConsistentSolver(s, effect, domain, pairs)
+        if isinstance(effect.data, SelfConsistentQuantity)
+        else DerivedSolver(s, effect)
+    )

@@ -1,0 +1,163 @@
+"""From plain data to what kernels see: one parameter table for all worlds.
+
+A bound part (see bound.py) has, in place of each parameter, a function of the world that reads the table. So
+a kernel written ``self.hardness(w)`` sees the value of world w, and loading other designs changes numbers in
+a table, not code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.components.component import Component
+from tisim.errors import must
+from tisim.state.bound import Bound, Kind
+
+
+def _reader(table: Any, slot: int, size: int) -> Any:
+    if size == 1:
+
+        @ti.func
+        def read(w):
+            return table[w, slot]
+
+    else:
+
+        @ti.func
+        def read(w):
+            return ti.Vector([table[w, slot], table[w, slot + 1], table[w, slot + 2]])
+
+    return read
+
+
+def _row_reader(table: Any, slot: int, size: int, stride: int) -> Any:
+    if size == 1:
+
+        @ti.func
+        def read(w, k):
+            return table[w, slot + k * stride]
+
+    else:
+
+        @ti.func
+        def read(w, k):
+            at = slot + k * stride
+            return ti.Vector([table[w, at], table[w, at + 1], table[w, at + 2]])
+
+    return read
+
+
+def _length_reader(table: Any, slot: int) -> Any:
+    @ti.func
+    def read(w):
+        return ti.cast(table[w, slot], ti.i32)
+
+    return read
+
+
+def _width(kind: type[Component]) -> int:
+    return sum(size for _, size in kind.columns())
+
+
+def _slots(part: Component) -> int:
+    """Return the number of slots of a part in the table of a world: its own, for each list its length and
+    room for its rows, what is derived for each row, and those of its members."""
+    lists = sum(1 + _width(kind) * kind.room(len(getattr(part, n))) for n, kind in part.lists())
+    derived = sum(len(values) for values in part.derived_rows().values())
+    return _width(type(part)) + lists + derived + sum(_slots(one) for one in part.members().values())
+
+
+def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
+    """Yield what stands in the slots of a part, in order, each with its dotted name."""
+    names = [f"{where}.{name}" for name, size in part.columns() for _ in range(size)]
+    yield from zip(names, part.values(), strict=True)
+    for name, kind in part.lists():
+        rows = getattr(part, name)
+        yield f"{where}.{name}", float(len(rows))
+        for k, row in enumerate(rows):
+            yield from _entries(row, f"{where}.{name}.{k}")
+        spare = _width(kind) * (kind.room(len(rows)) - len(rows))
+        yield from [(f"{where}.{name}", 0.0)] * spare
+    for name, values in part.derived_rows().items():
+        yield from ((f"{where}.{name}", value) for value in values)
+    for name, member in part.members().items():
+        yield from _entries(member, f"{where}.{name}")
+
+
+class ParameterTable:
+    """The table has the parameters of every part of a scene, for every world: ``table[world, slot]``."""
+
+    def __init__(self, parts: Sequence[Component], worlds: int, real: Any) -> None:
+        self.slots = sum(_slots(part) for part in parts)
+        self.field = ti.field(real)
+        builder = Builder()
+        builder.dense(ti.i, worlds).dense(ti.j, max(1, self.slots)).place(self.field)
+        self.trees = [Tree(builder)]
+        self._next, self.array_bytes = 0, 0
+
+    def bind(self, part: Kind) -> Bound[Kind]:
+        """Return what kernels see of a part, the next one in the order of the table."""
+        bound, slot = Bound(part), self._next
+        for name, size in part.columns():
+            setattr(bound, name, _reader(self.field, slot, size))
+            slot += size
+        for name, kind in part.lists():
+            setattr(bound, name, self._bind_rows(kind, slot))
+            slot += 1 + _width(kind) * kind.room(len(getattr(part, name)))
+        for name, derived in part.derived_rows().items():
+            setattr(bound, name, _row_reader(self.field, slot, 1, 1))
+            slot += len(derived)
+        self._next = slot
+        for name, member in part.members().items():
+            setattr(bound, name, self.bind(member))
+        for name, values in part.lookups().items():
+            setattr(bound, name, self._place(values))
+        return bound
+
+    @in_taichi_thread
+    def _place(self, values: np.ndarray) -> Any:
+        """Return an array in device memory that holds these values."""
+        column, builder = ti.field(self.field.dtype), Builder()
+        builder.dense(ti.i, values.shape[0]).dense(ti.j, values.shape[1]).place(column)
+        self.trees.append(Tree(builder))
+        rounded = values.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
+        column.from_numpy(rounded)
+        self.array_bytes += rounded.nbytes
+        return column
+
+    def _bind_rows(self, kind: type[Component], slot: int) -> Bound[Any]:
+        """Return the one object that stands for all rows of a list."""
+        rows, first = Bound(kind.model_construct()), slot + 1
+        rows.size = _length_reader(self.field, slot)
+        for name, size in kind.columns():
+            setattr(rows, name, _row_reader(self.field, first, size, _width(kind)))
+            first += size
+        return rows
+
+    def write(self, rows: Sequence[Sequence[Component]]) -> None:
+        """Set the parameters of each world from its parts, in the order they were bound.
+
+        InputError is raised for one that the precision cannot hold, or that kernels would flush to zero.
+        """
+        table = np.ones((self.field.shape[0], max(1, self.slots)))
+        for world, parts in enumerate(rows):
+            table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.label)]
+        real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
+        with np.errstate(over="ignore", under="ignore"):
+            rounded = table.astype(real)
+        flushed = (table != 0) & (np.abs(rounded) < np.finfo(real).tiny)
+        for world, slot in np.argwhere(~np.isfinite(rounded) | flushed):
+            names = [name for part in rows[world] for name, _ in _entries(part, part.label)]
+            must(False, names[slot], f"within the range of {precision}", float(table[world, slot]))
+        self._put(rounded)
+
+    @in_taichi_thread
+    def _put(self, values: np.ndarray) -> None:
+        self.field.from_numpy(values)
