@@ -29,11 +29,11 @@ from . import (
     steppers as steppers,
 )
 from .backend.runtime import init as init
-from .engine.measure_series import MeasureSeries as MeasureSeries
+from .engine.batches import run as run
+from .engine.observer import MeasureSeries as MeasureSeries
 from .engine.observer import Observer as Observer
 from .engine.result import Result as Result
 from .engine.result import Status as Status
-from .engine.run import run as run
 from .engine.simulation import Simulation as Simulation
 from .errors import InputError as InputError
 from .errors import MeshWarning as MeshWarning

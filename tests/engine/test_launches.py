@@ -14,8 +14,7 @@ from tisim.program import team
 from tisim.program.launched_program import LaunchedProgram
 from tisim.program.launches import tasks_of
 from tisim.program.phases import Phase, Repeat
-from tisim.program.team import Teams
-from tisim.program.team_trials import FIRST_ALONE, TRIAL_COST, TeamTrials
+from tisim.program.team import FIRST_ALONE, TRIAL_COST, Teams, TeamTrials
 from tisim.program.world_program import in_pieces, in_shares, world_programs
 from tisim.state.fields import CORE
 from tisim.state.state import State

@@ -12,7 +12,7 @@ from tisim.backend import memory
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import DipoleDipole, NearField
 from tisim.engine.allocation import Allocation
-from tisim.engine.schedule_choice import choose, members
+from tisim.engine.compiled_worlds import choose, members
 from tisim.program.phases import Phase
 from tisim.program.team import MOST_LOOKS, Teams
 

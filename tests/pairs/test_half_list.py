@@ -14,7 +14,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.effects import PairForce, parameter
 from tisim.engine import monitor, replay
 from tisim.pairs import half_list, pair_chunks, rebuild_half_list
-from tisim.program import prefix_sum
+from tisim.program import scans as prefix_sum
 from tisim.steppers import Boris, FixedStep
 
 WORLDS, CAPACITY, STEPS, DT, GAP, SLOTS = 18, 300, 4, 1.0, 0.02, 32

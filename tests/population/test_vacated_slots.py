@@ -7,7 +7,7 @@ from tests.scenes import scene, usual
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.operators import Operator
-from tisim.program import prefix_sum
+from tisim.program import scans as prefix_sum
 from tisim.state.fields import Field
 
 N, STEPS = 300, 6

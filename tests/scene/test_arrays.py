@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tisim import InputError, Particles, Scene
-from tisim.components.json_text import ROWS_PER_PIECE, json_pieces
+from tisim.components.serialization import ROWS_PER_PIECE, json_pieces
 
 
 def text(value):

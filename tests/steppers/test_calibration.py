@@ -18,7 +18,7 @@ from tests.steppers.charged import order
 from tisim import Box, Scene
 from tisim.io.checkpoint import restore, save
 from tisim.steppers import ErrorControl, StageControl, Trapezoid
-from tisim.steppers.implicit.lobatto import leading
+from tisim.steppers.implicit.stages import leading
 
 ASKED = 10.0 ** -np.arange(2, 6)
 FORGETS = "drag in a flow"

@@ -25,9 +25,8 @@ from tisim.forces.loads import FORCE, TORQUE
 from tisim.operators.base import Operator
 from tisim.pairs.contact_memory import ContactMemory, memory_fields
 from tisim.pairs.half_list import HalfList, ListSizes
-from tisim.pairs.listed_pairs import ExportedTerms, fuse, sum_phases
+from tisim.pairs.listed_pairs import AdvanceParticles, ExportedTerms, advance_phases, fuse, sum_phases
 from tisim.pairs.lists import NeighbourLists
-from tisim.pairs.memory_advance import AdvanceParticles, advance_phases
 from tisim.pairs.near_list import NearList, update_near_list
 from tisim.pairs.pair_chunks import PairChunks
 from tisim.pairs.rebuild_pairs import update_pairs

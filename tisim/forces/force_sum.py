@@ -9,8 +9,7 @@ from tisim.forces.loads import Loads
 from tisim.numerics.ieee import finite
 from tisim.numerics.roots import estimates_roots
 from tisim.numerics.vectors import piece
-from tisim.pairs.listed_laws import ListedLaws
-from tisim.pairs.pair_sum import PairSum
+from tisim.pairs.pair_sum import ListedLaws, PairSum
 from tisim.program.occasion import Occasion
 from tisim.state.status import WorldStatus
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from tisim.engine.loading import check_field
 from tisim.errors import Words, must
-from tisim.state.columns import WORLD_COUNTERS
 from tisim.state.fields import Field
-from tisim.state.status import WorldStatus
+from tisim.state.status import WORLD_COUNTERS, WorldStatus
 
 ROUNDED_PART = 1e-9
 """What time has been rounded by is far below this part of it."""

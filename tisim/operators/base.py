@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
-from tisim.program.world_action import WorldAction
+from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound
 from tisim.state.state import State
 

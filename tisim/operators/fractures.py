@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.program.phases import Item, PerParticle, Phase, Repeat
-from tisim.program.prefix_sum import PrefixSum
-from tisim.program.world_action import WorldAction
+from tisim.program.phases import Item, PerParticle, Phase, Repeat, WorldAction
+from tisim.program.scans import PrefixSum
 from tisim.state.bound import Bound
 from tisim.state.state import State
 from tisim.state.status import WorldStatus

@@ -14,7 +14,7 @@ from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.operators.base import Operator, parameter
 from tisim.operators.fractures import Fractures
-from tisim.program.world_action import WorldAction
+from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound, Peers
 from tisim.state.fields import Field
 from tisim.state.state import State

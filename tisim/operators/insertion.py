@@ -20,7 +20,7 @@ from tisim.operators.filled_region import FilledRegion
 from tisim.operators.grain_shapes import GrainShapes
 from tisim.operators.tried_place import TriedPlace
 from tisim.packing.grains import check_quantities, class_materials, quantity
-from tisim.program.world_action import WorldAction
+from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound
 from tisim.state.state import State
 

@@ -8,8 +8,7 @@ from tisim.backend import runtime
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.program.phases import Item, Phase, Repeat
-from tisim.program.world_action import WorldAction
+from tisim.program.phases import Item, Phase, Repeat, WorldAction
 from tisim.state.bound import Bound
 from tisim.state.state import State
 

@@ -11,7 +11,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.domains.domain import Domain
 from tisim.program.phases import Phase
-from tisim.program.prefix_sum import PrefixSum
+from tisim.program.scans import PrefixSum
 from tisim.state.bound import Bound
 from tisim.state.state import State
 

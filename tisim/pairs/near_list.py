@@ -14,8 +14,7 @@ from tisim.domains.domain import Domain
 from tisim.numerics import elementary
 from tisim.pairs.cell_grid import OfGrid
 from tisim.pairs.cell_phases import cell_phases, measure_phases
-from tisim.pairs.neighbour_rows import NeighbourRows
-from tisim.pairs.search_rows import search_rows
+from tisim.pairs.neighbour_rows import NeighbourRows, search_rows
 from tisim.program.phases import Item, Phase, Repeat
 from tisim.state.bound import Bound
 from tisim.state.state import State

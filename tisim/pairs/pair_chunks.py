@@ -19,7 +19,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.pairs.half_list import HalfList
 from tisim.program.phases import PerParticle, Phase
-from tisim.program.prefix_sum import PrefixSum
+from tisim.program.scans import PrefixSum
 
 if TYPE_CHECKING:
     from tisim.pairs.contact_memory import ContactMemory

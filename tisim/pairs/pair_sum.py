@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.numerics.roots import inverse_root
-from tisim.pairs.listed_laws import ListedLaws
 from tisim.program.occasion import OnOccasion
 from tisim.program.phases import PerParticle
 
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from tisim.state.bound import Bound
     from tisim.state.state import State
 
+
 TILE = 32
 """A tile has this many particles. It measured best of 8 to 128 with AVX-512: the sums of more do not fit the
 registers, and loops over fewer are unrolled before they are vectorised. From 96 on some kernels are not
@@ -29,6 +29,25 @@ vectorised."""
 
 VECTOR_BYTES = 32
 """The widest vectors used (256 bits); the lanes of a tile that are computed are a whole number of them."""
+
+
+class ListedLaws:
+    """These laws of a sum are computed together for each listed pair within the reach of one of them.
+
+    placed : each law with where what it has a pair remember begins among the values of a pair. remembering :
+    those that have any. reaching : the laws that act beyond contact. values : how many numbers a pair comes
+    to.
+    """
+
+    def __init__(self, laws: tuple[Any, ...], begin: int, remember: bool) -> None:
+        placed, self.values = [], begin
+        for law in laws:
+            placed.append((law, self.values))
+            self.values += law.data.memory if remember else 0
+        self.placed = tuple(placed)
+        # Values have no room for memory where the sum may not advance it.
+        self.remembering = tuple(one for one in placed if remember and one[0].data.memory)
+        self.reaching = tuple(law for law in laws if law.data.reaches())
 
 
 class PairSum(OnOccasion, PerParticle):

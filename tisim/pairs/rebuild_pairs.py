@@ -2,8 +2,8 @@
 
 from tisim.backend.taichi import ti
 from tisim.pairs.cell_phases import sort_row
+from tisim.pairs.half_list import rebuild_half_list, watch_reach
 from tisim.pairs.pair_chunks import PairChunks, PerChunk, PerWorld
-from tisim.pairs.rebuild_half_list import rebuild_half_list, watch_reach
 from tisim.program.phases import Item, Phase, Repeat
 from tisim.state.status import WorldStatus
 

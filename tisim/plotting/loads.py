@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tisim.effects.walls.resultant import resultant_units
+from tisim.effects.walls.motion import resultant_units
 from tisim.io.reader import Frames
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity
 

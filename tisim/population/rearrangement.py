@@ -6,8 +6,8 @@ from tisim.backend.taichi import ti
 from tisim.pairs.pair_chunks import PairChunks
 from tisim.pairs.rebuild_pairs import StoreMemory
 from tisim.population.vacated_slots import FillSlots, VacatedSlots
-from tisim.program.block_sum import BlockSums, PerBlock
 from tisim.program.phases import Item, Phase
+from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.bound import Bound
 from tisim.state.state import State
 

@@ -6,7 +6,7 @@ from tisim.backend.taichi import ti
 from tisim.domains.domain import Domain
 from tisim.pairs.lists import NeighbourLists
 from tisim.program.phases import PerParticle, Phase, Repeat
-from tisim.program.prefix_sum import PrefixSum
+from tisim.program.scans import PrefixSum
 from tisim.state.bound import Bound
 from tisim.state.state import State
 

@@ -8,8 +8,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.errors import must
 from tisim.program.launches import TASK, Plan, Planner, Visit
 from tisim.program.phases import Item, Phase, Repeat
-from tisim.program.program import Program, StepRules
-from tisim.program.routes import NOWHERE, OVER, Fork, entry, launch_count
+from tisim.program.program import NOWHERE, OVER, Fork, Program, StepRules, entry, launch_count
 from tisim.state.state import State
 from tisim.state.status import NEVER, WorldStatus
 

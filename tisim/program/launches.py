@@ -15,7 +15,7 @@ from tisim.backend import runtime
 from tisim.backend.launcher import Launcher
 from tisim.backend.taichi import ti
 from tisim.program.phases import Phase, Repeat
-from tisim.program.routes import OVER, Items, Route, entry, first_group, launch_count
+from tisim.program.program import OVER, Items, Route, entry, first_group, launch_count
 from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:

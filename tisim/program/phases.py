@@ -1,5 +1,8 @@
 """What a step consists of: phases, each a loop over independent items, and repeats of them."""
 
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -70,7 +73,7 @@ class Repeat:
 
     usual: int = 1
 
-    def __init__(self, items: "tuple[Item, ...]") -> None:
+    def __init__(self, items: tuple[Item, ...]) -> None:
         self.items = items
 
     @ti.func
@@ -88,3 +91,22 @@ def nested(items: tuple[Item, ...], depth: int = 0) -> Iterator[tuple[Phase, int
             yield from nested(item.items, depth + 1)
         else:
             yield item, depth
+
+
+class WorldAction(ABC):
+    """A world action is what an operator does to a world in loops over its particles.
+
+    It is a ``ti.data_oriented`` object with device memory of its own.
+    """
+
+    @abstractmethod
+    def phases(self) -> tuple[Item, ...]:
+        """Return the items of the action, which are taken in every step: a repeat that is pending only where
+        there is something to do costs others next to nothing.
+
+        What they come to may not depend on the order of parallel work.
+        """
+
+    @abstractmethod
+    def bytes(self) -> int:
+        """Return the device memory, in bytes."""

@@ -5,7 +5,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.program.phases import Item, Phase, Repeat
-from tisim.program.prefix_sum import PrefixSum
+from tisim.program.scans import PrefixSum
 from tisim.state.state import State
 
 DIGIT_BITS = 8

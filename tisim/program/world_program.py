@@ -7,10 +7,8 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.program.launches import TASK
 from tisim.program.phases import Item, Phase, Repeat
-from tisim.program.program import Program, StepRules
-from tisim.program.routes import Items
-from tisim.program.team import Teams
-from tisim.program.team_trials import TeamTrials
+from tisim.program.program import Items, Program, StepRules
+from tisim.program.team import Teams, TeamTrials
 from tisim.state.state import State
 from tisim.state.status import NEVER, WorldStatus
 

@@ -12,7 +12,7 @@ from pydantic import field_validator, model_validator
 
 from tisim.components import serialization
 from tisim.components.component import Component, Text, option, parameter
-from tisim.components.json_text import json_pieces
+from tisim.components.serialization import json_pieces
 from tisim.domains.domain import Box, Domain, Open
 from tisim.domains.sheared_box import ShearedBox
 from tisim.effects.base import Effect

@@ -14,13 +14,12 @@ from tisim.effects.base.derived_quantity import SWEEPS
 from tisim.forces.derived import DerivedSolver
 from tisim.numerics.ieee import finite
 from tisim.numerics.vectors import piece
-from tisim.pairs.listed_laws import ListedLaws
 from tisim.pairs.listed_pairs import ExportedTerms, sum_phases
 from tisim.pairs.pair_chunks import PairChunks
-from tisim.pairs.pair_sum import PairSum
-from tisim.program.block_sum import BlockSums
+from tisim.pairs.pair_sum import ListedLaws, PairSum
 from tisim.program.occasion import OnOccasion
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
+from tisim.program.scans import BlockSums
 from tisim.self_consistent.sweep_mixing import MIXING_TERMS, ChooseMixing, CompareSweeps
 from tisim.state.bound import Bound
 from tisim.state.state import State

@@ -22,8 +22,8 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
-from tisim.program.block_sum import PerBlock
 from tisim.program.phases import Phase
+from tisim.program.scans import PerBlock
 
 if TYPE_CHECKING:
     from tisim.self_consistent.self_consistent import SelfConsistentSolver

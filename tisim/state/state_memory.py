@@ -18,7 +18,8 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
 from tisim.errors import RunError
-from tisim.state.columns import (
+from tisim.state.fields import Field
+from tisim.state.status import (
     WORLD_COUNTERS,
     WORLD_INTEGERS,
     WORLD_QUANTITIES,
@@ -26,7 +27,6 @@ from tisim.state.columns import (
     WORLD_VECTORS,
     check_names,
 )
-from tisim.state.fields import Field
 
 
 class StateMemory:

@@ -6,7 +6,7 @@ from .choice import StepperChoice as StepperChoice
 from .context import Step as Step
 from .context import StepContext as StepContext
 from .implicit.collocation import Collocation as Collocation
-from .implicit.stage_control import StageControl as StageControl
+from .implicit.collocation import StageControl as StageControl
 from .implicit.step_control import (
     ErrorControl as ErrorControl,
 )

@@ -28,8 +28,7 @@ from tisim.operators.base import Operator
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
 from tisim.steppers.boris import Boris
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.collocation import Collocation, StageControl
 from tisim.steppers.step_control import SHORTEST_STEP, ApproachTime, FixedStep
 from tisim.steppers.verlet import Verlet
 

@@ -8,7 +8,7 @@ from tests.scenes import DENSITY, GRAIN, RADIUS, SOFT, energy, hit, laws, moment
 from tisim import Simulation
 from tisim.effects import Impact
 from tisim.operators import Fragmentation
-from tisim.program import prefix_sum
+from tisim.program import scans as prefix_sum
 
 
 def run(scenes):

@@ -15,7 +15,7 @@ from tisim import Box
 from tisim.effects import NearField
 from tisim.io.checkpoint import restore, save
 from tisim.steppers import Collocation, StageControl
-from tisim.steppers.implicit.lobatto import highest, integrals, nodes
+from tisim.steppers.implicit.stages import highest, integrals, nodes
 
 DURATION = 4.0
 DRIVEN = {"stiffness": 8.0, "amplitude": 1.5, "omega": 2.0}

@@ -12,8 +12,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Component
 from tisim.domains.domain import Domain
 from tisim.effects.base import Constraint, Field, option
-from tisim.effects.walls.motion import Fixed, Motion, MotionState
-from tisim.effects.walls.resultant import resultant, resultant_units
+from tisim.effects.walls.motion import Fixed, Motion, MotionState, resultant, resultant_units
 from tisim.errors import must
 from tisim.state.state import HEAVY
 

@@ -11,9 +11,9 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
 from tisim.numerics import elementary
-from tisim.program.block_sum import BlockSums, PerBlock
 from tisim.program.occasion import OnOccasion
 from tisim.program.phases import MANY, Item, PerParticle, Phase
+from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.bound import Bound
 from tisim.state.state import State
 

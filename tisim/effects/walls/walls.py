@@ -13,8 +13,7 @@ from tisim.components.component import Component, Text
 from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, Field, Force, option
 from tisim.effects.contact.granular.contact import GranularContact
-from tisim.effects.walls.motion import Fixed, Motion, MotionState
-from tisim.effects.walls.resultant import resultant, resultant_units
+from tisim.effects.walls.motion import Fixed, Motion, MotionState, resultant, resultant_units
 from tisim.effects.walls.wall_contacts import WallContacts
 from tisim.effects.walls.wall_faces import check_faces
 from tisim.effects.walls.wall_ring import Bundling, Doubting

@@ -8,8 +8,8 @@ Forces enter the inner product as the displacement that they would cause. Torque
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
-from tisim.program.block_sum import BlockSums, PerBlock
 from tisim.program.phases import Item, PerParticle
+from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.fields import Field
 from tisim.steppers.context import StepContext
 
