@@ -9,9 +9,9 @@ import pytest
 from tisim import InputError
 from tisim.backend.taichi import ti
 from tisim.components import serialization
+from tisim.components.arrays import Numbers, Rows
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.invalid import text_of, unit_of
-from tisim.components.plain_numbers import Numbers, Rows
 from tisim.describe import docstrings, reference, template
 from tisim.describe.explain import known_effects
 from tisim.effects import Force

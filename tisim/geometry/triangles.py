@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
+from tisim.components.arrays import Rows, equal
 from tisim.components.component import parameter
-from tisim.components.plain_numbers import Rows, equal
 from tisim.errors import MeshWarning, Words, is_number, must, printable
 from tisim.files import regular_file
 from tisim.geometry.mesh_check import MeshCheck

@@ -12,8 +12,8 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation as Turn
 from scipy.special import logsumexp, softmax
 
+from tisim.components.arrays import Numbers, Rows, equal
 from tisim.components.component import Component, parameter
-from tisim.components.plain_numbers import Numbers, Rows, equal
 from tisim.components.ranges import LEAST, MOST
 from tisim.errors import Words, must
 from tisim.geometry.sphere_union import sphere_union

@@ -8,8 +8,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import ConfigDict, field_serializer, field_validator, model_validator
 
+from tisim.components.arrays import Numbers, RowsOrNone, equal, frozen
 from tisim.components.component import Component, Text, option, parameter
-from tisim.components.plain_numbers import DEEPEST, Numbers, RowsOrNone, broken_rule, equal, frozen, plain
+from tisim.components.plain_numbers import DEEPEST, broken_rule, plain
 from tisim.components.ranges import MOST, limits
 from tisim.domains.domain import Box, Domain, Open
 from tisim.errors import InputError, Words, abbreviated, must
