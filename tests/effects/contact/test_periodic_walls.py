@@ -127,7 +127,7 @@ def test_a_duct_of_pieces_is_taken_for_small_grains_too(radius):
 
 def test_a_run_looks():
     with pytest.raises(tisim.InputError, match="it is not felt through them"):
-        tisim.run(scene(**REFUSED["a post"]))
+        tisim.run(scene(**REFUSED["a plane across"]))
 
 
 @pytest.mark.parametrize("name", REFUSED)
