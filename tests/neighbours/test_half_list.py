@@ -136,6 +136,7 @@ def simulation_of_bursts():
     simulation.close()
 
 
+@pytest.mark.long
 def test_solid_particles_whose_list_overflows_on_the_way_go_on(simulation_of_bursts):
     """The step after is not taken for one in which they pass through each other."""
     (result,) = simulation_of_bursts.results()
@@ -236,6 +237,7 @@ def test_lists_do_not_grow_beyond_the_memory_of_the_machine(monkeypatch):
     simulation.close()
 
 
+@pytest.mark.long
 def test_the_first_list_of_a_run_knows_nothing_of_the_run_before(simulation_of_bursts):
     simulation, made = simulation_of_bursts, burst()
     skins = []
@@ -246,6 +248,7 @@ def test_the_first_list_of_a_run_knows_nothing_of_the_run_before(simulation_of_b
     assert skins[0] == skins[1] < chosen_skin(simulation)
 
 
+@pytest.mark.long
 def test_what_is_asked_for_at_each_load_is_made_once(simulation_of_bursts, monkeypatch):
     """Many particles are looked at on the device."""
     monkeypatch.setattr(monitor, "LARGE", 1)
