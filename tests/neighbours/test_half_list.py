@@ -146,6 +146,14 @@ def test_solid_particles_whose_list_overflows_on_the_way_go_on(simulation_of_bur
 
 
 @pytest.fixture
+def fresh():
+    """A simulation whose list has its first length."""
+    simulation = Simulation(burst())
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture
 def kept(monkeypatch):
     """Memory that is kept for later, 8 MB of it, until it is asked back."""
 
@@ -161,10 +169,10 @@ def kept(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(kept, monkeypatch):
+def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(fresh, kept, monkeypatch):
     """Beside a run whose list is long enough from the start, and others of skins that the scene says. There
     is room for it once what is kept for later has been given back."""
-    simulation, rows, ends = Simulation(burst()), [], []
+    simulation, rows, ends = fresh, [], []
     simulation.load(burst())
     present = memory.bytes_in_use()
     monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
@@ -180,7 +188,6 @@ def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(kept, monkeyp
         for name, values in ends[0].state.items():
             np.testing.assert_array_equal(values, end.state[name], err_msg=name)
         assert ends[0].work == end.work
-    simulation.close()
 
 
 @pytest.mark.slow
