@@ -15,7 +15,7 @@ from tests import scenes
 from tisim.backend import choice, memory, runtime
 from tisim.backend.taichi import BACKEND
 from tisim.errors import InputError
-from tisim.files import python_file
+from tisim.files import pictures, python_file
 
 ON_DEVICES = (
     *("numerics/test_elementary.py", "numerics/test_philox.py", "pairs/test_half_list.py"),
@@ -39,6 +39,14 @@ ON_DEVICES = (
 have been seen to, docs/devices.md says. Insertions and clumps, whose steps take longest to compile, are left
 out."""
 
+RENDERED = (
+    "optimize/report/",
+    "optimize/test_several.py",
+    "cli/test_optimize_command.py",
+    "cli/test_inspect_commands.py",
+)
+"""Of the command line and the search, these files look at pictures."""
+
 
 def pytest_collection_modifyitems(items):
     """Mark what is for devices too; TISIM_DEVICE names the one to run on."""
@@ -55,6 +63,9 @@ def pytest_configure(config):
     With Taichi, tests take two thirds of the time, nearly all of which is compiling, without the compiler's
     passes ahead of LLVM. No bit depends on these: the process of ``elsewhere`` has them. Quadrants 1.3.3 and
     1.4.0 compile as long without theirs, and wrongly: the oscillator of CONTRIBUTING.md does not move.
+
+    The processes of xdist, one on each core, inherit the environment of this one. NumPy's and SciPy's linear
+    algebra would have as many threads as cores in each of them, which wait for each other.
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -62,6 +73,7 @@ def pytest_configure(config):
         # A program that is begun has the default again; the tests themselves go on.
         signal.signal(signal.SIGHUP, lambda *_: None)
     os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -86,6 +98,19 @@ def room_for_the_next_module():
         scenes.close_compiled()
         memory.reclaim()
         memory.renew()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def unrendered(request):
+    """Commands and searches draw their pictures, but write a stand-in for the image: to render one takes a
+    quarter of a second, and a search has four. Where pictures are what is tested they are rendered."""
+    file = request.path.relative_to(Path(__file__).parent).as_posix()
+    if not file.startswith(("cli/", "optimize/")) or file.startswith(RENDERED):
+        yield
+        return
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pictures, "image", lambda figure, kind="png", dpi=0.0: f"a picture, {kind}".encode())
+        yield
 
 
 @pytest.fixture

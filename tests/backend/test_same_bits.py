@@ -18,7 +18,7 @@ pytestmark = pytest.mark.long
 
 FAMILIES = ("effects.granular", "stepper.collocation.0", "stepper.brownian.2")
 """Contacts with memory, an implicit stepper with forces between all, and noise with hydrodynamics. Impacts
-are compared where ``elsewhere`` is (tests/engine/test_schedules.py)."""
+and noise are compared where ``elsewhere`` is (tests/engine/test_schedules.py)."""
 
 
 def bits_of(backend, schedule, folder, names=()):
@@ -33,14 +33,15 @@ def bits_of(backend, schedule, folder, names=()):
 
 
 @pytest.mark.long
-def test_scenes_of_some_families(tmp_path):
+@pytest.mark.parametrize("names", [FAMILIES[:1], pytest.param(FAMILIES[1:], marks=pytest.mark.slow)])
+def test_scenes_of_some_families(tmp_path, names):
     if runtime.current().settings != runtime.Runtime(threads=1).settings:
         pytest.skip("bits are promised of one device, precision and arithmetic")
     other = next((name for name in choice.installed() if name != BACKEND), None)
     if other is None:
         pytest.skip("one backend is installed")
-    theirs = bits_of(other, "world", tmp_path, FAMILIES)
-    for name in FAMILIES:
+    theirs = bits_of(other, "world", tmp_path, names)
+    for name in names:
         mine = bits(scene_of(name), "world")
         assert "reached its end" in mine["ended"]
         assert mine == theirs[name], name

@@ -63,7 +63,7 @@ def test_a_case(tisim, own_file):
 @pytest.mark.long
 def test_a_problem(tisim, own_file):
     assert tisim("new", "problem", "my_throw")[0] == 0
-    code, out, err = tisim("optimize", "my_throw.py")
+    code, out, err = tisim("optimize", "my_throw.py", "--generations", "1")
     assert code == 0, err
     assert "miss (m)" in out
     run_tests("my_throw")

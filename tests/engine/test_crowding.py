@@ -221,7 +221,8 @@ def test_lists_that_would_not_fit_are_refused_before_they_are_made(monkeypatch):
 
 def test_a_command_prints_the_warning_on_one_line(tmp_path):
     """On standard error, whatever the place in the code."""
-    (tmp_path / "two.toml").write_text(start([[0, 0, 0], [R, 0, 0]]).to_toml())
+    two = scene([[0, 0, 0], [R, 0, 0]], np.zeros((2, 3)), (Hertz(young=1e-9, poisson=0.3),), R)
+    (tmp_path / "two.toml").write_text(two.to_toml())
     command = [sys.executable, "-m", "tisim", "run", "two.toml", "--out", "out"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     lines = [line for line in done.stderr.splitlines() if "overlap" in line]

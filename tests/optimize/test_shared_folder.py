@@ -68,9 +68,10 @@ def test_a_search_takes_what_others_have_run(tmp_path):
 
 
 @pytest.mark.long
-def test_several_processes_with_different_methods(tmp_path):
+@pytest.mark.parametrize("methods", [METHODS[:2], pytest.param(METHODS, marks=pytest.mark.slow)])
+def test_several_processes_with_different_methods(tmp_path, methods):
     folder = tmp_path / "both"
-    at_work = [worker("shared", folder, method, 1, stderr=subprocess.PIPE) for method in METHODS]
+    at_work = [worker("shared", folder, method, 1, stderr=subprocess.PIPE) for method in methods]
     for process in at_work:
         _, err = process.communicate()
         assert process.returncode == 0, err
@@ -78,7 +79,7 @@ def test_several_processes_with_different_methods(tmp_path):
     assert report.ok
     assert report.duplicates == 0
     names = {}
-    for method in METHODS:
+    for method in methods:
         alone = searched(tmp_path / method, method, 1)
         names[alone.name.removeprefix("searches/")] = tmp_path / method
         assert tables_of(folder, alone.name) == tables_of(tmp_path / method, alone.name)
@@ -142,7 +143,7 @@ def test_a_warm_start_wants_a_folder():
         optimize.run(problem(), warm_start=True)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_killed_beside_another_it_ends_as_if_never_stopped(tmp_path):
     """A warm start, killed again and again, while another search of the folder goes on."""
     for folder in ("whole", "cut"):

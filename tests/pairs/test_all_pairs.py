@@ -55,7 +55,7 @@ def test_forces_in_every_tile_are_their_numpy_twin(usual):
     [
         ("particle", ROOM, NUMBERS),
         ("team", ROOM, NUMBERS),
-        ("world", 4 * TILE, NUMBERS),
+        pytest.param("world", 4 * TILE, NUMBERS, marks=pytest.mark.slow),
         ("world", TILE - 1, NUMBERS[:2]),
     ],
     ids=["a launch per phase", "a team", "more room", "too little room for a tile"],

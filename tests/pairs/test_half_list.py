@@ -110,14 +110,14 @@ class SolidShell(SoftShell):
     solid = True
 
 
-def burst(seed=2, n=240, law=SoftShell):
+def burst(seed=2, n=240):
     """A cloud that falls together, so that its list overflows on the way."""
     draw = np.random.default_rng(seed)
     position = draw.uniform(-1.0, 1.0, (n, 3))
     return scene(
         position,
         -0.9 * position,
-        (law(stiffness=1e-3, width=0.05),),
+        (SolidShell(stiffness=1e-3, width=0.05),),
         radius=0.02,
         mass=1.0,
         dt=5e-3,
@@ -125,20 +125,28 @@ def burst(seed=2, n=240, law=SoftShell):
     )
 
 
-def test_solid_particles_whose_list_overflows_on_the_way_go_on():
-    """The step after is not taken for one in which they pass through each other."""
-    made = burst(law=SolidShell)
-    simulation = Simulation(made)
-    simulation.load(made)
+@pytest.fixture(scope="module")
+def simulation_of_bursts():
+    """One whose list has overflowed on the way."""
+    simulation = Simulation(burst())
+    simulation.load(burst())
     simulation.run()
-    (result,) = simulation.results()
-    assert result.status.ok, result.status.reason
-    assert simulation.assembly.pairs.half_list.row > half_list.ListSizes().row
+    yield simulation
     simulation.close()
 
 
-@pytest.fixture(scope="module")
-def simulation_of_bursts():
+@pytest.mark.long
+def test_solid_particles_whose_list_overflows_on_the_way_go_on(simulation_of_bursts):
+    """The step after is not taken for one in which they pass through each other."""
+    (result,) = simulation_of_bursts.results()
+    assert result.status.ok, result.status.reason
+    assert result.time == burst().duration
+    assert simulation_of_bursts.assembly.pairs.half_list.row > half_list.ListSizes().row
+
+
+@pytest.fixture
+def fresh():
+    """A simulation whose list has its first length."""
     simulation = Simulation(burst())
     yield simulation
     simulation.close()
@@ -160,10 +168,10 @@ def kept(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(simulation_of_bursts, kept, monkeypatch):
+def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(fresh, kept, monkeypatch):
     """Beside a run whose list is long enough from the start, and others of skins that the scene says. There
     is room for it once what is kept for later has been given back."""
-    simulation, rows, ends = simulation_of_bursts, [], []
+    simulation, rows, ends = fresh, [], []
     simulation.load(burst())
     present = memory.bytes_in_use()
     monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
@@ -235,6 +243,7 @@ def test_lists_do_not_grow_beyond_the_memory_of_the_machine(monkeypatch):
     simulation.close()
 
 
+@pytest.mark.long
 def test_the_first_list_of_a_run_knows_nothing_of_the_run_before(simulation_of_bursts):
     simulation, made = simulation_of_bursts, burst()
     skins = []
@@ -245,6 +254,7 @@ def test_the_first_list_of_a_run_knows_nothing_of_the_run_before(simulation_of_b
     assert skins[0] == skins[1] < chosen_skin(simulation)
 
 
+@pytest.mark.long
 def test_what_is_asked_for_at_each_load_is_made_once(simulation_of_bursts, monkeypatch):
     """Many particles are looked at on the device."""
     monkeypatch.setattr(monitor, "LARGE", 1)

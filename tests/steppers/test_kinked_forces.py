@@ -62,7 +62,7 @@ def trapezoid(per="run"):
     )
 
 
-@pytest.mark.parametrize("name", ["constriction", "flow_that_begins"])
+@pytest.mark.parametrize("name", [pytest.param("constriction", marks=pytest.mark.slow), "flow_that_begins"])
 def test_collocation_meets_the_error_asked_for_past_kinks(name):
     assert ratios(name, collocation(5), 12).max() < LARGEST["run"][name]
 

@@ -147,7 +147,7 @@ def random_clump(rng):
 @pytest.mark.long
 def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
     """Tops of any inertia, spun about any axis, at 0.03 rad a step: docs/bodies.md states the errors."""
-    spins = rng.normal(size=(60, 3))
+    spins = rng.normal(size=(30, 3))
     spins *= 500 / np.linalg.norm(spins, axis=1)[:, None]
     shapes = [random_clump(rng) for _ in spins]
     scenes = [
@@ -157,8 +157,8 @@ def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
     simulation = compiled(scenes[0], len(scenes), 4)
     simulation.load(scenes)
     energies = [[clump_bodies(scene.start()).energy[0] for scene in scenes]]
-    for _ in range(100):
-        simulation.run(steps=30)
+    for _ in range(30):
+        simulation.run(steps=100)
         energies.append([clump_bodies(result.state).energy[0] for result in simulation.results()])
     errors = np.abs(np.array(energies) / energies[0] - 1)
     largest = errors.max(axis=0)
@@ -167,7 +167,7 @@ def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
     assert 2e-5 < np.median(largest) < 5e-5
     assert largest.max() < 1e-4
     # It does not grow: the second half is as the first.
-    assert (errors[50:].max(axis=0) < 1.5 * errors[:50].max(axis=0)).all()
+    assert (errors[15:].max(axis=0) < 1.5 * errors[:15].max(axis=0)).all()
 
 
 @pytest.mark.long
@@ -189,7 +189,9 @@ def test_a_clump_on_springs_is_its_numpy_twin():
 
 @pytest.mark.long
 def test_weight_acts_at_the_centre_of_mass():
-    (result,) = simulate([clumps(PEAR, [(0, 0, 0)], (Gravity(acceleration=(0, 0, -9.81)),), 1e-3, 100)])
+    # Springs of no stiffness: the structure of the test before.
+    weight = Tether(stiffness=(0.0,) * 3), Gravity(acceleration=(0, 0, -9.81))
+    (result,) = simulate([clumps(PEAR, [(0, 0, 0)], weight, 1e-3, 100)], capacity=4)
     body = clump_bodies(result.state)
     assert np.linalg.norm(body.angular_velocity) * 0.1 < 1e-5
     np.testing.assert_allclose(body.position, [[0, 0, -9.81 * 0.1**2 / 2]], rtol=1e-9, atol=1e-12)

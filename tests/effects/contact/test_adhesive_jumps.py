@@ -65,7 +65,7 @@ LAWS = {"dmt": Granular(cohesion=DMT()), "jkr": Granular(normal=JKR())}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", [pytest.param("dmt", marks=pytest.mark.slow), "jkr"])
 def test_work_of_adhesion_does_not_depend_on_the_phase_of_a_step(name):
     """DMT's energy is kept; JKR takes the work of parting. A force that simply jumps is off by up to 0.036
     and 0.013 here, by chance."""

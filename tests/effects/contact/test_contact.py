@@ -183,7 +183,8 @@ def test_a_grain_inside_another_is_not_pushed():
 def test_light_contact_keeps_its_digits():
     """At an overlap of 1e-9 radii, to all digits of the overlap itself."""
     gap = 2.0 - 1e-9
-    (state,) = loads([pair((Contact(stiffness=1.0),), gap, 1.0)])
+    law = Contact(stiffness=1.0), ContactFriction(stiffness=10.0, static=1e3, dynamic=1.0)
+    (state,) = loads([pair(law, gap, 1.0)])
     delta = 2.0 - gap
     expected = (delta / 2) ** 2 * np.pi * delta * (4 - delta) / 4
     np.testing.assert_allclose(state["force"][1, 0], expected, rtol=1e-14)

@@ -116,6 +116,7 @@ def test_the_longest_step_that_is_named_is_that_of_the_stiffest_spring():
     assert float(BOUND.search(result.status.reason).group(2)) == pytest.approx(limit, rel=5e-3)
 
 
+@pytest.mark.long
 def test_two_bodies_that_are_both_held_have_no_longest_step():
     """Nothing moves by their contact, and its force is that of the overlap at any step."""
     speed, gap, duration = 1e-4, 2e-6, 0.05

@@ -125,9 +125,10 @@ def test_a_duct_of_pieces_is_taken_for_small_grains_too(radius):
     start(made.replace({"particles.radius": radius}))
 
 
+@pytest.mark.long
 def test_a_run_looks():
     with pytest.raises(tisim.InputError, match="it is not felt through them"):
-        tisim.run(scene(**REFUSED["a post"]))
+        tisim.run(scene(**REFUSED["a plane across"]))
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -145,6 +146,7 @@ def test_without_periodic_faces_it_is_taken(name):
     start(changed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["a plane", *(pytest.param(name, marks=pytest.mark.slow) for name in FELT if name != "a plane")]
 )

@@ -58,7 +58,9 @@ def test_a_ball_rests_in_a_ring_of_any_number_of_facets(number, friction):
         assert np.linalg.norm(result.state["position"][0, :2]) < 1e-9 * RADIUS
 
 
-@pytest.mark.parametrize("number", [6, 7, 8, 12])
+@pytest.mark.parametrize(
+    "number", [7, 12, *(pytest.param(number, marks=pytest.mark.slow) for number in (6, 8))]
+)
 def test_contacts_apart_push_each_by_its_own(number):
     """The force is the sum of those of Hertz, also where there are more contacts than a ball remembers."""
     sunk, aside = 1e-4, np.array([2e-7, -1e-7])
@@ -94,7 +96,9 @@ def test_a_ball_in_a_ring_is_the_same_alone_and_among_others():
             assert alone.state[name].tobytes() == among.state[name].tobytes()
 
 
-@pytest.mark.parametrize("radius", [0.3, 0.45, 0.8])
+@pytest.mark.parametrize(
+    "radius", [0.45, *(pytest.param(radius, marks=pytest.mark.slow) for radius in (0.3, 0.8))]
+)
 def test_nothing_pushes_a_ball_in_the_middle_aside(radius):
     """Nor far aside near it: of 64 facets it would be chance which ones count."""
     given = {"radius": radius, "slope": 0.05, "sunk": 1e-4, "steps": 1, "dt": 1e-12}

@@ -132,6 +132,7 @@ def pieces_of(end, start, who):
     return round(float(start["mass"][who] / end["mass"][end["id"] == who][0]))
 
 
+@pytest.mark.long
 def test_no_piece_is_lighter_than_an_original_grain():
     """However violent: an agglomerate of 3.7 grains gives three pieces, a single grain none."""
     radius = RADIUS * 3.7 ** (1 / 3)

@@ -108,6 +108,7 @@ def test_a_slab_is_a_layer_without_images_above_and_below(rng):
     close(exact.field(), field + beyond, 5e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "periodic",
     [

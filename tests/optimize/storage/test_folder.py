@@ -107,7 +107,7 @@ def test_searches_of_one_problem_share_their_runs(optimize, tmp_path):
         ("--fix", "x1=0.5"),
         ("--set", "search.ensemble.min_starts=3"),
     ):
-        assert optimize(*change)[0] == 0
+        assert optimize(*change, "--generations", 0)[0] == 0
     with Cache(folder / "search.h5") as cache:
         assert len(searches(cache)) == 6
         assert first in searches(cache)
@@ -165,9 +165,9 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
             return super().evaluate(scenes, progress)
 
     monkeypatch.setattr("tisim.optimize.evaluation.executors.BatchEvaluator", Joined)
-    assert optimize("--generations", 3)[0] == 0
+    assert optimize("--generations", 2)[0] == 0
     assert interrupted
-    assert optimize("--generations", 3, "--overwrite")[0] == 0
+    assert optimize("--generations", 0, "--overwrite")[0] == 0
 
 
 def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path, monkeypatch):
@@ -212,7 +212,10 @@ def test_a_search_begins_with_files_and_with_the_folder(optimize, tmp_path):
     assert "method must be for experiments: cma-es, gaussian-process, genetic, nsga2; received" in err
 
 
-@pytest.mark.parametrize("name", ["best.csv", "convergence.png.new", "search.h5.journal", "best_scene.toml"])
+OF_USERS = ["best.csv", "convergence.png.new", "search.h5.journal", "best_scene.toml"]
+
+
+@pytest.mark.parametrize("name", OF_USERS)
 def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
     users = tmp_path / "s" / name
     users.parent.mkdir()
@@ -224,8 +227,14 @@ def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
         f"(or give --overwrite); received 's' with {name}",
     )
     assert contents(users.parent) == {name: b"the user's own"}
+
+
+def test_files_of_the_user_are_replaced_where_that_is_asked_for(optimize, tmp_path):
+    (tmp_path / "s").mkdir()
+    for name in OF_USERS:
+        (tmp_path / "s" / name).write_text("the user's own")
     assert optimize("--overwrite")[0] == 0
-    assert contents(users.parent).get(name) != b"the user's own"
+    assert b"the user's own" not in contents(tmp_path / "s").values()
     assert optimize()[0] == 0
 
 
