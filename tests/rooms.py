@@ -1,6 +1,7 @@
 """The picture of the house: which room uses which, and how high the modules stand on each other.
 
-    python tests/rooms.py [FOLDER]
+    python tests/rooms.py [FOLDER]      rooms, their order, and figures of the source
+    python tests/rooms.py --run         files and changes of room of one ``tisim.run``, and of one design
 
 A room is a package or a module of tisim, the longest name in ``ROOMS`` that a module's
 begins with. A module imports from its own room and from those that stand before it; what a function imports
@@ -11,6 +12,7 @@ import ast
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import FrameType
 
 ROOMS = (
     "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.compiling", "tisim.streams", "tisim.console",
@@ -110,16 +112,83 @@ def floors(early: Imports) -> list[str]:
     return max((chain(name, ()) for name in sorted(early)), key=len)
 
 
+def figures(folder: Path) -> Iterator[str]:
+    """Files and lines of the three folders and of the tests, and the part of lines that are imports."""
+    for name in ("tisim", "optimize", "cases", "tests"):
+        texts = [file.read_text(encoding="utf-8") for file in (folder / name).rglob("*.py")]
+        lines = sum(text.count("\n") for text in texts)
+        spans = [
+            node.end_lineno - node.lineno + 1
+            for text in texts
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, ast.Import | ast.ImportFrom) and node.end_lineno
+        ]
+        short = sum(0 < text.count("\n") < 60 for text in texts)
+        yield (
+            f"{name}: {len(texts)} files, {lines} lines, {lines / len(texts):.0f} a file, "
+            f"{100 * sum(spans) / lines:.1f} % imports, {short} files of 1 to 59 lines"
+        )
+
+
+class Passage:
+    """What Python code a call goes through in its thread: the files, and how often the room changes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.rooms = {str(file): room(name) for name, file in modules(folder).items()}
+        self.files: set[str] = set()
+        self.changes, self.at = 0, -1
+
+    def __call__(self, frame: FrameType, event: str, _: object) -> None:
+        here = self.rooms.get(frame.f_code.co_filename)
+        if event == "call" and here is not None:
+            self.files.add(frame.f_code.co_filename)
+            self.changes += here != self.at
+            self.at = here
+
+    def __str__(self) -> str:
+        crossed = len({self.rooms[name] for name in self.files})
+        return f"{len(self.files)} files in {crossed} rooms, which change {self.changes} times"
+
+
+def passages(folder: Path) -> Iterator[str]:
+    """The passages of a run of agglomeration, with its second scene, and of a search of one design."""
+    from tisim.cases.case import every
+
+    import tisim
+    from tisim import optimize
+
+    tisim.init("cpu", threads=1)
+    case = every()["agglomeration"]
+    problem, _ = case.inverse("small", None)
+    for what, call in (
+        ("tisim.run", lambda: tisim.run(case.scene("small", 1))),
+        ("a search of one design", lambda: optimize.run(problem, max_evaluations=20, generations=0)),
+    ):
+        call()
+        sys.setprofile(passage := Passage(folder))
+        call()
+        sys.setprofile(None)
+        yield f"{what}: {passage}"
+
+
 def main() -> None:
-    """Print modules and lines of each room, and the longest chain."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1]
-    early, _ = imports(folder)
+    """Print modules of each room, the longest chain and figures; or the passages."""
+    folder = Path(__file__).parents[1]
+    if "--run" in sys.argv:
+        sys.path.insert(0, str(folder))
+        print(*passages(folder), sep="\n")
+        return
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else folder
+    early, late = imports(folder)
     for k, name in enumerate(ROOMS):
         inside = [module for module in early if room(module) == k]
         below = sorted({ROOMS[room(o)] for m in inside for o in early[m]} - {name}, key=ROOMS.index)
         print(f"{name:26s} {len(inside):3d} modules, on {', '.join(below) or 'nothing'}")
     longest = floors(early)
     print(f"longest chain of imports: {len(longest)} modules: {' > '.join(longest)}")
+    upward = sum(room(other) > room(module) for module, others in late.items() for other in others)
+    print(f"imports from above, when a function is called: {upward}")
+    print(*figures(folder), sep="\n")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import PairForce, parameter
 from tisim.engine import monitor, replay
-from tisim.pairs import half_list, pair_chunks, rebuild_half_list
+from tisim.pairs import half_list, pair_chunks
 from tisim.program import scans as prefix_sum
 from tisim.steppers import Boris, FixedStep
 
@@ -208,7 +208,7 @@ def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_th
     u = speed * dt / 2 / diameter / (1 - half_list.REACH_PART)
     # The least of 2 u / x * REBUILD_COST + n (1 + x)^3, of what a skin of x diameters costs.
     x = np.linspace(0.01, 0.5, 4901)
-    cost = 2 * u / x * rebuild_half_list.REBUILD_COST + rebuild_half_list.FEWEST_PAIRS * (1 + x) ** 3
+    cost = 2 * u / x * half_list.REBUILD_COST + half_list.FEWEST_PAIRS * (1 + x) ** 3
     assert chosen_skin(simulation) == pytest.approx(diameter * x[np.argmin(cost)], rel=1e-2)
     simulation.close()
 
