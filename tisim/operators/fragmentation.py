@@ -1,4 +1,7 @@
-"""Fragmentation of agglomerates that absorb too much kinetic energy (Z04 section 5)."""
+"""Fragmentation of agglomerates that absorb too much kinetic energy (Z04 section 5).
+
+The fractures of a step: grains that have broken write their pieces into slots, all at once.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import Impact
@@ -13,11 +18,12 @@ from tisim.effects.impact.law import ImpactLaw
 from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.operators.base import Operator, parameter
-from tisim.operators.fractures import Fractures
-from tisim.program.phases import WorldAction
+from tisim.program.phases import Item, PerParticle, Phase, Repeat, WorldAction
+from tisim.program.scans import PrefixSum
 from tisim.state.bound import Bound, Peers
 from tisim.state.fields import Field
 from tisim.state.state import State
+from tisim.state.status import WorldStatus
 
 
 class Fragmentation(ImpactLaw, Operator):
@@ -124,3 +130,87 @@ class Fragmentation(ImpactLaw, Operator):
     def site(self, k, edge):
         """Return the k-th site of a cubic block, in diameters."""
         return ti.Vector([k % edge, k // edge % edge, k // (edge * edge)])
+
+
+@ti.data_oriented
+class Fractures(WorldAction):
+    """The new pieces of the grains of a world that have broken take the slots after the last one in use, in
+    the order of the grains.
+
+    new : of each grain how many more pieces than one it breaks into, then how many there are of all grains up
+    to it.
+    """
+
+    def __init__(self, fragmentation: Bound[Fragmentation], s: State) -> None:
+        self.fragmentation, self.s = fragmentation, s
+        self.new = ti.field(ti.i32)
+        builder = Builder()
+        builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.new)
+        self.tree = Tree(builder)
+        self.sums = PrefixSum(s, PerParticle(s), self.new, self.new)
+
+    def phases(self) -> tuple[Item, ...]:
+        return (SplitGrains(self),)
+
+    def bytes(self) -> int:
+        return self.tree.bytes + self.sums.bytes()
+
+
+class SplitGrains(Repeat):
+    """This item splits all grains of a world that have broken."""
+
+    usual = 0
+
+    def __init__(self, fractures: Fractures) -> None:
+        find = (CountPieces(fractures), *fractures.sums.phases())
+        super().__init__((*find, SplitGrain(fractures), EndFractures(fractures)))
+        self.s = fractures.s
+
+    @ti.func
+    def pending(self, w):
+        return self.s.fracture_due[w]
+
+
+class CountPieces(PerParticle):
+    """This phase counts the new pieces of each grain."""
+
+    def __init__(self, fractures: Fractures) -> None:
+        super().__init__(fractures.s)
+        self.fractures = fractures
+
+    @ti.func
+    def run(self, w, i):
+        self.fractures.new[w, i] = ti.max(self.s.pieces[w, i] - 1, 0)
+
+
+class SplitGrain(PerParticle):
+    """This phase splits each grain that has broken; none, where there is not room for all pieces, and the
+    first grain that has none stops the world."""
+
+    def __init__(self, fractures: Fractures) -> None:
+        super().__init__(fractures.s)
+        self.fractures, self.fragmentation = fractures, fractures.fragmentation
+
+    @ti.func
+    def run(self, w, i):
+        s, fractures, n = self.s, self.fractures, self.s.pieces[w, i]
+        if n >= 2:
+            s.pieces[w, i] = 0
+            upto, room = fractures.new[w, i], s.room(w)
+            before = upto - (n - 1)
+            if fractures.sums.total[w] <= room:
+                self.fragmentation.split(s, w, i, n, before)
+            elif before <= room < upto:
+                s.fail(w, WorldStatus.OUT_OF_ROOM, i)
+
+
+class EndFractures(Phase):
+    """This phase counts the new pieces as particles."""
+
+    def __init__(self, fractures: Fractures) -> None:
+        self.s, self.fractures = fractures.s, fractures
+
+    @ti.func
+    def run(self, w, _k):
+        self.s.lengthen(w, self.fractures.sums.total[w])
+        self.s.fracture_due[w] = 0
