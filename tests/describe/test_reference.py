@@ -130,7 +130,8 @@ def test_what_a_part_needs():
     assert needs["lorentz"][0] == "a source of electric_field or magnetic_flux_density"
     assert needs["sphere"] == ("magnetic_spheres, a row of its spheres",)
     assert needs["collocation"] == ("a step control: stage_control",)
-    assert "no impact" in needs["capture"]
+    # "no impact or recorder", where a test of another file has an event of its own.
+    assert any(one.startswith("no impact") for one in needs["capture"])
 
 
 def test_an_unknown_name_lists_the_known_ones():

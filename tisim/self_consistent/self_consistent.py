@@ -15,8 +15,6 @@ that one of them is: a linear law then has no solution, and of one that saturate
 which is stable.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

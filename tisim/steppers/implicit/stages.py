@@ -6,8 +6,6 @@ the last at its end; a quantity at each stage follows from the polynomial throug
 With two stages this is the trapezoidal rule.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import factorial
 
