@@ -21,7 +21,7 @@ REFERENCE = Field("reference_position", "m", 3, "keep", default="position")
 
 
 class PrescribedMotion(Constraint):
-    """Particles of a group follow a prescribed motion, whatever the forces on them, or are frozen.
+    """Particles of a group follow a prescribed motion regardless of the forces on them, or are frozen.
 
         r(t) = M(t) M(0)^-1 r(0),    v = velocity of M at r,    spin = angular velocity of M
 

@@ -71,7 +71,7 @@ class RigidClumps(Constraint):
         radii = np.concatenate([start["radius"], *(one["radius"] for one in later)])
         # Another particle may touch both of its ends, one of them in an image.
         taken = float(lengths.max() + 2 * radii.max(initial=0.0))
-        rule = f"at least {taken:g} m wide where it is periodic, what its longest clump and a particle take"
+        rule = f"at least {taken:g} m wide where it is periodic, longest clump plus largest diameter"
         must(not (imaged & (high - low < taken)).any(), domain.label, rule, (high - low).tolist())
 
     def critical_step(

@@ -21,7 +21,7 @@ class ContactLaw(Effect):
 
     @ti.func
     def softened(self, s, w, i, stiffness):
-        """Return the stiffness (N/m^2) of grain i as it is now, given that of the material."""
+        """Return the stiffness (N/m^2) of grain i as it is now, given the stiffness of the material."""
         return stiffness
 
 

@@ -29,7 +29,7 @@ class MagneticMaterial:
         ``EwaldFroehlichMoment``; a given susceptibility replaces its own."""
         own = self.susceptibility if susceptibility is None else susceptibility
         if own is None:
-            rule = "given, as it goes by how it was made"
+            rule = "given, as it depends on the preparation of the material"
             raise InputError(f"susceptibility of {self.name} must be {rule}; received nothing")
         return {"susceptibility": own, "saturation": self.saturation}
 

@@ -44,7 +44,7 @@ def check_faces(
                 continue
             rule = (
                 f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
-                f"{'xyz'[axis]}, or be the same at both, as one that goes on flat: it is not felt through "
+                f"{'xyz'[axis]}, or be the same at both, as a flat floor is: it does not act through "
                 "them"
             )
             received = "one that ends or bends there" + ("" if at_start[axis] else " as it moves")

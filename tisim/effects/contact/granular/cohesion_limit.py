@@ -56,5 +56,5 @@ def _check(law: Granular, pair: Touching, radius: float, what: str) -> None:
     """Compare elastic force and cohesion at an overlap of R* (m)."""
     if law.cohesion is not None:
         push, pull = law.normal.push(pair, radius, radius), law.cohesion.pulls(pair, radius, radius)
-        rule = f"below what {law.normal.kind()} pushes with at an overlap of R*, {push:.4g} N, where {what}"
+        rule = f"below the repulsion of {law.normal.kind()} at an overlap of R*, {push:.4g} N, when {what}"
         must(pull < push, f"{law.label}.cohesion", rule, float(f"{pull:.4g}"))

@@ -102,7 +102,7 @@ class Granular(ContactGuards, GranularContact):
     solid: ClassVar[bool] = True
 
     normal: NormalForce = option("elastic force along the line of centres", HertzMaterial())
-    damping: Damping | None = option("damping, of the normal and the tangential force", None)
+    damping: Damping | None = option("damping of the normal and the tangential force", None)
     tangential: TangentialForce | None = option("friction of surfaces that slide", None)
     rolling: RollingResistance | None = option("resistance to rolling", None)
     twisting: TwistingResistance | None = option("resistance to twisting about the line of centres", None)
@@ -116,7 +116,7 @@ class Granular(ContactGuards, GranularContact):
     def _goes_together(self) -> Self:
         label = self.label
         wants = self.twisting is not None and self.twisting.needs_tangential
-        rule = "given, as the resistance to twisting goes by it"
+        rule = "given, as the resistance to twisting needs it"
         must(self.tangential is not None or not wants, f"{label}.tangential", rule, Words("nothing"))
         double = self.normal.adhesive and self.cohesion is not None
         rule = f"left out, as {self.normal.kind()} is adhesive itself"
