@@ -27,8 +27,8 @@ class PrescribedMotion(Constraint):
 
     M(t) maps the body to its position at time t; a frozen group stays at rest. The group contains the
     particles whose field ``group`` has its number at the start, and those that join it later
-    (``join_group``); particles with the number 0 move freely. Velocities and spins at the start follow from
-    the motion, whatever the start says. The particles act on others as usual. In granular contacts they have
+    (``join_group``); particles with the number 0 move freely. The motion also sets velocities and spins at
+    the start, replacing given values. The particles act on others as usual. In granular contacts they have
     the mass of a wall. Short-ranged laws do not act between particles of the group; dipole interactions and
     sums over all pairs do. The result contains the total force (N) on the group, including gravity, as
     ``measures["NAME_force_x"]`` and so on, and the total torque (N m) about the origin or the centre of

@@ -77,9 +77,10 @@ class Granular(ContactGuards, GranularContact):
 
     This limit holds for an isolated pair. In rows and heaps energy grows at shorter steps already: in a row
     of n grains with undamped springs from 1 / (sqrt(2) cos(pi / (2 n))) of the limit, which is 0.72 for ten
-    grains and 0.71 for many. For rigid clumps the mass is the mass of the body, as if it were a solid sphere.
-    A contact at a lever l about an axis with the moment of inertia I accelerates the body by 1/M + l^2/I per
-    unit force, so that the limit is lower by sqrt(1 + M l^2/I), 1.31 at the end of two touching spheres.
+    grains and 0.71 for many. For rigid clumps m is computed from the mass of the body, as if it were a solid
+    sphere. A contact at a lever l about an axis with the moment of inertia I accelerates the body by 1/M +
+    l^2/I per unit force, so that the true limit is lower by the factor sqrt(1 + M l^2/I), 1.31 at the end of
+    two touching spheres.
 
     A world also stops if, in one step, two touching grains move relative to each other by more than the
     smaller diameter, if a grain approaches a wall by more than its diameter, or if grains may pass through
