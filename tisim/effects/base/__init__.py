@@ -45,7 +45,7 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
 8. An ``Operator`` changes the state between steps (see tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It receives each pair in ``contact`` with exclusive access
    to both, earliest first (see tisim/collisions/collision_rounds.py), and may remove either particle.
-10. A ``Constraint`` moves the particles that it holds, in place of the stepper, whatever the forces on them.
+10. A ``Constraint`` moves the particles that it holds, in place of the stepper, regardless of the forces.
 11. ``connect`` returns references to other bound effects, such as ``peers.of(Heating)``. ``requires`` lists
     effects that must be present, ``excludes`` those that must be absent, and ``precedes`` those that must
     come later in the scene. ``suits_others`` rejects incompatible settings of other effects; ``beside``

@@ -79,8 +79,7 @@ class NormalContact(PairForce):
     # Contacts begin and end.
     kinked: ClassVar[bool] = True
     solid: ClassVar[bool] = True
-    # This step control would reduce steps until surfaces touch and then leave them there: it ignores
-    # stiffness.
+    # This step control limits the approach of surfaces, but ignores the stiffness of contacts.
     incompatible_controls = ("approach_time",)
     fields = ("radius",)
 

@@ -37,9 +37,9 @@ class TreeGravity(LongRange, Force):
         s^2 = d^2 + eps^2,    Q = sum_k m_k x_k x_k^T,    |x_k| <= b < theta d
 
     The cost grows as N log N. d leads from particle i to the centre of mass of a cell, x_k from there to
-    particle k of the cell, M is the mass of the cell and b the distance of its farthest particle. Cells that
-    are nearer are opened, down to leaves of 16 particles that are summed one by one; as theta goes to 0, all
-    are. Without softening the error of a cell is at most
+    particle k of the cell, M is the mass of the cell and b the distance of its farthest particle. Nearer
+    cells, with b >= theta d, are opened, down to leaves of 16 particles that are summed one by one; as theta
+    goes to 0, all are. Without softening the error of a cell is at most
 
         (4 theta^3 - 3 theta^4) / (1 - theta)^2 G M m_i / d^2
 

@@ -21,7 +21,7 @@ impacts that reach the limit are counted. x >= 1 means that the pair bonds.
 
 Lost kinetic energies refer to the frame of the pair's centre of mass. The paper uses 1/2 m v^2 of each
 particle (5.1, 6.10). The division of this energy between the two depends on the frame of reference and can
-cool a grain below absolute zero; the sum, which enters heat and energy balance, is the same.
+cool a grain below absolute zero; the sum, which enters the balances of heat and energy, is the same.
 
 A pair at relative rest is in contact, not colliding. Bonded grains therefore leave with exactly the same
 velocity, and an approach must exceed the rounding error of a pair at rest. With u the unit roundoff, each

@@ -20,8 +20,8 @@ class MagneticBodyForce(Force):
 
         F = grad(gamma B.B) = 2 gamma (grad B)^T B
 
-    B is the sum of all sources. gamma is the same for each particle, whatever its size; for a sphere of
-    volume V and small susceptibility chi it is chi V / (2 mu_0). Uniform fields exert no force.
+    B is the sum of all sources. gamma is the same for all particles, regardless of their size; for a sphere
+    of volume V and small susceptibility chi it is chi V / (2 mu_0). Uniform fields exert no force.
 
     Source: Z16 Eq. (7.24).
     """

@@ -45,10 +45,10 @@ class Walls(WallContacts, UsesMaterials, Force):
 
     The body is at rest or moves as prescribed by its ``motion``. A wall is a grain of infinite radius and
     mass. Planes bound the region of the grains, and each plane acts independently. Other surfaces have two
-    sides and rims. Where they meet, a grain feels the nearer one at an edge or a seam, and both at a concave
-    edge. The contact history is stored on the grain, and is kept when the grain moves from one triangle to
-    the next. No surface acts through the periodic faces of a box: a surface at one face must be the same at
-    the opposite face, as a floor is, or it is refused.
+    sides and rims. If they meet, a grain feels the nearer one at a convex edge or a seam, and both at a
+    concave edge. The contact history is stored on the grain, and is kept when the grain moves from one
+    triangle to the next. No surface acts through the periodic faces of a box: a surface at one face must be
+    the same at the opposite face, as a floor is, or it is refused.
 
     Use separate walls, each with its own name, for bodies that move independently or whose forces are
     reported separately. The result contains the force (N) and the torque (N m) of the grains on the body,

@@ -34,8 +34,7 @@ class GranularContact(MaterialLaw, PairForce):
     leapfrog: ClassVar[bool] = True
     guards_steps: ClassVar[bool] = True
     turns_springs: ClassVar[bool] = False
-    # This step control would reduce steps until surfaces touch and then leave them there: it ignores
-    # stiffness.
+    # This step control limits the approach of surfaces, but ignores the stiffness of contacts.
     incompatible_controls = ("approach_time",)
 
     def suits_wall(
