@@ -92,9 +92,9 @@ def ewald_settings(
 ) -> dict[str, Any]:
     """Return settings of Ewald sums in a box, for ``EwaldDipoleDipole(**settings)`` and for moments.
 
-    particles : their number. accuracy : error of the forces, over the force of dipoles at the cut-off. cutoff
-    : cut-off of pairs, m; by default chosen so that pairs and wave vectors take the same time. slab_factor :
-    the period along an open axis, over the side of the box.
+    particles : their number. accuracy : error of the forces, over the force of dipoles at the cut-off.
+    cutoff : cut-off of pairs, m; by default chosen so that pairs and wave vectors take the same time.
+    slab_factor : the period along an open axis, over the side of the box.
 
     The ``waves`` hold for this box; worlds of a batch share them, so use the values of the largest box.
     """

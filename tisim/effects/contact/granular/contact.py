@@ -21,8 +21,8 @@ class GranularContact(MaterialLaw, PairForce):
     surfaces, and its history. The point of contact lies in the middle of the overlap, R_i - delta/2 from the
     centre of i, and the force acts there. A wall is a grain of infinite radius and mass.
 
-    memory : number of history values of a contact, kept while it lasts and zero when it begins. turns_springs
-    : whether the history contains vectors, which rotate with the contact.
+    memory : number of history values of a contact, kept while it lasts and zero when it begins.
+    turns_springs : whether the history contains vectors, which rotate with the contact.
     """
 
     contract: ClassVar[bool] = True
@@ -57,11 +57,11 @@ class GranularContact(MaterialLaw, PairForce):
         given the history ``past``.
 
         pair : index of the pair of materials (see tisim/materials/material_law.py). normal : unit vector from
-        i to the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses
-        : inverse masses, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of the
-        other relative to the surface of i. spinning : spin (rad/s) of the other relative to i. tilt, turn :
-        rotation of the contact in the step (see ``carried`` in spring.py), 0 unless it ``turns_springs``. If
-        there is no contact the result is not used and may be NaN.
+        i to the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j.
+        inverses : inverse masses, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of
+        the other relative to the surface of i. spinning : spin (rad/s) of the other relative to i. tilt,
+        turn : rotation of the contact in the step (see ``carried`` in spring.py), 0 unless it
+        ``turns_springs``. If there is no contact the result is not used and may be NaN.
         """
         return 0.0 * normal, 0.0 * normal, past
 

@@ -57,8 +57,8 @@ def inverse_masses(lever, share, depth, free):
     For sliding it is 1 + 5/2 (m*/m_i (l_i/R_i)^2 + m*/m_j (l_j/R_j)^2) with the levers l_i = R_i - delta/2,
     which is 7/2 if surfaces just touch; for rolling m* R*^2 / I* with 1/I* = 1/I_i + 1/I_j.
 
-    lever : R*/R_i; the value of j is one minus this. share : m*/m_i; the value of j is one minus this. depth
-    : overlap over R*. free : 1, or 0 if forces move neither body, so that no step is too long.
+    lever : R*/R_i; the value of j is one minus this. share : m*/m_i; the value of j is one minus this.
+    depth : overlap over R*. free : 1, or 0 if forces move neither body, so that no step is too long.
     """
     back, rest = 1.0 - lever, 1.0 - share
     arm, other = 1.0 - 0.5 * depth * lever, 1.0 - 0.5 * depth * back
