@@ -1,6 +1,6 @@
 """Laws of force and of impact, one file each, by family.
 
-``tisim effects effects`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
+``tisim effects effects`` lists them in a shell, one line each. ``tisim effects NAME`` prints one law with its
 source, parameters and units.
 """
 

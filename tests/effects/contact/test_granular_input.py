@@ -73,7 +73,7 @@ WRONG = {
     ),
     "walls.material must be one of the materials of the scene (grain); received 'grian'; did you "
     "mean 'grain'?": lambda: one(HERTZ_MINDLIN, Walls(planes=[Plane()], material="grian")),
-    "granular.tangential must be given, as the resistance to twisting goes by it; received nothing": lambda: (
+    "granular.tangential must be given, as the resistance to twisting needs it; received nothing": lambda: (
         Granular(twisting=TwistingMarshall())
     ),
     "granular.cohesion must be left out, as jkr is adhesive itself; received 'dmt'": lambda: Granular(
@@ -131,7 +131,7 @@ def test_cohesion_that_nothing_holds_is_refused(case):
 
     assert answer(0.999) == ""
     message = answer(1.001)
-    assert message.startswith(f"granular.cohesion must be below what {normal.kind()} pushes with")
+    assert message.startswith(f"granular.cohesion must be below the repulsion of {normal.kind()} at")
     assert words in message
 
 
@@ -180,7 +180,7 @@ def test_a_scene_is_asked_before_it_runs():
     """By whoever loads it."""
     made = one(Granular(normal=Hooke(), cohesion=SJKR()), Walls(planes=[Plane()]), radius=1.0,
                materials={"grain": Material(stiffness=1.0, cohesion_energy_density=1.0)})  # fmt: skip
-    wrong = "granular.cohesion must be below what hooke pushes with at an overlap of R*, 1 N, where grain of "
+    wrong = "granular.cohesion must be below the repulsion of hooke at an overlap of R*, 1 N, when grain of "
     with pytest.raises(InputError) as fault, started(made):
         pass
     assert str(fault.value) == f"{wrong}1 m in radius touches walls; received 6.283"

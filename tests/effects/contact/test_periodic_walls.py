@@ -115,7 +115,7 @@ def test_a_mesh_that_does_not_tell_its_distances_is_refused_beside_a_duct(monkey
     """One of very many triangles is not taken for one that is the same at both faces."""
     monkeypatch.setattr("tisim.geometry.triangles.MOST_DISTANCES", 1)
     both = FELT["a duct of two pieces that reach beyond"] | {"surface": STAIR}
-    with pytest.raises(tisim.InputError, match="it is not felt through them"):
+    with pytest.raises(tisim.InputError, match="it does not act through them"):
         start(scene(**both))
 
 
@@ -127,7 +127,7 @@ def test_a_duct_of_pieces_is_taken_for_small_grains_too(radius):
 
 @pytest.mark.long
 def test_a_run_looks():
-    with pytest.raises(tisim.InputError, match="it is not felt through them"):
+    with pytest.raises(tisim.InputError, match="it does not act through them"):
         tisim.run(scene(**REFUSED["a plane across"]))
 
 

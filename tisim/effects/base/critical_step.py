@@ -1,8 +1,8 @@
 """The critical time step of contacts, known before a run from masses, stiffness and the speed of impact.
 
-Two that touch swing against each other with the angular frequency omega = sqrt(S / m*), with S the slope of
-the force at the deepest overlap that an impact reaches, and m* the reduced mass. A leapfrog follows that in
-steps below 2 / omega. Of Hertz's contact it is 1/2.01 of the time of an impact.
+Two grains in contact oscillate with the angular frequency omega = sqrt(S / m*). S is the slope of the force
+at the deepest overlap of an impact, and m* the reduced mass. A leapfrog is stable at steps below 2 / omega.
+For Hertz's contact this limit is 1/2.01 of the duration of an impact.
 
 Source: P. A. Cundall, O. D. L. Strack, Geotechnique 29 (1979) 47; C. O'Sullivan, J. D. Bray, Eng. Comput. 21
 (2004) 278.
@@ -18,12 +18,12 @@ import numpy as np
 from tisim.effects.base.effect import LONGEST_PART
 
 SLIDING = 3.5
-"""m* over the reduced mass of the surfaces of two solid spheres that slide, as these turn too."""
+"""m* over the effective mass at the surfaces of two solid spheres that slide and therefore also rotate."""
 LEAST_OVERLAP = 1e-3
-"""Grains at rest under load overlap by some such part of R*: the stiffness is asked for at this overlap at
-least."""
+"""The stiffness is evaluated at this overlap over R* or above, a typical overlap of grains at rest under
+load."""
 OVERLAPS = np.geomspace(1e-9, 1.0, 512)
-"""Forces are asked for at these overlaps, over R*."""
+"""Overlaps over R* at which forces are evaluated."""
 
 
 def critical_step(stiffness: float, mass: float) -> float:
@@ -32,37 +32,37 @@ def critical_step(stiffness: float, mass: float) -> float:
 
 
 def elastic_contact(accuracy: float) -> float:
-    """Return how long steps may be, over the critical one, for impacts without loss that return their energy
-    to some accuracy: it was off by at most 0.15 of the square of that (tests/hard/test_default_stepper.py),
-    and more is allowed for."""
+    """Return the longest step over the critical step at which lossless impacts return their energy to a
+    relative accuracy. The measured error was at most 0.15 of the square of this ratio
+    (tests/hard/test_default_stepper.py); 0.25 is assumed."""
     return min(math.sqrt(accuracy / 0.25), LONGEST_PART)
 
 
 def lagging_contact(accuracy: float) -> float:
-    """Return the same for impacts with damping or friction, whose velocities are those of half a step ago:
-    the coefficient of restitution was off by at most 0.08 of the step over the critical one."""
+    """Return the same for impacts with damping or friction, whose velocities are half a step old: the
+    measured error of the coefficient of restitution was at most 0.08 of the step over the critical step."""
     return min(accuracy / 0.1, elastic_contact(accuracy))
 
 
 def adhesive_contact(accuracy: float) -> float:
-    """Return the same for grains that pull each other in full as soon as they touch: the energy of an impact
-    was off by at most 2.5 of the square of the step over the critical one, times that energy or that of
-    adhesion."""
+    """Return the same for grains that attract each other in full as soon as they touch. The measured error of
+    the energy of an impact was at most 2.5 times the square of the step over the critical step, times that
+    energy or the energy of adhesion."""
     return min(math.sqrt(accuracy / 2.5), elastic_contact(accuracy))
 
 
 def impact_stiffness(
     push: Callable[[np.ndarray], np.ndarray], mass: float, radius: float, speed: float
 ) -> float:
-    """Return the largest slope (N/m) of a force that two meet in an impact.
+    """Return the largest slope (N/m) of a contact force during an impact.
 
-    push : the force (N) at overlaps (m), an array of them; it may pull at first. mass : m* (kg). radius : R*
-    (m). speed : at which they meet (m/s).
+    push : the force (N) at an array of overlaps (m); it may be attractive at first. mass : m* (kg). radius :
+    R* (m). speed : approach speed (m/s).
     """
     overlap = radius * OVERLAPS
     force = push(overlap)
     if not np.isfinite(force).all():
-        # The law does not say it.
+        # The law does not define its force.
         return math.inf
     steps, means = np.diff(overlap, prepend=0.0), 0.5 * (force + np.append(0.0, force[:-1]))
     work = np.cumsum(steps * means)
@@ -77,7 +77,7 @@ def _least() -> int:
 
 def smallest_grains(start: Mapping[str, np.ndarray]) -> Iterator[tuple[int, float, float]]:
     """Yield material, mass (kg) and radius (m) of the lightest and of the smallest grain of each material:
-    two of these swing fastest."""
+    contacts of these have the highest frequencies."""
     mass, radius = start["mass"], start["radius"]
     material = start.get("material", np.zeros(len(mass), int))
     for index in np.unique(material):

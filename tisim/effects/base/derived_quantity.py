@@ -11,13 +11,13 @@ from tisim.effects.base.effect import Effect
 from tisim.effects.base.pairwise import Pairwise
 
 SWEEPS = 100
-"""There are at most so many sweeps unless it is said how many."""
+"""Default of the largest number of sweeps."""
 
 
 class DerivedQuantity(Effect):
     """A derived quantity of each particle follows from the rest of the state, such as a magnetic moment.
 
-    It is set before forces are summed, whenever they are; several of them in scene order.
+    It is set before each summation of forces; several derived quantities are set in scene order.
 
     quantity : the name of the field that it sets.
     """
@@ -27,38 +27,40 @@ class DerivedQuantity(Effect):
 
     @ti.func
     def response(self, s, w, i, total, t):
-        """Return the value of i, given the sum of what others do to it: 0 unless it is self-consistent."""
+        """Return the value of i, given the sum of the influences of others, which is 0 unless it is
+        self-consistent."""
         return total
 
 
 class SelfConsistentQuantity(DerivedQuantity, Pairwise):
-    """A self-consistent quantity of each particle depends on that of all others, such as an induced dipole.
+    """A self-consistent quantity of each particle depends on its values at all other particles, such as an
+    induced dipole.
 
         q_i = response(sum_j influence(q_j))
 
-    It is found by sweeps over all particles at once (the method of Jacobi), each starting from the last
-    values, also those of the last step, until no particle changes by more than ``tolerance`` times the
-    largest value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so.
+    It is solved by sweeps over all particles at once (Jacobi's method). Each step starts from the values of
+    the last step. Sweeps end when no particle changes by more than ``tolerance`` times the largest value, or
+    by more than rounding. A world that has not converged after ``sweeps`` sweeps fails with a message.
 
-    With ``sweeps`` of 0 a step makes one, and more only where that one changes a particle by more than
-    ``largest_change`` times the largest value: at the start, from nothing, where particles are put in or a
-    field is switched on, and where values grow without end. It then goes on to ``tolerance``, in at most
-    100 sweeps, or the world fails. A ``largest_change`` of 2 has one sweep a step whatever comes of it.
+    With ``sweeps`` = 0 each step makes one sweep. It makes more only if that sweep changes a particle by more
+    than ``largest_change`` times the largest value. This happens at the start, when particles are inserted,
+    when a field is switched on, and when values diverge. Sweeps then continue to ``tolerance``; after 100
+    sweeps the world fails. With ``largest_change`` = 2 each step makes exactly one sweep.
 
-    Where the others act by a linear law, with real eigenvalues L, plain sweeps with a ``relaxation`` of a
-    converge if 1 - 2/a < L < 1 for all of them. Mixed by the method of Anderson they are fewer, and converge
-    as well where some are below -1, as in dense lattices. There is no solution to find where L exceeds 1:
-    what a mixed sweep would then find is none, so a ``linear`` law stops its world as soon as sweeps show
+    If the others act by a linear law with real eigenvalues L, plain sweeps with a ``relaxation`` a converge
+    if 1 - 2/a < L < 1 for all of them. Anderson mixing needs fewer sweeps, and also converges if some
+    eigenvalues are below -1, as in dense lattices. No physical solution exists if an L exceeds 1. Mixed
+    sweeps could then converge to a spurious one, so a ``linear`` law stops its world as soon as sweeps reveal
     such an L.
 
-    ``sweep_change`` of a world is the change in the last sweep, over the largest value: where there is one
-    sweep a step, it times L / (1 - L) is about how far values are from those that they should have.
-    ``sweep_factor`` is what sweeps multiply the change by, from the last three of a step; of plain ones
-    without end it tends to the largest |1 - a + a L|. Where a world stops as L exceeds 1 it is a bound of L
-    from below.
+    ``sweep_change`` of a world is the change in the last sweep, over the largest value. With one sweep per
+    step, the distance of the values from the solution is about L / (1 - L) times this change.
+    ``sweep_factor`` is the factor by which a sweep multiplies the change, from the last three sweeps of a
+    step. For plain sweeps it tends to the largest |1 - a + a L|. If a world stops because L exceeds 1, it is
+    a lower bound of L.
 
-    linear : whether the response is linear in what the others do. Its ``weight`` then makes what i does to j
-    equal to what j does to i.
+    linear : whether the response is linear in the influence of the others. The ``weight`` must then make the
+    influence of i on j equal to that of j on i.
 
     Source: D. G. Anderson, J. ACM 12 (1965) 547, with a depth of 1.
     """
@@ -70,22 +72,24 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     linear: ClassVar[bool] = False
 
     tolerance: float = parameter(
-        "", "change in a sweep, over the largest value, at which the solution counts as converged", 1e-8, gt=0
+        "", "change in a sweep over the largest value at which sweeps have converged", 1e-8, gt=0
     )
     sweeps: int = option(
-        "sweeps over all particles at most; 0 for one a step, while that suffices", SWEEPS, ge=0
+        "largest number of sweeps over all particles; 0 for one sweep per step while that suffices",
+        SWEEPS,
+        ge=0,
     )
     largest_change: float = parameter(
         "",
-        "beside sweeps = 0, change over the largest value above which a step makes more than one",
+        "with sweeps = 0, relative change above which a step makes more than one sweep",
         1e-2,
         gt=0,
     )
     relaxation: float = parameter(
-        "", "part a of its way that a sweep goes, q = (1 - a) q + a response", 1.0, gt=0, le=1
+        "", "relaxation factor a of a sweep, q = (1 - a) q + a response", 1.0, gt=0, le=1
     )
     acceleration: Literal["anderson", "none"] = option(
-        "how sweeps are mixed with the last, where a step makes several", "anderson"
+        "how a sweep is mixed with the previous one, if a step makes several", "anderson"
     )
 
     @property
@@ -93,7 +97,7 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
         return self.sweep_parameters()
 
     def sweep_parameters(self) -> tuple[AccuracyParameter, ...]:
-        """Return the setting that says when there is another sweep."""
+        """Return the setting that decides whether another sweep is made."""
         return (AccuracyParameter(tolerance=1) if self.sweeps else AccuracyParameter(largest_change=1),)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
@@ -101,10 +105,10 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
 
     @ti.func
     def weight(self, s, w, i):
-        """Return the weight of particle i in the inner product by which sweeps are mixed."""
+        """Return the weight of particle i in the inner product that Anderson mixing uses."""
         return ti.cast(1.0, s.real)
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
-        """Return what j, with its present value, does at i."""
+        """Return the influence of j, with its present value, at i."""
         return 0.0 * separation

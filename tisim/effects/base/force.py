@@ -13,7 +13,7 @@ from tisim.state.fields import Field
 
 
 class Force(Effect):
-    """A force acts on each particle by itself, and depends on its state, its place and the time."""
+    """A force acts on each particle individually; it depends on the state of the particle and the time."""
 
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
@@ -22,7 +22,7 @@ class Force(Effect):
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
-        # Not known of a law that does not say it.
+        # Unknown for a law that does not define it.
         return None
 
     def turns(self, effects: Sequence[Effect]) -> bool:
@@ -41,21 +41,21 @@ class Force(Effect):
 
     @ti.func
     def load(self, s, w, i, t, dt, commit):
-        """Return force (N) and torque (N m) on particle i together; ``dt`` (s) have gone by since what i
-        remembers, in the fields of ``memory_fields``, was brought up to date; it now is, if ``commit``."""
+        """Return force (N) and torque (N m) on particle i together. ``dt`` (s) is the time since the history
+        of i in ``memory_fields`` was last updated; it is updated now if ``commit``."""
         return self.force(s, w, i, t), self.torque(s, w, i, t)
 
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
-        """Return the fields in which particles remember what it has done to them, given all effects of the
-        scene; by default none. A bound force finds them with ``remembers``."""
+        """Return the fields that hold the history of its force on particles, given all effects of the scene;
+        by default none. A bound force finds them with ``remembers``."""
         return ()
 
     @ti.func
     def velocity_jacobian(self, s, w, i, t):
-        """Return the derivatives of ``force``: [a, b] that of component a by component b of the velocity of
-        i, in N s/m.
+        """Return the derivatives of ``force`` by velocity, in N s/m: element [a, b] is the derivative of
+        component a by component b of the velocity of i.
 
-        Like ``force`` it is of the trial state. Implicit steppers solve with it what is linear in velocity
-        exactly; a force that does not define it they take as given.
+        Like ``force`` it depends on the trial state. Implicit steppers use it to solve the linear part of the
+        velocity dependence exactly; they treat a force without it as given.
         """
         return ti.Matrix.zero(s.real, 3, 3)

@@ -1,4 +1,4 @@
-"""Sums over all other particles at once, made by phases of their own in place of a sum over pairs."""
+"""Sums over all other particles that are computed by separate phases, not pair by pair."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ if TYPE_CHECKING:
 
 
 class LongRangeSum(ABC):
-    """A long-range sum is made for all particles of a world together, such as by a tree of cells or by waves.
+    """A long-range sum is computed for all particles of a world together, such as by a tree of cells or by
+    waves.
 
-    It is a ``ti.data_oriented`` object with device memory of its own, in which a kernel finds what it has
-    come to.
+    It is a ``ti.data_oriented`` object with its own device memory, in which kernels find its result.
     """
 
     @abstractmethod
     def phases(self) -> tuple[Item, ...]:
-        """Return the items that make the sum of the state as it is, which may be a trial state.
+        """Return the items that compute the sum of the present state, which may be a trial state.
 
-        They read positions, other fields and derived quantities that are set before; they write nothing but
-        the memory of the sum. What they come to may depend neither on the order of parallel work nor on what
-        was there before: it is asked for anew in each force evaluation. The first ones are ``OnOccasion``, as
-        all sums are that stand several times in a step, and ask for what is repeated. Where positions are not
-        finite they must end all the same; what is not finite is left to the forces to show.
+        They read positions, other fields and derived quantities that have been set before; they write only
+        the memory of the sum. The result may depend neither on the order of parallel work nor on previous
+        contents: it is computed anew in each force evaluation. The first items are ``OnOccasion``, as for all
+        sums that appear several times in a step: they run only if there is something to do, and request the
+        repeated items. Items must terminate even if positions are not finite; the forces then report the
+        error.
         """
 
     @abstractmethod
@@ -38,18 +39,19 @@ class LongRangeSum(ABC):
 
 
 class LongRange(Effect):
-    """This is the contract of an effect that makes a long-range sum, from which its other hooks take what
-    they return: the ``force`` of a ``Force``, for one.
+    """This is the contract of an effect that computes a long-range sum, which its other hooks read, such as
+    the ``force`` of a ``Force``.
 
-    The sum is made before forces are summed, after derived quantities are set; that of a
-    ``SelfConsistentQuantity`` in each of its sweeps, before what others do is summed over pairs, of the
-    values that the sweep begins with. In kernels it is ``self.sum`` of the bound effect. Particles that feel
-    each other so are not stepped one by one.
+    The sum is computed after derived quantities are set and before forces are summed. For a
+    ``SelfConsistentQuantity`` it is computed in each sweep, before the sum over pairs, from the values at the
+    beginning of the sweep. In kernels it is ``self.sum`` of the bound effect. Particles that interact in this
+    way are not stepped one by one.
     """
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = False
 
     def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> LongRangeSum:
-        """Return what makes the sum in a state; ``own`` is the bound effect, ``domain`` likewise."""
+        """Return the object that computes the sum in a state; ``own`` is the bound effect, ``domain`` the
+        bound domain."""
         raise NotImplementedError(f"{type(self).__name__} must define long_range_sum")

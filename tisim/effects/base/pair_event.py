@@ -9,10 +9,10 @@ from tisim.effects.base.effect import Effect
 
 
 class PairEvent(Effect):
-    """A pair event is something sudden between two particles, such as an impact.
+    """A pair event is a sudden change of two particles, such as an impact.
 
-    hard : whether its particles are hard spheres, which may touch but not lie in each other: a world stops in
-        which that is true of more pairs than can touch.
+    hard : whether its particles are hard spheres, which may touch but not overlap. A world stops if more
+    pairs overlap than can touch.
     """
 
     contract: ClassVar[bool] = True
@@ -20,7 +20,7 @@ class PairEvent(Effect):
 
     @ti.func
     def contact(self, s, w, i, j, separation):
-        """Return how long ago (s) the event between i and j fell due; something negative when it has not.
+        """Return the time (s) since the event between i and j became due; negative if it is not due.
 
         ``separation`` is r_j - r_i (m). It is called for every near pair in every step.
         """
@@ -28,4 +28,4 @@ class PairEvent(Effect):
 
     @ti.func
     def resolve(self, s, w, i, j, separation):
-        """Change i and j, which no other event changes at the same time."""
+        """Change i and j; no other event changes them at the same time."""

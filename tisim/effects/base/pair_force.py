@@ -1,4 +1,4 @@
-"""Forces between two particles, and what a pair remembers of them."""
+"""Forces between two particles, and their contact history."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from tisim.effects.base.pairwise import Pairwise
 
 
 def kinks(effects: Sequence[Effect], domain: Domain) -> list[str]:
-    """Return the labels of the parts of a scene whose forces have kinks or jumps on the way, or may have."""
+    """Return the labels of the parts of a scene whose forces have or may have kinks or jumps."""
     kinked = [effect.label for effect in effects if effect.has_kinks()]
     if any(domain.imaged()) and any(isinstance(effect, PairForce) for effect in effects):
-        # Where the nearest image becomes another.
+        # Forces have a kink at distances where the nearest image changes.
         kinked.append(domain.label)
     return kinked
 
 
 def keeps_apart(effects: Sequence[Effect]) -> bool:
-    """Return whether a scene has a law of contact with a memory, which is far stiffer than what draws
-    particles together."""
+    """Return whether a scene has a contact law with history, which is far stiffer than attractive forces."""
     return any(isinstance(one, PairForce) and one.solid and one.leapfrog for one in effects)
 
 
@@ -33,10 +32,10 @@ class PairForce(Pairwise):
 
         pair_force(i, j) = -pair_force(j, i)
 
-    Most laws define ``pair_force``, and ``pair_torque`` where they turn particles. A short-ranged law whose
-    force, torques and memory belong together, such as that of a contact, defines ``interaction`` instead.
+    Most laws define ``pair_force``, and ``pair_torque`` if they exert torques. A short-ranged law whose
+    force, torques and history belong together, such as a contact law, defines ``interaction`` instead.
 
-    memory : values that a pair remembers while it is within ``reach``, zero for a pair that has just met.
+    memory : number of history values of a pair, kept while the pair is within ``reach``; zero for a new pair.
     """
 
     contract: ClassVar[bool] = True
@@ -46,7 +45,7 @@ class PairForce(Pairwise):
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
-        # Not known of a law that does not say it.
+        # Unknown for a law that does not define it.
         return None
 
     def turns(self, effects: Sequence[Effect]) -> bool:
@@ -57,25 +56,26 @@ class PairForce(Pairwise):
     def pair_force(self, s, w, i, j, separation, distance, t):
         """Return the force on i by j, in N; ``separation`` is r_j - r_i (m), ``distance`` its length.
 
-        Two particles in one place have a distance of 0. A law that has a limit there must return it; one that
-        divides by the distance gives what is not finite, and the world stops and names the law.
+        The distance is 0 if both particles are at the same place. A law that has a finite limit there must
+        return it. A law that divides by the distance returns a value that is not finite; the world then stops
+        and names the law.
         """
         return 0.0 * separation
 
     @ti.func
     def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
-        """Return ``pair_force`` given 1/distance (1/m); 0 where that is 0.
+        """Return ``pair_force`` given 1/distance (1/m); 0 if 1/distance is 0.
 
-        A law that needs no more of the distance may define it as well: sums over all pairs in fast arithmetic
-        then make roots and divisions ahead. A subclass that changes the law, ``pair_force`` or what that
-        calls, defines it anew, or is summed without it.
+        A law that uses the distance in no other way may define this method too: in fast arithmetic, sums over
+        all pairs then compute roots and divisions in advance. A subclass that changes the law, ``pair_force``
+        or a function that it calls, must redefine this method; otherwise it is not used.
         """
         return 0.0 * separation
 
     @classmethod
     def offers_inverse(cls) -> bool:
-        """Return whether ``pair_force_by_inverse`` is the law of this class: no class derived from the one
-        that defines it has changed a device function."""
+        """Return whether ``pair_force_by_inverse`` is valid for this class: no subclass of its defining class
+        has changed a device function."""
         classes = cls.__mro__
         definer = next(base for base in classes if "pair_force_by_inverse" in vars(base))
         later = classes[: classes.index(definer)]
@@ -89,13 +89,13 @@ class PairForce(Pairwise):
 
     @ti.func
     def interaction(self, s, w, i, j, separation, distance, past, dt, t):
-        """Return the force on i by j (N), the torques on i and on j about their centres (N m), and what the
-        pair remembers from now on, given what it did, ``past``, and that ``dt`` (s) have gone by since.
+        """Return the force on i by j (N), the torques on i and on j about their centres (N m), and the new
+        history of the pair, given its history ``past`` and the time ``dt`` (s) since it was updated.
 
-        It is asked of listed pairs within ``reach``: i is the one of lower id, and what is remembered is as i
-        sees it. ``past`` is a vector of ``memory`` values, or of one 0 where there are none, which is
-        returned as it came. It writes nothing: several pairs are computed at once, and some twice. Choices
-        (``ti.select``) are faster in it than branches.
+        It is called for listed pairs within ``reach``. i is the particle of lower id, and the history is
+        expressed from the viewpoint of i. ``past`` is a vector of ``memory`` values; if there are none it is
+        a single 0, returned unchanged. The method writes nothing: several pairs are computed at once, and
+        some twice. Use ``ti.select`` rather than branches for speed.
         """
         force = self.pair_force(s, w, i, j, separation, distance, t)
         turn = self.pair_torque(s, w, i, j, separation, distance, t)

@@ -1,4 +1,4 @@
-"""What forces between particles and self-consistent quantities have in common: sums over pairs."""
+"""The common base of forces between particles and self-consistent quantities: sums over pairs."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from tisim.effects.base.effect import Effect
 
 
 class Pairwise(Effect):
-    """This is the contract of what is summed over pairs.
+    """This is the contract of sums over pairs.
 
-    short_ranged : whether it is zero where the gap between surfaces is wider than ``reach``; it is then
-    summed over the pair list, otherwise over all pairs. within_bodies : whether a short-ranged one acts
-    between the particles of one rigid body as well, as what is a cut-off of a sum over all pairs does.
-    truncated : whether ``reach`` is a cut-off of what would go on: far more pairs are within it than touch,
-    and laws of contact are not asked of those. solid : whether it holds spheres apart that touch: a world in
-    which a step is so long that they may pass through each other is stopped.
+    short_ranged : whether it is zero if the gap between surfaces is wider than ``reach``. It is then summed
+    over the pair list, otherwise over all pairs. within_bodies : whether a short-ranged law also acts between
+    particles of one rigid body, as a truncated sum over all pairs does. truncated : whether ``reach`` is a
+    cut-off of a law that would extend further. Far more pairs are then within it than touch, and contact laws
+    are not evaluated for these. solid : whether it keeps touching spheres apart. A world is stopped if a step
+    is so long that spheres may pass through each other.
     """
 
     contract: ClassVar[bool] = True
@@ -31,9 +31,10 @@ class Pairwise(Effect):
 
     @ti.func
     def reach(self, s, w, i):
-        """Return the widest gap (m) between surfaces at which it acts between i and a particle no larger.
+        """Return its interaction range: the widest gap (m) between surfaces at which it acts between i and a
+        particle no larger than i.
 
-        Of a pair it is the reach of the larger particle that counts, whatever the smaller one would return.
-        ``assert_reach`` of tisim/testing tells whether it is long enough.
+        For a pair the value of the larger particle is used. ``assert_reach`` of tisim/testing checks that the
+        range is long enough.
         """
         return 0.0

@@ -1,4 +1,4 @@
-"""What the particles of clumps carry, and what a start must say of it."""
+"""Fields of the particles of clumps, and the checks of a start that contains clumps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tisim.errors import Words, must
 from tisim.packing.clump import length
 
 NO_CLUMP = -1
-"""What a particle that is of no clump has as its ``clump``."""
+"""Value of ``clump`` for a particle that belongs to no clump."""
 MEMBERSHIP = (
     Field("clump", "", 1, "keep", integer=True, default=NO_CLUMP),
     Field("clump_member", "", 1, "keep", integer=True, default=NO_CLUMP),
@@ -22,8 +22,9 @@ MEMBERSHIP = (
     Field("clump_size", "", 1, "keep", integer=True, default=0),
     Field("clump_offset", "m", 3, "keep"),
 )
-"""A particle has the number of its clump, its own number among the members of all clumps, that of the first
-member of its clump, how many members this has, and its place in the body, along the principal axes."""
+"""Fields of each particle: the number of its clump, its own number among the members of all clumps, the
+number of the first member of its clump, the number of members of the clump, and its position in the body
+along the principal axes."""
 BODY = (
     Field("clump_position", "m", 3, "keep"),
     Field("clump_velocity", "m/s", 3, "keep"),
@@ -32,14 +33,14 @@ BODY = (
     Field("clump_inertia", "kg m^2", 3, "keep"),
     Field("clump_volume", "m^3", 1, "keep"),
 )
-"""The first member of a clump has these of the body: the centre of mass, its velocity, the orientation as a
-unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments, the
+"""Fields of the body, stored on the first member of a clump: centre of mass, its velocity, orientation as a
+unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments,
 volume of the union of its members."""
 BODY_BEFORE = Field("clump_orientation_before", "", 1, "keep", slots=4, scratch=True)
 """The orientation at the beginning of a step."""
 APART = 1e-4
-"""Members are where and as fast as their bodies say to within this part of a radius and of the largest speed,
-and quaternions are of length 1 to within it; single precision rounds by less."""
+"""Tolerance of the positions of members, over a radius, of their velocities, over the largest speed, and of
+the length of quaternions; rounding in single precision is smaller."""
 
 
 def longest_clump(start: Mapping[str, np.ndarray]) -> float:
@@ -54,16 +55,16 @@ def longest_clump(start: Mapping[str, np.ndarray]) -> float:
 
 
 def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
-    """Raise InputError unless the particles of a start are whole clumps, which are where their bodies say,
-    and others."""
+    """Raise InputError unless the particles of a start are complete clumps, consistent with their bodies, and
+    single particles."""
     names = [field.name for field in (BODY_MASS, *MEMBERSHIP, *BODY)]
     given = [name for name in names if name in start]
     must(given == names, "particles", "made by Particles.of_clumps with effects.rigid_clumps", given)
     held = np.flatnonzero(start["clump"] != NO_CLUMP)
     held = held[np.argsort(start["clump_member"][held])]
     clump, member, first, size = (start[field.name][held] for field in MEMBERSHIP[:4])
-    # Kernels index memory by these: all must follow from which are the first. Clumps that have left leave
-    # gaps, and members of others are below the number of all particles that there have been.
+    # Kernels use these as memory indices, so all must be consistent with the first members. Clumps that have
+    # left leave gaps; numbers of members are below the number of all particles that have existed.
     number, leads = np.arange(len(held)), np.flatnonzero(member == first)
     sizes = np.diff([*leads, len(held)])
     most = int(start["id"].max()) + 1 if "id" in start else len(start["mass"])
@@ -83,7 +84,8 @@ def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
 def _check_bodies(
     start: Mapping[str, np.ndarray], domain: Domain, held: np.ndarray, leader: np.ndarray
 ) -> None:
-    """Raise InputError unless members of clumps are where the bodies say, which their ``leader`` carries."""
+    """Raise InputError unless members of clumps agree with the bodies, whose fields their ``leader``
+    holds."""
     position, velocity, quaternion, momentum, inertia = (start[field.name][leader] for field in BODY[:5])
     length = np.linalg.norm(quaternion, axis=1)
     off = float(np.abs(length - 1).max())

@@ -1,4 +1,4 @@
-"""Groups of particles that move as prescribed, or not at all."""
+"""Groups of particles with a prescribed motion, or at rest."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ from tisim.errors import must
 from tisim.state.state import HEAVY
 
 REFERENCE = Field("reference_position", "m", 3, "keep", default="position")
-"""Where a particle that moves as prescribed is at the time 0."""
+"""Position at time 0 of a particle with a prescribed motion."""
 
 
 class PrescribedMotion(Constraint):
-    """Particles of a group move together as a motion says, whatever the forces on them, or are frozen.
+    """Particles of a group follow a prescribed motion regardless of the forces on them, or are frozen.
 
         r(t) = M(t) M(0)^-1 r(0),    v = velocity of M at r,    spin = angular velocity of M
 
-    M(t) takes the body to where the motion has it; frozen it stays. They are of the group whose number the
-    field ``group`` of the start has, or join it on the way (``join_group``); 0 is that of particles that move
-    freely. Their velocities and spins at the start are those of the motion, whatever the start says. They act
-    on others as ever, and in granular contacts they count as so heavy as a wall; short-ranged laws do not act
-    between them. Dipoles, and all that is summed over all pairs, do act between them. The result tells the
-    sum of all forces (N) on the group, gravity among them, as ``measures["NAME_force_x"]`` and so on, and
-    that of their torques (N m), about the origin or the centre of its rotation, as ``NAME_torque_x``.
+    M(t) maps the body to its position at time t; a frozen group stays at rest. The group contains the
+    particles whose field ``group`` has its number at the start, and those that join it later
+    (``join_group``); particles with the number 0 move freely. The motion also sets velocities and spins at
+    the start, replacing given values. The particles act on others as usual. In granular contacts they have
+    the mass of a wall. Short-ranged laws do not act between particles of the group; dipole interactions and
+    sums over all pairs do. The result contains the total force (N) on the group, including gravity, as
+    ``measures["NAME_force_x"]`` and so on, and the total torque (N m) about the origin or the centre of
+    rotation as ``NAME_torque_x``.
 
-    It is what LAMMPS has in fix freeze and fix move.
+    It corresponds to fix freeze and fix move of LAMMPS.
     """
 
     fields = (*Constraint.fields, "group", REFERENCE)
@@ -95,7 +96,7 @@ class PrescribedMotion(Constraint):
 
     @ti.func
     def join(self, s, w, i):
-        """Have a free particle be of the group from now on, where it is."""
+        """Add a free particle to the group, at its present position."""
         start, place = ti.cast(0.0, ti.f64), s.position[w, i]
         body = self.motion.to_body(self.kept, w, place, s.time[w])
         s.group[w, i], s.body_mass[w, i] = self.group, HEAVY * s.mass[w, i]

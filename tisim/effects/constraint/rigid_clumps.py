@@ -24,7 +24,7 @@ from tisim.errors import must
 from tisim.numerics.quaternions import brought, rotated
 
 INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
-"""The slot of a number has where in memory the member of that number is; it says nothing of the particle in
+"""Slot k holds the present index of clump member number k; it does not describe the particle that occupies
 the slot."""
 
 if TYPE_CHECKING:
@@ -32,17 +32,18 @@ if TYPE_CHECKING:
 
 
 class RigidClumps(Constraint):
-    """Clumps of spheres move as rigid bodies: the forces on their spheres make up one force and one torque.
+    """Clumps of spheres move as rigid bodies under the total force and torque on their spheres.
 
         M dV/dt = sum_i f_i,    dL/dt = sum_i ((r_i - X) x f_i + t_i),    v_i = V + w x (r_i - X)
 
-    Spheres, which the start says are clumps (``Particles.of_clumps``), are ordinary particles otherwise: laws
-    act on each, but short-ranged ones, other than of dipoles, not between those of one clump. In granular
-    contacts the mass is that of the body. The centre of mass is stepped by velocity Verlet. The rotation is
-    stepped by five turns about principal axes between half kicks of the angular momentum, which is symplectic
-    and of second order; permanent moments turn with the body. Sums are in the order of the members.
+    A start with clumps is made by ``Particles.of_clumps``. The spheres are ordinary particles otherwise. Laws
+    act on each sphere; short-ranged laws other than dipole laws do not act between spheres of one clump. In
+    granular contacts the mass is the mass of the body. The centre of mass is integrated by velocity Verlet.
+    The rotation is integrated by five rotations about principal axes between half kicks of the angular
+    momentum, which is symplectic and of second order. Permanent moments rotate with the body. Sums are in the
+    order of the members.
 
-    ``tisim.analysis.clump_bodies`` tells of a Result where the bodies are and how they move.
+    ``tisim.analysis.clump_bodies`` returns the positions and velocities of the bodies of a Result.
 
     Source: A. Dullweber, B. Leimkuhler, R. McLachlan, J. Chem. Phys. 107 (1997) 5840.
     """
@@ -68,15 +69,15 @@ class RigidClumps(Constraint):
         own = longest_clump(start) if len(start["mass"]) else 0.0
         lengths = np.concatenate([[own], *(one["length"] for one in later)])
         radii = np.concatenate([start["radius"], *(one["radius"] for one in later)])
-        # Another one may touch both of its ends, one of them in an image.
+        # Another particle may touch both of its ends, one of them in an image.
         taken = float(lengths.max() + 2 * radii.max(initial=0.0))
-        rule = f"at least {taken:g} m wide where it is periodic, what its longest clump and a particle take"
+        rule = f"at least {taken:g} m wide where it is periodic, longest clump plus largest diameter"
         must(not (imaged & (high - low < taken)).any(), domain.label, rule, (high - low).tolist())
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
-        # Of a body that tumbles; what presses it tells its own.
+        # The limit of a tumbling body; the forces on it give their own limits.
         fastest = float(np.linalg.norm(start.get("spin", np.zeros((1, 3))), axis=1).max(initial=0.0))
         return 2 / fastest if fastest > 0 else math.inf
 
@@ -97,7 +98,7 @@ class RigidClumps(Constraint):
 
     @ti.func
     def leads(self, s, w, i):
-        # The first member of a clump has what is known of the body.
+        # The first member of a clump holds the fields of the body.
         return s.clump_member[w, i] == s.clump_first[w, i]
 
     @ti.func
@@ -141,7 +142,7 @@ class RigidClumps(Constraint):
 
     @ti.func
     def load(self, s, w, i):
-        """Return force (N) and torque (N m) on the body that i leads, about its centre of mass."""
+        """Return force (N) and torque (N m), about the centre of mass, on the body that i leads."""
         force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
         if ti.static(hasattr(s, "force")):
             q, first = self.orientation(s, w, i), s.clump_first[w, i]
@@ -177,7 +178,7 @@ class RigidClumps(Constraint):
         q, momentum = self.orientation(s, w, leader), s.clump_angular_momentum[w, leader]
         moments, arm = s.clump_inertia[w, leader], rotated(q, s.clump_offset[w, i])
         spin = angular_velocity(q, momentum, moments)
-        # The body turned freely, dw/dt = -I^-1 (w x L). The arm midway in the step, a, follows from that at
+        # The body rotates freely, dw/dt = -I^-1 (w x L). The arm a midway in the step follows from the arm at
         # its end, which is a + turn x a.
         spin += half * angular_velocity(q, spin.cross(momentum), moments)
         turn = half * spin

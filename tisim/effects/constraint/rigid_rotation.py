@@ -2,9 +2,9 @@
 
     exp(dt/2 T3) exp(dt/2 T2) exp(dt T1) exp(dt/2 T2) exp(dt/2 T3)
 
-T_k is the rotation by the kinetic energy m_k^2 / 2 I_k alone: about axis k of the body, at the rate
-m_k / I_k, which stays. The angular momentum in space is unchanged to the last bit. It is symplectic, can be
-reversed, and is of second order in dt.
+T_k is the rotation by the kinetic energy m_k^2 / 2 I_k alone: about axis k of the body at the constant rate
+m_k / I_k. The angular momentum in space is unchanged to the last bit. The method is symplectic,
+time-reversible, and of second order in dt.
 
 Source: A. Dullweber, B. Leimkuhler, R. McLachlan, J. Chem. Phys. 107 (1997) 5840; in quaternions, as LAMMPS
 has it: T. F. Miller III et al., J. Chem. Phys. 116 (2002) 8649 (NO_SQUISH).
@@ -15,13 +15,13 @@ from tisim.numerics import elementary
 from tisim.numerics.quaternions import conjugate, product, rotated
 
 TURNS = ((2, 0.5), (1, 0.5), (0, 1.0), (1, 0.5), (2, 0.5))
-"""Axes of the turns, in order, with the part of the step that each lasts."""
+"""Axes of the rotations, in order, with the part of the step that each lasts."""
 
 
 @ti.func
 def free_rotation(q, momentum, moments, dt):
-    """Return the orientation after dt (s): of unit quaternion q, from the axes of the body to space, with an
-    angular momentum (kg m^2/s) in space and principal moments of inertia (kg m^2)."""
+    """Return the orientation after dt (s), given the unit quaternion q from the axes of the body to space,
+    the angular momentum (kg m^2/s) in space and the principal moments of inertia (kg m^2)."""
     m, turned = rotated(conjugate(q), momentum), q
     for axis, part in ti.static(TURNS):
         angle = part * dt * m[axis] / moments[axis]

@@ -10,14 +10,14 @@ from tisim.numerics.powers import Exponent, power
 
 
 class ContactBond(SurfaceContact):
-    """Grains that are pressed into each other hold on to each other: a bond pulls and grips.
+    """Grains that are pressed into each other are bonded: the bond pulls them together and resists sliding.
 
         F_i = K_nb E^p A n_ij + K_rb A dt u        while E >= E*
 
     E is the overlap strain, A the contact area, n_ij the unit vector from i to j, and u the velocity of the
-    surface of j past that of i at their point of contact, spin included. The bond has no memory: it is there
-    while the overlap is. The grip carries the time step dt, as the stick of ``contact_friction`` does: it
-    vanishes with dt, and is absent from the forces of the start.
+    surface of j relative to the surface of i at the point of contact, spin included. The bond has no history:
+    it exists while the overlap strain is at least E*. The grip contains the time step dt, as the stick force
+    of ``contact_friction`` does: it vanishes with dt, and is absent from the forces at the start.
 
     Source: Z16 Eqs (7.16), (7.17).
     """
@@ -28,7 +28,7 @@ class ContactBond(SurfaceContact):
     exponent: Exponent = option("exponent p of the overlap strain", 2, gt=0)
     grip_stiffness: float = parameter("N/m^3", "stiffness K_rb of the grip along the surfaces", 0.0, ge=0)
     threshold: float = parameter(
-        "", "overlap strain E* from which on the bond holds; Z16 gives no value", examples=[0.01], ge=0, lt=1
+        "", "overlap strain E* above which the bond holds; Z16 gives no value", examples=[0.01], ge=0, lt=1
     )
 
     @ti.func

@@ -14,14 +14,15 @@ from tisim.effects.contact.granular.contact import GranularContact
 
 
 class CapillaryBridge(GranularContact):
-    """Grains that have touched pull each other by a liquid bridge, until it ruptures.
+    """Grains that have touched attract each other through a liquid bridge until it ruptures.
 
         F = 2 pi R gamma cos(theta) / (1 + 1.05 s + 2.5 s^2),    s = S sqrt(R / V)
 
-    S is the gap between the surfaces, 0 while they overlap, and R = 2 R_i R_j / (R_i + R_j). A bridge of the
-    volume V forms when surfaces touch, and ruptures where S is above (1 + theta / 2) V^(1/3). The liquid wets
-    both alike. The fit is for V of at most some thousandths of R^3, and of grains so small that gravity does
-    not deform the liquid. It pulls beside what pushes grains apart, such as ``granular``.
+    S is the gap between the surfaces, 0 while they overlap, and R = 2 R_i R_j / (R_i + R_j). A bridge of
+    volume V forms when surfaces touch, and ruptures when S exceeds (1 + theta / 2) V^(1/3). The contact angle
+    is the same on both grains. The fit holds for V of at most some thousandths of R^3, and for grains so
+    small that gravity does not deform the liquid. The force acts together with a contact law that pushes
+    grains apart, such as ``granular``.
 
     Source: C. D. Willett, M. J. Adams, S. A. Johnson and J. P. K. Seville, Langmuir 16 (2000) 9396, Eq. (12);
     G. Lian, C. Thornton and M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138, for the rupture.
@@ -32,7 +33,7 @@ class CapillaryBridge(GranularContact):
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
-        # Its slope is far below that of a contact.
+        # The force changes with distance far more slowly than a contact force.
         return math.inf if keeps_apart(effects) else None
 
     depends_on_velocity: ClassVar[bool] = False

@@ -14,8 +14,8 @@ class ContactDissipation(PairForce):
 
         F_i = c_cd ((v_j - v_i) . n_ij) A n_ij
 
-    A is the contact area and n_ij the unit vector from i to j. As in the paper it also holds back grains that
-    part: the sum of contact and dissipation can pull just before they separate.
+    A is the contact area and n_ij the unit vector from i to j. As in the paper the dashpot also acts on
+    grains that separate: the sum of contact force and dissipation can be attractive just before they part.
 
     Source: Z16 Eq. (7.10).
     """

@@ -15,18 +15,19 @@ from tisim.state.bound import Peers
 
 
 class ContactFriction(SurfaceContact):
-    """Touching grains that slide past each other are held back by regularised friction, which turns them.
+    """Regularised friction resists the sliding of touching grains and exerts torques on them.
 
         F_i = K_f A dt u            stick, while that is below mu_s |F_n|
         F_i = mu_d |F_n| u / |u|    slip
 
-    u is the velocity of the surface of j past that of i at their point of contact, spin included; A is the
-    contact area; |F_n| is how hard contact presses, without dissipation (the paper has con,n here, con,c in
+    u is the velocity of the surface of j relative to the surface of i at the point of contact, spin included;
+    A is the contact area; |F_n| is the contact force without dissipation (the paper has con,n here, con,c in
     7.5, con,d in 7.10).
 
-    Stick carries the time step dt: it is a viscous regularisation, the spring K_f A of what has slid in one
-    step, without memory of the steps before. As dt -> 0 it does not converge to sticking but vanishes, and
-    grains creep past each other. The forces of the start, before any step, have dt = 0 and no stick.
+    The stick force contains the time step dt. It is a viscous regularisation: a spring K_f A acts on the
+    displacement of one step, without memory of earlier steps. As dt -> 0 it does not converge to sticking but
+    vanishes, and grains creep past each other. The forces at the start, before any step, have dt = 0 and no
+    stick.
 
     Source: Z16 Eqs (7.11)-(7.15).
     """

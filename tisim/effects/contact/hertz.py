@@ -10,13 +10,13 @@ from tisim.effects.contact.normal import NormalContact, overlap
 
 
 class Hertz(NormalContact):
-    """Elastic spheres that overlap push each other apart as Hertz found.
+    """Elastic spheres that overlap repel each other by Hertz's law.
 
         F_i = -4/3 sqrt(R*) E* delta^1.5 n_ij,    1/R* = 1/R_i + 1/R_j,    1/E* = 2 (1 - nu^2) / E
 
-    delta is the overlap and n_ij the unit vector from i to j. All grains are of one material. The law is
-    without friction and loss, and for a circle of contact that is small beside the radii. As printed the
-    minus sign is missing; the paper's n_ij is from i to j.
+    delta is the overlap and n_ij the unit vector from i to j. All grains have the same material. The law is
+    free of friction and loss, and assumes a contact circle that is small compared with the radii. The printed
+    equation lacks the minus sign; the n_ij of the paper points from i to j.
 
     Source: Z16 Eq. (B.7), after Hertz (1882).
     """

@@ -1,4 +1,4 @@
-"""What laws of contact between overlapping spheres share: the geometry of the overlap, and a contract.
+"""The common base of contact laws between overlapping spheres: the geometry of the overlap, and a contract.
 
 Two spheres touch when d <= R_i + R_j. Their surfaces meet in a circle of radius a (Z16 B.1-B.6):
 
@@ -8,11 +8,11 @@ Two spheres touch when d <= R_i + R_j. Their surfaces meet in a circle of radius
     A = pi a^2,  a^2 = R_i^2 - L_i^2            contact area (B.5)
       = (2 R_i + 2 R_j - delta) delta (d^2 - (R_i - R_j)^2) / (4 d^2)
 
-The last form is the same without its cancellation at light contact. A sphere inside another meets it in no
-circle; its area, and with it every force here, is zero.
+The last form avoids the cancellation of the first at light contact. A sphere inside another has no contact
+circle; its area, and every force here, is zero.
 
-The point of contact is the centre of the circle, for both. So L_i + L_j = d, the torques L_i n x F and
-L_j n x F of a force F and its reaction balance the moment of the two, and angular momentum is conserved.
+The point of contact is the centre of the circle, for both spheres. So L_i + L_j = d, the torques L_i n x F
+and L_j n x F of a force F and its reaction balance the moment of the two, and angular momentum is conserved.
 (With the radii in place of L it would not be: they add up to more than d.)
 """
 
@@ -41,13 +41,13 @@ def overlap(s, w, i, j, distance):
 
 @ti.func
 def strain(s, w, i, j, distance):
-    """Return the overlap strain E of two that touch."""
+    """Return the overlap strain E of two touching spheres."""
     return overlap(s, w, i, j, distance) / (s.radius[w, i] + s.radius[w, j])
 
 
 @ti.func
 def area(s, w, i, j, distance):
-    """Return the contact area A (m^2) of two that touch."""
+    """Return the contact area A (m^2) of two touching spheres."""
     delta, step = overlap(s, w, i, j, distance), s.radius[w, i] - s.radius[w, j]
     around = (distance + s.radius[w, i] + s.radius[w, j]) * delta
     apart = ti.max(distance * distance - step * step, 0.0)
@@ -63,8 +63,8 @@ def arm(s, w, i, j, distance):
 
 @ti.func
 def slip(s, w, i, j, separation, distance):
-    """Return the velocity (m/s) of the surface of j past that of i at their point of contact, spin included
-    (7.9, 7.14)."""
+    """Return the velocity (m/s) of the surface of j relative to the surface of i at the point of contact,
+    spin included (7.9, 7.14)."""
     n = separation / distance
     turn = arm(s, w, i, j, distance) * s.spin[w, i] + arm(s, w, j, i, distance) * s.spin[w, j]
     past = s.relative_velocity(w, i, j, separation) - turn.cross(n)
@@ -72,21 +72,20 @@ def slip(s, w, i, j, separation, distance):
 
 
 class NormalContact(PairForce):
-    """This is the contract of a law by which spheres that touch push each other apart along the line of
-    centres."""
+    """This is the contract of a law by which touching spheres repel each other along the line of centres."""
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
     # Contacts begin and end.
     kinked: ClassVar[bool] = True
     solid: ClassVar[bool] = True
-    # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
+    # This step control limits the approach of surfaces, but ignores the stiffness of contacts.
     incompatible_controls = ("approach_time",)
     fields = ("radius",)
 
     def push(self, radius: float, overlap: np.ndarray) -> np.ndarray:
-        """Return the force (N) with which two equal spheres of a radius (m) push each other apart, at an
-        array of overlaps (m); infinite where a law does not say it."""
+        """Return the repulsive force (N) of two equal spheres of a radius (m) at an array of overlaps (m);
+        infinite if a law does not define it."""
         return np.full_like(overlap, math.inf)
 
     def critical_step(
@@ -103,7 +102,7 @@ class NormalContact(PairForce):
 
     @ti.func
     def compression(self, s, w, i, j, distance):
-        """Return the force (N, >= 0) with which two spheres that touch push each other apart."""
+        """Return the repulsive force (N, >= 0) of two touching spheres."""
         return 0.0 * distance
 
     @ti.func

@@ -19,36 +19,38 @@ from tisim.numerics.vectors import piece
 
 @ti.func
 def swung(rate, normal, tilt, turn):
-    """Return a rate across the line of centres midway in a step as the bond carries it to the end: by half of
-    its turn (see ``carried``), which is by arctan(turn) about the normal."""
+    """Return a rate across the line of centres midway in a step, rotated with the bond to the end of the
+    step: by half of its rotation (see ``carried``), which is arctan(turn) about the normal."""
     known = rate - rate.dot(normal) * (normal + tilt)
     return (known + turn * normal.cross(known)) / ti.sqrt(1.0 + turn * turn)
 
 
 @ti.func
 def reduced(one, other):
-    """Return the reduced mass (kg) of two, or moment of inertia (kg m^2)."""
+    """Return the reduced mass (kg), or moment of inertia (kg m^2), of two bodies."""
     return one * (other / (one + other))
 
 
 class ParallelBond(PairForce):
-    """Grains that are near each other at the start are cemented: a bond carries forces and moments, and
-    breaks.
+    """Grains that are close to each other at the start are cemented by bonds, which carry forces and moments
+    and break.
 
         F_n = k_n A (d - d_0),    dF_s/dt = k_s A u_s,    dM_n/dt = k_s J Omega_n,    dM_s/dt = k_n I Omega_s
         k_n = E / (R_i + R_j),    k_s = k_n / kappa,    A = pi r^2,    I = pi r^4 / 4,    J = 2 I
         breaks at   F_n / A + |M_s| r / I > sigma_c   or   |F_s| / A + |M_n| r / J > tau_c
 
-    It is a disc of cement of the radius r = lambda min(R_i, R_j), and a chain of them an elastic beam. d_0 is
-    the distance of the centres at the start, u_s the velocity of the surfaces past each other midway between
-    them and Omega the relative spin, n along the line of centres and s across. What is remembered turns with
-    the pair. Beside it may act what pushes grains apart that touch, such as ``granular``.
+    A bond is a disc of cement of radius r = lambda min(R_i, R_j); a chain of bonds is an elastic beam. d_0 is
+    the distance of the centres at the start, u_s the relative velocity of the surfaces midway between them,
+    and Omega the relative spin; the index n stands for along the line of centres, s for across it. The stored
+    force and moment rotate with the pair. A law that pushes touching grains apart, such as ``granular``, may
+    act in addition.
 
-    Damping goes by the masses behind both grains: that of a rigid body, and what is held is like a wall. In
-    steps beyond k dt^2 + 2 c dt = 4 m, with the stiffness k, the damping c and the reduced mass m of any of
-    the four springs, a pair would alternate and grow: the force is then not a number, and the world stops.
-    For shear 1/m is 1/m_i + 1/m_j + l_i^2/I_i + l_j^2/I_j with the arms l and moments of inertia I, as grains
-    that are sheared turn too. In rows energy grows in shorter steps, in a long one from 0.71 of that on.
+    Damping uses the effective masses of both grains: in a rigid body the mass of the body; a held body counts
+    as a wall. In steps beyond k dt^2 + 2 c dt = 4 m, with the stiffness k, damping c and reduced mass m of
+    any of the four springs, the motion of a pair would oscillate and grow: the force is then not a number,
+    and the world stops. For shear 1/m is 1/m_i + 1/m_j + l_i^2/I_i + l_j^2/I_j with the arms l and moments of
+    inertia I, as sheared grains also rotate. In rows energy grows at shorter steps already, in a long row
+    from 0.71 of this limit.
 
     Source: D. O. Potyondy and P. A. Cundall, Int. J. Rock Mech. Min. Sci. 41 (2004) 1329, Eqs (9)-(15).
     """
@@ -60,19 +62,19 @@ class ParallelBond(PairForce):
     smooth: ClassVar[bool] = False
     leapfrog: ClassVar[bool] = True
     guards_steps: ClassVar[bool] = True
-    # Its steps know nothing of how stiff bonds are.
+    # This step control ignores the stiffness of bonds.
     incompatible_controls = ("approach_time",)
     memory: ClassVar[int] = 8
 
-    gap: float = parameter("m", "widest gap between surfaces over which bonds form at the start", 0.0)
+    gap: float = parameter("m", "widest gap between surfaces at which bonds form at the start", 0.0)
     young: float = parameter("Pa", "Young's modulus E of the cement", examples=[1e9], gt=0)
     stiffness_ratio: float = parameter("", "normal over shear stiffness, kappa", 2.5, gt=0)
     radius_ratio: float = parameter(
-        "", "radius of the cement over that of the smaller grain, lambda", 1.0, gt=0
+        "", "radius of the cement over the radius of the smaller grain, lambda", 1.0, gt=0
     )
-    tensile_strength: float = parameter("Pa", "strength sigma_c", examples=[1e7], gt=0)
-    shear_strength: float = parameter("Pa", "strength tau_c", examples=[1e7], gt=0)
-    damping_ratio: float = parameter("", "damping of each spring over the critical one", 0.0, ge=0)
+    tensile_strength: float = parameter("Pa", "tensile strength sigma_c", examples=[1e7], gt=0)
+    shear_strength: float = parameter("Pa", "shear strength tau_c", examples=[1e7], gt=0)
+    damping_ratio: float = parameter("", "damping of each spring over its critical damping", 0.0, ge=0)
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
@@ -80,7 +82,7 @@ class ParallelBond(PairForce):
         shortest = math.inf
         for _, mass, radius in smallest_grains(start):
             stiffness = self.young / (2 * radius) * math.pi * (self.radius_ratio * radius) ** 2
-            # Grains that are sheared turn too.
+            # Sheared grains also rotate.
             stiffest = stiffness * max(1.0, SLIDING / self.stiffness_ratio)
             shortest = min(shortest, critical_step(stiffest, 0.5 * mass))
         return shortest
@@ -90,7 +92,7 @@ class ParallelBond(PairForce):
 
     @ti.func
     def reach(self, s, w, i):
-        # What is stretched so far has broken.
+        # A bond that is stretched further than this has broken.
         strain = self.tensile_strength(w) / self.young(w)
         return ti.max(self.gap(w), 0.0) + 2.0 * strain * s.radius[w, i]
 
@@ -101,7 +103,7 @@ class ParallelBond(PairForce):
         arm = 0.5 * (a - b + distance)
         back = distance - arm
         passing = s.relative_velocity(w, i, j, separation)
-        # Velocities are those midway in the step, where the centres were apart by this.
+        # Velocities are midway in the step, at which the distance vector of the centres is this.
         half = separation - 0.5 * dt * passing
         apart = half.norm()
         middle = half / apart
@@ -133,7 +135,7 @@ class ParallelBond(PairForce):
         m, n, free = s.masses_behind(w, i, j)
         inertia, other = 0.4 * m * a * a, 0.4 * n * b * b
         mass, turning = reduced(m, n), reduced(inertia, other)
-        # Surfaces that are sheared push and turn both grains.
+        # A shear force moves and rotates both grains.
         sheared = 1.0 / mass + arm * arm / inertia + back * back / other
         twice = 2.0 * self.damping_ratio(w)
         along, across = twice * ti.sqrt(stiff * area * mass), twice * ti.sqrt(soft * area * mass)
@@ -141,11 +143,11 @@ class ParallelBond(PairForce):
         twisted = twice * ti.sqrt(2.0 * soft * second * turning)
         force = (pull + along * opening) * normal + shear + across * sliding
         couple = moment + bent * bending + (twist + twisted * twisting) * normal
-        # In a longer step what is stretched, sheared, bent or twisted would alternate and grow.
+        # In a longer step stretching, shear, bending or twisting would oscillate and grow.
         follows = can_follow(least_mass(stiff * area, along, dt), free / mass)
         follows = follows & can_follow(least_mass(2.0 * soft * second, twisted, dt), free / turning)
         shears, bends = least_mass(soft * area, across, dt), least_mass(stiff * second, bent, dt)
-        # Of unlike grains what is sheared bends too.
+        # Between unlike grains shear and bending are coupled.
         coupled = free * (arm / inertia - back / other)
         follows = follows & can_follow_both(shears, bends, free * sheared, free / turning, coupled)
         force = ti.select(follows, force, ti.math.nan)

@@ -21,23 +21,23 @@ class ContactLaw(Effect):
 
     @ti.func
     def softened(self, s, w, i, stiffness):
-        """Return the stiffness (N/m^2) of grain i as it is now, given that of the material."""
+        """Return the stiffness (N/m^2) of grain i as it is now, given the stiffness of the material."""
         return stiffness
 
 
 class Contact(NormalContact):
-    """Soft spheres that overlap push each other apart by a power of their overlap strain.
+    """Soft spheres that overlap repel each other by a power of their overlap strain.
 
         F_i = -K_ij E^p A n_ij
 
-    E is the overlap strain, A the contact area, n_ij the unit vector from i to j, and K_ij the mean of the
-    stiffnesses that the two grains have (7.20).
+    E is the overlap strain, A the contact area, n_ij the unit vector from i to j, and K_ij the mean stiffness
+    of the two grains (7.20).
 
     Source: Z16 Eqs (7.3)-(7.7), (B.5).
     """
 
     stiffness: float = parameter("N/m^2", "stiffness K of the material", examples=[1e6], gt=0)
-    exponent: Exponent = option("exponent p of the overlap strain; whole ones are fastest", 2, gt=0)
+    exponent: Exponent = option("exponent p of the overlap strain; whole numbers are fastest", 2, gt=0)
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {"laws": peers.of(ContactLaw)}

@@ -11,12 +11,12 @@ from tisim.numerics import elementary
 
 
 class ContactSoftening(ContactLaw):
-    """The stiffness of contact falls with the temperature of a grain.
+    """The contact stiffness of a grain decreases with its temperature.
 
         K_i = max(K_0 exp(-a (T_i / T* - 1)), K_lim)
 
-    K_0 is the stiffness that ``contact`` gives. Below T* a grain is stiffer. Section 9 of the
-    paper prints the exponent as (a T/T* - 1), the same only for its a = 1.
+    K_0 is the stiffness that ``contact`` gives. Below T* a grain is stiffer. Section 9 of the paper prints
+    the exponent as (a T/T* - 1), the same only for its a = 1.
 
     Source: Z16 Eqs (7.18)-(7.20).
     """
@@ -28,7 +28,7 @@ class ContactSoftening(ContactLaw):
     reference_temperature: float = parameter(
         "K", "reference temperature T*, at which the stiffness is K_0", examples=[300.0], gt=0
     )
-    floor: float = parameter("N/m^2", "least stiffness K_lim", 0.0, ge=0)
+    floor: float = parameter("N/m^2", "lower limit K_lim of the stiffness", 0.0, ge=0)
 
     @ti.func
     def softened(self, s, w, i, stiffness):

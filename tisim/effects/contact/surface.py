@@ -1,4 +1,4 @@
-"""What forces at the surfaces of touching spheres share: they turn both."""
+"""The common base of forces at the surfaces of touching spheres, which exert torques on both."""
 
 from typing import ClassVar
 
@@ -8,7 +8,8 @@ from tisim.effects.contact.normal import NormalContact, arm
 
 
 class SurfaceContact(PairForce):
-    """This is the contract of a force at the point of contact of touching spheres, which turns both."""
+    """This is the contract of a force at the point of contact of touching spheres, which exerts torques on
+    both."""
 
     contract: ClassVar[bool] = True
     kinked: ClassVar[bool] = True
@@ -20,7 +21,7 @@ class SurfaceContact(PairForce):
 
     @ti.func
     def surface_force(self, s, w, i, j, separation, distance):
-        """Return the force (N) on i by j, which touch."""
+        """Return the force (N) on i by j; both touch."""
         return 0.0 * separation
 
     @ti.func
@@ -28,7 +29,7 @@ class SurfaceContact(PairForce):
         force, turn, back = 0.0 * separation, 0.0 * separation, 0.0 * separation
         if distance <= s.radius[w, i] + s.radius[w, j]:
             force = self.surface_force(s, w, i, j, separation, distance)
-            # n x F is the same seen from either: both turn round at once.
+            # n x F has the same value for both spheres.
             couple = separation.cross(force) / distance
             turn = arm(s, w, i, j, distance) * couple
             back = arm(s, w, j, i, distance) * couple

@@ -1,11 +1,11 @@
 """Drag of a surrounding fluid on spheres (Z16 Eqs 3.6, 4.13 and section 4.2).
 
-All are F = g u with u = v_f - v, the velocity of the fluid as the sphere sees it: v_f is the sum of all
-sources of a flow velocity, zero without any. The fluid does not feel the spheres.
+All laws have the form F = g u with u = v_f - v, the velocity of the fluid relative to the sphere: v_f is the
+sum of all sources of a flow velocity, zero without any. The spheres exert no force on the fluid.
 
 The law of Chow (``ChowDrag``) jumps at 3e5 from 0.5 to 0.080, as Z16 says, and also a little at 400 (0.5003
-to 0.5) and 2e6 (0.1808 to 0.18). That of Schiller and Naumann jumps at 1000, from 0.4383 to 0.44. Z16 prints
-the unit of viscosity as Pa/s; it is Pa s.
+to 0.5) and 2e6 (0.1808 to 0.18). The law of Schiller and Naumann jumps at 1000, from 0.4383 to 0.44. Z16
+prints the unit of viscosity as Pa/s; it is Pa s.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from tisim.sources.base import Source, sources
 from tisim.state.bound import Peers
 
 LEAST_SPEED = 1e-30
-"""This speed, in m/s, stands for zero where a direction is needed that then has no effect."""
+"""Lower bound of the speed, in m/s, in divisions that give a direction; below it the direction has no
+effect."""
 
 
 class Drag(Force):
@@ -37,7 +38,8 @@ class Drag(Force):
         return {"flow": sources(peers, "flow_velocity")}
 
     def resistance_of(self, radius: np.ndarray, speed: float) -> np.ndarray:
-        """Return a bound of g (N s/m) of spheres of some radii (m) up to a speed (m/s) past the fluid."""
+        """Return an upper bound of g (N s/m) of spheres of some radii (m) up to a speed (m/s) relative to the
+        fluid."""
         raise NotImplementedError(f"{type(self).__name__} must define resistance_of")
 
     def critical_step(
@@ -55,13 +57,12 @@ class Drag(Force):
         return 2 / fastest if fastest > 0 else math.inf
 
     def part_of_critical_step(self, accuracy: float) -> float:
-        # Verlet takes the drag of half a step ago, which is an error of dt g / (2 m).
+        # Verlet uses the drag of half a step ago, which is an error of dt g / (2 m).
         return min(accuracy, super().part_of_critical_step(accuracy))
 
     @ti.func
     def resistance(self, s, w, i, speed):
-        """Return g (N s/m) at this |u| (m/s), and the power of |u| that it goes with there, d ln g / d ln
-        |u|."""
+        """Return g (N s/m) at this |u| (m/s), and its local exponent d ln g / d ln |u|."""
         return 0.0 * speed, 0.0 * speed
 
     @ti.func
@@ -80,7 +81,7 @@ class Drag(Force):
 
     @ti.func
     def velocity_jacobian(self, s, w, i, t):
-        """Return dF/dv = -g (I + p u u^T / u^2) for g that goes with |u|^p, in N s/m."""
+        """Return dF/dv = -g (I + p u u^T / u^2) for g proportional to |u|^p, in N s/m."""
         u = self.approach(s, w, i, t)
         speed = u.norm()
         g, power = self.resistance(s, w, i, speed)
@@ -126,14 +127,14 @@ class ChowDrag(Drag):
     Source: Z16 section 4.2, after Chow (1979).
     """
 
-    # Its coefficient jumps.
+    # The drag coefficient jumps.
     kinked: ClassVar[bool] = True
 
     density: float = parameter("kg/m^3", "density rho_a of the fluid", examples=[1.2], gt=0)
     viscosity: float = parameter("Pa s", "dynamic viscosity mu of the fluid", examples=[1.8e-5], gt=0)
 
     def resistance_of(self, radius: np.ndarray, speed: float) -> np.ndarray:
-        # C_D is nowhere above the sum of those of Stokes and of Newton, with 1 for the coefficient.
+        # C_D is nowhere above the sum of Stokes's and Newton's coefficients, with 1 for Newton's.
         return np.pi * radius * (6 * self.viscosity + 0.5 * self.density * radius * speed)
 
     @ti.func
@@ -155,8 +156,7 @@ class ChowDrag(Drag):
 
 
 class SchillerNaumannDrag(Drag):
-    """A fluid drags spheres by Stokes's law, with the correction of Schiller and Naumann for larger Reynolds
-    numbers.
+    """A fluid drags spheres by Stokes's law, corrected for larger Reynolds numbers by Schiller and Naumann.
 
         F = 1/2 rho_f C_D(Re) |u| u pi R^2,    u = v_f - v,    Re = 2 R rho_f |u| / mu
 
@@ -164,14 +164,15 @@ class SchillerNaumannDrag(Drag):
               0.44                           1000 < Re
 
     v_f is the sum of all sources of a flow velocity, zero without any. At Re = 1000 the coefficient jumps by
-    0.4 %, from 0.4383 to 0.44. It is good to some 5 % up to there, and 0.44 is that of Newton's regime, up to
-    where the boundary layer becomes turbulent, near Re = 2e5: beyond it this law knows no drop of the drag.
-    It is that of a sphere alone: neighbours neither hinder nor shelter it.
+    0.4 %, from 0.4383 to 0.44. The law is accurate to some 5 % up to Re = 1000. The value 0.44 is the
+    coefficient of Newton's regime, which ends near Re = 2e5, when the boundary layer becomes turbulent; the
+    law does not describe the drop of the drag beyond. It holds for an isolated sphere: neighbours neither
+    hinder nor shelter it.
 
     Source: L. Schiller, A. Naumann, Zeitschrift des VDI 77 (1933) 318.
     """
 
-    # Its coefficient jumps.
+    # The drag coefficient jumps.
     kinked: ClassVar[bool] = True
 
     density: float = parameter("kg/m^3", "density rho_f of the fluid", examples=[1000.0], gt=0)

@@ -15,15 +15,14 @@ from tisim.state.bound import Peers
 
 
 class Lorentz(Force):
-    """Electric and magnetic fields push charged particles by the Lorentz force.
+    """Electric and magnetic fields act on charged particles by the Lorentz force.
 
         F = q (E + v x B)
 
-    E and B are the sums of all sources of each. The charges, a field of the particles (C), do not act on each
-    other here: that is ``near_field``. Fields that moving particles make are left out (Z16 section 7.7: far
-    below the speed of light). Without ``magnetic`` only the electric force is left, as for a charge at rest:
-    in a scene whose magnetic field is there for other effects, and turns no velocity in the time of a run
-    (q B t/m << 1).
+    E and B are the sums of all sources of each. The charge is a field of the particles (C). The force between
+    charges is in ``near_field``. The fields of moving particles are neglected (Z16 section 7.7: far below the
+    speed of light). Without ``magnetic`` only the electric force acts, as on a charge at rest. Use this in a
+    scene whose magnetic field serves other effects and rotates no velocity during a run (q B t/m << 1).
 
     Source: Z13 Eqs (1)-(5).
     """

@@ -1,4 +1,4 @@
-"""A binder that holds each particle at the place where it began (Z13 Eqs 11 and 34)."""
+"""A binder that ties each particle to its initial position (Z13 Eqs 11 and 34)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ from tisim.state.fields import Field
 
 
 class Tether(Force):
-    """A binder holds each particle at the place where it began, by a spring along each axis.
+    """A binder ties each particle to its initial position by a spring along each axis.
 
-        F = -k (r - r(0)),    each component by itself
+        F = -k (r - r(0)),    each component separately
 
-    r(0) is the field ``anchor`` (m): the position at the start, or what the start gives for it. In a box with
-    joined faces the distance is still that of open space: a particle that leaves through a face is pulled
-    back across the box, so tethered particles must stay clear of the faces. The
-    minus sign is missing in (34) as printed; (11) has it.
+    r(0) is the field ``anchor`` (m): by default the position at the start. In a box with joined faces the
+    distance is not wrapped: a particle that leaves through a face is pulled back across the box, so tethered
+    particles must stay clear of the faces. The minus sign is missing in (34) as printed; (11) has it.
 
     Source: Z13 Eqs (11), (34).
     """

@@ -1,4 +1,5 @@
-"""Moments of the mass in the cells of a tree: of leaves by their particles, of others by the cells within."""
+"""Mass moments of the cells of a tree: leaves from their particles, other cells from the cells within
+them."""
 
 from __future__ import annotations
 
@@ -17,12 +18,14 @@ from tisim.state.bound import Bound
 
 @ti.data_oriented
 class CellMoments:
-    """Cell moments are mass, centre of mass and second moments about it of each cell, each mass times G.
+    """Cell moments are total mass, centre of mass and second moments about it of each cell, each mass times
+    G.
 
-    strength : G m of the particle in a place, m^3/s^2. total : G M of a cell. centre : r_c, m. diagonal,
-    mixed : sum G m x x^T, with x = r - r_c, as (xx, yy, zz) and (yz, zx, xy), m^5/s^2. extent : how far from
-    r_c a particle of the cell may be, m; the least of two bounds. opens_within : the square of the distance
-    from r_c within which a cell is opened, (extent / theta)^2, m^2. level : the next one to be made.
+    strength : G m of the particle at each position in the order, m^3/s^2. total : G M of a cell. centre :
+    r_c, m. diagonal, mixed : sum G m x x^T, with x = r - r_c, as (xx, yy, zz) and (yz, zx, xy), m^5/s^2.
+    extent : largest distance from r_c of a particle of the cell, the smaller of two upper bounds, m.
+    opens_within : the square of the distance from r_c within which a cell is opened, (extent / theta)^2, m^2.
+    level : the next level to be computed.
     """
 
     def __init__(self, tree: CellTree, effect: Bound[Any]) -> None:
@@ -42,7 +45,7 @@ class CellMoments:
         return sum(tree.bytes for tree in self.trees)
 
     def phases(self) -> tuple[Item, ...]:
-        """Return the items that make the moments, after those of the tree."""
+        """Return the items that compute the moments, after the items of the tree."""
         return PutStrengths(self.t, self), LeafMoments(self), EachLevel(self)
 
     @ti.func
@@ -63,7 +66,7 @@ def second_moments(x):
 
 
 class PutStrengths(OfTree):
-    """This phase puts G m of the particles in the order of the tree."""
+    """This phase stores G m of the particles in the order of the tree."""
 
     def __init__(self, tree: CellTree, moments: CellMoments) -> None:
         super().__init__(tree)
@@ -75,8 +78,8 @@ class PutStrengths(OfTree):
 
 
 class Gather(Phase):
-    """This phase makes box and moments of cells of what they hold: members that have a box, a centre, G m,
-    second moments about it, and an extent around it."""
+    """This phase computes box and moments of cells from their members, which have a box, a centre, G m,
+    second moments about the centre, and an extent around it."""
 
     def __init__(self, moments: CellMoments, extent: int) -> None:
         self.m, self.t, self.s, self.extent = moments, moments.t, moments.s, extent
@@ -98,9 +101,9 @@ class Gather(Phase):
 
     @ti.func
     def gather(self, w, cell, begin, end):
-        """Set box and moments of a cell by its members, ``begin`` to ``end``."""
+        """Set box and moments of a cell from its members, ``begin`` to ``end``."""
         low, high = self.box(w, begin)
-        # About the first one: so it is exact where all are in one place.
+        # Relative to the first member, so that the result is exact if all are in one place.
         first, _part = self.middle(w, begin)
         shift, total = ti.Vector.zero(self.s.real, 3), ti.cast(0.0, self.s.real)
         for c in range(begin, end):
@@ -124,7 +127,7 @@ class Gather(Phase):
 
 
 class LeafMoments(OnOccasion, Gather):
-    """This phase makes box and moments of each leaf, of its particles."""
+    """This phase computes box and moments of each leaf from its particles."""
 
     def __init__(self, moments: CellMoments) -> None:
         super().__init__(moments, moments.t.leaves)
@@ -154,7 +157,7 @@ class LeafMoments(OnOccasion, Gather):
 
 
 class EachLevel(Repeat):
-    """This item makes the moments of one level after the other."""
+    """This item computes the moments level by level."""
 
     def __init__(self, moments: CellMoments) -> None:
         super().__init__((LevelMoments(moments), EndLevel(moments)))
@@ -166,7 +169,7 @@ class EachLevel(Repeat):
 
 
 class LevelMoments(Gather):
-    """This phase makes box and moments of each cell of a level, of the cells that it has of the one below."""
+    """This phase computes box and moments of each cell of a level from its cells of the level below."""
 
     def __init__(self, moments: CellMoments) -> None:
         super().__init__(moments, -(-moments.t.leaves // FAN))
@@ -183,7 +186,7 @@ class LevelMoments(Gather):
 
 
 class EndLevel(Phase):
-    """After this phase it is the turn of the next level."""
+    """This phase advances to the next level."""
 
     def __init__(self, moments: CellMoments) -> None:
         self.m = moments

@@ -1,9 +1,9 @@
-"""A tree of cells over particles, built anew from where they are: in parallel, and the same bits always.
+"""A tree of cells over particles, rebuilt from their positions in parallel and bitwise reproducible.
 
-Particles are sorted along Hilbert's curve and cut into leaves of the same number. So many leaves that follow
-each other are a cell of the next level, and so on up to one cell that has all. The tree needs no pointers:
-what is where follows from the number of particles alone, and each cell has a box of its own around what is in
-it.
+Particles are sorted along Hilbert's curve and divided into leaves of a fixed number of particles. A fixed
+number of successive leaves form a cell of the next level, and so on up to one cell that contains all
+particles. The tree needs no pointers: the indices of all cells follow from the number of particles alone.
+Each cell has a bounding box around its particles.
 """
 
 from typing import Any
@@ -18,20 +18,21 @@ from tisim.program.radix_sort import RadixSort
 from tisim.state.state import State
 
 LEAF = 16
-"""A leaf has so many particles; the last one of a world may have fewer."""
+"""Number of particles in a leaf; the last one of a world may have fewer."""
 FAN = 4
-"""A cell has so many cells of the level below; the last one of a level may have fewer."""
+"""Number of cells of the level below in a cell; the last one of a level may have fewer."""
 BOX_BLOCK = 512
-"""One task looks for the box around so many particles."""
+"""Number of particles whose bounding box is found in one task."""
 
 
 @ti.data_oriented
 class CellTree:
-    """A cell tree has the particles of each world in order, and its cells level by level.
+    """A cell tree holds the particles of each world in order, and its cells level by level.
 
-    Cell k of level l is ``first(l) + k`` in the columns of cells; level 0 are the leaves. Leaf k has those in
-    places ``LEAF * k`` and on. order : the index of the particle in a place. place : its position, m, by
-    place. low, high : corners of the box around what is in a cell, m. levels : how many a world has.
+    Cell k of level l has the index ``first(l) + k`` in the columns of cells; level 0 are the leaves. Leaf k
+    has the particles from position ``LEAF * k`` of the order on. order : the index of the particle at each
+    position of the order. place : the coordinates of that particle, m. low, high : corners of the bounding
+    box of each cell, m. levels : number of levels of a world.
     """
 
     def __init__(self, s: State) -> None:
@@ -60,13 +61,14 @@ class CellTree:
         return self.tree.bytes + self.sort.bytes()
 
     def phases(self) -> tuple[Item, ...]:
-        """Return the items that put the particles in order, and in places; cells have no boxes yet."""
+        """Return the items that sort the particles and store their positions in order; cells have no boxes
+        yet."""
         sorting = (BeginTree(self), FindBox(self), MakeKeys(self), *self.sort.phases())
         return (*sorting, PutInPlace(self))
 
     @ti.func
     def first(self, level):
-        """Return where the cells of a level begin."""
+        """Return the index of the first cell of a level."""
         first = 0
         for k in ti.static(range(1, self.most_levels)):
             first = ti.select(level == k, self.firsts[k], first)
@@ -74,18 +76,18 @@ class CellTree:
 
     @ti.func
     def leaf_end(self, w, k):
-        """Return the place after the last of leaf k."""
+        """Return the position in the order after the last particle of leaf k."""
         return ti.min((k + 1) * LEAF, self.s.count[w])
 
     @ti.func
     def child_end(self, w, level, k):
-        """Return the cell of the level below that comes after the last in cell k."""
+        """Return the cell of the level below that follows the last one in cell k."""
         return ti.min((k + 1) * FAN, self.population[w, level - 1])
 
     @ti.func
     def next_cell(self, w, level, k):
-        """Return level and number of the cell that follows in the order of the curve when all in cell k is
-        done; the level is that of no cell at the end."""
+        """Return level and number of the cell that follows in the order of the curve after all of cell k; at
+        the end the level is above the last one."""
         up, number = level, k
         while up < self.levels[w] and (number % FAN == FAN - 1 or number == self.population[w, up] - 1):
             number //= FAN
@@ -94,7 +96,7 @@ class CellTree:
 
 
 class OfTree(OnOccasion, PerParticle):
-    """This phase works on each particle of a tree."""
+    """This phase is the base of phases that process each particle of a tree."""
 
     def __init__(self, tree: CellTree) -> None:
         super().__init__(tree.s)
@@ -102,7 +104,7 @@ class OfTree(OnOccasion, PerParticle):
 
 
 class BeginTree(OnOccasion, Phase):
-    """This phase finds how many cells each level has."""
+    """This phase computes the number of cells of each level."""
 
     def __init__(self, tree: CellTree) -> None:
         self.t, self.s = tree, tree.s
@@ -123,7 +125,7 @@ class BeginTree(OnOccasion, Phase):
 
 
 class FindBox(OnOccasion, Phase):
-    """This phase finds the box around all particles, by blocks of them."""
+    """This phase finds the box around all particles, by blocks of particles."""
 
     light = False
 
@@ -146,7 +148,7 @@ class FindBox(OnOccasion, Phase):
 
 
 class MakeKeys(OfTree):
-    """This phase finds where along the curve each particle is, in a cube around all."""
+    """This phase computes the position of each particle along the curve, in a cube around all particles."""
 
     @ti.func
     def run(self, w, i):
@@ -156,13 +158,13 @@ class MakeKeys(OfTree):
         cell = ti.Vector.zero(ti.i32, 3)
         for a in ti.static(range(3)):
             part = (s.position[w, i][a] - t.low_corner[w, a]) / ti.select(side > 0.0, side, 1.0)
-            # In single precision what is not finite must stay within as well.
+            # In single precision values that are not finite must stay within range as well.
             cell[a] = ti.max(0, ti.min(ti.cast(part * (1 << CURVE_BITS), ti.i32), (1 << CURVE_BITS) - 1))
         t.sort.set_key(w, i, hilbert_index(cell))
 
 
 class PutInPlace(OfTree):
-    """This phase puts the positions in the order of the curve."""
+    """This phase stores the positions in the order of the curve."""
 
     @ti.func
     def run(self, w, k):

@@ -1,4 +1,4 @@
-"""Gravity of particles on each other, summed over all pairs (L21 section 4.2.1.3)."""
+"""Gravity between particles, summed over all pairs (L21 section 4.2.1.3)."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from tisim.effects.base import Effect, PairForce
 from tisim.effects.gravitation.tree_gravity import TreeGravity, fall_step
 
 ROOT_G = G**0.5
-"""The square root of the constant of gravitation, N^(1/2) m/kg: m ROOT_G is to it what a charge is to
-Coulomb's law."""
+"""The square root of the gravitational constant, N^(1/2) m/kg: m ROOT_G corresponds to a charge in Coulomb's
+law."""
 OPENING_ANGLES = (0.8, 0.5, 0.3)
-"""These opening angles of a tree are worth a try."""
+"""Opening angles of a tree that are tried as approximations."""
 
 
 class SelfGravity(PairForce):
-    """Particles attract each other by their gravity, over all pairs.
+    """Particles attract each other by gravity, over all pairs.
 
         F_i = G sum_j m_i m_j / d^2 n_ij
 
-    n_ij is the unit vector from i to j, d the distance of the centres, G that of CODATA. Spheres that are the
-    same at all depths attract each other exactly as points of their masses do, as long as they do not
-    overlap; those that overlap are taken as points as well, whose force has no bound as d goes to 0. Grains
-    in contact, which overlap by a small part of their radii, are never near that; for clouds of points
-    without contacts there is ``softened_self_gravity``. In a periodic box only the nearest image of a
-    particle acts, which is no gravity of an infinite medium.
+    n_ij is the unit vector from i to j, d the distance of the centres, and G the CODATA value. Spheres with
+    radially symmetric density attract each other exactly as point masses do, as long as they do not overlap.
+    Overlapping spheres are also treated as points, whose force diverges as d goes to 0. Grains in contact,
+    which overlap by a small part of their radii, never come near this limit; for clouds of points without
+    contacts use ``softened_self_gravity``. In a periodic box only the nearest image of a particle acts, which
+    does not represent the gravity of an infinite medium.
 
     For thousands of particles ``tree_gravity`` is faster.
 
@@ -54,20 +54,21 @@ class SelfGravity(PairForce):
 
     @ti.func
     def attraction(self, s, w, i, j, inverse):
-        """Return the force between i and j over their distance (N/m), given the inverse of that (1/m)."""
-        # Each mass over the distance first: in f32 the product of two of 1e20 kg, or of 1e-20 kg, is none.
+        """Return the force between i and j over their distance (N/m), given the inverse distance (1/m)."""
+        # Divide each mass by the distance first: in f32 products of two masses of 1e20 kg overflow, of 1e-20
+        # kg underflow.
         a, b = ROOT_G * s.mass[w, i] * inverse, ROOT_G * s.mass[w, j] * inverse
         return a * b * inverse
 
 
 class SoftenedSelfGravity(SelfGravity):
-    """Particles attract each other by a gravity that is softened at small distances, over all pairs.
+    """Particles attract each other by gravity that is softened at short distance, over all pairs.
 
         F_i = G sum_j m_i m_j d / (d^2 + eps^2)^(3/2) n_ij
 
-    Each pulls as a Plummer sphere of length eps does: close encounters scatter no more than that, and two in
-    one place do not pull at all. It is for clouds whose particles stand for many bodies each; the gravity of
-    grains with contacts needs no softening. All else is as in ``self_gravity``.
+    Each particle acts as a Plummer sphere of length eps. This limits scattering in close encounters, and two
+    particles at one place exert no force. It is for clouds whose particles represent many bodies each; the
+    gravity of grains with contacts needs no softening. Otherwise it is the same as ``self_gravity``.
 
     Source: H. C. Plummer, Mon. Not. R. Astron. Soc. 71 (1911) 460; S. J. Aarseth, Mon. Not. R. Astron. Soc.
     126 (1963) 223.

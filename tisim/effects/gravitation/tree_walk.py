@@ -1,7 +1,8 @@
-"""The walk through a tree of cells that sums up the gravity of all on the particles of a leaf.
+"""The walk through a tree of cells, which sums the gravity of all particles on the particles of a leaf.
 
-The particles of a leaf meet the same cells, in the same order, so that on a CPU they are lanes of one loop,
-which compilers vectorise; on other devices each is a thread, and neighbours go the same way.
+The particles of a leaf visit the same cells in the same order. On a CPU they are therefore the lanes of one
+loop, which compilers vectorise. On other devices each particle is a thread, and neighbouring threads take the
+same path.
 """
 
 from typing import Any
@@ -43,10 +44,11 @@ class TreeSum(LongRangeSum):
 
 
 class WalkTree(OnOccasion, Phase):
-    """This phase sums the gravity on the particles of each leaf, or, but on a CPU, on each particle.
+    """This phase sums the gravity on the particles of each leaf, on other devices than CPUs on each particle.
 
-    A cell whose particles are all within ``extent`` of its centre of mass counts as one where the box of the
-    leaf is farther from that than extent / theta; otherwise it is opened, and of a leaf all are summed.
+    All particles of a cell are within ``extent`` of its centre of mass. The cell is used as a whole if the
+    box of the leaf is farther from this centre than extent / theta. Otherwise it is opened, or, if it is a
+    leaf, its particles are summed.
     """
 
     light = False
@@ -72,7 +74,7 @@ class WalkTree(OnOccasion, Phase):
         sums = [ti.Vector([0.0] * self.lanes, real) for _ in ti.static(range(3))]
         number = ti.Vector([float(lane) for lane in range(self.lanes)], real)
         for lane in range(self.lanes):
-            # What lanes without a particle compute, nobody reads.
+            # Results of lanes without a particle are not used.
             r = t.place[w, ti.min(begin + lane, count - 1)]
             for a in ti.static(range(3)):
                 place[a][lane] = r[a]
@@ -99,14 +101,14 @@ class WalkTree(OnOccasion, Phase):
 
     @ti.func
     def far(self, w, c, low, high):
-        """Return whether a cell is so far from a box that its moments stand for it."""
+        """Return whether a cell is far enough from a box to be represented by its moments."""
         centre = self.m.centre[w, c]
         apart = ti.max(ti.max(low - centre, centre - high), 0.0)
         return apart.norm_sqr() > self.m.opens_within[w, c]
 
     @ti.func
     def add_cell(self, w, c, soft, place: ti.template(), sums: ti.template()):  # type: ignore[valid-type]
-        """Add the attraction of a cell, by its mass and second moments Q about its centre.
+        """Add the attraction of a cell, from its mass and second moments Q about its centre.
 
             a = M d / s^3 + (15/2 d.Q.d / s^7 - 3/2 tr Q / s^5) d - 3 Q d / s^5,    s^2 = d^2 + eps^2
 
@@ -119,7 +121,7 @@ class WalkTree(OnOccasion, Phase):
             x, y, z = centre[0] - place[0][lane], centre[1] - place[1][lane], centre[2] - place[2][lane]
             inverse = 1.0 / ti.sqrt(x * x + y * y + z * z + soft * soft)
             square = inverse * inverse
-            # Over the distance at once: in f32 its seventh power may be none.
+            # Divided by the distance at once: in f32 its seventh power may underflow.
             x, y, z = inverse * x, inverse * y, inverse * z
             qx, qy, qz = (
                 q[0] * x + p[2] * y + p[1] * z,
@@ -155,7 +157,7 @@ class WalkTree(OnOccasion, Phase):
         number: ti.template(),  # type: ignore[valid-type]
         sums: ti.template(),  # type: ignore[valid-type]
     ):
-        """Add the attraction of each particle of the leaf itself, but of none on itself."""
+        """Add the attraction between the particles of the leaf itself, without self-attraction."""
         leaf = begin // LEAF
         for j in range(leaf * LEAF, self.t.leaf_end(w, leaf)):
             strength, other, itself = (

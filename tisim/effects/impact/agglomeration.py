@@ -11,13 +11,12 @@ from tisim.numerics import elementary
 
 
 class Agglomeration(ImpactLaw):
-    """Two grains that bond in an impact merge into one sphere, which conserves mass, momentum, volume and
-    heat.
+    """Two grains that bond in an impact merge into one sphere and conserve mass, momentum, volume and heat.
 
         b = (b_i^3 + b_j^3)^(1/3),    at the centre of mass of the two
 
-    Each quantity of a particle follows its own rule (tisim.state.fields.Field.merge): sums add, means are
-    weighted by mass, the radius b follows from the volume.
+    Each quantity of a particle follows its own rule (tisim.state.fields.Field.merge): sums are added, means
+    are weighted by mass, the radius b follows from the volume.
 
     Source: Z04 remark 2.1.
     """

@@ -11,11 +11,11 @@ from tisim.effects.impact.law import ImpactLaw
 
 
 class Friction(ImpactLaw):
-    """Coulomb friction slows the slip of two grains in an impact, or stops it.
+    """Coulomb friction reduces the slip of two grains in an impact, or stops it.
 
-        tangential impulse = min(mu |I_n| dtau, what stops the slip)
+        tangential impulse = min(mu |I_n| dtau, impulse that stops the slip)
 
-    |I_n| dtau is the normal impulse. Grains do not rotate (Z04 section 2). Z04 prints no bound at sticking,
+    |I_n| dtau is the normal impulse. Grains do not rotate (Z04 section 2). Z04 gives no bound for sticking,
     without which friction could reverse the slip.
 
     Source: Z04 Eq. (4.17).

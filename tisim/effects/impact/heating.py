@@ -12,7 +12,7 @@ from tisim.state.fields import Field
 
 
 class Heating(ImpactLaw):
-    """Each grain has a uniform temperature, and the energy that it receives in impacts warms it.
+    """The energy that a grain receives in impacts raises its temperature, which is uniform in the grain.
 
         dT = dE / (m C)
 
@@ -37,9 +37,10 @@ class DeformationWork(ImpactLaw):
         dW = m_ij v_n^2 (1 - e^2) / 3
 
     With the linear force and velocity histories of (4.4)-(4.6), the integral (4.7)-(4.9) of |I_n| over the
-    relative approach is I* v_n (dtau_1 - e dtau_2) / 6, I* = 2 |I_n|. It is two thirds of the kinetic energy
-    lost, which (6.10) also counts, and both grains receive it: an energy source of the paper's model, kept
-    in the books as ``deformation_work``. A scene without this effect conserves energy without it.
+    relative approach is I* v_n (dtau_1 - e dtau_2) / 6, I* = 2 |I_n|. It is two thirds of the lost kinetic
+    energy, which (6.10) also counts, and both grains receive it. The model of the paper therefore creates
+    energy. This energy is recorded as ``deformation_work``. A scene without this effect conserves energy
+    without the record.
 
     Source: Z04 Eqs (4.7)-(4.9), (6.10).
     """

@@ -8,27 +8,28 @@ Along the line of centres, with momentum conserved and restitution e (Z04 Eqs 2.
     a = (a_0 + (a_f - a_0)(1 - e)) pi min(b)^2      the contact area                        (4.12)
     e = max(1 - |I_n| / (2 a min(H_i, H_j)), 0)                                             (3.1)
 
-The paper iterates (3.1) from e = 0. With its own a_0 = 0, a_f = 1 that map is x -> p/x for x = 1 - e, which
-oscillates for ever. But with H given, (3.1) with (4.12) is a quadratic in x,
+The paper iterates (3.1) from e = 0. With its own a_0 = 0, a_f = 1 this map is x -> p/x for x = 1 - e, which
+oscillates for ever. For a given H, however, (3.1) with (4.12) is a quadratic equation in x,
 
     (a_f - a_0) x^2 + a_0 x = p,   p = |I_n| / (2 pi min(b)^2 min(H)),
 
 so x is solved for exactly, and only the coupling to temperature is iterated: heat depends on e, hardness on
-temperature. More bonding heats more and softens more, so that map rises with x and, started from e = 0 as
-in the paper, falls monotonically to its largest fixed point: it cannot flip between bond and rebound.
-Friction can make heat fall slightly with x; iterations are therefore bounded, and counted when the bound
-is met. x >= 1 means that the pair bonds.
+temperature. A larger x gives more heat and lower hardness, so the map increases with x. Started from e = 0 as
+in the paper, it decreases monotonically to its largest fixed point and cannot alternate between bond and
+rebound. With friction heat may decrease slightly with x; the number of iterations is therefore limited, and
+impacts that reach the limit are counted. x >= 1 means that the pair bonds.
 
-Kinetic energies lost are those in the frame of the pair's centre of mass. The paper writes each particle's
-own 1/2 m v^2 (5.1, 6.10), whose split between the two depends on who is watching and can cool a grain below
-absolute zero; the sum, which is what heat and energy books need, is the same.
+Lost kinetic energies refer to the frame of the pair's centre of mass. The paper uses 1/2 m v^2 of each
+particle (5.1, 6.10). The division of this energy between the two depends on the frame of reference and can
+cool a grain below absolute zero; the sum, which enters the balances of heat and energy, is the same.
 
-A pair at rest relative to each other is in contact, not colliding. So what bonds leaves with one velocity, to
-the last bit, and an approach is one only above what rounding makes of rest. With u the unit roundoff, each
-velocity is known to u of itself, their difference is rounded once, and a product of three components thrice
-(N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. 2002, Eq. 3.5): together that is
-5 u (|v_i| + |v_j|) . |r_ij|, by components. Closer than the rounding of its own way no such pair comes.
-Nor is it a collision when forces press a pair that is in contact already: see resting.py.
+A pair at relative rest is in contact, not colliding. Bonded grains therefore leave with exactly the same
+velocity, and an approach must exceed the rounding error of a pair at rest. With u the unit roundoff, each
+velocity is known to a relative accuracy of u, their difference is rounded once, and a product of three
+components three times (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. 2002, Eq. 3.5):
+together this is 5 u (|v_i| + |v_j|) . |r_ij|, by components. A pair that is ignored for this reason
+approaches by less than the rounding of its path. A pair in contact that forces press together does not
+collide either: see resting.py.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from tisim.state.bound import Peers
 
 
 class Impact(PairEvent):
-    """Spheres collide with a restitution that depends on pressure; they bond when it reaches twice their
+    """Spheres collide with a restitution that depends on pressure; they bond if it reaches twice their
     hardness.
 
         e = max(1 - |I_n| / (2 a min(H_i, H_j)), 0)                   restitution            (3.1)
@@ -67,19 +68,22 @@ class Impact(PairEvent):
     forced: ClassVar[bool] = False
 
     hardness: float = parameter(
-        "Pa", "Vickers hardness H_0 of the grains; with softening, at high temperature", examples=[3e5], gt=0
+        "Pa",
+        "Vickers hardness H_0 of the grains; with softening, the limit at high temperature",
+        examples=[3e5],
+        gt=0,
     )
     deformation_length: float = parameter(
         "", "deformation beta in an impact, over the smaller radius", 1.0, gt=0
     )
     initial_area: float = parameter(
-        "", "contact area a_0 of a rebound without loss (e = 1), over pi min(b)^2", 0.0, ge=0
+        "", "contact area a_0 of a lossless rebound (e = 1), over pi min(b)^2", 0.0, ge=0
     )
     final_area: float = parameter("", "contact area a_f of a bond (e = 0), over pi min(b)^2", 1.0, gt=0)
     tolerance: float = parameter(
-        "", "change of e at which the coupling to temperature counts as converged", 1e-9, gt=0
+        "", "change of e at which the coupling to temperature has converged", 1e-9, gt=0
     )
-    max_iterations: int = option("iterations of the coupling to temperature at most", 200, ge=1)
+    max_iterations: int = option("largest number of iterations of the coupling to temperature", 200, ge=1)
 
     @model_validator(mode="after")
     def _areas(self) -> Self:
@@ -98,7 +102,7 @@ class Impact(PairEvent):
 
     @ti.func
     def contact(self, s, w, i, j, separation):
-        """Return the time (s) since the surfaces met: overlap over approach speed; negative unless both are
+        """Return the time (s) since the surfaces met, overlap over approach speed; negative unless both are
         positive."""
         closing = (s.velocity[w, i] - s.velocity[w, j]).dot(separation)
         reach = s.radius[w, i] + s.radius[w, j]
@@ -119,20 +123,20 @@ class Impact(PairEvent):
 
     @ti.func
     def bonding(self, w, pressure, hardness):
-        """Return x = 1 - e from the force over 2 pi min(b)^2 (Pa), by the quadratic above in a form without
-        loss."""
+        """Return x = 1 - e from the force over 2 pi min(b)^2 (Pa), by the quadratic equation above in a form
+        without cancellation."""
         a0, d = self.initial_area(w), self.final_area(w) - self.initial_area(w)
         p = pressure / hardness
         x = 0.0 * p
-        # Not so for a NaN, which must not bond, nor for what is too small to be seen.
+        # False for a NaN, which must not bond, and for values that underflow.
         if p > 0.0:
             x = ti.min(1.0, 2.0 * p / (a0 + ti.sqrt(a0 * a0 + 4.0 * d * p)))
         return x
 
     @ti.func
     def tangential(self, w, reduced, v_n, v_t, x):
-        """Return the tangential impulse (N s): all of the slip when bonded, else what friction gives, never
-        more."""
+        """Return the tangential impulse (N s): it stops the slip if the pair bonds; otherwise it is the
+        friction impulse, never more than stops the slip."""
         stop = reduced * v_t
         impulse = stop
         if x < 1.0:
@@ -143,7 +147,7 @@ class Impact(PairEvent):
 
     @ti.func
     def lost(self, w, reduced, v_n, v_t, x):
-        """Return the kinetic energy (J) lost by the pair."""
+        """Return the kinetic energy (J) that the pair loses."""
         e, slip = 1.0 - x, v_t - self.tangential(w, reduced, v_n, v_t, x) / reduced
         return 0.5 * reduced * ((1.0 - e * e) * v_n * v_n + v_t * v_t - slip * slip)
 

@@ -1,4 +1,5 @@
-"""The contract of what takes part in an impact: what heats, softens, rubs, breaks or bonds grains."""
+"""The contract of effects that take part in an impact by heating, softening, friction, fracture or
+bonding."""
 
 from __future__ import annotations
 
@@ -20,28 +21,28 @@ class ImpactLaw(Effect):
 
     @ti.func
     def limit(self, w, impulse):
-        """Return the largest tangential impulse (N s) that goes with this normal impulse (N s)."""
+        """Return the largest tangential impulse (N s) for this normal impulse (N s)."""
         return 0.0 * impulse
 
     @ti.func
     def supply(self, w, area, work):
-        """Return the energy (J) given to each grain; ``area`` is that of contact (m^2), ``work`` that of
+        """Return the energy (J) given to each grain; ``area`` is the contact area (m^2), ``work`` the work of
         deformation (J)."""
         return 0.0 * area
 
     @ti.func
     def book(self, s, w, i, energy):
-        """Enter in the books of grain i the energy (J) that ``supply`` has given it."""
+        """Record for grain i the energy (J) that ``supply`` has given it."""
 
     @ti.func
     def temperature(self, s, w, i, energy):
-        """Return the temperature (K) of grain i with this much energy (J) more."""
+        """Return the temperature (K) of grain i after it has received this energy (J)."""
         return s.mass[w, i] * energy
 
     @ti.func
     def fracture(self, s, w, i, absorbed):
-        """Return whether grain i breaks, having absorbed this much kinetic energy (J); spend what it
-        takes."""
+        """Return whether grain i breaks after absorbing this kinetic energy (J); consume the energy of
+        fracture."""
         return 0
 
     @ti.func

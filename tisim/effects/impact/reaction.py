@@ -12,7 +12,7 @@ from tisim.state.fields import Field
 
 
 class Reaction(ImpactLaw):
-    """Gas that is adsorbed on the grains reacts in an impact, and heats each of the two grains.
+    """Gas adsorbed on the grains reacts in an impact and heats both grains.
 
         dH = alpha a,    a the contact area
 

@@ -1,4 +1,4 @@
-"""Thermal softening: hardness falls with temperature (Z04 section 6)."""
+"""Thermal softening: hardness decreases with temperature (Z04 section 6)."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from tisim.effects.impact.law import ImpactLaw
 from tisim.numerics import elementary
 
 LARGEST_EXPONENT = 50.0
-"""At this exponent hardness is 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a
+"""Largest exponent: hardness is then 5e21 times H_0. No grains bond, and the value fits f32 for any H_0 of a
 solid."""
 
 
 class Softening(ImpactLaw):
-    """The hardness of a grain falls with its temperature.
+    """The hardness of a grain decreases with its temperature.
 
         H = H_0 exp(Q / (R T)),    R the gas constant
 
     H_0 is the hardness of ``impact``, the limit at high temperature (the paper calls it the hardness at
-    absolute zero, where its formula is infinite).
+    absolute zero, at which its formula is infinite).
 
     Source: Z04 section 6, text after Eq. (6.2).
     """

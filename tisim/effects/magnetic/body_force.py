@@ -1,4 +1,4 @@
-"""The pull of an uneven magnetic field on magnetic particles (Z16 Eq. 7.24)."""
+"""The force of a non-uniform magnetic field on magnetic particles (Z16 Eq. 7.24)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from tisim.state.bound import Peers
 
 
 class MagneticBodyForce(Force):
-    """An uneven magnetic field pulls particles to where it is stronger, or weaker for a negative gamma.
+    """A non-uniform magnetic field pulls particles towards stronger field, or weaker field for a negative
+    gamma.
 
         F = grad(gamma B.B) = 2 gamma (grad B)^T B
 
-    B is the sum of all sources. gamma is that of each particle, whatever its size; for a sphere of volume V
-    and small susceptibility chi it is chi V / (2 mu_0). Uniform fields exert no force.
+    B is the sum of all sources. gamma is the same for all particles, regardless of their size; for a sphere
+    of volume V and small susceptibility chi it is chi V / (2 mu_0). Uniform fields exert no force.
 
     Source: Z16 Eq. (7.24).
     """

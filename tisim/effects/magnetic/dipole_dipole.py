@@ -1,4 +1,4 @@
-"""Forces of magnetic moments on each other (B16 Eqs 6.21 to 6.23, L21 Eqs 4.6 to 4.9)."""
+"""Forces between magnetic moments (B16 Eqs 6.21 to 6.23, L21 Eqs 4.6 to 4.9)."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from tisim.effects.magnetic.permanent_moment import PermanentMoment
 from tisim.state.bound import Peers
 
 CUTOFFS = (10.0, 20.0, 30.0, 60.0)
-"""These cut-offs, in radii, are worth a try."""
+"""Cut-offs, in radii, that are tried as approximations."""
 NEARER = (0.5, 0.7)
-"""A law with a cut-off is compared with those whose cut-off lies at these parts of its way beyond contact."""
+"""A law with a cut-off is compared with laws whose cut-off beyond contact is reduced to these fractions."""
 
 
 class DipoleDipole(Dipoles, PairForce):
-    """Magnetic moments attract and repel each other as dipoles, over all pairs, and turn permanent ones.
+    """Magnetic moments attract, repel and rotate each other as dipoles, over all pairs.
 
         F_i = -grad_i U,    U = -mu_0 / (4 pi) (3 (m_i.n)(m_j.n) - m_i.m_j) / d^3
             = -3 mu_0 / (4 pi d^4) [(m_i.n) m_j + (m_j.n) m_i + (m_i.m_j) n - 5 (m_i.n)(m_j.n) n]
         T_i = m_i x B_j,    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
 
-    n is the unit vector from i to j, d the distance, m the ``moment`` of each that another effect has set,
-    held fixed. The force is not along n: it turns the pair as a whole, against the torques T. These are given
-    to particles whose moments turn with them (``permanent_moment``). Soft moments turn inside the particle,
-    which feels none: where they lie along the field of all sources and moments (``mutual_induced_moment``)
-    there are none, and where they lie along that of the sources alone, the sources take the balance up. In a
-    periodic box only the nearest image of a particle acts.
+    n is the unit vector from i to j, d the distance, and m the ``moment`` that another effect has set, held
+    fixed. The force is not along n: it exerts a moment on the pair as a whole, which balances the torques T.
+    The torques act on particles whose moments rotate with them (``permanent_moment``). Soft moments rotate
+    inside the particle, which feels no torque. Moments along the field of all sources and moments
+    (``mutual_induced_moment``) have none; for moments along the field of the sources alone, the balance is
+    taken up by the sources. In a periodic box only the nearest image of a particle acts.
 
     Source: B16 Eqs (6.21), (6.23), L21 Eqs (4.8), (4.9).
     """
@@ -72,7 +72,7 @@ class DipoleDipole(Dipoles, PairForce):
         """Return the force on i by j, in N."""
         inverse = 1.0 / distance
         n, square = inverse * separation, inverse * inverse
-        # In this order: in f32 the product of two moments of 1e-20 A m^2 is nothing.
+        # In this order: in f32 the product of two moments of 1e-20 A m^2 underflows.
         a, b = s.moment[w, i], (3.0 * mu_0 / (4.0 * ti.math.pi) * square * square) * s.moment[w, j]
         along_a, along_b = a.dot(n), b.dot(n)
         return (5.0 * along_a * along_b - a.dot(b)) * n - along_a * b - along_b * a
@@ -84,33 +84,35 @@ class DipoleDipole(Dipoles, PairForce):
 
 
 class TruncatedDipoleDipole(DipolePairs, DipoleDipole):
-    """Magnetic moments within a cut-off attract and repel each other as dipoles; beyond it there is no force.
+    """Magnetic moments within a cut-off attract, repel and rotate each other as dipoles; beyond it no force
+    acts.
 
         d_c = cutoff (R_i + R_j)/2 + gap,    x = d/d_c,    f(x) = 1 plain, 1 - 4 x^3 + 3 x^4 shifted
         U = f U_dipoles,    F_i = f F_dipoles + f'(x) U_dipoles / d_c n,    T_i = f T_dipoles
 
-    The law is otherwise that of ``dipole_dipole``; pairs are found with the pair list. Without a shift the
-    force is that of dipoles up to the cut-off, where it jumps: at 30 radii by 2e-5 of that at contact. With
-    the shift, that of lj/sf/dipole/sf in LAMMPS, energy and force end smoothly, so that energy is conserved;
-    in between they are weaker than those of dipoles, at half of d_c by 5/16 of the energy.
+    The law is otherwise the same as ``dipole_dipole``; pairs are found with the pair list. Without a shift
+    the dipole force acts up to the cut-off and jumps there: at 30 radii by 2e-5 of the force at contact. With
+    the shift, as in lj/sf/dipole/sf of LAMMPS, energy and force end smoothly and energy is conserved. Inside
+    the cut-off they are then weaker than for dipoles: at half of d_c the energy is 5/16 lower.
 
-    B16 takes 30 radii (section 6.3), as the energy of the strongest moments it has is less than k T from
-    about 20 radii on (by its numbers, from 25). L21 takes a ``gap`` of 8 um between the surfaces of iron
-    grains, ``cutoff`` 2, and for asteroids three diameters, ``cutoff`` 6 (section 4.2.1.2).
+    B16 uses 30 radii (section 6.3), because the energy of its strongest moments is below k T from about 20
+    radii on (by its numbers, from 25). L21 uses a ``gap`` of 8 um between the surfaces of iron grains,
+    ``cutoff`` 2, and three diameters for asteroids, ``cutoff`` 6 (section 4.2.1.2).
 
     Source: B16 Eqs (6.21), (6.23), section 6.3; L21 Eqs (4.8), (4.9); M. Orsi, D. Y. Haubertin, W. E.
     Sanderson, J. W. Essex, J. Phys. Chem. B 112 (2008) 802.
     """
 
     cutoff: float = parameter(
-        "", "cut-off distance of the centres, over the mean radius of the two", 30.0, ge=2
+        "", "cut-off distance of the centres, over the mean radius of the pair", 30.0, ge=2
     )
 
     every_pair = False
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         beyond = self.cutoff - 2
-        # Rounding may end at contact, where it is no law, and at where the law itself ends, or beyond that.
+        # Rounding may give a cut-off at contact, which is invalid, or one not below the cut-off of the law
+        # itself.
         nearer = dict.fromkeys(
             (min(three_digits(2 + part * beyond), self.cutoff), three_digits(part * self.gap))
             for part in NEARER

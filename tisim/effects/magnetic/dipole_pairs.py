@@ -1,4 +1,4 @@
-"""What dipoles do to each other: the field of one, and how far it goes, over all pairs or up to a cut-off."""
+"""The interaction of dipoles: the field of one dipole, and its range, over all pairs or up to a cut-off."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from tisim.errors import must
 
 @ti.func
 def dipole_field(moment, separation, distance):
-    """Return the field (T) of a dipole (A m^2) at a place it is at the ``separation`` (m) from, of length
-    ``distance``: mu_0 / (4 pi d^3) (3 (m.n) n - m)."""
+    """Return the field (T) of a dipole (A m^2) at a point; ``separation`` (m), of length ``distance``, leads
+    from the point to the dipole: mu_0 / (4 pi d^3) (3 (m.n) n - m)."""
     inverse = 1.0 / distance
     n = inverse * separation
-    # Cube first: in f32 a moment of 1e-17 A m^2 squared is nothing.
+    # Cube first: in f32 the square of a moment of 1e-17 A m^2 underflows.
     m = inverse * inverse * inverse * moment
     return mu_0 / (4.0 * ti.math.pi) * (3.0 * m.dot(n) * n - m)
 
 
 class Dipoles(Pairwise):
-    """This is the contract of what dipoles do to each other: forces, and fields that magnetise.
+    """This is the contract of interactions between dipoles: forces, and fields that magnetise.
 
-    Forces are minus the gradient of an energy only where moments follow the fields of the same sum; moments
-    are refused beside forces of another one.
+    Forces are minus the gradient of an energy only if moments follow the fields of the same sum. Moments are
+    therefore refused beside forces with a different sum.
 
-    alike : names of the settings that say what is summed.
+    alike : names of the settings that define the sum.
     """
 
     contract: ClassVar[bool] = True
@@ -50,14 +50,14 @@ class Dipoles(Pairwise):
     alike: ClassVar[tuple[str, ...]] = ("cutoff", "gap", "shifted")
 
     def summed(self) -> dict[str, Any]:
-        """Return the settings that say what is summed, by name."""
+        """Return the settings that define the sum, by name."""
         return {name: getattr(self, name, 0) for name in self.alike}
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
         if keeps_apart(effects) or any(isinstance(one, PermanentMoment) for one in effects):
-            # Contacts are far stiffer; of permanent moments their own effect tells it.
+            # Contacts are far stiffer; the effect of permanent moments gives its own limit.
             return math.inf
         return None
 
@@ -80,28 +80,28 @@ class Dipoles(Pairwise):
 
 
 class DipolePairs(Dipoles):
-    """This is the contract of what dipoles do to each other over all pairs, or up to a cut-off.
+    """This is the contract of interactions between dipoles over all pairs, or up to a cut-off.
 
         d_c = cutoff (R_i + R_j)/2 + gap,    x = d/d_c,    f(x) = 1 plain, 1 - 4 x^3 + 3 x^4 shifted
 
-    The energy of a pair, and the field of one at the other, are those of dipoles times f, and 0 beyond d_c. A
-    plain cut-off leaves forces as they are and has them jump; shifted, f(1) = f'(1) = 0 and all of them end
-    smoothly.
+    The energy of a pair, and the field of one at the other, are the dipole values times f, and 0 beyond d_c.
+    With a plain cut-off forces are unchanged inside and jump at d_c; with the shift f(1) = f'(1) = 0, and
+    energy, field and force end smoothly.
 
-    Source: the shift is that of M. Orsi, D. Y. Haubertin, W. E. Sanderson, J. W. Essex, J. Phys. Chem. B 112
-    (2008) 802, which is lj/sf/dipole/sf in LAMMPS.
+    Source: the shift is from M. Orsi, D. Y. Haubertin, W. E. Sanderson, J. W. Essex, J. Phys. Chem. B 112
+    (2008) 802, lj/sf/dipole/sf in LAMMPS.
 
-    every_pair : whether it may be without a cut-off.
+    every_pair : whether the cut-off is optional.
     """
 
     contract: ClassVar[bool] = True
     every_pair: ClassVar[bool] = True
 
     cutoff: float = parameter(
-        "", "cut-off distance of the centres, over the mean radius of the two; 0 for all pairs", 0.0, ge=0
+        "", "cut-off distance of the centres, over the mean radius of the pair; 0 for all pairs", 0.0, ge=0
     )
     gap: float = parameter(
-        "m", "length added to the cut-off distance; beside a cutoff of 2, the gap between surfaces", 0.0, ge=0
+        "m", "length added to the cut-off distance; with a cutoff of 2, the gap between surfaces", 0.0, ge=0
     )
     shifted: bool = option("whether energies, fields and forces go to 0 smoothly at the cut-off", False)
 
@@ -124,7 +124,7 @@ class DipolePairs(Dipoles):
 
     @ti.func
     def reach(self, s, w, i):
-        # Between surfaces, of two as large as i: (cutoff / 2 - 1) (R_i + R_j) + gap.
+        # Between the surfaces of two as large as i: (cutoff / 2 - 1) (R_i + R_j) + gap.
         return (self.cutoff(w) - 2.0) * s.radius[w, i] + self.gap(w)
 
     @ti.func
@@ -135,7 +135,7 @@ class DipolePairs(Dipoles):
             limit = 0.5 * self.cutoff(w) * (s.radius[w, i] + s.radius[w, j]) + self.gap(w)
             if ti.static(self.shifted):
                 x = distance / limit
-                # 1 - 4 x^3 + 3 x^4 as a product, in which nothing cancels near 1.
+                # 1 - 4 x^3 + 3 x^4 as a product, without cancellation near 1.
                 part = (1.0 - x) * (1.0 - x) * (1.0 + 2.0 * x + 3.0 * x * x)
                 slope = 12.0 * x * x * x * (x - 1.0)
             part = ti.select(distance <= limit, part, 0.0)

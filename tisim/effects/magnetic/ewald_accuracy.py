@@ -1,17 +1,17 @@
-"""How far an Ewald sum of dipoles must go, in space and in wave vectors, to be as good as is asked for.
+"""Cut-offs in space and in wave vectors that an Ewald sum of dipoles needs for a given accuracy.
 
-Errors are those of forces, root mean square, of particles at random, over
+Errors are root mean square errors of forces on particles at random positions, over
 
     F_ref = 3 mu_0 m^2 / (4 pi r_c^4) sqrt(n r_c^3)
 
-the force of dipoles at the cut-off r_c on each other, of n particles in a unit of volume, m^2 being the mean
-of their squared moments. With x = alpha r_c and s = k_max / (2 alpha) they are
+This is the force between dipoles at the cut-off r_c, for n particles per unit volume and m^2 the mean of
+their squared moments. With x = alpha r_c and s = k_max / (2 alpha) they are
 
     in space:         Q exp(-x^2) / (3 x^2),    Q^2 = 13/6 C^2 + 2/15 D^2 - 13/15 C D
                       C = 4 x^4 + 6 x^2 + 3,    D = 8 x^6 + 20 x^4 + 30 x^2 + 15
     in wave vectors:  8/3 sqrt(2/15) x^(5/2) s^(3/2) exp(-s^2)
 
-and so functions of x and s alone.
+and therefore functions of x and s alone.
 
 Source: Z. Wang, C. Holm, J. Chem. Phys. 115 (2001) 6351.
 """
@@ -30,28 +30,28 @@ from tisim.domains.domain import Domain
 from tisim.errors import must
 
 PAIR_COST = 10.0
-"""The force of a pair takes about as long as so many terms of a wave vector and a particle."""
+"""Time for the force of a pair, over the time for one term of a wave vector and a particle."""
 WIDEST = 0.4
-"""A cut-off that is chosen is at most this part of the shortest side along which there are images."""
+"""Largest automatic cut-off, over the shortest side along which there are images."""
 WIDEST_DECAY = 12.0
-"""x and s are at most this number: exp(-144) is less than any accuracy."""
+"""Largest value of x and s: exp(-144) is less than any accuracy."""
 
 
 def space_error(x: float) -> float:
-    """Return the error by the pairs that are left out, over F_ref."""
+    """Return the error due to the omitted pairs, over F_ref."""
     c = 4 * x**4 + 6 * x**2 + 3
     d = 8 * x**6 + 20 * x**4 + 30 * x**2 + 15
     return math.sqrt(13 / 6 * c * c + 2 / 15 * d * d - 13 / 15 * c * d) * math.exp(-x * x) / (3 * x * x)
 
 
 def wave_error(x: float, s: float) -> float:
-    """Return the error by the wave vectors that are left out, over F_ref."""
+    """Return the error due to the omitted wave vectors, over F_ref."""
     return 8 / 3 * math.sqrt(2 / 15) * x**2.5 * s**1.5 * math.exp(-s * s)
 
 
 @lru_cache
 def screening_for(accuracy: float) -> float:
-    """Return the x at which pairs that are left out make half of the squared error."""
+    """Return the x at which omitted pairs cause half of the squared error."""
     least = math.sqrt(1.5)
     part = min(accuracy / math.sqrt(2), space_error(least))
     return float(brentq(lambda x: math.log(space_error(x) / part), least, WIDEST_DECAY, xtol=1e-14))
@@ -59,19 +59,19 @@ def screening_for(accuracy: float) -> float:
 
 @lru_cache
 def waves_for(accuracy: float, x: float) -> float:
-    """Return the s at which wave vectors that are left out make half of the squared error."""
+    """Return the s at which omitted wave vectors cause half of the squared error."""
     least = math.sqrt(0.75)
     part = min(accuracy / math.sqrt(2), wave_error(x, least))
     return float(brentq(lambda s: math.log(wave_error(x, s) / part), least, WIDEST_DECAY, xtol=1e-14))
 
 
 def periods(domain: Domain, slab_factor: float) -> np.ndarray:
-    """Return the periods (m) of the images: sides, or along an open axis so many times the side."""
+    """Return the periods (m) of the images: the sides, along an open axis multiplied by the slab factor."""
     return np.diag(domain.edges(0.0)) * np.where(domain.imaged(), 1.0, slab_factor)
 
 
 def most_waves(domain: Domain, slab_factor: float, wave_cutoff: float) -> tuple[int, int, int]:
-    """Return how many wave vectors there are along each axis up to one (1/m)."""
+    """Return the number of wave vectors along each axis up to a cut-off (1/m)."""
     x, y, z = (int(wave_cutoff * side / (2 * math.pi)) for side in periods(domain, slab_factor))
     return x, y, z
 
@@ -90,20 +90,21 @@ def ewald_settings(
     cutoff: float | None = None,
     slab_factor: float = 3.0,
 ) -> dict[str, Any]:
-    """Return settings of Ewald sums in a box, for ``EwaldDipoleDipole(**settings)`` and moments alike.
+    """Return settings of Ewald sums in a box, for ``EwaldDipoleDipole(**settings)`` and for moments.
 
-    particles : how many there are. accuracy : error of the forces, over that of dipoles at the cut-off.
-    cutoff : of pairs, m; unless given, one with which pairs take as long as wave vectors. slab_factor : the
-    period along an open axis, over the side of the box.
+    particles : their number. accuracy : error of the forces, over the force of dipoles at the cut-off.
+    cutoff : cut-off of pairs, m; by default chosen so that pairs and wave vectors take the same time.
+    slab_factor : the period along an open axis, over the side of the box.
 
-    The ``waves`` are those of this box: worlds of a batch, which share them, take those of the largest.
+    The ``waves`` hold for this box; worlds of a batch share them, so use the values of the largest box.
     """
     must(any(domain.imaged()), domain.label, "one in which particles see images of each other", domain.kind())
     must(particles > 0, "particles", "above 0", particles)
     x = screening_for(accuracy)
     s, sides = waves_for(accuracy, x), periods(domain, slab_factor)
     if cutoff is None:
-        # Pairs go as r_c^3, wave vectors as its inverse: the sum is least where both take as long.
+        # The time of pairs grows as r_c^3, of wave vectors as its inverse: the sum is least if both are
+        # equal.
         equal = float(np.prod(sides)) ** 2 * 2 * (x * s) ** 3 / (math.pi**3 * PAIR_COST * particles)
         cutoff = min(equal ** (1 / 6), WIDEST * float(sides[list(domain.imaged())].min()))
     waves = most_waves(domain, slab_factor, 2 * x * s / cutoff)

@@ -1,4 +1,4 @@
-"""Forces of magnetic moments on each other in a periodic box, with all their images."""
+"""Forces between magnetic moments in a periodic box, with all their images."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 
 
 class EwaldDipoleDipole(EwaldPairs, Force, PairForce):
-    """Magnetic moments attract, repel and turn each other as dipoles, with all images: the Ewald sum.
+    """Magnetic moments attract, repel and rotate each other as dipoles, with all periodic images (Ewald sum).
 
         F_i = -grad_i U,    T_i = m_i x B_i,    B_i = -dU / dm_i
 
-    U is the energy of all dipoles of a periodic box with their images, m the ``moment`` of each that another
-    effect has set, held fixed. The torques T are given to permanent moments. ``ewald_settings`` returns the
-    settings with which forces are good to an ``accuracy``. It is to ``dipole_dipole``, in which only nearest
-    images act, what lj/cut/dipole/long with ewald/disp is in LAMMPS.
-    Momentum is conserved to rounding, as each wave does to one what it does to the others, energy to the
-    jumps at the cut-off, which are of the accuracy.
+    U is the energy of all dipoles of a periodic box with their images, and m the ``moment`` that another
+    effect has set, held fixed. The torques T act on permanent moments. ``ewald_settings`` returns settings
+    for a given ``accuracy`` of the forces. In ``dipole_dipole`` only nearest images act. The law corresponds
+    to lj/cut/dipole/long with ewald/disp in LAMMPS. Momentum is conserved to rounding, since the forces of
+    each wave sum to zero. Energy is conserved up to the jumps at the cut-off, which are of the order of the
+    accuracy.
 
-    ``demagnetising_factors`` say what shape the sample has that the box is a piece of: 0 where applied fields
-    are those within it, as between the poles of a yoke.
+    ``demagnetising_factors`` describe the shape of the sample that contains the box; 0 if applied fields are
+    the fields inside the sample, as between the poles of a yoke.
 
-    Source: that of ``ewald_induced_moment``; B16 Eqs (6.21), (6.23), L21 Eqs (4.8), (4.9).
+    Source: the sources of ``ewald_induced_moment``; B16 Eqs (6.21), (6.23), L21 Eqs (4.8), (4.9).
     """
 
     fields = (MOMENT,)

@@ -25,12 +25,12 @@ class EwaldMoment(EwaldPairs, SelfConsistentQuantity, Moment):
 
         m_i = law(B(r_i) + B_i),    B_i = -dU / dm_i
 
-    U is the Ewald sum of ``ewald_dipole_dipole``, whose part of waves is made anew in each sweep.
+    U is the Ewald sum of ``ewald_dipole_dipole``; its sum over waves is recomputed in each sweep.
     """
 
     contract: ClassVar[bool] = True
     independent_law: ClassVar[type[Moment]]
-    """This law is that of a particle that the others do not magnetise."""
+    """The law of a particle that the others do not magnetise."""
 
     @property
     def accuracy_parameters(self) -> tuple[AccuracyParameter, ...]:  # type: ignore[override]
@@ -44,7 +44,7 @@ class EwaldMoment(EwaldPairs, SelfConsistentQuantity, Moment):
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
-        """Return the part of near pairs in the field (T) of j at i."""
+        """Return the contribution of near pairs to the field (T) of j at i."""
         return self.near_field(s, w, j, separation, distance)
 
     @ti.func
@@ -53,16 +53,15 @@ class EwaldMoment(EwaldPairs, SelfConsistentQuantity, Moment):
 
 
 class EwaldInducedMoment(LinearSpheres, EwaldMoment, InducedMoment):
-    """Spheres of linear material are magnetised by the sources and by each other, with all images of a
-    periodic box.
+    """The sources and all other moments, with their periodic images, magnetise spheres of linear material.
 
         m_i = V_i 3 chi / (3 + chi) (B(r_i) + B_i) / mu_0,    B_i = -dU / dm_i
 
-    U is the Ewald sum of all dipoles, as in ``ewald_dipole_dipole``, which is what these moments feel. On a
-    simple cubic lattice of n spheres in a unit of volume the field of the others is mu_0 M/3, and the
-    magnetisation that of Clausius and Mossotti, M = n g B / (1 - n g mu_0 / 3) with m = g B of each; then B
-    is the field within the sample, unless there are ``demagnetising_factors``. The rest is as in
-    ``mutual_induced_moment``.
+    U is the Ewald sum of all dipoles, which ``ewald_dipole_dipole`` also uses for the forces on these
+    moments. On a simple cubic lattice of n spheres per unit volume the field of the others is mu_0 M/3. The
+    magnetisation then follows Clausius and Mossotti, M = n g B / (1 - n g mu_0 / 3) with m = g B for each
+    sphere; B is then the field within the sample, unless there are ``demagnetising_factors``. Otherwise it is
+    the same as ``mutual_induced_moment``.
 
     Source: S. W. de Leeuw, J. W. Perram, E. R. Smith, Proc. R. Soc. Lond. A 373 (1980) 27; Z. Wang, C. Holm,
     J. Chem. Phys. 115 (2001) 6351; L21 Eqs (2.6), (4.12).
@@ -72,29 +71,28 @@ class EwaldInducedMoment(LinearSpheres, EwaldMoment, InducedMoment):
 
 
 class EwaldLangevinMoment(EwaldMoment, LangevinMoment):
-    """Superparamagnetic particles are magnetised by the sources and by each other, with all images of a
-    periodic box.
+    """The sources and all other moments, with their periodic images, magnetise superparamagnetic particles.
 
         m_i = m_s L(x) B/|B|,    L(x) = coth x - 1/x,    x = mu_d |B| / (k T)
 
-    B is that of the sources and of the Ewald sum of all dipoles, as in ``ewald_dipole_dipole``; the rest is
-    as in ``mutual_langevin_moment``.
+    B is the field of the sources plus the Ewald sum of all dipoles, as in ``ewald_dipole_dipole``. Otherwise
+    it is the same as ``mutual_langevin_moment``.
 
-    Source: B16 Eq. (6.22), L21 (2.6); that of ``ewald_induced_moment``.
+    Source: B16 Eq. (6.22), L21 (2.6); the sources of ``ewald_induced_moment``.
     """
 
     independent_law = LangevinMoment
 
 
 class EwaldFroehlichMoment(EwaldMoment, FroehlichMoment):
-    """Spheres of iron or an oxide are magnetised up to saturation, by each other with all images too.
+    """The sources and all other moments, with their periodic images, magnetise spheres of iron or an oxide.
 
         M_i = chi H M_s / (M_s + chi H),    H = |B(r_i) + B_i| / mu_0 - M_i/3,    B_i = -dU / dm_i
 
-    U is the Ewald sum of all dipoles, as in ``ewald_dipole_dipole``; the rest is as in
-    ``mutual_froehlich_moment``.
+    The magnetisation saturates. U is the Ewald sum of all dipoles, as in ``ewald_dipole_dipole``. Otherwise
+    it is the same as ``mutual_froehlich_moment``.
 
-    Source: L21 Eqs (2.6), (4.12); those of ``froehlich_moment`` and of ``ewald_induced_moment``.
+    Source: L21 Eqs (2.6), (4.12); the sources of ``froehlich_moment`` and of ``ewald_induced_moment``.
     """
 
     independent_law = FroehlichMoment

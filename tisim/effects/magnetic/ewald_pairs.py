@@ -1,4 +1,4 @@
-"""What Ewald sums of dipoles have in common: their settings, and the part of near pairs."""
+"""The common base of Ewald sums of dipoles: their settings, and the sum over near pairs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TWO_OVER_ROOT_PI = 2.0 / math.sqrt(math.pi)
 
 
 class EwaldPairs(LongRange, Dipoles):
-    """This is the contract of what dipoles do to each other with all their images, summed after Ewald.
+    """This is the contract of interactions between dipoles with all their images, summed after Ewald.
 
         U = U_pairs + U_waves - mu_0 alpha^3 / (6 pi^(3/2)) sum m_i^2 + mu_0 / (2 V) sum_a N_a M_a^2
         U_pairs = mu_0 / (4 pi) sum_pairs [b m_i.m_j - c (m_i.n)(m_j.n)] / d^3,    d <= r_c
@@ -33,17 +33,19 @@ class EwaldPairs(LongRange, Dipoles):
         b = erfc(x) + 2 x exp(-x^2) / sqrt(pi),    c = 3 b + 4 x^3 exp(-x^2) / sqrt(pi),    x = alpha d
 
     alpha and k_max follow from ``cutoff`` and ``accuracy`` (ewald_accuracy.py), unless they are given.
-    ``waves`` is how many wave vectors there is room for along each axis: as many as ``ewald_settings``
-    returns, and at least those that a box needs, or the scene is refused.
+    ``waves`` is the capacity for wave vectors along each axis, as ``ewald_settings`` returns it. A scene
+    whose box needs more is refused.
 
-    N_a are demagnetising factors of the sample that the box is a piece of. With 0 it has no poles: applied
-    fields are those within it (conducting, "tin-foil" boundary). With 1/3 along each axis it is a ball in
-    vacuum, with 1 along one axis a wide plate across it; then applied fields are those without the sample.
+    N_a are the demagnetising factors of the sample that contains the box. With 0 the sample has no poles:
+    applied fields are the fields inside it (conducting, "tin-foil" boundary). With 1/3 along each axis the
+    sample is a ball in vacuum, with 1 along one axis a wide plate across this axis; applied fields are then
+    the fields without the sample.
 
-    Along one axis the box may be open, as between plates. The sum then is that of plates of its images, at a
-    distance of ``slab_factor`` sides, with N = 1 across them, which takes away what plates do to each other
-    by their moments as a whole; the rest falls as exp(-2 pi gap / side). A world in which the centre of a
-    particle leaves the box there, so that the gap is less than that, stops: its field counts as not finite.
+    The box may be open along one axis, as between plates. The sum is then over periodic images of the plate,
+    at a distance of ``slab_factor`` sides, with N = 1 across the plates. This removes the interaction of the
+    plates through their total moments; the remaining error falls as exp(-2 pi gap / side). A world stops if
+    the centre of a particle leaves the box along the open axis, since the gap is then too small: the field
+    there is not finite.
 
     Source: S. W. de Leeuw, J. W. Perram, E. R. Smith, Proc. R. Soc. Lond. A 373 (1980) 27; Z. Wang, C. Holm,
     J. Chem. Phys. 115 (2001) 6351; for plates I.-C. Yeh, M. L. Berkowitz, J. Chem. Phys. 111 (1999) 3155, and
@@ -52,32 +54,30 @@ class EwaldPairs(LongRange, Dipoles):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
-    # A finer one needs more waves, for which there is room or not.
+    # A finer accuracy needs more waves, which the capacity may not allow.
     accuracy_parameters = (AccuracyParameter(accuracy=1, converges=False),)
     alike = ("cutoff", "accuracy", "screening", "wave_cutoff", "demagnetising_factors", "slab_factor")
 
     cutoff: float = parameter("m", "cut-off distance r_c of the centres of pairs", examples=[1e-4], gt=0)
-    waves: tuple[int, int, int] = option(
-        "room for so many wave vectors along x, y and z", examples=[(8, 8, 8)]
-    )
+    waves: tuple[int, int, int] = option("capacity for wave vectors along x, y and z", examples=[(8, 8, 8)])
     accuracy: float = parameter(
         "",
-        "error of the forces, root mean square, over that of dipoles at the cut-off",
+        "root mean square error of the forces, over the force of dipoles at the cut-off",
         1e-4,
         gt=1e-14,
         le=0.1,
     )
-    screening: float | None = parameter("1/m", "screening alpha; by the accuracy unless given", None, gt=0)
+    screening: float | None = parameter("1/m", "screening alpha; by default from the accuracy", None, gt=0)
     wave_cutoff: float | None = parameter(
-        "1/m", "largest wave vector k_max; by the accuracy unless given", None, gt=0
+        "1/m", "largest wave vector k_max; by default from the accuracy", None, gt=0
     )
     demagnetising_factors: Vector = parameter(
         "",
-        "factors N of the sample along x, y and z, at most 1 together; 0 for one without poles",
+        "factors N of the sample along x, y and z, with a sum of at most 1; 0 for a sample without poles",
         (0.0,) * 3,
     )
     slab_factor: float = parameter(
-        "", "period of the images along an axis that is open, over the side of the box", 3.0, ge=2
+        "", "period of the images along an open axis, over the side of the box", 3.0, ge=2
     )
 
     @model_validator(mode="after")
@@ -130,18 +130,18 @@ class EwaldPairs(LongRange, Dipoles):
 
     @ti.func
     def near_field(self, s, w, j, separation, distance):
-        """Return the part of near pairs in the field (T) of j at a place it is at the ``separation`` (m)
-        from."""
+        """Return the contribution of near pairs to the field (T) of j at a point; ``separation`` (m) leads
+        from the point to j."""
         b, c, _d = self.screened(w, distance)
         inverse = 1.0 / distance
         n = inverse * separation
-        # Cube first: in f32 a moment of 1e-17 A m^2 squared is nothing.
+        # Cube first: in f32 the square of a moment of 1e-17 A m^2 underflows.
         m = mu_0 / (4.0 * math.pi) * inverse * inverse * inverse * s.moment[w, j]
         return c * m.dot(n) * n - b * m
 
     @ti.func
     def near_force(self, s, w, i, j, separation, distance):
-        """Return the part of near pairs in the force on i by j, in N."""
+        """Return the contribution of near pairs to the force on i by j, in N."""
         _b, c, d = self.screened(w, distance)
         inverse = 1.0 / distance
         n, square = inverse * separation, inverse * inverse

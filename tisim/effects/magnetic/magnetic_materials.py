@@ -11,11 +11,11 @@ from tisim.errors import InputError
 
 @dataclass(frozen=True)
 class MagneticMaterial:
-    """A magnetic material is what grains are made of: its magnetisation and its density.
+    """A magnetic material holds the magnetisation and density of the material of grains.
 
-    saturation : saturation magnetisation, A/m. susceptibility : in weak fields, mu_r - 1; None where it goes
-    by how the material was made. Of spheres it hardly matters where it is far above 3. density : kg/m^3.
-    source : where the numbers are from.
+    saturation : saturation magnetisation, A/m. susceptibility : in weak fields, mu_r - 1; None if it depends
+    on the preparation of the material. For spheres it hardly matters if it is far above 3. density : kg/m^3.
+    source : reference of the numbers.
     """
 
     name: str
@@ -25,11 +25,11 @@ class MagneticMaterial:
     source: str
 
     def parameters(self, susceptibility: float | None = None) -> dict[str, float]:
-        """Return the parameters that ``FroehlichMoment``, ``MutualFroehlichMoment`` and
-        ``EwaldFroehlichMoment`` have of it; with a susceptibility of one's own, where one is given."""
+        """Return its parameters for ``FroehlichMoment``, ``MutualFroehlichMoment`` and
+        ``EwaldFroehlichMoment``; a given susceptibility replaces its own."""
         own = self.susceptibility if susceptibility is None else susceptibility
         if own is None:
-            rule = "given, as it goes by how it was made"
+            rule = "given, as it depends on the preparation of the material"
             raise InputError(f"susceptibility of {self.name} must be {rule}; received nothing")
         return {"susceptibility": own, "saturation": self.saturation}
 

@@ -1,4 +1,4 @@
-"""The pull of a magnetic field on magnetic moments, and how it turns them (B16 Eq. 6.20, L21 Eq. 4.7)."""
+"""The force and torque of a magnetic field on magnetic moments (B16 Eq. 6.20, L21 Eq. 4.7)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from tisim.state.bound import Peers
 
 
 class Magnetophoresis(Force):
-    """An uneven magnetic field pulls particles by their magnetic moments, and any field turns permanent ones.
+    """A non-uniform magnetic field pulls magnetic moments, and any field exerts torques on permanent moments.
 
         F = (m.grad) B,    T = m x B
 
-    B is the sum of all sources, m the ``moment`` that another effect has set. Where B is free of curl, as it
-    is where no current flows, this is grad(m.B) with m held fixed; of a moment that goes with B it is half of
-    grad(m.B) with m varying, which is ``magnetic_body_force``. What moments do to each other is
-    ``dipole_dipole``. The torque T is on particles whose moments turn with them (``permanent_moment``); soft
-    moments turn inside the particle, which feels none.
+    B is the sum of all sources, and m the ``moment`` that another effect has set. If B is free of curl, as it
+    is without currents, the force is grad(m.B) with m held fixed. For a moment proportional to B this is half
+    of grad(m.B) with m varying, the force of ``magnetic_body_force``. The forces between moments are in
+    ``dipole_dipole``. The torque T acts on particles whose moments rotate with them (``permanent_moment``);
+    soft moments rotate inside the particle, which feels no torque.
 
     Source: B16 Eqs (6.20), (7.1), L21 Eqs (4.6), (4.7).
     """
@@ -36,7 +36,7 @@ class Magnetophoresis(Force):
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
-        # Contacts are far stiffer; of permanent moments their own effect tells it.
+        # Contacts are far stiffer; the effect of permanent moments gives its own limit.
         permanent = any(isinstance(one, PermanentMoment) for one in effects)
         return math.inf if permanent or keeps_apart(effects) else None
 

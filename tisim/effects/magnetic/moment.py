@@ -1,8 +1,9 @@
-"""Magnetic moments of soft particles, along the field where they are (B16 sections 6.2.4, 7.2.3).
+"""Magnetic moments of soft particles, along the local field (B16 sections 6.2.4, 7.2.3).
 
-The field is that of all sources of a magnetic flux density at the centre of the particle, B = mu_0 H outside
-of magnets. A moment follows it at once, inside the particle, so that the particle feels no torque. What else
-makes moments is in mutual_moment.py; who feels them finds them in ``moment``, whoever has set them.
+The field is the sum of all sources of a magnetic flux density at the centre of the particle, B = mu_0 H
+outside of magnets. A moment follows it at once, inside the particle, so that the particle feels no torque.
+Moments that also depend on each other are in mutual_moment.py. Other effects read the field ``moment``,
+whichever effect has set it.
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ class Moment(DerivedQuantity):
 
     @ti.func
     def law(self, s, w, i, b):
-        """Return the moment (A m^2) of i in a field of b (T)."""
+        """Return the moment (A m^2) of i in a field b (T)."""
         return 0.0 * b
 
     @ti.func
     def with_sources(self, s, w, i, b, t):
-        """Return b (T) with the field of all sources where i is."""
+        """Return b (T) plus the field of all sources at particle i."""
         total = b
         for source in ti.static(self.applied):
             total += source.value(w, s.position[w, i], t)
@@ -48,18 +49,18 @@ class Moment(DerivedQuantity):
 
     @ti.func
     def response(self, s, w, i, total, t):
-        """Return the moment (A m^2) of i in the field of the sources and, where particles act on each other,
-        in theirs: ``total``, T."""
+        """Return the moment (A m^2) of i in the field of the sources plus ``total`` (T), the field of other
+        particles if they interact."""
         return self.law(s, w, i, self.with_sources(s, w, i, total, t))
 
 
 class FixedMoment(Moment):
-    """Each particle has a magnetic moment of fixed magnitude along the field where it is.
+    """Each particle has a magnetic moment of fixed magnitude along the local field.
 
-        m = m_s B/|B|,    0 where there is no field
+        m = m_s B/|B|,    0 without a field
 
-    B is the sum of all sources, m_s the ``saturation_moment`` (A m^2) of each particle, which the start
-    gives. Without a field no direction is preferred, and the mean over all of them is 0.
+    B is the sum of all sources, and m_s the ``saturation_moment`` (A m^2) of each particle, given by the
+    start. Without a field no direction is preferred, and the mean over all directions is 0.
 
     Source: B16 section 6.2.4, table 6.1.
     """
@@ -78,8 +79,8 @@ class LangevinMoment(Moment):
         m = m_s L(x) B/|B|,    L(x) = coth x - 1/x,    x = mu_d |B| / (k T)
 
     B is the sum of all sources. m_s is the ``saturation_moment`` (A m^2) of each particle, its saturation
-    magnetisation times its volume; mu_d its ``domain_moment`` (A m^2), that of a single domain in it: unless
-    the start says, the particle is one domain. For x << 1 it is the linear m_s mu_d B / (3 k T) (B16 7.7).
+    magnetisation times its volume. mu_d is its ``domain_moment`` (A m^2), the moment of a single domain in
+    it; by default the particle is one domain. For x << 1 the law is linear, m_s mu_d B / (3 k T) (B16 7.7).
 
     Source: B16 Eqs (6.22), (7.5).
     """
@@ -95,12 +96,12 @@ class LangevinMoment(Moment):
 
 
 class InducedMoment(Moment):
-    """Each particle is a sphere of linear material, which the field where it is magnetises.
+    """Each particle is a sphere of linear material that the local field magnetises.
 
         m = V 3 chi / (3 + chi) B / mu_0
 
-    V is its volume, B the sum of all sources. The field that the sphere makes in itself, -M/3, is taken into
-    account.
+    V is its volume, B the sum of all sources. The law accounts for the field of the sphere inside itself,
+    -M/3.
 
     Source: L21 Eq. (2.4).
     """
@@ -122,17 +123,17 @@ class InducedMoment(Moment):
 
 
 class FroehlichMoment(Moment):
-    """Each particle is a sphere of iron or an oxide, whose magnetisation saturates as Froehlich found.
+    """Each particle is a sphere of iron or an oxide, whose magnetisation saturates by Froehlich's law.
 
         M = chi H M_s / (M_s + chi H),    H = B/mu_0 - M/3,    m = V M
 
-    H is the field inside the sphere, which its own magnetisation weakens, B the sum of all sources. With
+    H is the field inside the sphere, which its own magnetisation weakens, and B the sum of all sources. With
     k = 3 chi / (3 + chi) and u = k |B| / (mu_0 M_s) the root of this equation is
 
         M/M_s = 2 u / (1 + u + sqrt((u + q)^2 + 1 - q^2)),    q = (3 - chi) / (3 + chi)
 
-    in which nothing cancels. In weak fields it is ``induced_moment``, M = k B / mu_0; in strong ones M_s less
-    M_s^2 / (chi H). There is no hysteresis.
+    which is free of cancellation. In weak fields it is ``induced_moment``, M = k B / mu_0; in strong fields M
+    is M_s - M_s^2 / (chi H). There is no hysteresis.
 
     Source: A. E. Kennelly, Trans. Am. Inst. Electr. Eng. 8 (1891) 485, after O. Froehlich (1881); R. M.
     Bozorth, Ferromagnetism (1951) 476; for iron in magnetorheological fluids J. M. Ginder, L. C. Davis, L. D.
@@ -156,7 +157,7 @@ class FroehlichMoment(Moment):
         chi, radius = self.susceptibility(w), s.radius[w, i]
         gain = 3.0 * (chi / (3.0 + chi)) / mu_0
         u = gain / self.saturation(w) * b.norm()
-        # 1 - q^2 = 12 chi / (3 + chi)^2; all over 1 + u, so that no square is beyond what numbers hold.
+        # 1 - q^2 = 12 chi / (3 + chi)^2; all divided by 1 + u, so that no square overflows.
         q, rest, whole = 3.0 / (3.0 + chi) - chi / (3.0 + chi), 2.0 / (3.0 + chi), 1.0 + u
         across = ti.sqrt(3.0 * chi) * rest / whole
         part = 2.0 / whole / (1.0 + ti.sqrt(((u + q) / whole) ** 2 + across * across))

@@ -11,13 +11,13 @@ from tisim.effects.magnetic.moment import FroehlichMoment, InducedMoment, Langev
 
 
 def independent(moment: Moment, law: type[Moment]) -> Moment:
-    """Return the law of particles that do not magnetise each other, with the options of one where they do."""
+    """Return the law without mutual magnetisation, with the options of the law with mutual magnetisation."""
     return law(**{name: getattr(moment, name) for name in law.model_fields})
 
 
 class LinearSpheres(SelfConsistentQuantity):
-    """This is the contract of moments of linear spheres: moments over volume are symmetric in what they do to
-    each other, as chi is that of all."""
+    """This is the contract of moments of linear spheres. Their influence on each other, weighted by the
+    inverse volume, is symmetric, since all have the same chi."""
 
     contract: ClassVar[bool] = True
     linear: ClassVar[bool] = True
@@ -32,21 +32,21 @@ class MutualMoment(DipolePairs, SelfConsistentQuantity, Moment):
 
         m_i = law(B(r_i) + sum_j f(x) B_j(r_i)),    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
 
-    A dipole at its centre stands for each sphere: near contact the higher multipoles, which are left out,
-    matter as well. In a periodic box only the nearest image of a particle acts. f is 1 for all pairs, unless
-    there is a ``cutoff``, as in ``truncated_dipole_dipole``, which is then to have the same one.
+    Each sphere is represented by a dipole at its centre; higher multipoles, which matter near contact, are
+    neglected. In a periodic box only the nearest image of a particle acts. f is 1 for all pairs unless there
+    is a ``cutoff``, as in ``truncated_dipole_dipole``, which must then have the same one.
     """
 
     contract: ClassVar[bool] = True
     independent_law: ClassVar[type[Moment]]
-    """This law is that of a particle that the others do not magnetise."""
+    """The law of a particle that the others do not magnetise."""
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return (independent(self, self.independent_law), *super().approximations(extent))
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
-        """Return the field (T) of j at i, as far as it counts."""
+        """Return the field (T) of j at i, reduced by the cut-off function."""
         field = dipole_field(s.moment[w, j], separation, distance)
         if ti.static(self.short_ranged):
             part, _slope = self.part(s, w, i, j, distance)
@@ -55,15 +55,16 @@ class MutualMoment(DipolePairs, SelfConsistentQuantity, Moment):
 
 
 class MutualInducedMoment(LinearSpheres, MutualMoment, InducedMoment):
-    """Spheres of linear material are magnetised by the sources and by each other.
+    """The sources and all other moments magnetise spheres of linear material.
 
         m_i = V_i 3 chi / (3 + chi) (B(r_i) + sum_j f(x) B_j(r_i)) / mu_0
         B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)                        the field of a dipole
         d_c = cutoff (R_i + R_j)/2 + gap,    x = d/d_c,    f(x) = 1 plain, 1 - 4 x^3 + 3 x^4 shifted
 
-    Two at a distance d, with a = chi / (3 + chi) R^3 / d^3, have 1 / (1 - 2 a) times the moment of one alone
-    along the line between them, 1 / (1 + a) across it. Near contact the higher multipoles, which are left
-    out, matter as well. In a periodic box only the nearest image of a particle acts.
+    With a = chi / (3 + chi) R^3 / d^3, each of two spheres at a distance d has 1 / (1 - 2 a) times the moment
+    of a single sphere in a field along the line between them, and 1 / (1 + a) times in a field across it.
+    Higher multipoles, which matter near contact, are neglected. In a periodic box only the nearest image of a
+    particle acts.
 
     Source: L21 Eqs (2.6), (4.12).
     """
@@ -72,13 +73,13 @@ class MutualInducedMoment(LinearSpheres, MutualMoment, InducedMoment):
 
 
 class MutualLangevinMoment(MutualMoment, LangevinMoment):
-    """Superparamagnetic particles are magnetised by the sources and by each other.
+    """The sources and all other moments magnetise superparamagnetic particles.
 
         m_i = m_s L(x) B/|B|,    L(x) = coth x - 1/x,    x = mu_d |B| / (k T)
 
-    B is that of the sources and of all other moments, each a dipole; the rest is as in ``langevin_moment``.
-    B16 leaves this out, as it matters for weak fields only (section 6.2.4). In a periodic box only the
-    nearest image of a particle acts.
+    B is the field of the sources and of all other moments, each a dipole. Otherwise it is the same as
+    ``langevin_moment``. B16 neglects the field of other moments, which matters only for weak fields (section
+    6.2.4). In a periodic box only the nearest image of a particle acts.
 
     Source: B16 Eq. (6.22), L21 (2.6).
     """
@@ -87,15 +88,15 @@ class MutualLangevinMoment(MutualMoment, LangevinMoment):
 
 
 class MutualFroehlichMoment(MutualMoment, FroehlichMoment):
-    """Spheres of iron or an oxide are magnetised by the sources and by each other, up to saturation.
+    """The sources and all other moments magnetise spheres of iron or an oxide, whose magnetisation saturates.
 
         M_i = chi H M_s / (M_s + chi H),    H = |B(r_i) + sum_j f(x) B_j(r_i)| / mu_0 - M_i/3
 
-    It is as ``mutual_induced_moment`` in weak fields, and as ``froehlich_moment`` of spheres by themselves.
-    Saturation ends the growth of moments where linear spheres that overlap have none. In a periodic box only
-    the nearest image of a particle acts.
+    In weak fields it is the same as ``mutual_induced_moment``, and for isolated spheres the same as
+    ``froehlich_moment``. Saturation limits moments for overlapping spheres, for which linear spheres have no
+    solution. In a periodic box only the nearest image of a particle acts.
 
-    Source: L21 Eqs (2.6), (4.12); that of ``froehlich_moment``.
+    Source: L21 Eqs (2.6), (4.12); the sources of ``froehlich_moment``.
     """
 
     independent_law = FroehlichMoment

@@ -1,4 +1,4 @@
-"""Permanent magnetic moments, which turn with their particles (L21 section 4.2.1.2)."""
+"""Permanent magnetic moments, which rotate with their particles (L21 section 4.2.1.2)."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from tisim.state.bound import Peers
 
 
 class PermanentMoment(Operator):
-    """Each particle is a permanent magnet: its moment is fixed in it and turns with it.
+    """Each particle is a permanent magnet: its moment is fixed in it and rotates with it.
 
         dm/dt = w x m,    m(0) = M V e  unless the start gives it,    I dw/dt = T,    I = 2/5 m R^2
 
-    w is the spin. ``dipole_dipole`` gives particles the torque m x B of the fields of the others, and
-    ``magnetophoresis`` that of the sources, beside the forces. e is drawn for each particle, evenly from all
-    directions, by the seed of the scene; particles that are put in later have the ``moment`` that their class
-    gives them.
+    w is the spin. Besides forces, ``dipole_dipole`` exerts the torque m x B of the fields of other particles,
+    and ``magnetophoresis`` of the sources. e is a random unit vector for each particle, uniformly distributed
+    and determined by the seed of the scene. Inserted particles have the ``moment`` that their class gives
+    them.
 
-    Each step turns the moment about w by |w| dt, so that its magnitude stays. With ``verlet`` that is the
-    drift of a leapfrog: of second order, symplectic, and without an error where there is no torque. In a
-    rigid body it turns with that, of a clump by its quaternion. Other
-    steppers hold moments where they were until the end of a step, which makes them of first order in dt.
+    Each step rotates the moment about w by |w| dt, which keeps its magnitude. With ``verlet`` this is the
+    drift of a leapfrog: second order, symplectic, and exact without torque. In a rigid body the moment
+    rotates with the body, in a clump by its quaternion. Other steppers keep moments fixed until the end of a
+    step, which makes them first order in dt.
 
     Source: L21 Eqs (4.6) to (4.9), section 4.2.1.4.
     """
@@ -45,7 +45,10 @@ class PermanentMoment(Operator):
     leapfrog: ClassVar[bool] = True
 
     magnetisation: float = parameter(
-        "A/m", "magnetisation M, along a direction drawn for each; 0 where the start gives moments", 0.0, ge=0
+        "A/m",
+        "magnetisation M, along a random direction for each particle; 0 if the start gives moments",
+        0.0,
+        ge=0,
     )
 
     def given_at_start(self, start: Mapping[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
@@ -70,7 +73,7 @@ class PermanentMoment(Operator):
         bounds = [one.strongest() for one in sources if one.quantity == "magnetic_flux_density"]
         if None in bounds or not len(moment):
             return None
-        # The field of the strongest other that touches, and of all sources.
+        # The field of the strongest moment at contact, and of all sources.
         pairs = any(isinstance(one, PairForce) for one in effects)
         near = mu_0 / (4 * np.pi) * 2 * float(moment.max()) / (2 * start["radius"]) ** 3 if pairs else 0.0
         torque = moment * (sum(filter(None, bounds)) + near)
@@ -79,8 +82,8 @@ class PermanentMoment(Operator):
         return 2 / fastest if fastest > 0 else math.inf
 
     def part_of_critical_step(self, accuracy: float) -> float:
-        # One that is released against the field passes it at twice the rate: its energy was off by up to
-        # 0.27 (omega dt)^2 of m B (tests/hard/test_default_stepper.py).
+        # A moment released against the field passes it at twice the rate: its energy error was up to 0.27
+        # (omega dt)^2 of m B (tests/hard/test_default_stepper.py).
         return super().part_of_critical_step(accuracy / 2)
 
     def connect(self, peers: Peers) -> dict[str, Any]:

@@ -1,4 +1,5 @@
-"""The part of an Ewald sum of dipoles that is made by waves: structure factors, then fields and forces."""
+"""The part of an Ewald sum of dipoles that is summed over waves: structure factors, then fields and
+forces."""
 
 import math
 from typing import Any
@@ -20,17 +21,19 @@ from tisim.state.state import State
 
 @ti.data_oriented
 class WaveSum(LongRangeSum):
-    """A wave sum is the field, and the force, that all dipoles of a periodic box make at each but by pairs.
+    """A wave sum gives the field of all dipoles of a periodic box at each dipole, and the force, except near
+    pairs.
 
-    B_i = -2 mu_0 / V sum_k g k Re[exp(-i k.r_i) S(k)] + mu_0 alpha^3 / (3 pi^(3/2)) m_i - mu_0 N M / V
-    F_i =  2 mu_0 / V sum_k g k (m_i.k) Im[exp(i k.r_i) S*(k)],    g = exp(-k^2 / (4 alpha^2)) / k^2
+        B_i = -2 mu_0 / V sum_k g k Re[exp(-i k.r_i) S(k)] + mu_0 alpha^3 / (3 pi^(3/2)) m_i - mu_0 N M / V
+        F_i =  2 mu_0 / V sum_k g k (m_i.k) Im[exp(i k.r_i) S*(k)],    g = exp(-k^2 / (4 alpha^2)) / k^2
 
-    k_a = 2 pi n_a / L_a are summed over half of all, as k and -k do the same: in columns along z, of which
-    column 0, of n_x = n_y = 0, has n_z > 0, and the others are those after it in the order of n_x and n_y.
+    k_a = 2 pi n_a / L_a are summed over one half of all wave vectors, as k and -k contribute equally. They
+    are arranged in columns along z. Column 0, with n_x = n_y = 0, has n_z > 0; the others follow in the order
+    of n_x and n_y.
 
     turns : exp(i 2 pi n x_a / L_a) of each particle along each axis, for n from 0 on. amplitude : 2 mu_0 / V
-    g S(k). top : the largest n_z of a column; -1 for none. moments : sums over blocks of all moments, in all
-    M, A m^2. mean : -mu_0 N M / V, T. field : T. force : N.
+    g S(k). top : the largest n_z of a column; -1 for none. moments : sums over blocks of all moments, in
+    total M, A m^2. mean : -mu_0 N M / V, T. field : T. force : N.
     """
 
     def __init__(self, s: State, effect: Bound[Any], domain: Bound[Any], forces: bool) -> None:
@@ -114,7 +117,7 @@ def times(a, b):
 
 
 class MeasureColumns(OnOccasion, Phase):
-    """This phase sets how far each column goes within k_max."""
+    """This phase sets the extent of each column within k_max."""
 
     def __init__(self, total: WaveSum) -> None:
         self.sum, self.s, self.extent = total, total.s, total.columns
@@ -135,7 +138,7 @@ class MeasureColumns(OnOccasion, Phase):
 
 
 class TurnParticles(OnOccasion, PerParticle):
-    """This phase sets by how much each wave along an axis has turned at each particle."""
+    """This phase sets the phase factor of each wave along an axis at each particle."""
 
     def __init__(self, total: WaveSum) -> None:
         super().__init__(total.s)
@@ -163,7 +166,7 @@ class SumMoments(OnOccasion, PerBlock):
 
 
 class FieldOfPoles(OnOccasion, Phase):
-    """This phase sets the field that the poles of the sample make."""
+    """This phase sets the field of the poles of the sample."""
 
     def __init__(self, total: WaveSum) -> None:
         self.sum, self.s = total, total.s
@@ -209,7 +212,7 @@ class StructureFactors(OnOccasion, Phase):
 
 
 class Waves(OnOccasion, PerParticle):
-    """This phase sums the waves at each particle, with what is not by waves nor by pairs."""
+    """This phase sums the waves at each particle, and adds the self and surface terms."""
 
     light = False
 
@@ -234,7 +237,7 @@ class Waves(OnOccasion, PerParticle):
                 if ti.static(a.forces):
                     force += (turn[1] * wave[0] - turn[0] * wave[1]) * k.dot(m) * k
         if not a.is_inside(w, i):
-            # Left to who feels it to show, as the state may be one that is to be given up.
+            # The effect that uses it reports the error, as this may be a trial state that is rejected.
             field, force = ti.math.nan * field, ti.math.nan * force
         a.field[w, i] = field
         if ti.static(a.forces):

@@ -17,14 +17,15 @@ from tisim.numerics.powers import Exponent, power
 
 
 class Mie(PairForce):
-    """Spheres repel and attract each other by Mie's potential within a cut-off; beyond it there is no force.
+    """Spheres repel and attract each other by Mie's potential within a cut-off; beyond it no force acts.
 
         F_i = -grad_i U,    U = C eps [(sigma/d)^n - (sigma/d)^m] + const,    sigma = R_i + R_j
 
     C = n/(n - m) (n/m)^(m/(n - m)) makes eps the depth of the well, at d = sigma (n/m)^(1/(n - m)). U is
-    shifted to vanish at the cut-off, which changes no force. Exponents of 30 and 15 stand for hard spheres in
-    B16 (section 6.3), with eps = 100 k T and repulsion alone; 12 and 6 are Lennard-Jones's. With the cut-off
-    at the bottom of the well, where it is unless given, the force ends there with a kink; elsewhere it jumps.
+    shifted to vanish at the cut-off, which changes no force. B16 represents hard spheres by exponents of 30
+    and 15 (section 6.3), with eps = 100 k T and repulsion alone; 12 and 6 give the Lennard-Jones potential.
+    The default cut-off is the bottom of the well, at which the force ends with a kink; at other cut-offs it
+    jumps.
 
     Source: B16 Eqs (6.18), (6.19), after Mie (1903).
     """
@@ -34,10 +35,10 @@ class Mie(PairForce):
     kinked: ClassVar[bool] = True
 
     epsilon: float = parameter("J", "depth eps of the potential well", examples=[4e-19], gt=0)
-    n: Exponent = option("exponent n of the repulsion, above m; whole ones are fastest", 30, gt=0)
+    n: Exponent = option("exponent n of the repulsion, above m; whole numbers are fastest", 30, gt=0)
     m: Exponent = option("exponent m of the attraction", 15, gt=0)
     cutoff: float | None = parameter(
-        "", "cut-off distance over sigma; unless given, the bottom of the well", None, gt=0
+        "", "cut-off distance over sigma; by default the bottom of the well", None, gt=0
     )
 
     @model_validator(mode="after")
@@ -47,7 +48,7 @@ class Mie(PairForce):
 
     @property
     def prefactor(self) -> float:
-        """Return the prefactor C of the law, which gives it its depth."""
+        """Return the prefactor C of the law, which makes eps its depth."""
         return self.n / (self.n - self.m) * (self.n / self.m) ** (self.m / (self.n - self.m))
 
     def at_start(self, masses: np.ndarray) -> Self:
@@ -72,7 +73,7 @@ class Mie(PairForce):
 
     @ti.func
     def reach(self, s, w, i):
-        # Between surfaces, of two as large as i.
+        # Between the surfaces of two as large as i.
         return 2.0 * ti.max(self.cutoff(w) - 1.0, 0.0) * s.radius[w, i]
 
     @ti.func

@@ -2,14 +2,14 @@
 
     F_i = sum_j (alpha_1 d^-beta_1 - alpha_2 d^-beta_2) n_ij,   n_ij from i to j
 
-so alpha_1 attracts and alpha_2 repels. The coefficients are plain numbers (Z13), or go with how strong the
-two particles are (Z16, text after 7.23): alpha = abar s_i s_j c_i c_j, with s the mass, the surface area, the
-volume or the charge, and c = +1 or -1 a positive or negative identifier. As printed, c_i c_j multiplies both
-terms: between unlike particles the first repels and the second attracts. (Z16 section 9 calls its abar "per
-unit mass"; by this formula it is per unit mass squared.)
+so alpha_1 attracts and alpha_2 repels. The coefficients are plain numbers (Z13), or depend on the strengths
+of the two particles (Z16, text after 7.23): alpha = abar s_i s_j c_i c_j, with s the mass, the surface area,
+the volume or the charge, and c = +1 or -1 a positive or negative identifier. As printed, c_i c_j multiplies
+both terms: between unlike particles the first repels and the second attracts. (Z16 section 9 calls its abar
+"per unit mass"; by this formula it is per unit mass squared.)
 
-With strengths of charge, beta_2 = 2 and abar_2 = 1/(4 pi epsilon) alone this is Coulomb's law. (Z13 Eq. 22
-lacks the minus sign that its n_ij, from i to j, asks for: like charges repel.)
+With charges as strengths, beta_2 = 2 and only abar_2 = 1/(4 pi epsilon) nonzero, this is Coulomb's law. (Z13
+Eq. 22 lacks the minus sign that its n_ij, from i to j, requires: like charges repel.)
 """
 
 import math
@@ -26,7 +26,7 @@ from tisim.numerics.powers import Exponent, power
 from tisim.state.fields import Field
 
 CUTOFF_PARTS = (0.1, 0.2, 0.5, 1.0)
-"""These cut-offs, as parts of the largest distance, are worth a try."""
+"""Cut-offs, over the largest distance, that are tried as approximations."""
 
 
 class NearField(PairForce):
@@ -35,8 +35,8 @@ class NearField(PairForce):
         F_i = sum_j (alpha_1 d^-beta_1 - alpha_2 d^-beta_2) n_ij,    alpha = abar s_i s_j c_i c_j
 
     n_ij is the unit vector from i to j, so alpha_1 attracts and alpha_2 repels. The strength s of a particle
-    is 1 ("plain"), its mass (kg), its surface area 4 pi R^2 ("area"), its volume or its charge (C, signed); c
-    is its field ``polarity``, +1 or -1, where the law is signed, and 1 otherwise. In a periodic box only the
+    is 1 ("plain"), its mass (kg), its surface area 4 pi R^2 ("area"), its volume or its charge (C, signed). c
+    is its field ``polarity``, +1 or -1, if the law is signed, and 1 otherwise. In a periodic box only the
     nearest image of a particle acts.
 
     Source: Z16 Eq. (7.23), Z13 Eq. (24).
@@ -47,13 +47,13 @@ class NearField(PairForce):
     alpha1: float = parameter(
         "N m^beta1", "coefficient abar_1 of attraction, per product of the two strengths", 0.0, ge=0
     )
-    beta1: Exponent = option("exponent beta_1 of attraction; whole ones are fastest", 1, ge=0)
+    beta1: Exponent = option("exponent beta_1 of attraction; whole numbers are fastest", 1, ge=0)
     alpha2: float = parameter(
         "N m^beta2", "coefficient abar_2 of repulsion, per product of the two strengths", 0.0, ge=0
     )
-    beta2: Exponent = option("exponent beta_2 of repulsion; whole ones are fastest", 2, ge=0)
+    beta2: Exponent = option("exponent beta_2 of repulsion; whole numbers are fastest", 2, ge=0)
     strength: Literal["plain", "mass", "area", "volume", "charge"] = option(
-        "what the strength s of a particle is", "plain"
+        "quantity that is the strength s of a particle", "plain"
     )
     signed: bool = option("whether particles carry a polarity c, +1 or -1", False)
 
@@ -71,7 +71,7 @@ class NearField(PairForce):
             "volume": 4 / 3 * np.pi * start["radius"] ** 3,
             "charge": np.abs(start.get("charge", np.zeros_like(start["mass"]))),
         }[self.strength]
-        # Of two like the lightest, the smallest and the strongest, where they touch.
+        # For two particles at contact with the smallest mass, the smallest radius and the largest strength.
         contact = 2 * float(start["radius"].min(initial=math.inf))
         steepest = sum(
             alpha * beta / contact ** (beta + 1)
@@ -86,7 +86,7 @@ class NearField(PairForce):
 
     @ti.func
     def own(self, s, w, i):
-        """Return c_i s_i, what a particle brings to the law of a pair."""
+        """Return c_i s_i, the factor of a particle in the law of a pair."""
         size = ti.cast(1.0, s.real)
         if ti.static(self.strength == "mass"):
             size = s.mass[w, i]
@@ -113,18 +113,17 @@ class NearField(PairForce):
     @ti.func
     def between(self, s, w, i, j, separation, distance):
         """Return the force on i by j, in N."""
-        # Each over d once more, for n_ij = separation / d; one division serves both whole powers.
+        # Each divided by d once more, for n_ij = separation / d; one division serves both whole powers.
         attraction = self.alpha1(w) * power(distance, -1 - self.beta1)
         repulsion = self.alpha2(w) * power(distance, -1 - self.beta2)
         return self.own(s, w, i) * self.own(s, w, j) * (attraction - repulsion) * separation
 
 
 class TruncatedNearField(NearField):
-    """Particles within a cut-off attract and repel each other by powers of distance; beyond it there is no
-    force.
+    """Particles within a cut-off attract and repel each other by powers of distance; beyond it no force acts.
 
-    The law is that of ``near_field``; pairs are found with the pair list. The force is not shifted: it jumps
-    at the cut-off. Z13 and Z16 cut nothing off.
+    The law is the same as ``near_field``; pairs are found with the pair list. The force is not shifted: it
+    jumps at the cut-off. Z13 and Z16 use no cut-off.
 
     Source: Z16 Eq. (7.23), Z13 Eq. (24).
     """
@@ -141,7 +140,7 @@ class TruncatedNearField(NearField):
 
     @ti.func
     def reach(self, s, w, i):
-        # Between surfaces, of two of which the other is a point.
+        # Between surfaces, if the other particle is a point.
         return self.cutoff(w) - s.radius[w, i]
 
     @ti.func

@@ -1,4 +1,4 @@
-"""The virial of the forces between particles, from which their stress follows."""
+"""The virial of the forces between particles, from which the stress follows."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ from tisim.effects.constraint.rigid_clumps import RigidClumps
 from tisim.forces.loads import VIRIAL
 
 NAMES = tuple(f"virial_{a}{b}" for a, b in product("xyz", "xyz"))
-"""Measures of a world have these names, in the order of the field."""
+"""Names of the measures of a world, in the order of the field."""
 
 
 class Virial(Effect):
-    """The virial of all pair forces is summed along with them, in each step.
+    """The virial of all pair forces is summed together with the forces in each step.
 
         W = sum_(i<j) (r_i - r_j) F_ij,    W_ab is a product of component a of the place and b of the force
 
     F_ij is the force on i by j, and r_i - r_j leads to i from the image of j that acts on it. W is positive
-    where particles press each other apart; over the volume it is what pair forces add to the pressure tensor.
-    It is asymmetric where pairs turn each other, such as dipoles in a field.
+    if particles repel each other; over the volume it is the contribution of pair forces to the pressure
+    tensor. It is asymmetric if pairs exert torques on each other, such as dipoles in a field.
 
-    Each particle has the half of each of its pairs as a field ``virial``, nine values in the order xx, xy,
-    xz, yx, ... zz; the sums are measures ``virial_xx`` ... ``virial_zz``. ``tisim.analysis.stress_tensor``
-    adds the motion of the particles and divides by the volume.
+    Each particle has half of the virial of each of its pairs as a field ``virial``, nine values in the order
+    xx, xy, xz, yx, ... zz; the sums are measures ``virial_xx`` ... ``virial_zz``.
+    ``tisim.analysis.stress_tensor`` adds the contribution of the motion of particles and divides by the
+    volume.
 
-    Forces on single particles, such as those of walls, gravity and drag, are no part of it; nor is what holds
-    particles in a prescribed motion. The forces within rigid clumps and those of sudden impacts are not
-    known, and those of sums over all others at once, by waves or by a tree, are not known pair by pair, so
-    that it does not go with these. Forces are those of the end of the step, as in ``force``.
+    Forces on single particles, such as walls, gravity and drag, are not included, nor are the forces that
+    hold particles in a prescribed motion. The effect excludes rigid clumps and sudden impacts, whose internal
+    forces are unknown, and long-range sums by waves or by a tree, whose forces are not known pair by pair.
+    Forces are taken at the end of the step, as in ``force``.
 
     Source: R. Clausius, Ann. Phys. 217 (1870) 124; A. P. Thompson, S. J. Plimpton, W. Mattson, J. Chem. Phys.
     131 (2009) 154107, for periodic systems.
@@ -44,7 +45,7 @@ class Virial(Effect):
     excludes: ClassVar = (PairEvent, RigidClumps, LongRange)
 
     def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
-        # Exactly rounded sums, so the same in any order.
+        # Exactly rounded sums do not depend on the order.
         return dict(zip(NAMES, map(math.fsum, state["virial"].T), strict=True))
 
     def measured(self) -> dict[str, str]:

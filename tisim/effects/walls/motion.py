@@ -14,21 +14,21 @@ from tisim.components.component import Component, Vector
 
 @ti.data_oriented
 class MotionState:
-    """A motion state holds the quantities of the world that a motion keeps, by name."""
+    """A motion state holds the quantities of the world that belong to a motion, by name."""
 
     def __init__(self, columns: Mapping[str, Any]) -> None:
         vars(self).update(columns)
 
 
 class Motion(Component):
-    """A motion says where a rigid body, such as a wall, is at a time, and how fast it moves.
+    """A motion gives the position and velocity of a rigid body, such as a wall, at any time.
 
-    At the time 0 the body is where its shapes say, unless the motion says otherwise. Most motions are
-    functions of the time alone. One that follows from the forces on the body keeps what it needs in
-    quantities of the world: it names them in ``quantities``, with their units, ``kept`` has them in kernels,
-    by name, and ``end_step`` sets them, with ``resistance``.
+    Shapes are given at the position of the body at time 0, unless the motion shifts it. Most motions are
+    functions of time alone. A motion that follows from the forces on the body keeps its state in quantities
+    of the world. It lists them in ``quantities``, with their units; kernels find them by name in ``kept``;
+    ``end_step`` updates them from the sum of ``resistance``.
 
-    moves : whether the body is ever elsewhere than its shapes say, or moves at all.
+    moves : whether the body ever leaves the position of its shapes, or moves at all.
     """
 
     contract: ClassVar[bool] = True
@@ -36,46 +36,46 @@ class Motion(Component):
     quantities: ClassVar[Mapping[str, str]] = {}
 
     def centre_of_torque(self) -> Vector:
-        """Return the place (m) about which the torque on the body is told; by default the origin."""
+        """Return the point (m) to which the torque on the body refers; by default the origin."""
         return 0.0, 0.0, 0.0
 
     def top_speed(self, extent: float) -> float:
-        """Return the largest speed (m/s) of the body, which is no larger than an extent (m); 0 where it is
-        not known ahead."""
+        """Return the largest speed (m/s) of the body, which is no larger than an extent (m); 0 if it is not
+        known in advance."""
         return 0.0
 
     def shift(self) -> Vector:
-        """Return how far (m) the body is at the time 0 from where its shapes say."""
+        """Return the displacement (m) of the body from its shapes at time 0."""
         return 0.0, 0.0, 0.0
 
     def shifts(self, duration: float) -> Sequence[Vector]:
-        """Return displacements (m) of the body from where its shapes say, between which all of those in a
-        run of some duration (s) lie."""
+        """Return displacements (m) of the body from its shapes that enclose all displacements in a run of
+        some duration (s)."""
         return (self.shift(),)
 
     def axis(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return a place (m) on the axis about which the body turns, and the direction of that; None for one
-        that does not turn."""
+        """Return a point (m) on the axis of rotation of the body and the direction of the axis; None for a
+        body that does not rotate."""
         return None
 
     @ti.func
     def to_body(self, kept, w, r, t):
-        """Return where a place r (m) in space is among the shapes of the body at time t (s, f64)."""
+        """Return the point of the body frame at a point r (m) in space at time t (s, f64)."""
         return r
 
     @ti.func
     def from_body(self, kept, w, r, t):
-        """Return where a place r (m) of the body is in space at time t; the inverse of ``to_body``."""
+        """Return the point in space of a point r (m) of the body at time t; the inverse of ``to_body``."""
         return r
 
     @ti.func
     def to_space(self, kept, w, direction, t):
-        """Return a direction of the body as it is in space at time t."""
+        """Return a direction of the body frame as a direction in space at time t."""
         return direction
 
     @ti.func
     def velocity_at(self, kept, w, r, t):
-        """Return the velocity (m/s) of the body at a place r in space at time t."""
+        """Return the velocity (m/s) of the body at a point r in space at time t."""
         return 0.0 * r
 
     @ti.func
@@ -85,30 +85,30 @@ class Motion(Component):
 
     @ti.func
     def fastest(self, w, r, around):
-        """Return a speed (m/s) above that of the body at all places within ``around`` (m) of r in space, at
-        any time."""
+        """Return an upper bound of the speed (m/s) of the body at all points within ``around`` (m) of r in
+        space, at any time."""
         return 0.0 * around
 
     @ti.func
     def resistance(self, w, force):
-        """Return what the motion has to know of a force (N) of the body on a particle: a part, summed over
-        all particles as a whole number, which is the same in any order."""
+        """Return the contribution of a force (N) of the body on a particle to the sum that the motion uses.
+        It is a whole number, so that the sum over all particles does not depend on their order."""
         return ti.cast(0, ti.i64)
 
     @ti.func
     def end_step(self, kept, w, total, t):
-        """Set the quantities of the world at the end of a step, at time t, given the sum of
-        ``resistance``; once also before the first step."""
+        """Set the quantities of the world at the end of a step, at time t, given the sum of ``resistance``;
+        also once before the first step."""
 
 
 class Fixed(Motion):
-    """The body rests where its shapes say."""
+    """The body is at rest at the position of its shapes."""
 
     moves: ClassVar[bool] = False
 
 
 def resultant_units(label: str) -> dict[str, str]:
-    """Return the unit of each of the sums that ``resultant`` returns, by name."""
+    """Return the unit of each sum that ``resultant`` returns, by name."""
     what = (("force", "N"), ("torque", "N m"))
     return {f"{label}_{name}_{axis}": unit for name, unit in what for axis in "xyz"}
 
@@ -117,8 +117,8 @@ def resultant(
     label: str, position: np.ndarray, force: np.ndarray, torque: np.ndarray, centre: tuple[float, ...]
 ) -> dict[str, float]:
     """Return the sums of forces (N) and of their torques (N m) about a centre (m), by name, such as
-    LABEL_force_x. Forces act at positions (m), with torques about these, each of shape (n, 3)."""
+    LABEL_force_x. Forces act at positions (m), with additional torques about these, each of shape (n, 3)."""
     moments = np.cross(position - np.array(centre), force) + torque
-    # Exactly rounded sums, so the same in any order.
+    # Exactly rounded sums do not depend on the order.
     sums = (math.fsum(column) for column in np.concatenate([force, moments], axis=1).T)
     return dict(zip(resultant_units(label), sums, strict=True))

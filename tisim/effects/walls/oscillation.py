@@ -1,4 +1,4 @@
-"""Oscillation along a line, such as that of a shaken plate."""
+"""Oscillation along a line, such as the motion of a shaken plate."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from tisim.numerics import elementary
 
 
 class Oscillation(Motion):
-    """The body oscillates about where its shapes say.
+    """The body oscillates about the position of its shapes.
 
     x = A sin(2 pi f t + phase)
     """
@@ -34,12 +34,12 @@ class Oscillation(Motion):
 
     @ti.func
     def angle(self, w, t):
-        # In f64, whatever the precision: it grows without bound.
+        # In f64 for any precision, as the angle grows without bound.
         return 2.0 * math.pi * ti.cast(self.frequency(w), ti.f64) * t + self.phase(w)
 
     @ti.func
     def displacement(self, w, t):
-        """Return how far (m) the body is from where its shapes say."""
+        """Return the displacement (m) of the body from its shapes."""
         return ti.cast(elementary.sin(self.angle(w, t)), float) * self.amplitude(w)
 
     @ti.func

@@ -1,4 +1,4 @@
-"""Rotation about an axis at a constant rate, such as that of a drum."""
+"""Rotation about an axis at a constant rate, such as the motion of a drum."""
 
 import math
 from collections.abc import Iterator
@@ -12,15 +12,15 @@ from tisim.numerics import elementary
 
 
 class Rotation(Motion):
-    """The body turns about an axis at a constant rate.
+    """The body rotates about an axis at a constant rate.
 
     v = Omega x (r - c)
 
-    The torque on it is that about c.
+    The reported torque on the body is about c.
     """
 
     rate: Vector = parameter("rad/s", "angular velocity Omega", examples=[(0.0, 1.0, 0.0)])
-    centre: Vector = parameter("m", "a place c on the axis", (0.0, 0.0, 0.0))
+    centre: Vector = parameter("m", "a point c on the axis", (0.0, 0.0, 0.0))
 
     def centre_of_torque(self) -> Vector:
         return self.centre
@@ -40,13 +40,13 @@ class Rotation(Motion):
         return (np.array(self.centre), np.array(self.rate) / size) if size > 0 else None
 
     def top_speed(self, extent: float) -> float:
-        # Where the body ends is not known in open space.
+        # In open space the extent of the body is unknown.
         return math.hypot(*self.rate) * extent if math.isfinite(extent) else 0.0
 
     @ti.func
     def turned(self, w, d, t):
-        """Return a vector d turned about the axis by Omega t (O. Rodrigues, 1840)."""
-        # In f64, whatever the precision: the angle grows without bound.
+        """Return a vector d rotated about the axis by Omega t (O. Rodrigues, 1840)."""
+        # In f64 for any precision, as the angle grows without bound.
         angle = ti.cast(self.size(w), ti.f64) * t
         cosine, sine = ti.cast(elementary.cos(angle), float), ti.cast(elementary.sin(angle), float)
         axis = self.axis(w)

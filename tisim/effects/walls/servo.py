@@ -1,4 +1,4 @@
-"""A servo, which moves a wall until particles resist it with a wanted force."""
+"""A servo moves a wall until the particles resist it with a wanted force."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -11,10 +11,10 @@ from tisim.effects.base import Vector, parameter
 from tisim.effects.walls.motion import Motion
 
 QUANTA = 2.0**32
-"""A resistance is counted in so many parts of the wanted one."""
+"""Number of units in which the wanted resistance is counted."""
 MOST_RESISTANCE = 2.0**8
-"""The resistance of one particle is counted up to so many times the wanted one: the sum of 2^22 is below
-2^63."""
+"""Upper limit of the counted resistance of one particle, over the wanted force: a sum over 2^22 particles
+stays below 2^63."""
 
 
 class Servo(Directed, Motion):
@@ -22,17 +22,17 @@ class Servo(Directed, Motion):
 
         v = v_max (1 - P / F), within -v_max and v_max
 
-    P is the force of the particles on it, against the direction. The velocity of a step is that of the force
-    at its beginning. It settles where F / (v_max dt) is above half of the stiffness (N/m) with which
-    particles resist it, and F / v_max above their damping (N s/m). For a pressure give F as pressure times
-    area. The result tells its ``travel`` (m) along the direction, and its ``speed`` (m/s).
+    P is the force of the particles on the body, against the direction. The velocity in a step follows from
+    the force at its beginning. The motion settles if F / (v_max dt) exceeds half of the stiffness (N/m) of
+    the particles' resistance, and F / v_max exceeds its damping (N s/m). For a given pressure set F to
+    pressure times area. The result contains the ``travel`` (m) along the direction and the ``speed`` (m/s).
     """
 
     quantities: ClassVar = {"travel": "m", "speed": "m/s", "moved_at": "s"}
 
     force: float = parameter("N", "wanted force F", examples=[10.0], gt=0)
     direction: Vector = parameter("", "direction in which it pushes", (0.0, 0.0, -1.0))
-    limit: float = parameter("m/s", "speed v_max against no resistance", examples=[0.1], gt=0)
+    limit: float = parameter("m/s", "speed v_max without resistance", examples=[0.1], gt=0)
 
     def shifts(self, duration: float) -> Sequence[Vector]:
         farthest = self.limit * duration * np.array(self.unit_vector())
@@ -40,7 +40,7 @@ class Servo(Directed, Motion):
 
     @ti.func
     def displacement(self, kept, w, t):
-        """Return how far (m) the body is from where its shapes say."""
+        """Return the displacement (m) of the body from its shapes."""
         travel = kept.travel[w] + kept.speed[w] * (t - kept.moved_at[w])
         return ti.cast(travel, float) * self.axis(w)
 

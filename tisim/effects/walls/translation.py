@@ -1,4 +1,4 @@
-"""Translation at a constant velocity, at once or from a time on, such as that of a gate."""
+"""Translation at a constant velocity from a given time on, such as the motion of a gate."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from tisim.effects.walls.motion import Motion
 
 
 class Translation(Motion):
-    """The body rests where its shapes say until it begins to move, and has a constant velocity from then on.
+    """The body rests at the position of its shapes until it begins to move at a constant velocity.
 
     x = v max(t - begin, 0)
     """
@@ -26,8 +26,8 @@ class Translation(Motion):
 
     @ti.func
     def displacement(self, w, t):
-        """Return how far (m) the body is from where its shapes say."""
-        # In f64, whatever the precision: the way grows without bound.
+        """Return the displacement (m) of the body from its shapes."""
+        # In f64 for any precision, as the displacement grows without bound.
         moving = ti.max(t - ti.cast(self.begin(w), ti.f64), 0.0)
         return ti.cast(ti.cast(self.velocity(w), ti.f64) * moving, float)
 

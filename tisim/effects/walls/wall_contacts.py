@@ -1,4 +1,4 @@
-"""The forces of a wall on the grains that touch it, and what they remember of it."""
+"""The forces of a wall on the grains that touch it, and the contact history."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -8,17 +8,18 @@ from tisim.effects.walls.wall_ring import WallRing
 from tisim.effects.walls.wall_search import CONTACTS, WallSearch
 
 STILL_THE_SAME = 0.9
-"""A contact goes on as the one whose direction was nearest a step ago, of a larger cosine than this."""
+"""Smallest cosine between the directions of a contact in successive steps; the closest match continues."""
 CAUTION = 1e-6
-"""Clearances are taken to be shorter by this part of the lengths that they are made of, as those round."""
+"""Clearances are reduced by this fraction of the lengths from which they are computed, to allow for
+rounding."""
 
 
 class WallContacts(WallRing, WallSearch):
-    """Wall contacts are what a bound wall does to the grains that touch it.
+    """Wall contacts compute the forces of a bound wall on the grains that touch it.
 
-    laws : each contact law with where its values begin among those of a contact, and their number; stride :
-    the number of all. kept : what the motion keeps of the world. The other attributes are the fields of
-    tisim/effects/walls/walls.py in which grains remember it.
+    laws : each contact law with the position of its values in the history of a contact, and their number;
+    stride : the number of all values. kept : the state of the motion. The other attributes are the fields of
+    tisim/effects/walls/walls.py that hold the history on the grains.
     """
 
     if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class WallContacts(WallRing, WallSearch):
     @ti.func
     def load(self, s, w, i, t, dt, commit):
         force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
-        # Most grains touch no wall, and have touched none in the step before.
+        # Most grains touch no wall and touched none in the step before.
         if self.may_touch(s, w, i, t):
             touching, before = 0, self.touched[w, i]
             r = self.motion.to_body(self.kept, w, s.position[w, i], t)
@@ -77,7 +78,7 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def reach(self, s, w, i):
-        """Return how far (m) a wall may be from the centre of grain i for a law to act: mostly its radius."""
+        """Return the interaction range (m) of a wall from the centre of grain i: mostly the radius of i."""
         gap = ti.cast(0.0, s.real)
         for law in ti.static(self.laws):
             gap = ti.max(gap, law[0].wall_reach(s, w, i))
@@ -85,7 +86,7 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def may_touch(self, s, w, i, t):
-        """Return whether grain i may touch the wall, given when it was last seen where, how far from it."""
+        """Return whether grain i may touch the wall, given its cached clearance and its motion since then."""
         near = True
         if ti.static(self.touches_surfaces or self.motion.moves):
             seen = ti.Vector([self.clear[w, i, axis] for axis in ti.static(range(3))])
@@ -95,15 +96,17 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def may_have_passed(self, s, w, i, beside, t, dt):
-        """Return whether grain i, so far ``beside`` (m) sheets that it does not touch, may have gone through
-        one in this step: by less than its reach it would be seen to touch it."""
+        """Return whether grain i may have passed through a sheet in this step. ``beside`` (m) is its distance
+        from sheets that it does not touch. A path shorter than the interaction range would be detected as a
+        contact."""
         at = s.position[w, i]
         path = dt * (s.velocity[w, i] - self.motion.velocity_at(self.kept, w, at, t)).norm()
         return (path > self.reach(s, w, i)) & (path > beside)
 
     @ti.func
     def note_clearance(self, s, w, i, clear, t):
-        """Note that grain i is so far (m) from the wall at least; the wall may come nearer by its speed."""
+        """Cache a lower bound ``clear`` (m) of the distance of grain i from the wall, and the speed of the
+        wall."""
         r = s.position[w, i]
         speed = self.motion.fastest(w, r, clear)
         until = clear + speed * ti.cast(t, s.real)
@@ -114,22 +117,22 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def touch(self, s, w, i, law: ti.template(), outward, before, distance, past, t, dt):  # type: ignore[valid-type]
-        """Return force (N), torque (N m) and what is remembered of a contact at a ``distance`` (m) from the
-        centre, which lies from there along ``outward``, a direction of the body; a step ago it lay along
-        ``before``, a direction in space."""
+        """Return force (N), torque (N m) and history of a contact at a ``distance`` (m) from the centre, in
+        the direction ``outward`` of the body frame; a step ago the contact was in the direction ``before`` in
+        space."""
         normal = -self.motion.to_space(self.kept, w, outward, t)
         overlap, turning = s.radius[w, i] - distance, self.motion.angular_velocity(w)
         arm, tilt = s.radius[w, i] - 0.5 * overlap, tilted(-before, normal)
         velocity = 0.0 * normal
         if ti.static(self.motion.moves):
-            # As that of a grain, midway in the step.
+            # Midway in the step, like the velocity of a grain.
             place = s.position[w, i] - 0.5 * dt * s.velocity[w, i] + arm * (normal + tilt)
             velocity = self.motion.velocity_at(self.kept, w, place, t - 0.5 * ti.cast(dt, ti.f64))
         return law.at_wall(s, w, i, normal, tilt, overlap, velocity, turning, self.wall_material, past, dt)
 
     @ti.func
     def moved_back(self, w, direction, dt):
-        """Return a direction in space that turns with the body, a step of dt (s) ago."""
+        """Return a direction in space that rotates with the body as it was a step of dt (s) ago."""
         before = direction
         if ti.static(self.motion.moves):
             before -= dt * self.motion.angular_velocity(w).cross(direction)
@@ -137,8 +140,7 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def touch_plane(self, s, w, i, k, r, t, dt, commit):
-        """Return force (N) and torque (N m) at plane k; what the contact remembers goes on where
-        ``commit``."""
+        """Return force (N) and torque (N m) at plane k; the contact history is updated if ``commit``."""
         force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
         distance = self.flat.distance(w, k, r)
         for law, first, size in ti.static(self.laws):
@@ -159,7 +161,7 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def touch_surfaces(self, s, w, i, lately, number, found, t, dt, commit):
-        """Return force (N) and torque (N m) at a number of contacts found; what they remember goes on where
+        """Return force (N) and torque (N m) of a number of contacts found; their history is updated if
         ``commit``. There is nothing to do for a grain that has not touched the wall ``lately``."""
         force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
         if lately > 0:
@@ -177,8 +179,8 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def touch_surface(self, s, w, i, q, slot, new, found, t, dt, commit):
-        """Return force (N) and torque (N m) at contact q of those found; ``slot`` has its direction, then
-        what it remembers, unless it is new."""
+        """Return force (N) and torque (N m) of contact q of those found; ``slot`` stores its direction
+        followed by its history, unless the contact is new."""
         force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
         outward, at = ti.Vector([found[q, 0], found[q, 1], found[q, 2]]), slot * (3 + self.stride)
         before = self.motion.to_space(self.kept, w, outward, t)
@@ -203,16 +205,17 @@ class WallContacts(WallRing, WallSearch):
 
     @ti.func
     def goes_through(self, s, w, i, outward, distance, t, dt):
-        """Return whether the centre of grain i would be behind a sheet after another such step, which then
-        would push it out there; it is ``distance`` (m) from it, along ``outward``."""
+        """Return whether the centre of grain i would be behind a sheet after another step like this one, so
+        that the sheet would push it out on the wrong side; ``distance`` (m) and direction ``outward`` lead to
+        the sheet."""
         away = self.motion.to_space(self.kept, w, outward, t)
         sheet = self.motion.velocity_at(self.kept, w, s.position[w, i] - distance * away, t)
         return dt * (sheet - s.velocity[w, i]).dot(away) > distance
 
     @ti.func
     def slots(self, s, w, i, number, found, t):
-        """Return in which slots the contacts found are remembered: a bit for each slot in use, one for each
-        contact that is new, and the slot of each contact, by four bits."""
+        """Return the history slots of the contacts found: a bit mask of used slots, a bit mask of new
+        contacts, and the slot of each contact in four bits."""
         used, fresh, slots = 0, 0, 0
         for q in range(number):
             outward = ti.Vector([found[q, 0], found[q, 1], found[q, 2]])
@@ -229,7 +232,7 @@ class WallContacts(WallRing, WallSearch):
             else:
                 used |= 1 << slot
                 slots |= slot << (4 * q)
-        # New ones take what the others leave free.
+        # New contacts take the remaining slots.
         for q in range(number):
             if (fresh >> q) & 1 > 0:
                 slot = 0

@@ -1,8 +1,9 @@
 """Walls at the periodic faces of a box.
 
-A grain at one face does not feel a wall at the opposite one. So a surface must stay farther from those faces
-than the largest grain reaches, or be the same at both, wherever the motion of its body takes it: as a floor
-that goes on flat from one to the other does, or a duct of several pieces that reaches beyond both.
+A grain at one face does not feel a wall at the opposite face. So a surface must stay farther from periodic
+faces than the largest grain reaches, or be the same at both faces, throughout the motion of its body. A floor
+that continues flat from one face to the other is the same at both; so is a duct of several pieces that
+extends beyond both.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from tisim.geometry.shape import SEAM, Shape
 from tisim.geometry.triangles import TriangulatedSurface
 
 FIRST_PLACES, MOST_PLACES, FEWEST_PLACES = 4000, 2**22, 200
-"""A body is compared at two faces at places at random, at first a few, then at twice as many each time, until
-at least FEWEST_PLACES of them were near it."""
+"""Numbers of random points at which a body is compared at two faces: the first number, doubled up to the
+largest, until at least FEWEST_PLACES points are near the body."""
 SAME_DISTANCE = 1e-4
-"""Distances from it may differ by this part of the reach, and by what single precision rounds coordinates."""
+"""Tolerance of distances from the body, over the interaction range, besides the rounding of coordinates in
+f32."""
 
 
 def check_faces(
@@ -42,7 +44,7 @@ def check_faces(
                 continue
             rule = (
                 f"farther than the largest radius, {reach:g} m, from the periodic faces of the box along "
-                f"{'xyz'[axis]}, or be the same at both, as one that goes on flat: it is not felt through "
+                f"{'xyz'[axis]}, or be the same at both, as a flat floor is: it does not act through "
                 "them"
             )
             received = "one that ends or bends there" + ("" if at_start[axis] else " as it moves")
@@ -52,14 +54,14 @@ def check_faces(
 def _ends(
     shape: Shape, motion: Motion, low: np.ndarray, high: np.ndarray, reach: float, duration: float
 ) -> np.ndarray:
-    """Return the axes along which a shape ends, or bends, within reach of a face at some time: shape (3,)."""
+    """Return the axes along which a shape ends or bends within reach of a face at some time: shape (3,)."""
     ends = np.zeros(3, bool)
     shifts = np.array(motion.shifts(duration))
     travel = np.ptp(shifts, axis=0)
     for shift in shifts:
         ends |= shape.ends_at(low - shift, high - shift, reach)
         if isinstance(shape, TriangulatedSurface):
-            # Between the extremes of a motion another part of it may pass a face.
+            # Between the extremes of a motion a different part of it may pass a face.
             for axis in np.flatnonzero(travel):
                 ends[axis] |= shape.ends_at(low - shift, high - shift, reach + travel[axis])[axis]
     turning = motion.axis()
@@ -71,7 +73,8 @@ def _ends(
 def _ends_turned(
     shape: Shape, centre: np.ndarray, axis: np.ndarray, low: np.ndarray, high: np.ndarray, reach: float
 ) -> np.ndarray:
-    """Return the same for a shape that turns about an axis, which may come anywhere in a ring around it."""
+    """Return the same for a shape that rotates about an axis; it may be anywhere in a ring around the
+    axis."""
     # Along the axis of rotation nothing changes.
     turned = np.abs(axis) < 1.0 - SEAM
     if (extent := shape.extent()) is None:
@@ -89,13 +92,13 @@ def _is_alike(
     body: list[Shape], motion: Motion, axis: int, low: np.ndarray, high: np.ndarray, reach: float,
     duration: float,
 ) -> bool:  # fmt: skip
-    """Return whether a body looks the same from both faces across an axis: its distance from places within
-    reach (m) of one face is that from their images at the other."""
+    """Return whether a body is the same at both faces across an axis: points within reach (m) of one face
+    have the same distance from it as their images at the other face."""
     turning, shifts = motion.axis(), np.array(motion.shifts(duration))
     if turning is not None and not all(shape.turns_into_itself(*turning) for shape in body):
         return False
     if np.ptp(shifts[:, axis]) > 0:
-        # Between the extremes of the motion its parts may lie otherwise.
+        # Between the extremes of the motion the parts may be arranged differently.
         return False
     apart = np.zeros(3)
     apart[axis] = high[axis] - low[axis]
@@ -110,13 +113,13 @@ def _is_alike_at(
     body: list[Shape], shift: np.ndarray, axis: int, low: np.ndarray, high: np.ndarray, apart: np.ndarray,
     reach: float, tolerance: float,
 ) -> bool:  # fmt: skip
-    """Return this for one displacement (m) of the body, by comparing at random places."""
+    """Return this for one displacement (m) of the body, by comparison at random points."""
     rng, found, number = np.random.Generator(np.random.Philox(0)), 0, FIRST_PLACES
     while number <= MOST_PLACES:
         places = rng.uniform(low, high, (number, 3))
-        # On either side of the lower face, and their images on either side of the upper one.
+        # Points on either side of the lower face, and their images on either side of the upper one.
         places[:, axis] = low[axis] + rng.uniform(-reach, reach, number)
-        # Each shape, as a mesh of too many triangles does not tell its distances, and is then refused.
+        # For each shape, as a mesh with too many triangles does not give distances and is then refused.
         here, there = (
             np.array([shape.distances(at - shift) for shape in body]) for at in (places, places + apart)
         )

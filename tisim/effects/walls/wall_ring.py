@@ -1,19 +1,20 @@
-"""A grain that blocks a round outlet, or touches a wall in more places than it remembers.
+"""Contacts of a grain that blocks a round outlet, or that touches a wall at more points than can be stored.
 
-Facets whose directions differ by less than 15 degrees share one contact, in parts that change smoothly as the
-grain moves: of a ring of facets it would else be chance which ones count, and a grain in its middle would be
-pushed aside. The part of a facet is
+Facets whose directions differ by less than 15 degrees share one contact. Each has a weight that changes
+smoothly as the grain moves. Otherwise the choice among the facets of a ring would be arbitrary, and a grain
+in the middle of the ring would be pushed aside. The weight of a facet is
 
     w_f = 1 / sum over g of K(n_f . n_g) min(1, h_g / h_f),    K(x) = (x - ALIKE) / (1 - ALIKE), from 0 on
 
-where n is its direction, and h how deep it is within the distance at which laws act. So facets that meet at
-an edge or a vertex, where both have their nearest place, count once. Then the contacts are taken in six
-bundles, by the axes of the body: a facet belongs to the bundle of an axis a by (n_f . a)^2, if that points
-its way, which add up to 1. A bundle acts as one contact of depth h, along G, with a force multiplied by |G|:
+with its direction n and its depth h within the interaction range of the laws. Facets that meet at an edge or
+a vertex, which is the nearest point of both, therefore count once. Contacts are then combined into six
+bundles, one for each direction along an axis of the body. A facet contributes to the bundle of an axis a that
+it faces with the weight (n_f . a)^2; these weights add up to 1. A bundle acts as one contact of depth h along
+G, and its force is multiplied by |G|:
 
     h^(5/2) = sum w_f (n_f . a)^2 h_f^(5/2),    G = sum w_f (n_f . a)^2 (h_f / h)^(3/2) n_f
 
-With Hertzian forces the bundles together push as all contacts do; with others nearly so.
+For Hertzian forces the bundles together give the force of all contacts; for other laws nearly so.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -23,16 +24,16 @@ from tisim.effects.walls.wall_search import ALIKE, BEHIND, CONTACTS, Faces
 from tisim.numerics import elementary
 
 DOUBTFUL = 3
-"""So many contacts may be those of a ring; two are where a grain lies in a groove or a round corner."""
+"""Smallest number of contacts that may belong to a ring; a groove or a round corner gives two."""
 LEAST_PUSH = 1e-25
-"""A bundle of less (h / touching)^(3/2) is empty: it is what rounding leaves."""
+"""A bundle with a smaller (h / touching)^(3/2) is empty and results from rounding."""
 
 
 class Doubting:
-    """Doubting finds whether there is a facet that is no contact beside those found, rows of a matrix, only
-    because it looks the same way as one of them.
+    """Doubting finds out whether a facet was rejected as a contact only because its direction is similar to
+    the direction of a contact found (the rows of a matrix).
 
-    ``told`` : the distance (m) within which laws act, then 1 if there is one.
+    ``told`` : the distance (m) within which laws act, then 1 if there is such a facet.
     """
 
     @ti.func
@@ -49,8 +50,8 @@ class Doubting:
 
 
 class Sharing:
-    """Sharing sums up how many facets share the contact of one of them, whose direction and depth are
-    ``facet``."""
+    """Sharing sums the number of facets that share the contact of one of them, given by its direction and
+    depth ``facet``."""
 
     @ti.func
     def consider(self, r, place, shares, facet, touching):
@@ -64,8 +65,8 @@ class Sharing:
 
 
 class Bundling:
-    """Bundling adds the facets of a wall to bundles, rows of a matrix: h^(5/2), then h^(3/2) G, of depths in
-    parts of ``touching``; two rows for each axis, which it points along and against."""
+    """Bundling adds the facets of a wall to bundles, rows of a matrix: h^(5/2), then h^(3/2) G, with depths
+    in units of ``touching``; two rows for each axis, one for each sense."""
 
     def __init__(self, faces: Faces) -> None:
         self.faces, self.sharing = faces, Sharing()
@@ -90,8 +91,7 @@ class Bundling:
 
 
 class WallRing:
-    """A wall ring bundles the contacts of a grain with a wall: it is what a bound wall does where there are
-    many."""
+    """A wall ring combines the contacts of a grain with a bound wall into bundles if there are many."""
 
     if TYPE_CHECKING:
         faces: Any
@@ -100,7 +100,7 @@ class WallRing:
 
     @ti.func
     def in_doubt(self, w, r, touching, reach, found, number):
-        """Return whether it depends on the depths of facets alone which of them are those found."""
+        """Return whether the choice of contacts among similar facets depends on their depths alone."""
         told = ti.Vector([touching, 0.0 * touching])
         if number >= DOUBTFUL:
             told = self.faces.all(w, r, reach, told, self.doubting, found, number)
@@ -108,9 +108,9 @@ class WallRing:
 
     @ti.func
     def bundles(self, s, w, r, touching, reach):
-        """Return the bundles of a grain at r (m) as contacts: how many, and the rows of ``contacts``."""
+        """Return the bundles of a grain at r (m) as contacts: their number, and the rows of ``contacts``."""
         found, number = ti.Matrix.zero(s.real, CONTACTS, 5), 0
-        # What is farther than that is in no bundle.
+        # Facets farther than this are in no bundle.
         near = ti.min(reach, touching)
         given = ti.Vector([ti.cast(w, s.real), near])
         empty = ti.Matrix.zero(s.real, CONTACTS, 4)

@@ -1,11 +1,12 @@
-"""Where a grain touches a wall made of several surfaces.
+"""The contacts of a grain with a wall made of several surfaces.
 
-Each face of a surface has a place nearest to the grain. Not all of those that lie within the grain are
-contacts: of two triangles in a plane, or two faces at a convex edge, the grain touches the nearer one, and
-the nearest place of the other is only where its face begins. So contacts are taken one by one, the deepest
-first. A further place is a contact if it lies in front of the tangent planes of those before, as at a concave
-edge, and in another direction: facets of a curved wall that differ by less than ALIKE count as one. So the
-force follows from the least distance wherever a grain moves over an edge, and no energy is made.
+Each face of a surface has a point nearest to the centre of the grain. Not all such points within the grain
+are contacts. Of two triangles in a plane, or two faces at a convex edge, the grain touches only the nearer
+one; the nearest point of the other lies on its boundary. Contacts are therefore taken one by one, the deepest
+first. A further point is a contact if it lies in front of the tangent planes of those before, as at a concave
+edge, and in a different direction: facets of a curved wall whose directions differ by less than ALIKE count
+as one. As a grain moves over an edge, the force then follows from the smallest distance, and no energy is
+created.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -13,22 +14,24 @@ from typing import TYPE_CHECKING, Any
 from tisim.backend.taichi import ti
 
 CONTACTS = 6
-"""A grain remembers so many contacts with one wall, as many as a box has faces; of more it makes bundles."""
+"""Contacts of a grain with one wall that are stored, as many as a box has faces; more are combined into
+bundles."""
 ALIKE = 0.966
-"""Two contacts of a grain with one wall whose directions have a larger cosine, so below 15 degrees, are
-one."""
+"""Two contacts of a grain with one wall count as one if the cosine of their directions is larger, that is,
+below 15 degrees."""
 BEHIND = 1e-3
-"""A place counts as behind a tangent plane up to so far in front of it, in parts of the distance."""
+"""Tolerance within which a point in front of a tangent plane counts as behind it, over the distance."""
 
 
 REACH = 1.5
-"""Surfaces are looked for within so many radii, to know for how long none will be touched."""
+"""Search radius for surfaces over the interaction range; a larger radius shows how long no surface can be
+touched."""
 
 
 @ti.func
 def explained(out, distance, found, number):
-    """Return whether a place at ``out`` (m) from it to the grain's centre, ``distance`` away, is no contact
-    beside a number of those found: rows of a matrix, direction to the centre and distance (m)."""
+    """Return whether a point is not a separate contact. ``out`` (m) leads from it to the grain's centre at a
+    ``distance``; ``found`` has a number of contacts as rows, direction to the centre and distance (m)."""
     hit = False
     for q in range(number):
         along = out[0] * found[q, 0] + out[1] * found[q, 1] + out[2] * found[q, 2]
@@ -37,16 +40,15 @@ def explained(out, distance, found, number):
 
 
 class Faces:
-    """These are the faces of a wall: lists of surfaces, of which there are any, and triangles, if there is a
-    mesh."""
+    """The faces of a wall: the non-empty lists of surfaces, and the triangles if there is a mesh."""
 
     def __init__(self, surfaces: tuple[Any, ...], mesh: Any, has_mesh: bool) -> None:
         self.surfaces, self.mesh, self.has_mesh = surfaces, mesh, has_mesh
 
     @ti.func
     def all(self, w, r, reach, best, search: ti.template(), found, number):  # type: ignore[valid-type]
-        """Return what ``search.consider`` makes of all faces, and of the triangles within ``reach`` (m) of r,
-        one after another, from ``best`` on."""
+        """Return the result of ``search.consider`` applied in turn to all faces, and to the triangles within
+        ``reach`` (m) of r, beginning with ``best``."""
         for each in ti.static(self.surfaces):
             for k in range(each.size(w)):
                 for c in range(ti.cast(each.faces(w, k), ti.i32)):
@@ -57,9 +59,9 @@ class Faces:
 
 
 class WallSearch:
-    """A wall search finds where a grain touches a wall: it is what a bound wall does with its shapes.
+    """A wall search finds the contacts of a grain with the shapes of a bound wall.
 
-    flat : the list of its planes. faces : those of its surfaces. mesh : its triangles, where ``has_mesh``.
+    flat : the list of its planes. faces : the faces of its surfaces. mesh : its triangles, if ``has_mesh``.
     """
 
     if TYPE_CHECKING:
@@ -72,8 +74,8 @@ class WallSearch:
 
     @ti.func
     def consider(self, r, place, best, found, number):
-        """Return the better contact of a grain at r (m): at a place (m), or ``best``, its distance and where
-        it is."""
+        """Return the better contact of a grain at r (m): the one at a place (m), or ``best``, as distance and
+        place."""
         out, result = r - place, best
         distance = out.norm()
         nearer = distance < best[0]
@@ -83,16 +85,16 @@ class WallSearch:
 
     @ti.func
     def deepest(self, w, r, limit, reach, found, number):
-        """Return distance (m) and place of the nearest contact beside those found, of triangles within
-        ``reach`` (m), where that is above 0; the distance is ``limit`` where there is none within it."""
+        """Return distance (m) and place of the nearest further contact beside those found. Triangles are
+        limited to ``reach`` (m) if that is above 0. The distance is ``limit`` if there is none within it."""
         best = ti.Vector([limit, r[0], r[1], r[2]])
         return self.faces.all(w, r, reach, best, self, found, number)
 
     @ti.func
     def contacts(self, s, w, i, r, touching):
-        """Return the contacts of grain i, which is at r (m) beside the shapes, with surfaces: how many, and
-        their directions, their distances, of ``touching`` (m) at most, and by how much their forces are
-        multiplied; and how far it is from surfaces at least, where there is none."""
+        """Return the contacts of grain i, at r (m) in the body frame, with surfaces: their number and a
+        matrix of directions, distances of at most ``touching`` (m) and force factors; and a lower bound of
+        the distance from surfaces if there is no contact."""
         found, number, searching = ti.Matrix.zero(s.real, CONTACTS, 5), 0, 1
         clear = ti.cast(ti.math.inf, s.real)
         limit, reach = clear, REACH * touching
@@ -118,7 +120,7 @@ class WallSearch:
 
     @ti.func
     def from_planes(self, w, r):
-        """Return the distance (m) of r from the nearest plane."""
+        """Return the distance (m) from r to the nearest plane."""
         clear = ti.cast(ti.math.inf, float)
         for k in range(self.flat.size(w)):
             clear = ti.min(clear, self.flat.distance(w, k, r))

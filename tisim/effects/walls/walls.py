@@ -36,24 +36,24 @@ if TYPE_CHECKING:
     from tisim.scene.scene import Scene
 
 FIELDS = ("past", "surface_past", "loads", "touched", "clear")
-"""A grain remembers of a wall, where there is need: what its contacts with planes do, and with surfaces, the
-load, how many contacts there are, and where it was how far from the wall."""
+"""Fields of a grain for a wall, if needed: the contact history at planes and at surfaces, the load, the
+number of contacts, and the cached clearance."""
 
 
 class Walls(WallContacts, UsesMaterials, Force):
-    """Walls hold grains back by the contact laws of the scene; together they are one rigid body, at rest or
-    in motion.
+    """Walls confine grains by the contact laws of the scene; the walls of an effect form one rigid body.
 
-    A wall is a grain of infinite radius and mass. Planes bound the space in which grains are: each is felt by
-    itself. Other surfaces have two sides, and rims; where they meet, at an edge or a seam, a grain feels the
-    nearer one, and at a concave edge both. What a contact remembers lies with the grain, and goes along with
-    it from one triangle to the next. None is felt through the periodic faces of a box: a surface at one must
-    be the same at the opposite one, as a floor is, or is refused.
+    The body is at rest or moves as prescribed by its ``motion``. A wall is a grain of infinite radius and
+    mass. Planes bound the region of the grains, and each plane acts independently. Other surfaces have two
+    sides and rims. If they meet, a grain feels the nearer one at a convex edge or a seam, and both at a
+    concave edge. The contact history is stored on the grain, and is kept when the grain moves from one
+    triangle to the next. No surface acts through the periodic faces of a box: a surface at one face must be
+    the same at the opposite face, as a floor is, or it is refused.
 
-    Bodies that move by themselves, or whose forces are reported separately, are walls of their own names. The
-    result tells the force (N) and the torque (N m) of the grains on the body, about the origin or the centre
-    of its rotation, as ``measures["NAME_force_x"]`` and so on, and ``state["NAME_loads"]`` those of the body
-    on each grain.
+    Use separate walls, each with its own name, for bodies that move independently or whose forces are
+    reported separately. The result contains the force (N) and the torque (N m) of the grains on the body,
+    about the origin or the centre of its rotation, as ``measures["NAME_force_x"]`` and so on, and the force
+    and torque of the body on each grain as ``state["NAME_loads"]``.
     """
 
     fields = ("radius", "velocity", "spin")
@@ -63,16 +63,20 @@ class Walls(WallContacts, UsesMaterials, Force):
     requires: ClassVar = (GranularContact,)
 
     planes: tuple[Plane, ...] = option(
-        "planes; their number may differ per world, as that of others", (), examples=[(Plane(),)]
+        "planes; their number may differ per world, as for the other lists", (), examples=[(Plane(),)]
     )
     discs: tuple[Disc, ...] = option("flat discs", (), examples=[()])
-    spheres: tuple[SphericalSurface, ...] = option("spheres, from within or around", (), examples=[()])
-    cylinders: tuple[CylindricalSurface, ...] = option("cylinders, from within or around", (), examples=[()])
-    cones: tuple[ConicalSurface, ...] = option("cones, from within or around", (), examples=[()])
-    boxes: tuple[BoxSurface, ...] = option("boxes, from within or around", (), examples=[()])
-    surface: TriangulatedSurface | None = option("a surface of triangles, such as that of an STL file", None)
+    spheres: tuple[SphericalSurface, ...] = option(
+        "spheres, with grains inside or outside", (), examples=[()]
+    )
+    cylinders: tuple[CylindricalSurface, ...] = option(
+        "cylinders, with grains inside or outside", (), examples=[()]
+    )
+    cones: tuple[ConicalSurface, ...] = option("cones, with grains inside or outside", (), examples=[()])
+    boxes: tuple[BoxSurface, ...] = option("boxes, with grains inside or outside", (), examples=[()])
+    surface: TriangulatedSurface | None = option("a surface of triangles, such as from an STL file", None)
     motion: Motion = option("how the body moves", Fixed())
-    material: Text | None = option("material of the walls; the first of the scene unless given", None)
+    material: Text | None = option("material of the walls; by default the first of the scene", None)
 
     @model_validator(mode="after")
     def _there(self) -> Walls:
@@ -106,7 +110,7 @@ class Walls(WallContacts, UsesMaterials, Force):
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
     ) -> float | None:
-        # Its laws of contact tell it, of the materials of walls too.
+        # The contact laws give the limit, including the materials of walls.
         return math.inf
 
     def reached_speed(self, duration: float, extent: float) -> float:
@@ -117,11 +121,11 @@ class Walls(WallContacts, UsesMaterials, Force):
         return ", or ".join(filter(None, laws))
 
     def material_index(self, materials: Materials) -> int:
-        """Return the index of the material of the walls among those of a scene."""
+        """Return the index of the material of the walls among the materials of a scene."""
         return 0 if self.material is None else materials.index(self.material, f"{self.label}.material")
 
     def kinds_of_surface(self) -> Iterator[str]:
-        """Yield the names of the lists of surfaces of which there are any."""
+        """Yield the names of the non-empty lists of surfaces."""
         return (name for name, kind in self.lists() if issubclass(kind, Surface) and getattr(self, name))
 
     @property
@@ -130,8 +134,8 @@ class Walls(WallContacts, UsesMaterials, Force):
         return self.surface is not None or any(self.kinds_of_surface())
 
     def overlaps(self, position: np.ndarray, radius: np.ndarray) -> np.ndarray:
-        """Return how deep (m) spheres at some places (m, shape (n, 3)) are in the wall at the time 0: what is
-        behind a plane by more than its diameter; shape (n,)."""
+        """Return the overlap (m) of spheres at some places (m, shape (n, 3)) with the wall at time 0, shape
+        (n,); for a sphere behind a plane it exceeds the diameter."""
         shapes = [shape for _, shape in self._named_shapes()]
         places = position - np.array(self.motion.shift())
         deepest: np.ndarray = radius - np.min([shape.distances(places) for shape in shapes], axis=0)

@@ -11,19 +11,19 @@ from tisim.materials.materials import Touching
 
 
 class SJKR(Cohesion):
-    """Grains pull each other by a cohesion for each area of contact, after a simplified JKR model.
+    """Grains attract each other with a force proportional to the contact area, after a simplified JKR model.
 
         F = k_c A,    A = 2 pi R* delta
 
-    A is the area of the lens that two spheres share, to first order in delta / R*. Coulomb's limit is that of
-    the normal force without cohesion.
+    A is the area of the lens that two spheres share, to first order in delta / R*. Coulomb's limit uses the
+    normal force without cohesion.
 
-    Beside ``hooke`` it is held at all overlaps or at none: where 2 pi k_c R* is above the stiffness k grains
-    fall into each other. Beside ``hertz_material`` two that nothing presses rest at delta = (3 pi k_c / (2
-    E*))^2 R*. Where that is above R*, for k_c > 2 E* / (3 pi), the circle of contact would be wider than R*
-    and the area above means nothing. Both are so where the pull is not below the elastic force at an overlap
-    of R*: grains of a start or of an insertion, and walls, are then refused, and what grows to be so stops
-    its world.
+    The elastic force must exceed the cohesion. Beside ``hooke`` it does so at all overlaps or at none: if 2
+    pi k_c R* exceeds the stiffness k, grains collapse into each other. Beside ``hertz_material`` two grains
+    without load rest at delta = (3 pi k_c / (2 E*))^2 R*. If this is above R*, for k_c > 2 E* / (3 pi), the
+    contact circle would be wider than R* and the area above loses its meaning. Both cases are detected by
+    comparing the forces at an overlap of R*. Grains of a start or of an insertion, and walls, are refused if
+    cohesion is not below the elastic force there; a world is stopped if grains grow to such a size.
 
     Source: L21 section 2.2.1; C. Kloss, C. Goniva, A. Hager, S. Amberger and S. Pirker, Prog. Comput. Fluid
     Dyn. 12 (2012) 140, for its use.
@@ -44,16 +44,17 @@ class SJKR(Cohesion):
 
 
 class DMT(Cohesion):
-    """Hard grains pull each other by a constant force while they touch, as Derjaguin, Muller and Toporov
-    found.
+    """Hard grains attract each other with a constant force while they touch, after Derjaguin, Muller and
+    Toporov.
 
         F = 4 pi gamma R*
 
-    gamma is the surface energy, half the work of adhesion. A constant force is held by every normal force:
-    beside ``hertz_material`` two that nothing presses rest at delta = (3 pi gamma / (E* R*))^(2/3) R*.
-    Coulomb's limit is taken of |F_n + 2 F|, with F_n the elastic and cohesive force, so that it is mu F where
-    the contact is about to part. The force begins and ends in full where surfaces touch; there it is spread
-    over two steps, so that its work does not depend on where in a step they meet (jump.py).
+    gamma is the surface energy, half the work of adhesion. Every normal force can balance a constant force:
+    beside ``hertz_material`` two grains without load rest at delta = (3 pi gamma / (E* R*))^(2/3) R*.
+    Coulomb's limit uses |F_n + 2 F|, with F_n the sum of elastic and cohesive force, so that it is mu F when
+    the contact is about to part. The force sets in and ends at its full value when surfaces touch or part.
+    There it is ramped over two steps, so that its work does not depend on when within a step this happens
+    (jump.py).
 
     Source: B. V. Derjaguin, V. M. Muller and Y. P. Toporov, J. Colloid Interface Sci. 53 (1975) 314; L21 Eq.
     (4.5); J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.

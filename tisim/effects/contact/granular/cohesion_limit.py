@@ -1,4 +1,4 @@
-"""How much cohesion by the overlap a normal force can hold: known of its grains before a scene runs."""
+"""Checks, before a scene runs, that a normal force can balance overlap-dependent cohesion."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ if TYPE_CHECKING:
 
 
 def with_newcomers(start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> dict[str, np.ndarray]:
-    """Return radius (m) and material of the grains of a start, and of the largest that effects put in."""
+    """Return radius (m) and material of the grains of a start and of the largest grains that effects
+    insert."""
     first = start.get("material", np.zeros(len(start["radius"]), int))
     all_of_them = ({"radius": start["radius"], "material": first}, *(e.largest_newcomers() for e in effects))
     return {name: np.concatenate([one[name] for one in all_of_them]) for name in ("radius", "material")}
 
 
 def largest_radii(grains: Mapping[str, np.ndarray]) -> dict[int, list[float]]:
-    """Return the radius (m) of the largest grain of each material, by its number, and of the one after it."""
+    """Return the radii (m) of the two largest grains of each material, by the number of the material."""
     radius, material = grains["radius"], grains["material"]
     return {int(k): np.sort(radius[material == k])[:-3:-1].tolist() for k in np.unique(material)}
 
 
 def check_grains(law: Granular, materials: Materials, grains: Mapping[str, np.ndarray]) -> None:
-    """Raise InputError unless a law pushes more than it pulls where the largest grains of any two materials
+    """Raise InputError unless a law repels more than it attracts when the largest grains of any two materials
     touch."""
     radii, number = largest_radii(grains), max(1, len(materials.named))
     for i, j in combinations_with_replacement(radii, 2):
@@ -44,7 +45,7 @@ def check_grains(law: Granular, materials: Materials, grains: Mapping[str, np.nd
 def check_wall(
     law: Granular, materials: Materials, grains: Mapping[str, np.ndarray], wall: int, label: str
 ) -> None:
-    """Raise InputError unless a law does so where the largest grains touch a wall of a material."""
+    """Raise InputError unless a law does so when the largest grains touch a wall of a material."""
     number = max(1, len(materials.named))
     for i, (radius, *_) in largest_radii(grains).items():
         pair = materials.touching()[i * number + wall]
@@ -52,8 +53,8 @@ def check_wall(
 
 
 def _check(law: Granular, pair: Touching, radius: float, what: str) -> None:
-    """Compare both at an overlap of R* (m)."""
+    """Compare elastic force and cohesion at an overlap of R* (m)."""
     if law.cohesion is not None:
         push, pull = law.normal.push(pair, radius, radius), law.cohesion.pulls(pair, radius, radius)
-        rule = f"below what {law.normal.kind()} pushes with at an overlap of R*, {push:.4g} N, where {what}"
+        rule = f"below the repulsion of {law.normal.kind()} at an overlap of R*, {push:.4g} N, when {what}"
         must(pull < push, f"{law.label}.cohesion", rule, float(f"{pull:.4g}"))

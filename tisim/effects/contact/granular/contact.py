@@ -1,4 +1,4 @@
-"""The contract of contact laws that hold between spheres, and between a sphere and a wall."""
+"""The contract of contact laws between two spheres, and between a sphere and a wall."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tisim.materials.material_law import MaterialLaw
 
 
 class GranularContact(MaterialLaw, PairForce):
-    """A granular contact gives the force at the point where a grain touches another or a wall.
+    """A granular contact law gives the force at the point of contact of a grain with another grain or a wall.
 
-    The law sees the contact only: which way it faces, how deep it is, of which materials, how its surfaces
-    move past each other, and what it remembers. The contact lies in the middle of the overlap, R_i - delta/2
-    from the centre of i, and the force acts there. A wall is a grain of infinite radius and mass.
+    The law depends only on the contact: its normal, overlap, materials, the relative velocity of its
+    surfaces, and its history. The point of contact lies in the middle of the overlap, R_i - delta/2 from the
+    centre of i, and the force acts there. A wall is a grain of infinite radius and mass.
 
-    memory : values that a contact remembers while it lasts, zero when it begins. turns_springs : whether
-    some of them are vectors, which turn with the contact.
+    memory : number of history values of a contact, kept while it lasts and zero when it begins.
+    turns_springs : whether the history contains vectors, which rotate with the contact.
     """
 
     contract: ClassVar[bool] = True
@@ -34,34 +34,34 @@ class GranularContact(MaterialLaw, PairForce):
     leapfrog: ClassVar[bool] = True
     guards_steps: ClassVar[bool] = True
     turns_springs: ClassVar[bool] = False
-    # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
+    # This step control limits the approach of surfaces, but ignores the stiffness of contacts.
     incompatible_controls = ("approach_time",)
 
     def suits_wall(
         self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], material: int, label: str
     ) -> None:
-        """Raise InputError unless it can act between the particles of a start, or those that effects of the
-        scene put in, and walls of a material."""
+        """Raise InputError unless it can act between walls of a material and the particles of a start, or
+        those that effects of the scene insert."""
 
     def required_fields(self) -> tuple[str | Field, ...]:
         return (*self.fields, "material") if self.several else self.fields
 
     @ti.func
     def lasts(self, w, pair, overlap, radius, past):
-        """Return whether there is a contact; a law that holds on to what parts asks what it remembers."""
+        """Return whether the contact exists; a law that acts beyond contact also uses its history."""
         return overlap >= 0.0
 
     @ti.func
     def contact(self, w, pair, normal, overlap, radius, mass, inverses, slip, spinning, tilt, turn, past, dt):
-        """Return the force (N) and the couple (N m) on i, and what the contact remembers after a further dt
-        (s), given ``past``.
+        """Return the force (N) and the couple (N m) on i, and the contact history after a further dt (s),
+        given the history ``past``.
 
-        pair : which materials touch (see tisim/materials/material_law.py). normal : unit vector from i to
-        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses :
-        inverse masses, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of the other
-        past that of i. spinning : spin (rad/s) of the other relative to i. tilt, turn : how the contact turns
-        in the step (see ``carried`` in spring.py), 0 unless it ``turns_springs``. Where there is no contact
-        what it returns is not used, and may be no number.
+        pair : index of the pair of materials (see tisim/materials/material_law.py). normal : unit vector from
+        i to the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j.
+        inverses : inverse masses, over 1/m* (see ``inverse_masses``). slip : velocity (m/s) of the surface of
+        the other relative to the surface of i. spinning : spin (rad/s) of the other relative to i. tilt,
+        turn : rotation of the contact in the step (see ``carried`` in spring.py), 0 unless it
+        ``turns_springs``. If there is no contact the result is not used and may be NaN.
         """
         return 0.0 * normal, 0.0 * normal, past
 
@@ -76,29 +76,29 @@ class GranularContact(MaterialLaw, PairForce):
         passing = s.relative_velocity(w, i, j, separation)
         slip, tilt, turn = passing - spins.cross(normal), 0.0 * normal, 0.0 * distance
         if ti.static(self.turns_springs):
-            # Half a step ago the centres were apart by separation - dt/2 passing.
+            # Half a step ago the distance vector of the centres was separation - dt/2 passing.
             opening, back = passing.dot(normal), 0.5 * dt * nearness
             tilt = (back + back * back * opening) * (opening * normal - passing)
             turn = 0.25 * dt * (s.spin[w, i] + s.spin[w, j]).dot(normal)
             slip = midway(slip + back * spins.cross(passing), opening, normal, tilt, turn)
         m, n, free = s.masses_behind(w, i, j)
-        # R* and m*, by one division, and by no product of masses, which of small grains is below f32.
+        # R* and m* by one division, without products of masses, which underflow in f32 for small grains.
         sizes, masses = a + b, m + n
         inverse = 1.0 / (sizes * masses)
         lever, share = b * (masses * inverse), n * (sizes * inverse)
         radius, mass = a * lever, m * share
         inverses = inverse_masses(lever, share, overlap / radius, free)
         pair, spinning = self.material_pair(s, w, i, j), s.spin[w, j] - s.spin[w, i]
-        # Chosen afterwards, not by a branch: several pairs are computed at once.
+        # Selected afterwards rather than by a branch: several pairs are computed at once.
         force, couple, known = self.contact(
             w, pair, normal, overlap, radius, mass, inverses, slip, spinning, tilt, turn, past, dt
         )
         lasts = self.lasts(w, pair, overlap, radius, past)
-        # Else two would be deep in each other, or past each other, before either is felt.
+        # Otherwise two grains would overlap deeply or pass each other before a force acts.
         outrun = (overlap >= 0.0) & ((free * dt * passing).norm_sqr() > (TRAVEL * ti.min(a, b)) ** 2)
         force = ti.select(outrun, ti.math.nan, force)
         force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
-        # n x F is the same seen from either: both turn round at once.
+        # n x F has the same value for both grains.
         moment = normal.cross(force)
         back = (distance - arm) * moment - couple
         return force, arm * moment + couple, back, ti.select(lasts, known, 0.0)
@@ -110,11 +110,11 @@ class GranularContact(MaterialLaw, PairForce):
 
     @ti.func
     def at_wall(self, s, w, i, normal, tilt, overlap, velocity, turning, material, past, dt):
-        """Return force and torque of a wall on i, and what the contact remembers.
+        """Return force and torque of a wall on i, and the contact history.
 
-        normal : unit vector into the wall. tilt : midway in the step it was along normal + tilt. velocity :
-        that of its surface at the contact (m/s), midway too. turning : its angular velocity (rad/s). material
-        : index of its material.
+        normal : unit vector into the wall. tilt : the direction midway in the step was normal + tilt.
+        velocity : velocity of the wall surface at the contact (m/s), also midway. turning : angular velocity
+        of the wall (rad/s). material : index of its material.
         """
         arm, radius = s.radius[w, i] - 0.5 * overlap, s.radius[w, i]
         pair, spin = 0, s.spin[w, i]

@@ -1,4 +1,4 @@
-"""The contact law that is composed of parts."""
+"""The granular contact law, which is composed of parts."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -48,63 +48,68 @@ if TYPE_CHECKING:
 
 @ti.func
 def remembered(past, begin: ti.template(), size: ti.template()):  # type: ignore[valid-type]
-    """Return what is remembered for a part; for one that remembers nothing, a number that it hands back."""
+    """Return the history values of a part; a single unused number for a part without history."""
     return piece(past, begin, max(1, size))
 
 
 class Granular(ContactGuards, GranularContact):
-    """Grains that touch push each other apart, lose energy, stick, slide and roll as the parts of it say.
+    """Touching grains repel each other, dissipate energy, stick, slide and roll as chosen by the parts of the
+    law.
 
         F_n = elastic force - gamma_n v_n - cohesion
         F_t, couples : of the tangential, rolling and twisting part, each up to its friction times N
 
     v_n is the speed at which the surfaces separate. N is |F_n| without cohesion; beside ``jkr`` and ``dmt``
-    it is |F_n + 2 F_c|, with F_c the force that parts the two and without damping. The contact lies in the
-    middle of the overlap. What the parts need to know of the materials that touch is in the materials of the
-    scene.
+    it is |F_n + 2 F_c|, with the pull-off force F_c and without damping. The point of contact lies in the
+    middle of the overlap. Material properties that the parts need are given in the materials of the scene.
 
-    With ``hertz_material``, ``restitution_damping`` and ``mindlin_force`` it is the law of Hertz and Mindlin:
-    an impact at a speed v lasts 2.94 (15 m* / (16 E* sqrt(R* v)))^(2/5), and a fiftieth of that as a step
-    gives its restitution to 0.004.
+    With ``hertz_material``, ``restitution_damping`` and ``mindlin_force`` it is the law of Hertz and Mindlin.
+    An impact at a speed v then lasts 2.94 (15 m* / (16 E* sqrt(R* v)))^(2/5). With a fiftieth of that as the
+    step its restitution is accurate to 0.004.
 
-    In a step beyond S dt^2 + 2 gamma dt = 4 m of any spring and dashpot what they hold would alternate and
-    grow: the force is then not a number, and the world stops. The mass m is m* along the normal; of surfaces
-    that slide 2/7 m*, and less where they overlap by more than four radii; I*/R*^2 of those that roll, with
-    1/I* = 1/I_i + 1/I_j; and I* where S is a couple of twisting. What slides and rolls at a wall, or of
-    unlike grains, moves each other, and its limit is that of both together. Mindlin's spring asks for steps
-    shorter by sqrt(14 G*/E*) than Hertz's, 1.70 at nu = 0.3. Parts without friction have no limit, and two
-    bodies that are both held have none. It is that of a pair by itself: in rows and heaps energy grows in
-    shorter steps, in a row of n grains with undamped springs from 1 / (sqrt(2) cos(pi / (2 n))) of it on,
-    0.72 for ten and 0.71 for many. Of rigid clumps the mass is that of the body, as if it were a solid
-    sphere: at a lever l about an axis with the moment of inertia I a contact moves it by 1/M + l^2/I, and the
-    limit falls by sqrt(1 + M l^2/I), 1.31 at the end of two spheres that touch.
+    Steps are limited for every spring S and dashpot gamma: beyond S dt^2 + 2 gamma dt = 4 m the motion would
+    oscillate and grow. The force is then not a number, and the world stops. The mass m depends on the motion.
+    It is m* along the normal. For sliding it is 2/7 m*, and less if surfaces overlap by more than four radii.
+    For rolling it is I*/R*^2 with 1/I* = 1/I_i + 1/I_j; for twisting, in which S is the stiffness of a
+    couple, it is I*. At a wall, and for unlike grains, sliding and rolling are coupled, and the limit is that
+    of the coupled motion. Mindlin's spring requires steps shorter than Hertz's by the factor sqrt(14 G*/E*),
+    1.70 at nu = 0.3. Parts without friction have no limit, nor have contacts of two held bodies.
 
-    A world also stops at a step in which two that touch move past each other by more than the smaller
-    diameter, a grain comes nearer a wall by more than its own, or grains may pass through each other or
-    through a sheet between two looks. Below these limits an undamped impact may still come out with up to 1 /
-    (1 - S dt^2 / 4 m) times its energy, by chance: 1.01 times at a thirtieth of a period.
+    This limit holds for an isolated pair. In rows and heaps energy grows at shorter steps already: in a row
+    of n grains with undamped springs from 1 / (sqrt(2) cos(pi / (2 n))) of the limit, which is 0.72 for ten
+    grains and 0.71 for many. For rigid clumps m is computed from the mass of the body, as if it were a solid
+    sphere. A contact at a lever l about an axis with the moment of inertia I accelerates the body by 1/M +
+    l^2/I per unit force, so that the true limit is lower by the factor sqrt(1 + M l^2/I), 1.31 at the end of
+    two touching spheres.
 
-    Springs turn with the two that touch: with the normal, and about it by the mean of both spins, at a wall
-    that of grain and wall. Two that turn as one, about whichever axis, so keep the force that they had. They
-    are drawn by the surfaces as these are midway in a step, to second order in dt. With ``frame`` =
-    "projected" they turn with the normal alone and are drawn along that at the end of a step, as in LAMMPS:
-    a force then stays in space while both turn about the normal, and what sticks to a turntable creeps.
+    A world also stops if, in one step, two touching grains move relative to each other by more than the
+    smaller diameter, if a grain approaches a wall by more than its diameter, or if grains may pass through
+    each other or through a sheet between two checks. Below these limits the energy of an undamped impact may
+    still be multiplied by up to 1 / (1 - S dt^2 / 4 m), depending on when within a step surfaces meet: 1.01
+    at a thirtieth of a period.
 
-    Source: that of its parts; M. R. Kuhn, K. Suzuki and A. Daouadji, Int. J. Numer. Methods Eng. 121 (2020)
-    560, for how springs turn; composed as by A. P. Santos, D. S. Bolintineanu, G. S. Grest, J. B. Lechman, S.
-    J. Plimpton, I. Srivastava and L. E. Silbert, Phys. Rev. E 102 (2020) 032903.
+    Springs rotate with the contact: with the normal, and about it by the mean of both spins (of grain and
+    wall at a wall). Two bodies that rotate as one about any axis therefore keep their force. Springs are
+    stretched by the velocity of the surfaces midway in a step, to second order in dt. With ``frame`` =
+    "projected" they rotate with the normal alone and are stretched in the contact plane at the end of a step,
+    as in LAMMPS. The force then stays fixed in space while both bodies spin about the normal, and grains that
+    stick to a turntable creep.
+
+    Source: the sources of its parts; M. R. Kuhn, K. Suzuki and A. Daouadji, Int. J. Numer. Methods Eng. 121
+    (2020) 560, for the rotation of springs; composed as by A. P. Santos, D. S. Bolintineanu, G. S. Grest, J.
+    B. Lechman, S. J. Plimpton, I. Srivastava and L. E. Silbert, Phys. Rev. E 102 (2020) 032903.
     """
 
     solid: ClassVar[bool] = True
 
     normal: NormalForce = option("elastic force along the line of centres", HertzMaterial())
-    damping: Damping | None = option("damping, of the normal and the tangential force", None)
+    damping: Damping | None = option("damping of the normal and the tangential force", None)
     tangential: TangentialForce | None = option("friction of surfaces that slide", None)
     rolling: RollingResistance | None = option("resistance to rolling", None)
     twisting: TwistingResistance | None = option("resistance to twisting about the line of centres", None)
     cohesion: Cohesion | None = option("cohesion of surfaces that touch", None)
     frame: Literal["turning", "projected"] = option(
-        "how springs turn with a contact: with its normal and about it, or with its normal as in LAMMPS",
+        "rotation of springs: with the contact normal and about it, or with the normal only as in LAMMPS",
         "turning",
     )
 
@@ -112,7 +117,7 @@ class Granular(ContactGuards, GranularContact):
     def _goes_together(self) -> Self:
         label = self.label
         wants = self.twisting is not None and self.twisting.needs_tangential
-        rule = "given, as the resistance to twisting goes by it"
+        rule = "given, as the resistance to twisting needs it"
         must(self.tangential is not None or not wants, f"{label}.tangential", rule, Words("nothing"))
         double = self.normal.adhesive and self.cohesion is not None
         rule = f"left out, as {self.normal.kind()} is adhesive itself"
@@ -122,7 +127,7 @@ class Granular(ContactGuards, GranularContact):
     def approximations(self, extent: float) -> tuple[Self, ...]:
         spring: dict[str, Component | None] = {"tangential": self.tangential and LinearSpring()}
         drawn: dict[str, Component | None] = {"tangential": self.tangential and MindlinDisplacement()}
-        # A spring would not pull, and is not to be held against what pulls by the overlap.
+        # A linear spring does not attract, and cannot be compared with cohesion that depends on the overlap.
         linear = () if self.normal.adhesive or self.by_overlap else ({"normal": Hooke(), **spring},)
         changes = ({"rolling": None}, *linear, spring, drawn)
         tried: list[Self] = []
@@ -142,7 +147,7 @@ class Granular(ContactGuards, GranularContact):
         number, shortest = self.number_of_materials, math.inf
         pairs = self._materials.touching()
         for material, mass, radius in smallest_grains(start):
-            # With grains of its own material, and with grains and walls of others.
+            # With grains of its own material, and with grains and walls of other materials.
             for pair in pairs[material * number : (material + 1) * number]:
                 push = partial(self.push, pair, 0.5 * radius)
                 stiffness = impact_stiffness(push, 0.5 * mass, 0.5 * radius, speed)
@@ -181,7 +186,7 @@ class Granular(ContactGuards, GranularContact):
         return name in self.members()
 
     def slots(self) -> dict[str, tuple[int, int]]:
-        """Return where what each part remembers begins in what a contact does, and how many values it is."""
+        """Return for each part where its values begin in the history of a contact, and their number."""
         slots, begin = {}, 0
         for name, part in self.members().items():
             size = getattr(part, "memory", 0)
@@ -194,7 +199,7 @@ class Granular(ContactGuards, GranularContact):
         return self.frame == "turning" and any(getattr(part, "memory", 0) for part in self.springs())
 
     def springs(self) -> list[Component]:
-        """Return the parts that hold back a motion."""
+        """Return the parts that resist sliding, rolling and twisting."""
         names = ("tangential", "rolling", "twisting")
         return [part for name, part in self.members().items() if name in names]
 
@@ -204,7 +209,7 @@ class Granular(ContactGuards, GranularContact):
 
     @property
     def adhesive(self) -> bool:
-        """Return whether Coulomb's limit knows of the force that parts two grains."""
+        """Return whether Coulomb's limit includes the pull-off force of two grains."""
         return self.normal.adhesive or (self.cohesion is not None and self.cohesion.adhesive)
 
     @property
@@ -253,7 +258,7 @@ class Granular(ContactGuards, GranularContact):
             spring = self.tangential.spring(w, pair, stiffness)
             dashpot = self.tangential.dashpot(w, pair, damping)
             friction = self.tangential.coulomb(w, pair)
-        # Else what moves would alternate and grow, or what touches fall into each other.
+        # Otherwise the motion would oscillate and grow, or grains would collapse into each other.
         follows = self.steps_follow(
             w, pair, circle, radius, mass, inverses, stiffness, damping, spring, dashpot, friction, dt
         )
@@ -303,7 +308,7 @@ class Granular(ContactGuards, GranularContact):
 
     @ti.func
     def turned(self, past, normal, tilt, turn, vector: ti.template()):  # type: ignore[valid-type]
-        """Return what a part remembers as it turns with the contact: the first three values where they are a
+        """Return the history of a part after rotation with the contact: the first three values, if they are a
         vector."""
         known = past
         if ti.static(vector):
@@ -318,8 +323,8 @@ class Granular(ContactGuards, GranularContact):
 
     @ti.func
     def adhesion(self, w, pair, radius, overlap):
-        """Return what Coulomb's limit adds to the elastic force (N): twice the force that parts the two, less
-        what pulls already."""
+        """Return the force (N) that Coulomb's limit adds to the elastic force: twice the pull-off force, less
+        the present cohesion."""
         force = 2.0 * self.normal.pull_off(w, pair, radius)
         if ti.static(self.has("cohesion")):
             force = self.cohesion.pull(w, pair, radius, overlap)

@@ -1,4 +1,4 @@
-"""What stops the world of a contact law: steps that no part can follow, and cohesion that nothing holds."""
+"""Conditions that stop the world of a contact law: steps that are too long, and unbalanced cohesion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tisim.effects.contact.granular.step_limit import (
 
 
 class ContactGuards:
-    """Contact guards ask the parts of a law by which springs, dashpots and forces they act.
+    """Contact guards check the springs, dashpots and cohesion of the parts of a law.
 
     The attributes are the parts of tisim/effects/contact/granular/granular.py.
     """
@@ -31,10 +31,10 @@ class ContactGuards:
     def steps_follow(
         self, w, pair, circle, radius, mass, inverses, stiffness, damping, spring, dashpot, friction, dt
     ):
-        """Return whether steps of dt (s) can follow what presses, slides, rolls and twists.
+        """Return whether steps of dt (s) are short enough for normal motion, sliding, rolling and twisting.
 
-        stiffness, damping : S_n (N/m) and gamma_n (N s/m). spring, dashpot, friction : those of the
-        tangential force.
+        stiffness, damping : S_n (N/m) and gamma_n (N s/m). spring, dashpot, friction : of the tangential
+        force.
         """
         inverse, rolls, twists = inverses / mass, 0.0 * mass, 0.0 * mass
         slides = least_held(friction, spring, dashpot, dt)
@@ -50,14 +50,14 @@ class ContactGuards:
                 self.twisting.dashpot(w, pair, circle, dashpot),
             )
             arm = self.twisting.coulomb(w, pair, circle, friction)
-            # As a mass, I/R*^2: moments of inertia of the smallest grains are no numbers of f32.
+            # As a mass, I/R*^2: moments of inertia of the smallest grains underflow in f32.
             twists = least_held(arm, turn, loss, dt) / radius / radius
         follows = can_follow(least_mass(stiffness, damping, dt), inverse[0]) & can_follow(twists, inverse[2])
         return follows & can_follow_both(slides, rolls, inverse[1], inverse[2], inverse[3])
 
     @ti.func
     def holds_apart(self, w, pair, radius):
-        """Return whether the elastic force is above cohesion by the overlap, at an overlap of R* (m)."""
+        """Return whether the elastic force exceeds overlap-dependent cohesion at an overlap of R* (m)."""
         holds = True
         if ti.static(self.by_overlap):
             push = self.normal.elastic(w, pair, radius, radius, radius)

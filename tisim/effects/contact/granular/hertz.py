@@ -11,7 +11,7 @@ from tisim.materials.materials import Touching
 
 
 class HertzMaterial(NormalForce):
-    """Elastic spheres push each other apart as Hertz found, by the elastic constants of their materials.
+    """Elastic spheres repel each other by Hertz's law, with the elastic constants of their materials.
 
         F_n = 4/3 E* a delta,    S_n = 2 E* a,    a^2 = R* delta
 

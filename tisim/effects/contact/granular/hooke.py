@@ -10,11 +10,11 @@ from tisim.materials.materials import Touching
 
 
 class Hooke(NormalForce):
-    """Grains push each other apart like a linear spring.
+    """Grains repel each other by a linear spring.
 
         F_n = k delta,    S_n = k
 
-    An impact lasts pi sqrt(m* / k) where damping is light, at any speed.
+    With light damping an impact lasts pi sqrt(m* / k), at any speed.
 
     Source: P. A. Cundall and O. D. L. Strack, Geotechnique 29 (1979) 47.
     """

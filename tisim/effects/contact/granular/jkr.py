@@ -14,25 +14,25 @@ from tisim.materials.materials import Touching
 from tisim.numerics.roots import cube_root
 
 LEAST_ROOT = 1e-9
-"""Roots of lengths are not below this, m^(1/2): its fourth power is a number of f32."""
+"""Lower bound of square roots of lengths, m^(1/2): the fourth power still fits f32."""
 CIRCLES = 8192
-"""The force at given overlaps is read off a curve of this number of circles of contact."""
+"""Number of contact circles on the curve from which the force at given overlaps is interpolated."""
 BEGINNING = 0.5
-"""A contact remembers this in its first two steps, and 1 later."""
+"""History value of a contact in its first two steps; later it is 1."""
 
 
 class JKR(NormalForce):
-    """Soft adhesive spheres press and pull each other as Johnson, Kendall and Roberts found.
+    """Soft adhesive spheres repel and attract each other by the law of Johnson, Kendall and Roberts.
 
         delta = a^2/R* - 2 sqrt(pi gamma a / E*)
         F_n = 4 E* a^3 / (3 R*) - 4 sqrt(pi gamma E* a^3),    S_n = 2 E* a
 
-    gamma is the surface energy, half the work of adhesion. Contact begins at delta = 0, with F_n = -8/9 F_c;
-    the largest pull is F_c = 3 pi gamma R*. It lasts to delta = -3/2 (pi gamma / E*)^(2/3) (R*/2)^(1/3),
-    where the equation ends, at F_n = -5/9 F_c. Two that nothing presses rest at delta = (pi gamma / E*)^(2/3)
-    (3 R*)^(1/3), at any gamma: what is pressed deeper is pushed back. LAMMPS ends it where the pull is
-    largest. Coulomb's limit is taken of |F_n + 2 F_c|. Where a contact begins, and where it ends, the pull is
-    spread over two steps, so that its work does not depend on where in a step that is (jump.py).
+    gamma is the surface energy, half the work of adhesion. Contact begins at delta = 0 with F_n = -8/9 F_c;
+    the largest attraction is F_c = 3 pi gamma R*. Contact lasts to delta = -3/2 (pi gamma / E*)^(2/3)
+    (R*/2)^(1/3), the end of the solution, at F_n = -5/9 F_c; LAMMPS ends it at the largest attraction. Two
+    grains without load rest at delta = (pi gamma / E*)^(2/3) (3 R*)^(1/3), for any gamma: deeper overlaps
+    give repulsion. Coulomb's limit uses |F_n + 2 F_c|. When a contact begins or ends, the attraction is
+    ramped over two steps, so that its work does not depend on when within a step this happens (jump.py).
 
     Source: K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; C. Thornton and
     Z. Ning, Powder Technol. 99 (1998) 154; J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.
@@ -66,14 +66,14 @@ class JKR(NormalForce):
 
     @ti.func
     def circle(self, w, pair, radius, overlap):
-        """Return a = x^2, with x the largest root of x^4 = c x + d, c = R* bond and d = R* delta: by the
-        resolvent cubic of Ferrari, in a unit of length in which neither c nor d is above 1."""
+        """Return a = x^2, with x the largest root of x^4 = c x + d, c = R* bond and d = R* delta. It is found
+        with Ferrari's resolvent cubic, in a unit of length in which c and d are at most 1."""
         d, line = radius * overlap, cube_root(radius * self.bond(w, pair))
         unit = ti.max(line + ti.sqrt(ti.sqrt(ti.abs(d))), LEAST_ROOT)
         share = line / unit
         c, third = share * share * share, d / (unit * unit * unit * unit) / 3.0
         q = c * c / 16.0
-        # Both are 0 where nothing adheres and surfaces just touch.
+        # Both are 0 without adhesion when surfaces just touch.
         first = ti.max(cube_root(q + ti.sqrt(ti.max(q * q + third * third * third, 0.0))), LEAST_ROOT)
         second = third / first
         square = first * first + third + second * second
@@ -98,7 +98,7 @@ class JKR(NormalForce):
     def spread_jumps(self, w, pair, radius, mass, overlap, opening, begun, dt):
         speed = ti.abs(opening)
         first, last = 8.0 / 9.0 * self.most(w, pair) * radius, 5.0 / 9.0 * self.most(w, pair) * radius
-        # At the gap of its end it passes only to end there; at 0 it begins, or is just passed again.
+        # A contact can only end at the gap of its end; at 0 it either begins or is passed again.
         left = overlap + self.separation_gap(w, pair, radius)
         ends = ti.select(opening > 0.0, 1.0 - spread(left, speed, dt, last, mass), 0.0)
         begins = ti.select(begun < 1.0, 1.0 - spread(overlap, speed, dt, first, mass), 0.0)

@@ -1,4 +1,4 @@
-"""Tangential springs with memory, up to Coulomb's limit."""
+"""Tangential springs with history, up to Coulomb's limit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tisim.materials.materials import Touching
 
 
 class TangentialSpring(TangentialForce):
-    """This is the contract of a tangential spring that is a part of the normal one, beside a dashpot.
+    """This is the contract of a tangential spring and dashpot in fixed ratio to the normal ones.
 
     F_t = T + gamma_t u,    |F_t| <= mu N,    S_t = kappa S_n,    gamma_t = sqrt(kappa) gamma_n
     """
@@ -43,14 +43,14 @@ class TangentialSpring(TangentialForce):
 
 
 class MindlinForce(TangentialSpring):
-    """Surfaces stick as Mindlin found, by a spring whose force is remembered, and slide after Coulomb.
+    """Mindlin's tangential spring, whose force is remembered, lets surfaces stick up to Coulomb's limit.
 
         F_t = T + gamma_t u,    dT/dt = S_t u,    |F_t| <= mu N,    S_t = 4 G*/E* S_n
 
-    S_t is 8 G* a beside Hertz's force. T turns with the pair; while surfaces slide it is what Coulomb's limit
-    leaves of it; and it falls as S_t does while they are unloaded, as a spring that is lighter holds less.
-    Without that a contact that is pressed, sheared, unloaded and sheared back would yield work. It is
-    ``mindlin_rescale/force`` of LAMMPS.
+    With Hertz's force S_t is 8 G* a. T rotates with the pair. While surfaces slide, T is the part that
+    Coulomb's limit leaves of it. During unloading T decreases in proportion to S_t, as a softer spring holds
+    less force; otherwise a contact that is pressed, sheared, unloaded and sheared back would produce work. It
+    is ``mindlin_rescale/force`` of LAMMPS.
 
     Source: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259, in the incremental form of O. R. Walton and R. L.
     Braun, J. Rheol. 30 (1986) 949, unloaded as by C. Thornton, S. J. Cummins and P. W. Cleary, Powder
@@ -87,18 +87,19 @@ class DisplacementSpring(TangentialSpring):
         drawn = ti.Vector([past[0], past[1], past[2]]) + dt * sliding
         drag = self.dashpot(w, pair, damping) * sliding
         grip, known = slipping(spring * drawn, drag, self.coulomb(w, pair) * limit)
-        # Where the spring is none, as at no overlap, nothing is drawn.
+        # Without a spring, as at zero overlap, there is no displacement.
         drawn = ti.select(spring > 0.0, known / spring, 0.0)
         return grip, drawn
 
 
 class MindlinDisplacement(DisplacementSpring):
-    """Surfaces stick as Mindlin found, by a spring whose displacement is remembered, and slide after Coulomb.
+    """Mindlin's tangential spring, whose displacement is remembered, lets surfaces stick up to Coulomb's
+    limit.
 
         F_t = S_t xi + gamma_t u,    dxi/dt = u,    |F_t| <= mu N,    S_t = 4 G*/E* S_n
 
-    It is ``mindlin`` of LAMMPS. A contact that is sheared, pressed and sheared back yields work, half of what
-    S_t has grown by times xi^2; ``mindlin_force`` does not.
+    It is ``mindlin`` of LAMMPS. A contact that is sheared, pressed and sheared back produces work: half the
+    increase of S_t times xi^2. ``mindlin_force`` does not.
 
     Source: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259.
     """
@@ -110,7 +111,7 @@ class MindlinDisplacement(DisplacementSpring):
 
 
 class LinearSpring(DisplacementSpring):
-    """Surfaces stick by a spring that is a given part of the normal one, and slide after Coulomb.
+    """A tangential spring in fixed ratio to the normal one lets surfaces stick up to Coulomb's limit.
 
         F_t = kappa S_n xi + sqrt(kappa) gamma_n u,    dxi/dt = u,    |F_t| <= mu N
 
@@ -121,7 +122,7 @@ class LinearSpring(DisplacementSpring):
     """
 
     stiffness_ratio: float = parameter(
-        "", "tangential stiffness over the normal one, kappa; at 2/7 both swing alike", 2 / 7, gt=0
+        "", "tangential over normal stiffness, kappa; at 2/7 both have the same period", 2 / 7, gt=0
     )
 
     def ratio(self, pair: Touching) -> float:

@@ -1,12 +1,12 @@
-"""The contracts of the parts of a granular contact law: what each sees of a contact, and what it gives.
+"""The contracts of the parts of a granular contact law.
 
-In all of them ``pair`` says which materials touch (see tisim/materials/material_law.py), ``radius`` is R*
-and ``mass`` m*; 1/R* = 1/R_i + 1/R_j and 1/m* = 1/m_i + 1/m_j. ``limit`` is the normal force (N) that
-Coulomb's limit is taken of. A part that remembers something says how many values, in ``memory``; they are 0
-when a contact begins. Where the first three are a vector across the normal, ``vector``, they have turned with
-the contact when the part is given them (see spring.py). Parts that hold back a motion say by which
-``spring``, ``dashpot`` and ``coulomb`` they do: where no step can follow these, and there is friction, the
-world stops (see step_limit.py).
+In all of them ``pair`` is the index of the pair of materials (see tisim/materials/material_law.py),
+``radius`` is R* and ``mass`` m*; 1/R* = 1/R_i + 1/R_j and 1/m* = 1/m_i + 1/m_j. ``limit`` is the normal force
+(N) of Coulomb's limit. A part with history gives the number of its values in ``memory``; they are 0 when a
+contact begins. If ``vector`` is set, the first three are a vector across the normal, which has been rotated
+with the contact before the part receives it (see spring.py). Parts that resist a motion return their
+``spring``, ``dashpot`` and ``coulomb`` coefficients. If steps are too long for these, and there is friction,
+the world stops (see step_limit.py).
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class ContactPart(MaterialLaw):
 
 
 class NormalForce(ContactPart):
-    """A normal force pushes grains apart along the line of centres, as far as it is elastic.
+    """A normal force is the elastic force along the line of centres, which pushes grains apart.
 
-    restitution_factor : by this a damping c sqrt(S m*) differs from that of a linear spring, S = k, where
-    both are to give an impact the same restitution. adhesive : whether it pulls too. beyond_contact : whether
-    it holds on to what parts; it then remembers that there is a contact, ``memory``.
+    restitution_factor : ratio of the damping c sqrt(S m*) to the damping of a linear spring, S = k, that
+    gives an impact the same restitution. adhesive : whether it also attracts. beyond_contact : whether a
+    contact persists after the surfaces part; its existence is then stored in the history, ``memory``.
     """
 
     contract: ClassVar[bool] = True
@@ -44,35 +44,36 @@ class NormalForce(ContactPart):
     memory: ClassVar[int] = 0
 
     def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        """Return the elastic force (N) at an overlap (m), or at an array of them, at this R* (m); infinity
-        where a law does not say it. At an overlap of R* cohesion by the overlap must not reach it, and its
-        slope tells the critical time step."""
+        """Return the elastic force (N) at an overlap (m), or an array of overlaps, at this R* (m); infinity
+        if a law does not define it. It is used to check that it exceeds overlap-dependent cohesion at an
+        overlap of R*, and to find the critical time step from its slope."""
         return overlap * math.inf
 
     @ti.func
     def circle(self, w, pair, radius, overlap):
-        """Return the radius a (m) of the circle of contact."""
+        """Return the radius a (m) of the contact circle."""
         return ti.sqrt(radius * overlap)
 
     @ti.func
     def stiffness(self, w, pair, circle):
-        """Return the stiffness S_n (N/m), how the force grows with the overlap."""
+        """Return the stiffness S_n (N/m), the slope of the force over the overlap."""
         return 0.0 * circle
 
     @ti.func
     def elastic(self, w, pair, radius, overlap, circle):
-        """Return the elastic force (N), positive where it pushes."""
+        """Return the elastic force (N), positive if repulsive."""
         return 0.0 * circle
 
     @ti.func
     def pull_off(self, w, pair, radius):
-        """Return the force (N) that it takes to part the two, where the law is adhesive."""
+        """Return the pull-off force (N) if the law is adhesive."""
         return 0.0 * radius
 
     @ti.func
     def spread_jumps(self, w, pair, radius, mass, overlap, opening, begun, dt):
-        """Return what is added to the elastic force (N) in the steps in which a contact begins or ends (see
-        jump.py), and what the contact remembers of this, given ``begun``: above 0, as there is a contact.
+        """Return the correction of the elastic force (N) in the steps in which a contact begins or ends (see
+        jump.py), and its history value, given the previous value ``begun``, which is above 0 if there is a
+        contact.
 
         opening : speed at which the surfaces separate, m/s.
         """
@@ -80,44 +81,44 @@ class NormalForce(ContactPart):
 
     @ti.func
     def separation_gap(self, w, pair, radius):
-        """Return the gap (m) up to which a contact that has begun lasts."""
+        """Return the gap (m) up to which an existing contact lasts."""
         return 0.0 * radius
 
     @ti.func
     def reach(self, w, radius):
-        """Return the widest of these gaps (m), of whatever materials, at this R*."""
+        """Return the widest of these gaps (m) over all materials, at this R*."""
         return 0.0 * radius
 
 
 class Damping(ContactPart):
-    """Damping takes energy from the relative motion of two that touch."""
+    """Damping dissipates the energy of relative motion of two touching grains."""
 
     contract: ClassVar[bool] = True
 
     @ti.func
     def coefficient(self, w, pair, stiffness, mass, factor):
-        """Return the coefficient (N s/m) of a dashpot beside a spring of some stiffness (N/m), ``factor``
-        being the ``restitution_factor`` of the normal force."""
+        """Return the coefficient (N s/m) of a dashpot beside a spring of some stiffness (N/m); ``factor`` is
+        the ``restitution_factor`` of the normal force."""
         return 0.0 * stiffness
 
 
 class TangentialForce(ContactPart):
-    """A tangential force holds back surfaces that slide past each other, up to Coulomb's limit."""
+    """A tangential force resists the sliding of surfaces, up to Coulomb's limit."""
 
     contract: ClassVar[bool] = True
     memory: ClassVar[int] = 0
     vector: ClassVar[bool] = False
 
     def ratio(self, pair: Touching) -> float:
-        """Return the tangential stiffness over the normal one; 0 where there is no spring."""
+        """Return the tangential over the normal stiffness; 0 without a spring."""
         return 0.0
 
     @ti.func
     def force(self, w, pair, normal, stiffness, damping, limit, sliding, past, dt):
-        """Return the force (N) on i, in the plane of contact, and what is remembered.
+        """Return the force (N) on i, in the plane of contact, and the history.
 
         stiffness, damping : S_n (N/m) and gamma_n (N s/m) of the normal force. sliding : velocity (m/s) of
-        the surface of j past that of i.
+        the surface of j relative to the surface of i.
         """
         return 0.0 * normal, past
 
@@ -128,7 +129,7 @@ class TangentialForce(ContactPart):
 
     @ti.func
     def dashpot(self, w, pair, damping):
-        """Return the tangential damping (N s/m), given that of the normal force."""
+        """Return the tangential damping (N s/m), given the normal damping."""
         return 0.0 * damping
 
     @ti.func
@@ -138,8 +139,7 @@ class TangentialForce(ContactPart):
 
 
 class RollingResistance(ContactPart):
-    """Rolling resistance holds back two that roll on each other, by a couple about an axis in the plane of
-    contact."""
+    """Rolling resistance opposes relative rolling by a couple about an axis in the plane of contact."""
 
     contract: ClassVar[bool] = True
     memory: ClassVar[int] = 0
@@ -147,7 +147,7 @@ class RollingResistance(ContactPart):
 
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
-        """Return the force (N) whose moment about an arm of R* n is the couple on i, and what is remembered.
+        """Return the force (N) whose moment about an arm of R* n is the couple on i, and the history.
 
         stiffness : S_n (N/m). rolling : R* Omega x n (m/s), Omega the spin of j relative to i.
         """
@@ -155,7 +155,7 @@ class RollingResistance(ContactPart):
 
     @ti.func
     def spring(self, w, pair, stiffness):
-        """Return the stiffness (N/m) by which the force grows, given S_n."""
+        """Return the stiffness (N/m) of the rolling spring, given S_n."""
         return 0.0 * stiffness
 
     @ti.func
@@ -170,7 +170,7 @@ class RollingResistance(ContactPart):
 
 
 class TwistingResistance(ContactPart):
-    """Twisting resistance holds back two that twist on each other, by a couple about their normal."""
+    """Twisting resistance opposes relative spin about the normal by a couple about the normal."""
 
     contract: ClassVar[bool] = True
     memory: ClassVar[int] = 0
@@ -178,7 +178,7 @@ class TwistingResistance(ContactPart):
 
     @ti.func
     def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):
-        """Return the couple (N m) on i about the normal, and what is remembered.
+        """Return the couple (N m) on i about the normal, and the history.
 
         circle : radius a (m) of the contact. spring, dashpot, friction : S_t (N/m), damping (N s/m) and mu of
         the tangential force. twisting : spin (rad/s) of j relative to i about the normal.
@@ -202,12 +202,12 @@ class TwistingResistance(ContactPart):
 
 
 class Cohesion(ContactPart):
-    """Cohesion pulls two that touch towards each other.
+    """Cohesion attracts two touching grains.
 
-    adhesive : whether Coulomb's limit knows of it, as of the force that parts the two. by_overlap : whether
-    it grows with the overlap, so that what two that touch do goes by which normal force is beside it. Where
-    it is then not below the elastic force at an overlap of R*, grains are refused, or their world stops.
-    jumps : whether it begins in full at the touch; it is then spread over two steps (see jump.py).
+    adhesive : whether Coulomb's limit includes it as a pull-off force. by_overlap : whether it grows with the
+    overlap, so that its balance depends on the normal force. If it is then not below the elastic force at an
+    overlap of R*, grains are refused, or their world stops. jumps : whether it sets in at its full value on
+    touching; it is then ramped over two steps (see jump.py).
     """
 
     contract: ClassVar[bool] = True
@@ -216,10 +216,10 @@ class Cohesion(ContactPart):
     jumps: ClassVar[bool] = False
 
     def pulls(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        """Return its force (N) at an overlap (m), or at an array of them, at this R* (m)."""
+        """Return its force (N) at an overlap (m), or an array of overlaps, at this R* (m)."""
         return 0.0 * overlap
 
     @ti.func
     def pull(self, w, pair, radius, overlap):
-        """Return the force (N, >= 0) by which the two are pulled together."""
+        """Return the attractive force (N, >= 0)."""
         return 0.0 * overlap

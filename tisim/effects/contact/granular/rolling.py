@@ -1,4 +1,4 @@
-"""Resistance to rolling: by a constant torque, and by springs with memory."""
+"""Resistance to rolling: by a constant torque, and by springs with history."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tisim.materials.materials import Touching
 
 
 class RollingCDT(RollingResistance):
-    """A constant directional torque holds back two that roll on each other, at any speed.
+    """A constant directional torque resists rolling at any speed.
 
         M = mu_r R* N,    against the relative spin across the normal
 
-    It jumps where rolling changes its sense: grains at rest tremble, by a step's worth of rolling. As it is
-    no spring, no step is too long for it.
+    It jumps when rolling changes its direction, so that grains at rest jitter by the rolling of one step. It
+    has no spring and sets no limit to the step.
 
     Source: Y. C. Zhou, B. D. Wright, R. Y. Yang, B. H. Xu and A. B. Yu, Physica A 269 (1999) 536, as type A
     of J. Ai, J.-F. Chen, J. M. Rotter and J. Y. Ooi, Powder Technol. 206 (2011) 269.
@@ -40,17 +40,17 @@ class RollingCDT(RollingResistance):
 
 
 class RollingEPSD(RollingResistance):
-    """An elastic-plastic spring and a dashpot hold back two that roll on each other.
+    """An elastic-plastic spring and a dashpot resist rolling.
 
         M = R* F,    F = T + gamma v_r,    dT/dt = k v_r,    |F| <= mu_r N
         k = 9/4 mu_r^2 S_n,    gamma = 2 eta sqrt(k m*)
 
-    v_r is R* times the relative spin across the normal. T turns with the pair and falls as k does while it is
-    unloaded, as the force of ``mindlin_force`` does; past the limit its origin is dragged along. The damping
-    is that of m* on the spring.
+    v_r is R* times the relative spin across the normal. T rotates with the pair, and during unloading it
+    decreases in proportion to k, as in ``mindlin_force``. Beyond the limit the origin of the spring is
+    dragged along. The damping ratio refers to m* on the spring.
 
     Source: K. Iwashita and M. Oda, J. Eng. Mech. 124 (1998) 285, as type C of J. Ai, J.-F. Chen, J. M. Rotter
-    and J. Y. Ooi, Powder Technol. 206 (2011) 269, who take the inertia of both grains for the damping.
+    and J. Y. Ooi, Powder Technol. 206 (2011) 269, who use the inertia of both grains for the damping.
     """
 
     memory: ClassVar[int] = 4
@@ -86,12 +86,12 @@ class RollingEPSD(RollingResistance):
 
 
 class RollingSDS(RollingResistance):
-    """A spring, a dashpot and a slider hold back two that roll on each other, with constants of their own.
+    """A spring, a dashpot and a slider with independent constants resist rolling.
 
         M = R* F,    F = k_r xi + gamma_r v_r,    dxi/dt = v_r,    |F| <= mu_r N
 
-    v_r is R* times the relative spin across the normal. xi turns with the pair; past the limit its origin is
-    dragged along. It is ``rolling sds`` of LAMMPS.
+    v_r is R* times the relative spin across the normal. xi rotates with the pair; beyond the limit its origin
+    is dragged along. It is ``rolling sds`` of LAMMPS.
 
     Source: S. Luding, Granul. Matter 10 (2008) 235; Y. Wang, F. Alonso-Marroquin and W. W. Guo, Particuology
     23 (2015) 49.

@@ -1,4 +1,4 @@
-"""Resistance to twisting about the line of centres, by springs with memory."""
+"""Resistance to twisting about the line of centres, by springs with history."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tisim.materials.materials import Touching
 
 @ti.func
 def _slipping(elastic, drag, limit):
-    """Return the sum of an elastic couple and a drag, cut to a limit, and what elastic couple that leaves."""
+    """Return the sum of an elastic couple and a drag, cut to a limit, and the elastic couple that remains."""
     couple = ti.max(-limit, ti.min(limit, elastic + drag))
     return couple, ti.select(couple == elastic + drag, elastic, couple - drag)
 
 
 class TwistingMarshall(TwistingResistance):
-    """Two that twist on each other are held back by the springs and the friction of their circle of contact.
+    """The tangential springs and the friction of the contact circle resist twisting.
 
         M = T + gamma_t a^2/2 Omega,    dT/dt = S_t a^2/2 Omega,    |M| <= 2/3 a mu N
 
-    S_t, gamma_t and mu are those of the tangential force, a is the radius of the circle, and Omega the
-    relative spin about the normal. T falls as its stiffness does while it is unloaded; ``twisting marshall``
-    of LAMMPS remembers the angle.
+    S_t, gamma_t and mu belong to the tangential force, a is the radius of the circle, and Omega the relative
+    spin about the normal. During unloading T decreases in proportion to its stiffness; ``twisting marshall``
+    of LAMMPS remembers the angle instead.
 
     Source: J. S. Marshall, J. Comput. Phys. 228 (2009) 1541.
     """
@@ -54,7 +54,7 @@ class TwistingMarshall(TwistingResistance):
 
 
 class TwistingSDS(TwistingResistance):
-    """A spring, a dashpot and a slider hold back two that twist on each other, with constants of their own.
+    """A spring, a dashpot and a slider with independent constants resist twisting.
 
         M = k_t xi + gamma_t Omega,    dxi/dt = Omega,    |M| <= mu_t N
 

@@ -1,4 +1,4 @@
-"""Friction without memory."""
+"""Friction without history."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from tisim.materials.materials import Touching
 
 
 class ViscousFriction(TangentialForce):
-    """Surfaces that slide are held back by a dashpot up to Coulomb's limit; nothing is remembered.
+    """A dashpot without history resists the sliding of surfaces, up to Coulomb's limit.
 
         F_t = min(gamma_t |u|, mu N) u / |u|,    gamma_t = x gamma_n
 
-    Two that are pressed together creep past each other under any load. It is ``linear_nohistory`` of LAMMPS.
+    Two grains that are pressed together creep past each other under any load. It is ``linear_nohistory`` of
+    LAMMPS.
 
     Source: P. K. Haff and B. T. Werner, Powder Technol. 48 (1986) 239.
     """
 
     uses: ClassVar = ("friction",)
 
-    damping_ratio: float = parameter("", "tangential damping over the normal one, x", 1.0, ge=0)
+    damping_ratio: float = parameter("", "tangential over normal damping, x", 1.0, ge=0)
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"slope": pair.mixed("friction")}
