@@ -338,11 +338,11 @@ class Ensemble:
 
 
 def _may_occur(costs: np.ndarray, seen: Sequence[float], most: float) -> Sequence[float]:
-    """Return costs of other designs that might also occur for this one.
+    """Return the costs that may occur for a design whose own costs are all equal.
 
-    They differ by at most ``most`` from the design's costs, where these are all equal, and lie between the
-    least and largest of all designs. If only two costs are known at all, both are returned; if no difference
-    between starts is known, all are.
+    They are the two ends of a range: at most ``most`` from the design's cost, and within the costs ``seen``
+    of all designs. If fewer than three costs or no differences between starts are known, ``seen`` itself is
+    returned.
     """
     if len(seen) < 3 or not most:
         return seen

@@ -1,4 +1,4 @@
-"""What a search has learnt beside its best design is told: tables for the terminal, CSV files, pictures."""
+"""Reports of calibration and sensitivity: tables for the terminal, CSV files and figures."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Analysis:
-    """An analysis is what there is to tell of a search.
+    """The analyses of a search.
 
-    calibration : None where the objective is not the misfit of what was measured. sensitivity : of each
-    objective; empty where too few designs are known.
+    calibration : None if the objective is not a Misfit.
+    sensitivity : of each objective; empty if too few designs are known.
     """
 
     calibration: Calibration | None
@@ -37,7 +37,7 @@ class Analysis:
 
     @classmethod
     def of(cls, outcome: Outcome) -> Analysis:
-        """Return all that there is to tell of a search that has found a design."""
+        """Return the analyses of a search that has found a design."""
         enough = len(outcome.estimates) >= sensing.least_designs(outcome.problem.genome)
         return cls(
             calibrating.calibration(outcome) if outcome.problem.measured else None,
@@ -50,8 +50,10 @@ class Analysis:
         return [*known, *(sensitivity_table(one) for one in self.sensitivity)]
 
     def write(self, folder: Path) -> list[Path]:
-        """Write calibration and sensitivity, where there is one, as .csv, .png and .pdf; return the paths. A
-        picture that cannot be drawn is left out, which is said on standard error."""
+        """Write the available analyses as .csv, .png and .pdf; return the paths.
+
+        A figure that cannot be drawn is skipped, with a message on standard error.
+        """
         paths: list[Path] = []
         known, sensitive = self.calibration, self.sensitivity
         if known is not None:
@@ -67,7 +69,7 @@ class Analysis:
 
 
 def _late(name: str, of: Calibration | tuple[Sensitivity, ...]) -> Callable[[], Figure]:
-    """Return what draws a figure, for which matplotlib is loaded only then."""
+    """Return a function that draws the figure; matplotlib is imported only when it is called."""
 
     def draw() -> Figure:
         from tisim.optimize.report import analysis_figures
@@ -79,7 +81,7 @@ def _late(name: str, of: Calibration | tuple[Sensitivity, ...]) -> Callable[[], 
 
 
 def calibration_table(found: Calibration) -> RenderableType:
-    """Return how well each gene is known, for the terminal."""
+    """Return the estimates and intervals of the genes as a table for the terminal."""
     title = Text(f"what the measurements tell: {calibrating.summary(found)}", "italic")
     parts: list[RenderableType] = ["", title]
     if found.genes:
@@ -102,7 +104,7 @@ def calibration_table(found: Calibration) -> RenderableType:
 
 
 def sensitivity_table(found: Sensitivity) -> RenderableType:
-    """Return what each gene does to an objective, for the terminal."""
+    """Return the effects of the genes on an objective as a table for the terminal."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("gene")
     for heading in ("-10 % of range", "+10 % of range", "alone", "in all"):
