@@ -131,7 +131,7 @@ class AskTell:
         in_file = isinstance(given, str | Path)
         for what, of in (("values", values), ("standard_errors", standard_errors)):
             able = of is None or (not in_file and values is not None)
-            must(able, what, "left out where the designs have them", of)
+            must(able, what, "left out if the designs contain them", of)
         if values is not None:
             given = self._joined(list(given), values, standard_errors, designs is not given)
         read = []
@@ -374,4 +374,4 @@ def _elsewhere(
 
 def _not_here(design: Any) -> float:
     """The objective of a campaign, which is evaluated elsewhere; raises InputError when called."""
-    raise InputError("a campaign must be told what designs are worth; received a call of its objective")
+    raise InputError("a campaign must be told the values of its designs; received a call of its objective")

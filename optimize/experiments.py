@@ -30,8 +30,8 @@ def experiments(given: Given, problem: Problem, what: str = "experiments") -> tu
 
     The columns are the genes, each objective and each constraint of the result, in their units, and
     optionally the standard error of each value ("NAME std. error", or "std. error" of a single objective). An
-    empty objective marks a failed design. Rows of the same design are repeats of it. InputError for an
-    invalid row, naming it.
+    objective that is empty or not finite marks a failed design. Rows of the same design are repeats of it.
+    InputError for an invalid row, naming it.
     """
     found: dict[tuple[float, ...], list[tuple[Values, Values, Values]]] = {}
     for place, row in rows(given, what):
@@ -167,5 +167,5 @@ def _number(name: str, cell: str | None) -> float:
     try:
         return float(cell)
     except ValueError:
-        rule = f"{name} must be a number, or empty where there is none"
+        rule = f"{name} must be a number, or empty if there is none"
         raise InputError(f"{rule}; received {abbreviated(cell)}") from None

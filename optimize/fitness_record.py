@@ -77,7 +77,7 @@ class FitnessRecord:
     def again(self, problem: Problem) -> FitnessRecord:
         """Return a new record of the same designs and starts, computed now; InputError for another
         problem."""
-        must(problem.name == self.problem, "problem", f"that of the record, {self.problem!r}", problem.name)
+        must(problem.name == self.problem, "problem", f"the one recorded, {self.problem!r}", problem.name)
         return self.measure(problem, self.designs, self.starts)
 
     @property

@@ -190,7 +190,7 @@ def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> d
     """Return the settings of a case for a method.
 
     Another method than the case's gets its own default options, unless it accepts all options of the case's
-    method (as restart accepts those of zohdi); it then keeps them.
+    method (as restart accepts the options of zohdi); it then keeps them.
 
     base : settings of the case; "methods" may contain settings for other methods, by name.
     method : name of the method; None for the case's own, or for one that supports its objectives.

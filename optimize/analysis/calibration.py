@@ -125,7 +125,7 @@ def calibration(outcome: Outcome) -> Calibration:
     """
     problem = outcome.problem
     measured = problem.measured
-    rule = "the Misfit of what was measured in a problem that is calibrated"
+    rule = "a Misfit in a problem that is calibrated"
     must(measured is not None, "statistic of the objective", rule, problem.objectives[0].statistic)
     must(outcome.best is not None, "search", "one with a design that has not failed", Words("none"))
     assert measured is not None
@@ -226,19 +226,19 @@ def _remarks(
             if abs(rho) > _TOGETHER and {one.name, other.name} <= known:
                 more = "less" if rho < 0 else "more"
                 remarks.append(
-                    f"{other.name} and {one.name} are hardly told apart: more of one goes with {more} of "
+                    f"{other.name} and {one.name} are hard to distinguish: more of one fits with {more} of "
                     f"the other (correlation {rho:.2f})."
                 )
     freedom = max(measurements - len(genes), 1)
     if chi2_distribution.sf(shape.least / (1.0 + evidence.shift), freedom) < _UNLIKELY:
         remarks.append(
-            f"The measurements are not met together: the least chi^2 is {shape.least:.3g} of "
-            f"{measurements} quantities. The intervals hold for a model that can meet them."
+            f"The model does not meet all measurements: the least chi^2 is {shape.least:.3g} of "
+            f"{measurements} quantities. The intervals are valid only if it can."
         )
     if not np.any(evidence.noise) and shape.scatter > 1.0:
         remarks.append(
-            f"chi^2 is off a quadratic form by {shape.scatter:.2g} in the root of the mean square, over "
-            f"designs up to {shape.within:.3g} above the least: the intervals are rough."
+            f"chi^2 deviates from a quadratic form by {shape.scatter:.2g} (root mean square) for "
+            f"designs up to {shape.within:.3g} above the least: the intervals are approximate."
         )
     return remarks
 
@@ -263,18 +263,18 @@ def _untold(directions: Array, grown: float, genes: Sequence[Searched]) -> list[
     parts = (directions**2).sum(axis=1)
     change = f"chi^2 changes by {grown:.2g} or less"
     alone = [gene.name for gene, part in zip(genes, parts, strict=True) if part > 1.0 - _LITTLE]
-    told = [f"Nothing is told of {_listed(alone)}: {change} over the range."] if alone else []
+    told = [f"The measurements do not determine {_listed(alone)}: {change} over the range."] if alone else []
     mixed = [k for k, part in enumerate(parts) if _LITTLE <= part <= 1.0 - _LITTLE]
     if len(mixed) < 2:
         return told
     names = _listed([genes[k].name for k in mixed])
     if directions.shape[1] - len(alone) > 1:
-        return [*told, f"{names} cannot be told apart: {change} along several combinations of them."]
+        return [*told, f"{names} cannot be distinguished: {change} along several combinations of them."]
     one = directions[mixed, int(np.argmax((directions[mixed] ** 2).sum(axis=0)))]
     up = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] > 0]
     down = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] < 0]
-    goes = f"where more {_listed(up)} goes with less {_listed(down)}" if down else "where all grow together"
-    return [*told, f"{names} cannot be told apart: {change} {goes}."]
+    goes = f"for more {_listed(up)} with less {_listed(down)}" if down else "if all increase together"
+    return [*told, f"{names} cannot be distinguished: {change} {goes}."]
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -44,8 +44,8 @@ class EnsembleSettings(Checked):
     confirm : held-out starts of each of the best designs afterwards, from which their values are reported (0:
         none, and no intervals); raised if the interval of a statistic needs more.
 
-    Up to an eighth of max_evaluations is reserved for select and confirm, up to a quarter with several
-    objectives. If that is not enough, fewer designs are reported.
+    An eighth of max_evaluations, or less if that suffices, is reserved for select and confirm; with several
+    objectives a quarter. If the reserve is not enough, fewer designs are reported.
     """
 
     min_starts: int = Field(2, ge=1)

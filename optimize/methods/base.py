@@ -87,9 +87,9 @@ class SearchMethod(ABC):
 
 
 def every() -> dict[str, type[SearchMethod]]:
-    """Return all search methods by name: those of this package, and those in imported modules of the user.
+    """Return all search methods by name, from this package and from imported modules of the user.
 
-    InputError if one of the latter cannot be used.
+    InputError if one of the user's cannot be used.
     """
     for entry in pkgutil.iter_modules(methods.__path__):
         importlib.import_module(f"{methods.__name__}.{entry.name}")

@@ -59,7 +59,7 @@ def mate_z04(
         phi A + (1 - phi) B
 
     A new weight 0 <= phi <= 1 is drawn for every component of both. first, second : shape (genes,). Each
-    component of an offspring lies between those of its parents.
+    component of an offspring lies between the parents' components.
     """
     a, b = np.array(first), np.array(second)
     phi = rng.random((2, len(a)))

@@ -102,8 +102,8 @@ class CmaEs(SearchMethod):
 def within(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return points of [-EDGE, 1 + EDGE] mapped to [0, 1].
 
-    The mapping is the identity except within EDGE of a bound, where a parabola leads smoothly to it. A best
-    design on a bound is then a smooth minimum of the strategy.
+    The mapping is the identity except within EDGE of a bound; there a parabola leads smoothly to the bound. A
+    best design on a bound is then a smooth minimum of the strategy.
 
     Source: the transformation BoundTransform of N. Hansen's program cma.
     """

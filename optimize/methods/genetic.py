@@ -78,7 +78,7 @@ class GeneticOptions(BreedingOptions):
             for name in ("first", "proposals", "inner"):
                 value = getattr(self, name)
                 unused = value == type(self).model_fields[name].get_default()
-                must(unused, f"search.options.{name}", "left out where surrogate is false", value)
+                must(unused, f"search.options.{name}", "left out if surrogate is false", value)
         return self
 
 
@@ -189,10 +189,10 @@ class Genetic(SearchMethod):
         return np.vstack([local, worth.batch(evolved, count - len(local))])
 
     def _evolved(self, worth: Worth, count: int) -> Array:
-        """Return the individuals of some generations on the surrogate, ``count`` in each, and as many random
-        ones in the first.
+        """Return the individuals of some generations on the surrogate, ``count`` in each.
 
-        Their fitness is the worth of a run for one cost, and the posterior means for several.
+        The first generation also has ``count`` random individuals. The fitness is the worth of a run for one
+        cost, and the posterior means for several.
         """
         belief, most = self.belief, _PARENTS * self.objectives
         parents = self._best(self._strings(belief.points[belief.chosen], belief.means), most)

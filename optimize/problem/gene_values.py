@@ -49,7 +49,7 @@ def plain_value(value: Any, what: str) -> Value:
     must(is_number(value), what, "a text, a number or a flag", value)
     whole = isinstance(value, numbers.Integral)
     able = abs(value) <= WHOLE_WITHIN if whole else math.isfinite(value)
-    must(able, what, "finite, and within +-2^50 where it is whole", value)
+    must(able, what, "finite, and within +-2^50 if it is whole", value)
     return int(value) if whole else float(value)
 
 

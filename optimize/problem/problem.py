@@ -47,8 +47,8 @@ class Problem:
     derived : extra report columns computed from the fitness, heading -> function; with one objective only.
     picture : (Scene, Result) -> figure of a run, for the report.
     details : (design, Result) -> further quantities of the best design's run, for the report.
-    met_at : the fitness at and below which a design meets all requirements. The report then shows the spread
-        of each gene over all such designs of the search. With one objective only.
+    met_at : a design with this fitness, or a better one, meets all requirements. The report then shows the
+        spread of each gene over all such designs of the search. With one objective only.
     constraints : any number of ResultConstraints and DesignConstraints.
     code : a text that distinguishes this problem from others of the same name and version. It replaces the
         checksums of scene and objectives, of their files and of all values that they are bound to (see
@@ -97,7 +97,7 @@ class Problem:
         headings = [*self.genome.names, *own]
         twice = sorted({name for name in own if headings.count(name) > 1})
         must(not twice or own == names, "names of constraints, and of quantities,",
-             "other than each other's, and than those of genes and objectives", twice)  # fmt: skip
+             "different from each other and from the names of genes and objectives", twice)  # fmt: skip
 
     @classmethod
     def of_function(

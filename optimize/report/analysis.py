@@ -82,7 +82,7 @@ def _late(name: str, of: Calibration | tuple[Sensitivity, ...]) -> Callable[[], 
 
 def calibration_table(found: Calibration) -> RenderableType:
     """Return the estimates and intervals of the genes as a table for the terminal."""
-    title = Text(f"what the measurements tell: {calibrating.summary(found)}", "italic")
+    title = Text(f"calibration: {calibrating.summary(found)}", "italic")
     parts: list[RenderableType] = ["", title]
     if found.genes:
         table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
@@ -97,9 +97,9 @@ def calibration_table(found: Calibration) -> RenderableType:
                           one.words.partition(":")[0])  # fmt: skip
         parts.append(table)
     if any(one.open_low or one.open_high for one in found.genes):
-        parts.append(Text("[...]: an end of the range that was searched, and not of the interval", "dim"))
+        parts.append(Text("[...]: an end of the searched range; the interval may extend beyond it", "dim"))
     for name, values in found.choices.items():
-        parts.append(Text(f"{name}: {', '.join(map(str, values))} (designs within the 95 % of one gene)"))
+        parts.append(Text(f"{name}: {', '.join(map(str, values))} (designs within the 95 % limit of one gene)"))
     return Group(*parts, *(Text(remark) for remark in found.remarks))
 
 
@@ -114,19 +114,19 @@ def sensitivity_table(found: Sensitivity) -> RenderableType:
         changes = (_signed(gene.changes[move]) for move in (-0.1, 0.1))
         table.add_row(Text(label), *changes, _index(gene.first), _index(gene.total))
     predicts = (
-        f"predicts {found.q2.low:.2f} to {found.q2.high:.2f} of the variance of designs left out, "
-        "their noise taken off"
+        f"predicts {found.q2.low:.2f} to {found.q2.high:.2f} of the variance of left-out designs, "
+        "without their noise"
     )
     words = [
-        f"-10 %, +10 %: change of {found.objective} as the gene alone moves so far from the best design",
-        f"alone, in all: parts of the variance of {found.objective} over all ranges, by the gene alone and "
-        "with the others (Sobol' indices of first order and total)",
-        f"± is half of the 95 % interval. By a Gaussian process through {found.designs} designs, which "
+        f"-10 %, +10 %: change of {found.objective} when only this gene moves by that part of its range",
+        f"alone, in all: parts of the variance of {found.objective} over all ranges due to the gene alone "
+        "and together with others (first-order and total Sobol' indices)",
+        f"±: half of the 95 % interval. From a Gaussian process through {found.designs} designs, which "
         f"{predicts}",
     ]
     if not found.trusted:
-        words[1] = f"alone, in all: not given, as the Gaussian process predicts less than {LEAST_Q2:g}"
-    title = Text(f"what each gene does to {found.label}", "italic")
+        words[1] = f"alone, in all: not given, because the Gaussian process predicts less than {LEAST_Q2:g}"
+    title = Text(f"effect of each gene on {found.label}", "italic")
     return Group("", title, table, *(Text(line, "dim") for line in words))
 
 

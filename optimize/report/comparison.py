@@ -32,8 +32,8 @@ COMPARISON_FILES = (COMPARISON_FILE, f"{COMPARISON_FILE}.journal", f"{COMPARISON
 FRESH = 10**6
 """The seed of the starts from which the best designs are run again; no search uses it."""
 NOTE = (
-    "median, lowest, highest: of the best designs of the searches, from fresh starts; claimed: what the "
-    "searches held them for, the median; 95 % +-: half of the interval from fresh starts, the median"
+    "median, lowest, highest: best designs of the searches, from held-out (fresh) starts; claimed: median of "
+    "the searches' own estimates; 95 % +-: median of half the interval from the fresh starts"
 )
 
 

@@ -66,7 +66,7 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
     if few:
         axis.plot(
             means[:, x], means[:, y], "o", mfc="none", color=_FEW_STARTS_COLOUR, ms=2.5, mew=0.6, zorder=1,
-            label=f"other designs, only {_starts(few)}: the luckiest lie beyond the front",
+            label=f"other designs, only {_starts(few)}: the luckiest appear beyond the front",
         )  # fmt: skip
     if many:
         means, _ = _values(outcome, many)

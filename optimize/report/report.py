@@ -62,17 +62,17 @@ def notes(outcome: Outcome) -> RenderableType:
         return Group()
     first = outcome.hall[0]
     words = {
-        "starts": "random starts that the mean is over",
-        ERROR: "standard error of that mean. It does not count that the design was chosen for its luck, too",
+        "starts": "number of random starts in the mean",
+        ERROR: "standard error of that mean; it does not include the bias from choosing the best designs",
     }
     if all(estimate.exact for estimate in first.estimates):
         words = {"starts": "one: all random starts of a design give the same run"}
     if any(string.estimates[0].converged for string in outcome.hall) and ensemble.tolerance:
         words["converged"] = (
-            f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it"
+            f"yes if the last start changed the mean by less than {ensemble.tolerance:g} of it"
         )
     if first.confirmed:
-        words["fresh starts"] = "starts that have had no part in choosing the designs"
+        words["fresh starts"] = "held-out starts, not used to choose the designs"
         words[f"{LOW}, {HIGH}"] = "ends of the 95 % confidence interval of the mean"
     meanings = {**problem.meanings, **words}
     return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in meanings.items()))

@@ -82,7 +82,7 @@ class Cache:
         return tabulated(self._runs, self._newer.values())
 
     def records(self) -> list[Record]:
-        """Return all evaluations in the file; those of one problem oldest first."""
+        """Return all evaluations in the file, grouped by problem and oldest first."""
         return [*(record for part in self._runs for record in part.records()), *self._newer.values()]
 
     def get(self, key: str) -> Record | None:
@@ -220,7 +220,7 @@ class Cache:
         mark = Mark.read(self._lock) if first else None
         if mark is not None and (loss := mark.loss(self._content, entries)):
             warnings.warn(
-                f"{self.path}: {loss}; what is lost will be run again", RuntimeWarning, stacklevel=3
+                f"{self.path}: {loss}; lost evaluations will be run again", RuntimeWarning, stacklevel=3
             )
 
     def _warn(self, damaged: Sequence[str]) -> None:

@@ -113,7 +113,7 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
     if image is None:
         raise InputError(
             f"{rule} {len(content)} bytes that are damaged, cut short or another program's "
-            "('tisim cache --compact' keeps what can be read)"
+            "('tisim cache --compact' keeps the readable part)"
         )
     with h5py.File(io.BytesIO(image), "r") as file:
         if not by_cache(file):

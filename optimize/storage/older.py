@@ -94,4 +94,4 @@ def _names(problem: str, count: int, tables: Mapping[str, Hdf5Table]) -> tuple[S
             names = identity.get("objective_order", list(identity.get("objectives", ())))
             if identity.get("problem") == problem and len(names) == count:
                 return names, identity.get("gene_order", ())
-    raise _Unnamed("no search in the file says what its objectives are called")
+    raise _Unnamed("no search in the file names its objectives")

@@ -97,7 +97,7 @@ class DaskCluster:
             self._answered, self._warned = now, False
         elif now - self._answered > SILENCE_S:
             raise RunError(
-                f"no worker of the Dask cluster has answered for {SILENCE_S:g} s; what had finished is kept"
+                f"no worker of the Dask cluster has answered for {SILENCE_S:g} s; finished runs are kept"
             )
         elif not self._warned:
             self._warned = True
@@ -141,7 +141,7 @@ def _client(address: str) -> Client:
 
 
 def _scheduler_lost() -> RunError:
-    return RunError("Dask scheduler was lost; what had finished is kept")
+    return RunError("Dask scheduler was lost; finished runs are kept")
 
 
 def _run(scenes: bytes, worker_settings: WorkerSettings) -> Answer:

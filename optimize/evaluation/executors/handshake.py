@@ -60,7 +60,7 @@ def agree(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> None:
 def stranger(answer: object, who: str) -> InputError:
     """Return the error for a worker that sent no valid description of its program."""
     ours = program()
-    rule = f"one that knows what the search is made of ({_versions_of(ours, ours)})"
+    rule = f"one with the program of the search ({_versions_of(ours, ours)})"
     return InputError(f"{who} must be {rule}; received {shorten(repr(answer), 200)}")
 
 

@@ -88,7 +88,7 @@ class Remote:
                     if losses + 1 == MAX_LOST_WORKERS:
                         raise RunError(
                             f"{error}; it was the worker number {MAX_LOST_WORKERS} to be lost with the same "
-                            "work. What had finished is kept"
+                            "work. Finished runs are kept"
                         ) from error
                     send(unit, losses + 1)
                     continue

@@ -140,7 +140,7 @@ def _unpack_scenes(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[
     except InputError as error:
         raise InputError(f"{_name()}: {error}") from None
     except (ImportError, AttributeError) as error:
-        rule = "able to import what the scenes are made of (give your own files with --plugin)"
+        rule = "able to import the parts of the scenes (give your own files with --plugin)"
         raise InputError(f"{_name()} must be {rule}; received {error}") from None
     return scenes
 
@@ -162,8 +162,7 @@ def _end_unless_sent(answer_sent: cf.Future[None]) -> None:
 
 
 def _portable(error: BaseException) -> BaseException:
-    """Return the error in a form that can be sent. An internal error gets the place in the worker where it
-    was raised."""
+    """Return the error in a form that can be sent. An internal error includes its traceback in the worker."""
     if isinstance(error, (InputError, RunError)):
         return error
     trace = "".join(traceback.format_exception(error))
