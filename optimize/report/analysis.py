@@ -99,7 +99,7 @@ def calibration_table(found: Calibration) -> RenderableType:
     if any(one.open_low or one.open_high for one in found.genes):
         parts.append(Text("[...]: an end of the searched range; the interval may extend beyond it", "dim"))
     for name, values in found.choices.items():
-        parts.append(Text(f"{name}: {', '.join(map(str, values))} (designs within the 95 % limit of one gene)"))
+        parts.append(Text(f"{name}: {', '.join(map(str, values))} (designs within the 95 % limit of a gene)"))
     return Group(*parts, *(Text(remark) for remark in found.remarks))
 
 

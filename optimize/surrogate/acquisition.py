@@ -32,9 +32,9 @@ _APART = 1e-6
 
 
 class Worth:
-    """The worth of running each design, according to a belief.
+    """The acquisition function: the worth of running each design, according to a belief.
 
-    rng : for volumes in three dimensions or more, which are sampled.
+    rng : random generator for volumes in three dimensions or more, which are sampled.
     """
 
     def __init__(self, belief: Belief, rng: np.random.Generator) -> None:

@@ -535,9 +535,7 @@ def test_dask_worker_of_another_version_is_refused_before_anything_runs(cluster,
 def test_dask_worker_that_does_not_know_its_version_is_refused(cluster, join, tmp_path):
     without(tmp_path, "handshake.py")
     join()
-    message = (
-        rf"must be one with the program of the search \(tisim {__version__}, .*; received .*handshake"
-    )
+    message = rf"must be one with the program of the search \(tisim {__version__}, .*; received .*handshake"
     with pytest.raises(InputError, match=message):
         connected(cluster)
 
