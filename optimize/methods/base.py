@@ -31,12 +31,10 @@ class SearchMethod(ABC):
        the hall: the best designs so far, or the front. The objects are the same ones, but a fitness may have
        changed since, because more starts were spent on the design.
     3. ``learn`` receives individuals that the method did not ask for, between generations: designs of the
-    user,
-       which were run before generation 0, and designs with known values.
+       user, which were run before generation 0, and designs with known values.
     4. The method has its own random numbers, determined by the seed alone. Its proposals are a function of
-    the
-       seed and of the fitnesses that it was told: a search is resumed by running it again from the beginning
-       with the same cache.
+       the seed and of the fitnesses that it was told: a search is resumed by running it again from the
+       beginning with the same cache.
 
     name : as in ``--method NAME``.
     several : whether it supports several objectives at once.
