@@ -13,8 +13,9 @@ def representative(costs: Array, most: int, exact: bool) -> NDArray[np.intp]:
     """Return the indices of at most ``most`` designs, in order, from their costs, (n, objectives).
 
     exact : whether the costs have no noise. If so, half of the returned designs are the best ones, and the
-        rest are drawn uniformly. With noise all are drawn uniformly: the lowest means are partly luck, and a
-        process fitted to lucky designs would predict too low costs in their region.
+        rest are taken at even intervals from the others, ordered by rank. With noise all are taken at even
+        intervals from the whole list: the lowest means are partly luck, and a process fitted to lucky designs
+        would predict too low costs in their region.
     """
     if len(costs) <= most:
         return np.arange(len(costs))
