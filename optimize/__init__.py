@@ -1,6 +1,6 @@
-"""tisim.optimize: inverse design, a search for the scene whose result is wanted.
+"""tisim.optimize: inverse design, the search for a scene whose result meets given objectives.
 
-Names are loaded when they are first asked for; __init__.pyi lists them. ``optimize.run(problem)`` searches.
+Start a search with ``optimize.run(problem)``. Names are loaded on first use; __init__.pyi lists them.
 """
 
 import lazy_loader

@@ -1,7 +1,8 @@
-"""Ask and tell: a search method for experiments, or for a simulator, that are elsewhere.
+"""Ask and tell: a search method for experiments, or for a simulator outside tisim.
 
-The methods are those of a search, and what one asks for follows from its seed and from what it was told. So
-a CSV file of what was told is enough to go on with: a new object of the same settings tells it all again.
+The methods are the same as in a search. The designs that one asks for depend only on its seed and on the
+values that it was told. A campaign can therefore be resumed from a CSV file of these values: a new object
+with the same settings replays the file.
 """
 
 from __future__ import annotations
@@ -43,25 +44,28 @@ from tisim.files import regular_file
 from tisim.files.atomic import replace_file
 
 SAME = 1e-9
-"""A design that is told is the one that was asked for within this, in widths of the ranges of genes."""
+"""A told design counts as an asked one if every gene agrees within this tolerance, as a fraction of its
+range."""
 _TRIES = 100
-"""Generations of nothing new in a row after which a method is taken to have no more to ask for."""
+"""After this number of generations in a row without a new design, ``ask`` returns an empty list."""
 _SETTINGS = "of the same genes, method, seed, options and starting designs as this campaign"
 Point = tuple[float, ...]
-"""A design as a point of the unit cube, in the middle of the cells of whole numbers and choices."""
+"""A design as a point of the unit cube, at the centre of the cells of integers and choices."""
 Tried = tuple[Values, Values, Values]
-"""Values, their standard errors and constraints of one time that a design was tried."""
+"""The values, standard errors and constraint values of one trial of a design."""
 
 
 class AskTell:
-    """A campaign: ``ask`` for designs, find out elsewhere what they are worth, ``tell``.
+    """A campaign: ``ask`` for designs, evaluate them elsewhere, ``tell`` their values.
 
-    problem : a Problem, whose scene and objectives are then not used, or a genome or its genes with
-    ``objectives``: names of what is to be small, {name: "smallest" or "largest"}, or Objectives.
-    method, seed, options : as of a search. starting_designs : are asked for first (optimize.run).
-    file : a CSV file that all that is told is written to; one that is there is gone on with.
+    problem : a Problem, whose scene and objective functions are not called; or a genome or its genes,
+        together with ``objectives``.
+    objectives : a list of names to minimise, {name: "smallest" or "largest"}, or Objectives.
+    method, seed, options : as in a search.
+    starting_designs : designs to be asked for first (see optimize.run).
+    file : a CSV file in which every told value is recorded; an existing file is continued.
 
-    InputError for a method that cannot work on the problem, and for a file of other genes or settings.
+    InputError if the method does not support the problem, or the file has other genes or settings.
     """
 
     def __init__(
@@ -82,20 +86,23 @@ class AskTell:
         genome, count = self.problem.genome, len(self.problem.objectives)
         self._method = find(method)(genome, count, self.settings.options, seed)
         self._starting = beginning.first(self.problem)
-        self._asked: list[Individual] = []  # of the generation under way
-        self._open: dict[Point, list[Individual]] = {}  # those of them that are to be told, by design
-        self._by_method = False  # whether the method has asked for them
+        self._asked: list[Individual] = []  # of the current generation
+        self._open: dict[Point, list[Individual]] = {}  # individuals that await a value, by design
+        self._by_method = False  # whether the method proposed them
         self._generations = 0
         self._told: dict[Point, list[Tried]] = {}
-        self._strings: dict[Point, list[Individual]] = {}  # of designs that were told, the first as told
+        self._strings: dict[Point, list[Individual]] = {}  # of told designs; the first one is the one told
         self._not_learned: list[Point] = []
         self._file, self._content = None if file is None else Path(file), b""
         self._lines: list[list[str]] = []
         self._replay()
 
     def ask(self) -> list[dict[str, Any]]:
-        """Return the designs that are to be tried now, by the names of all genes, in their units: the same
-        ones until each has been told, then others. None where the method has nothing new."""
+        """Return the designs to be tried now, as {gene name: value in its unit}.
+
+        The same designs are returned until each has been told, then the next ones. The list is empty once the
+        method has no new design.
+        """
         for _ in range(_TRIES):
             if self._open:
                 return [self.problem.genome.decode(strings[0]) for strings in self._open.values()]
@@ -105,23 +112,26 @@ class AskTell:
     def tell(
         self, designs: Given | Mapping[str, Any], values: Any = None, standard_errors: Any = None
     ) -> None:
-        """Say what designs are worth: those that were asked for, in any order and number, or others.
+        """Report the values of designs: of those that were asked for, in any order and number, or of others.
 
-        designs : one, or a list, by the names of the searched genes, or a CSV file (optimize.experiments).
-        values : for each design its value, in the unit of the objective; for several objectives a list in
-        their order or a dictionary by their names, in which constraints of the result stand, too. NaN, or
-        None, for a design that failed. Left out where the designs have them as further keys or columns.
-        standard_errors : of the values, in the same way, where they are known. A design that is told more
-        than once has the mean of its values: weighted by standard errors, if it has them; else its noise is
-        had from how its values differ. Without either, a value counts as exact.
+        designs : one design, or a list, by the names of the searched genes, or a CSV file
+            (optimize.experiments).
+        values : one value for each design, in the unit of the objective. With several objectives, or with
+            constraints of the result, each is a list in that order or a dictionary by name. NaN or None for a
+            failed design. Omitted if the designs contain the values as further keys or columns.
+        standard_errors : the standard errors of the values, in the same form, if known.
 
-        InputError for what cannot be; then nothing of it counts.
+        The values of a design that is told more than once are averaged, weighted by the standard errors if
+        they are given; otherwise the noise is estimated from the spread of the values. A single value without
+        a standard error counts as exact.
+
+        InputError for invalid input; in that case nothing is recorded.
         """
         given: Any = [designs] if isinstance(designs, Mapping) else designs
         in_file = isinstance(given, str | Path)
         for what, of in (("values", values), ("standard_errors", standard_errors)):
             able = of is None or (not in_file and values is not None)
-            must(able, what, "left out where the designs have them", of)
+            must(able, what, "left out if the designs contain them", of)
         if values is not None:
             given = self._joined(list(given), values, standard_errors, designs is not given)
         read = []
@@ -135,7 +145,7 @@ class AskTell:
 
     @property
     def best(self) -> Design | None:
-        """The best design by posterior mean; of several objectives the compromise. None before one is
+        """The best design by posterior mean, or the compromise of several objectives. None before a value is
         known."""
         outcome = self.outcome
         return next((one for one, string in zip(outcome.designs, outcome.hall, strict=True)
@@ -143,13 +153,15 @@ class AskTell:
 
     @property
     def designs(self) -> list[Design]:
-        """The best designs, best first; of several objectives the front. Their values have had a part in
-        choosing them, and flatter them."""
+        """The best designs, best first, or the front of several objectives.
+
+        Their values are biased towards good ones, because the designs were chosen by these values.
+        """
         return self.outcome.designs
 
     @property
     def outcome(self) -> Outcome:
-        """What has been found so far, as of a search, for ``to_frame`` and ``tisim.optimize.sensitivity``."""
+        """The results so far, as of a search, for ``to_frame`` and ``tisim.optimize.sensitivity``."""
         found = Outcome(self.problem, self.settings, identity(self.problem, self.settings, {}))
         strings = self._ranked()
         for string in strings:
@@ -159,7 +171,7 @@ class AskTell:
         return found
 
     def _next(self) -> None:
-        """Tell the method what is known, and ask for the next generation."""
+        """Tell the method the known values, and ask it for the next generation."""
         hall = Hall(self.settings.hall_of_fame)
         hall.update(self._ranked())
         if self._by_method:
@@ -175,8 +187,8 @@ class AskTell:
                 self._recognise(string)
 
     def _recognise(self, string: Individual) -> None:
-        """Give a string that is asked for what is known of its design. One that does not keep to a constraint
-        of the design fails."""
+        """Give an individual the known values of its design, or list it as open. It fails if its design
+        violates a design constraint."""
         design = self.problem.genome.decode(string)
         point = self._point(design)
         if point in self._strings:
@@ -192,7 +204,7 @@ class AskTell:
             self._open.setdefault(point, []).append(string)
 
     def _ranked(self) -> list[Individual]:
-        """Return the strings of all designs that were told, with costs that put the feasible ones first."""
+        """Return the individuals of all told designs; their costs rank feasible designs first."""
         strings = [of_design[0] for of_design in self._strings.values()]
         good = [string for string in strings if not string.failed]
         if good and self.problem.result_constraints:
@@ -208,7 +220,7 @@ class AskTell:
     def _known(
         self, told: Sequence[tuple[Point, Tried]]
     ) -> tuple[dict[Point, list[Tried]], dict[Point, Individual]]:
-        """Return of each design in what is told all its tries, and the string that they make."""
+        """Return all trials of each told design, and the individual that combines them."""
         tries: dict[Point, list[Tried]] = {}
         for point, tried in told:
             same = self._same(point)
@@ -220,7 +232,7 @@ class AskTell:
         return tries, strings
 
     def _take(self, tries: Mapping[Point, list[Tried]], strings: Mapping[Point, Individual]) -> None:
-        """Take in what designs are worth."""
+        """Record the trials and individuals of told designs."""
         self._told |= tries
         for point, string in strings.items():
             if point not in self._strings:
@@ -231,7 +243,8 @@ class AskTell:
                 _become(other, string)
 
     def _same(self, point: Point) -> Point:
-        """Return the design, asked for or told, that a design is taken for; itself where there is none."""
+        """Return the asked or told design that agrees with this one within ``SAME``; the point itself if
+        there is none."""
         points = list(dict.fromkeys((*self._open, *self._strings)))
         if point in self._open or point in self._strings or not points:
             return point
@@ -246,7 +259,7 @@ class AskTell:
         return self._point(design_of(self.problem, row)), row_values(self.problem, row)
 
     def _joined(self, designs: list[Any], values: Any, errors: Any, one: bool) -> list[dict[str, Any]]:
-        """Return designs with their values and standard errors as further keys."""
+        """Return the designs with their values and standard errors as further keys."""
         objectives = [objective.name for objective in self.problem.objectives]
         names = [*objectives, *(constraint.name for constraint in self.problem.result_constraints)]
         values_of = [values] if one else list(values)
@@ -262,7 +275,7 @@ class AskTell:
         return found
 
     def _line(self, row: Mapping[str, str], asked: bool) -> list[str]:
-        """Return the line of the file for a row that was told."""
+        """Return the line of the file for a told row."""
         _, (values, errors, limits) = self._read(row)
         design = design_of(self.problem, row)
         numbers = ("" if np.isnan(number) else repr(number) for number in (*values, *errors, *limits))
@@ -279,7 +292,7 @@ class AskTell:
         ]  # fmt: skip
 
     def _write(self, lines: list[list[str]]) -> None:
-        """Write these lines behind those of the file, if there is one. RunError if the disk is full."""
+        """Append these lines to the file, if there is one. RunError if the disk is full."""
         if self._file is not None:
             rule = "as this campaign has left it; make a new AskTell to go on with it"
             same = (regular_file.content(self._file) or b"") == self._content
@@ -292,7 +305,7 @@ class AskTell:
         self._lines += lines
 
     def _replay(self) -> None:
-        """Tell what is in the file, as it was told."""
+        """Tell the method the contents of the file, in their order."""
         content = None if self._file is None else regular_file.content(self._file)
         if self._file is None or not content:
             return
@@ -325,14 +338,14 @@ class AskTell:
 
 
 def _become(string: Individual, other: Individual) -> None:
-    """Give a string what is known of another one of the same design."""
+    """Give an individual the known values of another one with the same design."""
     string.know(other.estimates)
     string.limited, string.violation = other.limited, other.violation
     string.fitness.values = other.fitness.values
 
 
 def _by_name(value: Any, names: Sequence[str], what: str) -> dict[str, Any]:
-    """Return a number, or several, by names."""
+    """Return one or several numbers as a dictionary by name."""
     if isinstance(value, Mapping):
         must(set(value) == set(names), what, f"of {', '.join(names)}", [*value])
         return dict(value)
@@ -345,7 +358,7 @@ def _by_name(value: Any, names: Sequence[str], what: str) -> dict[str, Any]:
 def _elsewhere(
     genes: Genome | Sequence[AnyGene], objectives: Sequence[str | Objective] | Mapping[str, str]
 ) -> Problem:
-    """Return the problem of a campaign on these genes."""
+    """Return the problem of a campaign with these genes."""
     must(not isinstance(objectives, str), "objectives", "a list or a dictionary of names", objectives)
     directions = dict(objectives) if isinstance(objectives, Mapping) else {}
     for name, direction in directions.items():
@@ -360,5 +373,5 @@ def _elsewhere(
 
 
 def _not_here(design: Any) -> float:
-    """Stands for what a campaign finds out elsewhere."""
-    raise InputError("a campaign must be told what designs are worth; received a call of its objective")
+    """The objective of a campaign, which is evaluated elsewhere; raises InputError when called."""
+    raise InputError("a campaign must be told the values of its designs; received a call of its objective")

@@ -1,4 +1,4 @@
-"""What a search begins with: designs that are run first, and what is known of others before anything runs."""
+"""The beginning of a search: designs that are run first, and designs with known values."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ RUN_AGAIN = 6
 
 @dataclass(frozen=True)
 class Beginning:
-    """A beginning is part of what decides the course of a search.
+    """The starting designs and known values of a search; part of its identity.
 
-    designs : of the user, the searched genes by name. They run before generation 0, for any method.
+    designs : given by the user as searched genes by name. They run before generation 0, for any method.
     experiments : measured designs, which the method learns from and which are not run.
-    warm : what runs of other searches have found, from which the method learns too; the best of them are run
-    with the user's designs. None where that is not asked for.
+    warm : designs run by other searches, from which the method learns, too; the best of them are run together
+        with the user's designs. None without a warm start.
     """
 
     designs: tuple[dict[str, Any], ...] = ()
@@ -36,8 +36,10 @@ class Beginning:
     def of(
         cls, problem: Problem, starting_designs: Given | None, measured: Given | None, warm_start: bool
     ) -> Beginning:
-        """Return the beginning of what a user gives; ``warm`` is still without what it learns from.
-        InputError for designs that are none of the problem."""
+        """Return the beginning from the user's input; ``warm`` is still empty.
+
+        InputError for designs that do not belong to the problem.
+        """
         first = () if starting_designs is None else designs(starting_designs, problem)
         known = () if measured is None else experiments(measured, problem)
         return cls(first, known, () if warm_start else None)
@@ -48,13 +50,13 @@ class Beginning:
         return (*self.experiments, *(self.warm or ()))
 
     def first(self, problem: Problem) -> list[Individual]:
-        """Return the strings that are run before generation 0, without a fitness."""
+        """Return the individuals that are run before generation 0, without a fitness."""
         points = [tuple(map(float, problem.genome.encode(design))) for design in self.designs]
         points += [tuple(string) for string in best(problem.genome, self.warm or (), RUN_AGAIN)]
         return [Individual(point, len(problem.objectives)) for point in dict.fromkeys(points)]
 
     def identity(self, problem: Problem) -> dict[str, str]:
-        """Return its part of the identity of a search; nothing of one that begins with nothing."""
+        """Return its part of the identity of a search; empty if it has no designs."""
         parts = {}
         if self.designs:
             parts["starting_designs"] = _checksum(list(self.designs))
@@ -81,4 +83,4 @@ def _checksum(value: Any) -> str:
 
 
 NOTHING = Beginning()
-"""A search begins with nothing unless designs, experiments or a warm start are given."""
+"""The beginning without designs, experiments or a warm start."""

@@ -1,9 +1,9 @@
-"""How a search ends: the best designs are chosen from all it knows, and reported from starts that are new.
+"""The end of a search: the best designs are chosen from all known ones, and evaluated with held-out starts.
 
-The best of many noisy means is good by luck, too, so that what chooses a design flatters it. Three things are
-kept apart. The search has few starts of many designs. Those of them that are best by posterior mean are given
-some starts more, and ranked again. Values and intervals that are reported are of fresh starts, which have had
-no part in either.
+The best of many noisy means is partly lucky, so the values by which a design is chosen are biased. The search
+therefore has three separate stages. During the search, many designs get few starts each. Then the best of
+them by posterior mean get some more starts, and are ranked again. Finally, reported values and intervals are
+computed from held-out starts, which were used in neither stage.
 """
 
 from __future__ import annotations
@@ -23,20 +23,23 @@ from tisim.numerics.skewed import Moments
 from tisim.numerics.statistics import CONFIDENCE
 
 FEWEST_FRESH = 4
-"""Fresh starts of each design of a front, where the budget does not pay for more."""
+"""Held-out starts of each design of a front, if the budget does not allow more."""
 _PROOF = 2 * 10**6
-"""The number of the first start that is used to see whether a design meets a target."""
+"""The number of the first start that is used to check whether a design meets a target."""
 _STARTS_OF_PROOF = 16
 WRONGLY_MET = 0.05
-"""The chance that a search stops at a design that does not meet its target, where none does, at most."""
+"""Upper limit of the probability that a search stops at a design that does not meet its target, if none
+does."""
 Report = Callable[[float], None]
 Noise = Sequence[Moments] | None
 
 
 def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
-    """Return the number of runs that are kept back for the end: an eighth of the budget for one objective,
-    or what all designs that are reported need, if that is less; a quarter for a front; none where all starts
-    of a design are the same."""
+    """Return the number of runs that are reserved for the end of a search.
+
+    It is an eighth of the budget for one objective, or less if the reported designs need less; a quarter for
+    a front; 0 if all starts of a design are the same.
+    """
     asked, most = settings.ensemble, settings.max_evaluations
     if most is None or ensemble.repeatable or not (asked.select or asked.confirm):
         return 0
@@ -46,7 +49,7 @@ def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
 
 
 def _fresh(problem: Problem, settings: Settings) -> int:
-    """Return the number of fresh starts of each design that is reported."""
+    """Return the number of held-out starts of each reported design."""
     asked = settings.ensemble.confirm
     return max(asked, *(one.statistic.fewest_fresh for one in problem.objectives)) if asked else 0
 
@@ -55,10 +58,12 @@ def concluded(
     problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual], report: Report,
     met: Individual | None = None,
 ) -> list[Individual]:  # fmt: skip
-    """Return the designs that a search reports, best first, and give these their fresh starts.
+    """Return the designs that a search reports, best first, after their held-out starts.
 
-    known : all designs that have run; those that have not failed are chosen from. met : the one that has met
-    the target, which is reported first. The budget of the ensemble is not exceeded.
+    known : all designs that have run; the ones that did not fail are candidates.
+    met : the design that has met the target, which is reported first.
+
+    The budget of the ensemble is not exceeded.
     """
     asked = settings.ensemble
     fresh = _fresh(problem, settings)
@@ -88,12 +93,14 @@ def _front(
     report: Report,
     noise: Noise,
 ) -> list[Individual]:
-    """Return the front, of which no design is dominated by the fresh means of another; confirm : fresh starts
-    of each.
+    """Return the front, in which no design is dominated according to the means of held-out starts.
 
-    Those that are left were lucky more often than not, as the same means decide. Of r left of m intervals
-    have the confidence 1 - 0.05 r / m, by which a part of 0.95 of them hold the truth (Y. Benjamini and D.
-    Yekutieli, J. Am. Stat. Assoc. 100 (2005) 71-81).
+    confirm : held-out starts of each design.
+
+    The remaining designs are selected by the same means, and so are biased again. If r of m intervals remain,
+    they get the confidence 1 - 0.05 r / m, so that 95 % of them contain the true value.
+
+    Source: Y. Benjamini and D. Yekutieli, J. Am. Stat. Assoc. 100 (2005) 71-81.
     """
     front = best(problem.genome, known, len(known))
     if ensemble.repeatable:
@@ -123,12 +130,14 @@ def proven(
     goal: float,
     tried: int,
 ) -> bool:
-    """Return whether a design is as good as a goal, a cost, with confidence: whether the upper end of its
-    interval over starts of its own is no higher.
+    """Return whether a design meets a goal, a cost, with confidence: its upper interval end is at most the
+    goal.
 
-    known : all designs that have run. tried : designs that have not met the goal before it. Of many that are
-    tried some would meet it by luck; the k-th has a chance of 0.05 / (k (k + 1)) to do so, and all together
-    one of 0.05 at most.
+    The interval is computed from starts that only this check uses.
+
+    known : all designs that have run.
+    tried : number of designs that failed this check before. With many checks, some would succeed by chance;
+        the k-th has an error probability of 0.05 / (k (k + 1)), which gives at most 0.05 in total.
     """
     ensemble.look()
     if ensemble.repeatable:
@@ -152,8 +161,8 @@ def _confirm(
     noise: Noise,
     confidence: float = CONFIDENCE,
 ) -> None:
-    """Give designs their fresh starts, if these are enough for their statistics, and the budget has them or
-    they have been made."""
+    """Run the held-out starts of designs, if they are enough for the statistics and the budget allows them,
+    or they are cached."""
     again = bool(chosen) and bool(chosen[0].confirmed)
     too_few = starts < max(one.statistic.fewest_starts for one in problem.objectives)
     if not starts or too_few or (starts * len(chosen) > _left(ensemble) and not again):
@@ -165,8 +174,10 @@ def _confirm(
 
 
 def _noise(problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual]) -> Noise:
-    """Return what the search tells of the noise of each cost, where it can: not of starts that all designs
-    have in common, whose noise is no less alike."""
+    """Return the moments of the noise of each cost, if they can be estimated.
+
+    They cannot with common starts, because then the noise is the same for all designs.
+    """
     if ensemble.repeatable or settings.ensemble.common_starts:
         return None
     return moments(problem.genome, known)
@@ -180,13 +191,13 @@ def _know(problem: Problem, candidates: Sequence[Individual], ensemble: Ensemble
 
 
 def _exact(problem: Problem, chosen: list[Individual], ensemble: Ensemble) -> list[Individual]:
-    """Let designs be known for sure that had several starts before these were seen to be all the same."""
+    """Mark designs as exact if several of their starts were run before all starts proved to be the same."""
     _know(problem, [one for one in chosen if not all(e.exact for e in one.estimates)], ensemble, 0)
     return chosen
 
 
 def _first(met: Individual | None, chosen: list[Individual]) -> list[Individual]:
-    """Return as many designs as these, with the one that has met the target in front."""
+    """Return these designs with the one that met the target in front, and the same number in total."""
     return chosen if met is None else [met, *(one for one in chosen if one is not met)][: len(chosen)]
 
 

@@ -1,7 +1,7 @@
-"""Designs that a user has, as rows of a CSV file or dictionaries: genes and values by their headings.
+"""Designs given by the user as rows of a CSV file or as dictionaries: genes and values by heading.
 
-The headings are those of best.csv, met.csv and ``Outcome.to_frame``, so that these files can be given; a gene
-or an objective may be named with its unit, as there, or without.
+The headings are the same as in best.csv, met.csv and ``Outcome.to_frame``, so these files can be used as
+input; the unit in the heading of a gene or an objective may be omitted.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from tisim.errors import InputError, is_number, must
 from tisim.files import regular_file
 
 MOST_ROWS = 10_000
-"""The largest number of designs that are taken from a file."""
+"""The largest number of designs that are read from a file."""
 GENERATION, WHETHER_ASKED = "generation", "asked"
-"""Headings of what a campaign of ask and tell keeps beside designs and values."""
+"""Headings of the additional columns in the file of an ask-and-tell campaign."""
 COUNTS = ("rank", "front", "starts", "converged", "failed", GENERATION, WHETHER_ASKED)
-"""Headings that result files have beside genes and values; they are not looked at."""
+"""Headings of further columns in result files, which are ignored."""
 Row = tuple[str, Mapping[str, str]]
-"""Where a row stands, in words, and its cells by heading."""
+"""The position of a row, in words, and its cells by heading."""
 Given = str | Path | Sequence[Mapping[str, Any]]
-"""A CSV file, or rows of one as dictionaries."""
+"""A CSV file, or its rows as dictionaries."""
 
 
 def rows(given: Given, what: str) -> list[Row]:
-    """Return the rows of a file, or those that are given; ``what`` names them in messages.
+    """Return the rows of a file, or the given rows; ``what`` names them in messages.
 
-    InputError where there are none, or too many, and for a file that is no table with a heading.
+    InputError for no rows or too many, and for a file that is not a table with a heading.
     """
     if isinstance(given, str | Path):
         found = _of_file(Path(given))
@@ -52,11 +52,11 @@ def rows(given: Given, what: str) -> list[Row]:
 
 
 def check_headings(problem: Problem, row: Mapping[str, str]) -> None:
-    """Raise InputError for a column that is neither of the problem nor of a result file: a gene may be
-    misspelt, or have another unit."""
+    """Raise InputError for a column that belongs neither to the problem nor to a result file, such as a
+    misspelt gene or a gene with another unit."""
     known = set(_headings(problem))
     for head in row:
-        # That of a constraint has its bound, which may have been another.
+        # The heading of a constraint contains its bound, which may have been different.
         of_constraint = head.partition(",")[0] in {constraint.name for constraint in problem.constraints}
         labels = ", ".join(gene.label for gene in problem.genome.genes)
         rule = f"a gene ({labels}) or a heading of best.csv"
@@ -64,8 +64,10 @@ def check_headings(problem: Problem, row: Mapping[str, str]) -> None:
 
 
 def design_of(problem: Problem, row: Mapping[str, str]) -> dict[str, Any]:
-    """Return the values of the searched genes of a row, within their ranges. InputError for one that is
-    missing or out of its range, and where a fixed gene has another value."""
+    """Return the values of the searched genes of a row, within their ranges.
+
+    InputError for one that is missing or out of its range, and if a fixed gene has another value.
+    """
     genome = problem.genome
     for gene in genome.genes:
         if isinstance(gene, FixedGene) and (cell := cell_of(gene, row)) is not None:
@@ -75,8 +77,10 @@ def design_of(problem: Problem, row: Mapping[str, str]) -> dict[str, Any]:
 
 
 def designs(given: Given, problem: Problem, what: str = "starting designs") -> tuple[dict[str, Any], ...]:
-    """Return the different designs of a file or of rows, the values of the searched genes by name, in their
-    order. InputError as of ``rows``, ``check_headings`` and ``design_of``, naming the row."""
+    """Return the different designs of a file or of rows, the values of the searched genes by name, in order.
+
+    InputError as in ``rows``, ``check_headings`` and ``design_of``, naming the row.
+    """
     found: dict[tuple[Any, ...], dict[str, Any]] = {}
     for place, row in rows(given, what):
         with naming(place):
@@ -87,14 +91,14 @@ def designs(given: Given, problem: Problem, what: str = "starting designs") -> t
 
 
 def cell_of(named: Named | Any, row: Mapping[str, str]) -> str | None:
-    """Return the cell below the label or the name of a gene, an objective or a constraint; None where there
-    is no such column."""
+    """Return the cell below the label or the name of a gene, an objective or a constraint; None without that
+    column."""
     return row.get(named.label, row.get(named.name))
 
 
 @contextmanager
 def naming(place: str) -> Iterator[None]:
-    """Have an InputError within this context say where it was."""
+    """Add this place to the message of an InputError within the context."""
     try:
         yield
     except InputError as error:
@@ -134,7 +138,7 @@ def _text(cell: Any) -> str:
 
 
 def _is(value: Any, cell: str) -> bool:
-    """Return whether a cell has a value."""
+    """Return whether a cell contains this value."""
     if cell == str(value):
         return True
     try:

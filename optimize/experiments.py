@@ -1,7 +1,7 @@
-"""Designs whose worth is known without a run of the search: what was measured, told, or found before.
+"""Designs with values that the search did not run: measured by the user, told, or found by other searches.
 
-They are strings as those of a search. Where a value came with its standard error, its estimate has one start
-and that as its standard deviation (see FitnessEstimate.standard_error).
+They are individuals, as in a search. If a value has a standard error, its estimate has one start, with the
+standard error as its standard deviation (see FitnessEstimate.standard_error).
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from tisim.optimize.tables import ERROR, error_of
 from tisim.errors import InputError, abbreviated, must
 
 DEVIATION = "std. deviation"
-"""The end of the heading of the standard deviation from start to start."""
+"""The end of the heading of the standard deviation between starts."""
 FAILED = "failed"
 Values = tuple[float, ...]
 
 
 def experiments(given: Given, problem: Problem, what: str = "experiments") -> tuple[Individual, ...]:
-    """Return the designs of a CSV file, or of rows of one, with what was measured of them.
+    """Return the designs of a CSV file, or of its rows, with their measured values.
 
-    Columns are the genes, each objective and each constraint of the result, in their units, and, where it is
-    known, the standard error of each value ("NAME std. error", or "std. error" of a single objective). An
-    objective without a number says that the design failed. Rows of one design are repeats of it. InputError
-    for what is no such row, naming it.
+    The columns are the genes, each objective and each constraint of the result, in their units, and
+    optionally the standard error of each value ("NAME std. error", or "std. error" of a single objective). An
+    objective that is empty or not finite marks a failed design. Rows of the same design are repeats of it.
+    InputError for an invalid row, naming it.
     """
     found: dict[tuple[float, ...], list[tuple[Values, Values, Values]]] = {}
     for place, row in rows(given, what):
@@ -51,11 +51,14 @@ def known(
     problem: Problem, point: Sequence[float], values: Sequence[Values], errors: Sequence[Values],
     limits: Sequence[float] = (),
 ) -> Individual:  # fmt: skip
-    """Return the string of a design by all its values.
+    """Return the individual of a design from all its values.
 
-    point : of the unit cube. values, errors : of each time that it was tried, for each objective its value,
-    in its unit, and the standard error of that; NaN where there is none. limits : of each constraint of the
-    result its mean. A design fails where any of its values is no finite number.
+    point : of the unit cube.
+    values, errors : for each trial the value of each objective, in its unit, and its standard error; NaN if
+        there is none.
+    limits : mean of each constraint of the result.
+
+    A design fails if any of its values is not a finite number.
     """
     string = Individual(point, len(problem.objectives))
     if not np.all(np.isfinite(values)):
@@ -72,8 +75,9 @@ def known(
 def combined(values: Sequence[float], errors: Sequence[float]) -> FitnessEstimate:
     """Return the estimate of a cost from repeated values.
 
-    errors : the standard error of each value; NaN for all where it is not known: then it is had from how the
-    values differ. Known ones weigh the values by their inverse squares, one of 0 outweighing all others.
+    errors : the standard error of each value, or NaN for all if not known; then the error is computed from
+        the spread of the values. Known errors weight the values by their inverse squares; a value with error
+        0 outweighs all others.
     """
     x, s = np.asarray(values, dtype=float), np.asarray(errors, dtype=float)
     if np.all(np.isnan(s)):
@@ -94,7 +98,7 @@ def plain(values: Sequence[float] | Any) -> FitnessEstimate:
 
 
 def table_of(problem: Problem, strings: Sequence[Individual]) -> dict[str, list[Any]]:
-    """Return the columns of a table of strings from which ``restored`` makes them, to the last bit."""
+    """Return a table of individuals as columns, from which ``restored`` recovers them to the last bit."""
     designs = [problem.genome.decode(string) for string in strings]
     found: dict[str, list[Any]] = {
         gene.name: [design[gene.name] for design in designs] for gene in problem.genome.searched
@@ -111,14 +115,14 @@ def table_of(problem: Problem, strings: Sequence[Individual]) -> dict[str, list[
 
 
 def restored(problem: Problem, table: Mapping[str, Sequence[Any]]) -> tuple[Individual, ...]:
-    """Return the strings of a table of ``table_of``."""
+    """Return the individuals of a table from ``table_of``."""
     lines = zip(*table.values(), strict=True)
     return tuple(_restored(problem, dict(zip(table, cells, strict=True))) for cells in lines)
 
 
 def _restored(problem: Problem, row: Mapping[str, Any]) -> Individual:
     cells = {gene: row[gene.name] for gene in problem.genome.searched}
-    # A choice between texts and numbers is a column of texts.
+    # A gene that mixes texts and numbers is stored as a column of texts.
     design = {gene.name: gene.parse(cell) if isinstance(cell, str) else cell for gene, cell in cells.items()}
     string = Individual(problem.genome.encode(design), len(problem.objectives))
     if row[FAILED]:
@@ -151,17 +155,17 @@ def row_values(problem: Problem, row: Mapping[str, str]) -> tuple[Values, Values
 
 
 def _limit(name: str, row: Mapping[str, str]) -> str | None:
-    """Return the cell of a constraint, whose heading may have a bound behind its name."""
+    """Return the cell of a constraint, whose heading may have a bound after its name."""
     return next((cell for head, cell in row.items() if head.partition(",")[0] == name), None)
 
 
 def _number(name: str, cell: str | None) -> float:
-    """Return a number that was measured; NaN for an empty cell. InputError without one."""
+    """Return a measured number; NaN for an empty cell. InputError if it is not a number."""
     must(cell is not None, "columns", f"of all objectives and constraints, {name} among them", "none")
     if not cell:
         return math.nan
     try:
         return float(cell)
     except ValueError:
-        rule = f"{name} must be a number, or empty where there is none"
+        rule = f"{name} must be a number, or empty if there is none"
         raise InputError(f"{rule}; received {abbreviated(cell)}") from None

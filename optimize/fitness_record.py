@@ -1,4 +1,4 @@
-"""What designs of an inverse problem are worth, recorded once, so that a test sees when it changes."""
+"""A record of the objectives of some designs, so that a test can detect changes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tisim.scene.scene import PHYSICS_VERSION
 
 RECORD_FORMAT = "tisim fitness record 1"
 ROUNDING_SHIFT = 1e-5
-"""Part of its size by which single precision may shift every value alike, no run having gone elsewhere."""
+"""Relative shift of all values that single precision may cause, even if no trajectory changes."""
 
 Values = dict[str, dict[str, list[float]]]
 
@@ -31,9 +31,11 @@ Values = dict[str, dict[str, list[float]]]
 class FitnessRecord:
     """The objectives of some designs of a problem, from random starts 0, 1, 2, ... each.
 
-    problem : its name. designs : genes in physical units, by the name of the design. values : of each design
-    and objective, in the unit of the objective, one for each start. settings, platform : what they were
-    computed with, which decides their last bits; physics : the version of the laws.
+    problem : its name.
+    designs : genes in physical units, by the name of the design.
+    values : for each design and objective, in the unit of the objective, one value for each start.
+    settings, platform : of the computation; they determine the last bits of the values.
+    physics : the version of the physical laws.
     """
 
     problem: str
@@ -47,10 +49,10 @@ class FitnessRecord:
     def measure(
         cls, problem: Problem, designs: Mapping[str, Mapping[str, float]], starts: int = 8
     ) -> FitnessRecord:
-        """Run every design from so many starts, all in batches, with the settings of ``tisim.init``.
+        """Run every design from this number of starts, in batches, with the settings of ``tisim.init``.
 
         InputError for no designs, a design that the problem refuses, or fewer than 1 start; RunError naming
-        the design of which a run does not end well.
+        the design if a run does not end well.
         """
         must(bool(designs), "designs", "at least one", dict(designs))
         must(starts >= 1, "starts", "at least 1", starts)
@@ -73,8 +75,9 @@ class FitnessRecord:
         return cls(problem.name, plain, values, settings, _platform())
 
     def again(self, problem: Problem) -> FitnessRecord:
-        """Return what the same designs and starts give now; InputError for another problem."""
-        must(problem.name == self.problem, "problem", f"that of the record, {self.problem!r}", problem.name)
+        """Return a new record of the same designs and starts, computed now; InputError for another
+        problem."""
+        must(problem.name == self.problem, "problem", f"the one recorded, {self.problem!r}", problem.name)
         return self.measure(problem, self.designs, self.starts)
 
     @property
@@ -83,16 +86,17 @@ class FitnessRecord:
         return len(next(iter(next(iter(self.values.values())).values())))
 
     def same_arithmetic(self, other: FitnessRecord) -> bool:
-        """Return whether both were computed with the same settings on the same platform: then the same laws
+        """Return whether both were computed with the same settings on the same platform: the same laws then
         give the same values to the last bit."""
         return (self.settings, self.platform) == (other.settings, other.platform)
 
     def deviations(self, other: FitnessRecord) -> dict[str, float]:
-        """Return for each design how far the means of the other record are from these, in standard errors of
-        the difference; the largest of its objectives, 0 where all bits are the same.
+        """Return for each design the deviation of the other record's means, in standard errors of the
+        difference; the largest over its objectives, 0 if all bits are the same.
 
-        Rounding that differs sends single starts elsewhere, as collisions are chaotic; the mean stays. The
-        difference is taken start by start, as most are the same in both, so that its error is small.
+        Different rounding changes the course of single starts, because collisions are chaotic, but not the
+        mean. The difference is computed start by start: most starts are the same in both records, so its
+        error is small.
         """
         return {
             name: max(_deviation(values, other.values[name][what]) for what, values in objectives.items())
@@ -100,13 +104,13 @@ class FitnessRecord:
         }
 
     def save(self, path: str | Path) -> None:
-        """Write the record as JSON, in place of any before; RunError when the disk is full."""
+        """Write the record as JSON, replacing an earlier file; RunError if the disk is full."""
         data = {"format": RECORD_FORMAT, **asdict(self)}
         replace_file(Path(path), (json.dumps(data, indent=1) + "\n").encode())
 
     @classmethod
     def load(cls, path: str | Path) -> FitnessRecord:
-        """Read a record; InputError when the file is missing, or is none."""
+        """Read a record; InputError if the file is missing or invalid."""
         text = regular_file.content(Path(path))
         must(text is not None, "fitness record", "an existing file", str(path))
         try:
@@ -125,7 +129,7 @@ def _results(problem: Problem, scenes: Sequence[Any]) -> Iterator[Any]:
 
 
 def _deviation(recorded: list[float], now: list[float]) -> float:
-    """Return the change of the mean in its standard errors; infinite for what is no number any more."""
+    """Return the change of the mean in its standard errors; infinite if a value is no longer a number."""
     if recorded == now:
         return 0.0
     if not (np.isfinite(recorded).all() and np.isfinite(now).all()):
@@ -137,6 +141,6 @@ def _deviation(recorded: list[float], now: list[float]) -> float:
 
 
 def _platform() -> str:
-    """Return what may change the last bits of exp and pow, and so of a chaotic trajectory, on the same
-    settings."""
+    """Return the properties of the machine that affect the last bits of exp and pow, and so a chaotic
+    trajectory."""
     return " ".join((platform.system(), platform.machine(), *platform.libc_ver()))

@@ -1,4 +1,4 @@
-"""Columns as data frames of pandas, which need not be installed."""
+"""Columns as pandas data frames; pandas is optional."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 def data_frame(columns: Mapping[str, Any], units: Mapping[str, str]) -> DataFrame:
-    """Return the columns as a data frame, whose ``attrs["units"]`` has the unit of each column that has one.
+    """Return the columns as a data frame; ``attrs["units"]`` has the unit of each column that has one.
 
-    InputError where pandas is not installed.
+    InputError if pandas is not installed.
     """
     try:
         from pandas import DataFrame

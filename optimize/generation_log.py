@@ -1,4 +1,4 @@
-"""What a generation was like, in a line of the logbook."""
+"""Statistics of a generation, for its line of the logbook."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tisim.optimize.problem.problem import Problem
 def statistics(
     problem: Problem, population: Sequence[Individual], hall: Sequence[Individual]
 ) -> dict[str, Any]:
-    """Return the columns of Outcome.logbook that tell of fitness; values of the objectives, not costs."""
+    """Return the fitness columns of Outcome.logbook; values of the objectives, not costs."""
     best = [
         min((s.fitness.values[k] for s in hall), default=math.inf) for k in range(len(problem.objectives))
     ]

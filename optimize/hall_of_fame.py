@@ -10,9 +10,10 @@ from tisim.optimize.methods.individual import Individual
 
 
 class Hall:
-    """strings : best first; a front from the least first cost on.
+    """The hall of fame.
 
-    size : most strings of a ranking; a front is kept whole. Failed designs never enter.
+    strings : best individuals, best first; a front is sorted by its first cost.
+    size : largest length of a ranking; a front is kept whole. Failed designs never enter.
     """
 
     def __init__(self, size: int) -> None:
@@ -20,7 +21,7 @@ class Hall:
         self.strings: list[Individual] = []
 
     def update(self, population: Iterable[Individual]) -> bool:
-        """Take in these strings; whether there is a better best, or a design in the front that was not."""
+        """Add these individuals; return whether the best improved, or the front gained a design."""
         before = {tuple(string): string.fitness.values for string in self.strings}
         leader = self.strings[0].fitness.values if self.strings else ()
         different: dict[tuple[float, ...], Individual] = {}
@@ -37,12 +38,12 @@ class Hall:
 
 
 def reported(string: Individual) -> tuple[float, ...]:
-    """Return the costs by which a design is reported: from fresh starts, where it has any."""
+    """Return the reported costs of a design: from held-out starts, if it has any."""
     return tuple(one.mean for one in string.confirmed) or tuple(string.fitness.values)
 
 
 def not_dominated(front: list[Individual]) -> list[Individual]:
-    """Return those of a front that no other dominates by the costs that are reported, in their order."""
+    """Return the designs of a front that no other dominates by reported costs, in order."""
     costs = np.array([reported(string) for string in front])
     no_better = np.all(costs[:, None] >= costs[None], axis=2)
     worse = np.any(costs[:, None] > costs[None], axis=2)
@@ -50,7 +51,7 @@ def not_dominated(front: list[Individual]) -> list[Individual]:
 
 
 def compromise(front: list[Individual]) -> Individual:
-    """Return the design of a front nearest to the best of each objective, the front's ranges taken as 1."""
+    """Return the design of a front nearest to the best of each objective, the front's ranges scaled to 1."""
     costs = np.array([reported(string) for string in front])
     span = np.ptp(costs, axis=0)
     distance = np.linalg.norm((costs - costs.min(axis=0)) / np.where(span > 0, span, 1.0), axis=1)

@@ -1,4 +1,4 @@
-"""Progress says where a search is; an outcome holds what it has found."""
+"""The progress of a running search, and the outcome of a finished one."""
 
 from __future__ import annotations
 
@@ -34,12 +34,15 @@ Stopped = Literal["", "generations", "target", "patience", "evaluations", "wall 
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress says where a search is.
+    """The progress of a running search.
 
-    fraction : of this generation, 0..1. best : value of each objective, the best that any design of the hall
-    has; empty until one is known. designs : in the hall. best_design : of one objective; None until one is
-    known. evaluations, hits : run, and found in the cache. elapsed_s : wall seconds since the search began.
-    failure : why a design of this generation failed, while none is known that did not.
+    fraction : finished fraction of this generation, 0..1.
+    best : best value of each objective over the designs of the hall; empty until one is known.
+    designs : number of designs in the hall.
+    best_design : for one objective; None until one is known.
+    evaluations, hits : numbers of runs made, and of runs found in the cache.
+    elapsed_s : wall time since the search began, s.
+    failure : reason why a design of this generation failed, as long as no design has succeeded.
     """
 
     generation: int
@@ -56,13 +59,15 @@ class Progress:
 
 @dataclass(frozen=True)
 class Design:
-    """A design is one that a search has found, in physical units.
+    """A design that a search has found, in physical units.
 
-    genes : the value of each gene, by name, in its unit: a number, a text or a flag. values : of each
-    objective, by name, in its unit: the mean over random starts, the fresh ones where there are any.
-    intervals : the ends of their 95 % confidence intervals; None without fresh starts, as the starts that a
-    design was chosen by flatter it. starts : their number. converged : whether the last of them changed the
-    mean by less than the tolerance that was asked for.
+    genes : the value of each gene, by name, in its unit: a number, a text or a flag.
+    values : mean of each objective over random starts, by name, in its unit; over the held-out starts if
+        there are any.
+    intervals : the ends of their 95 % confidence intervals; None without held-out starts, because the starts
+        that chose a design bias its values.
+    starts : number of these starts.
+    converged : whether the last start changed the mean by less than the given tolerance.
     """
 
     genes: dict[str, Any]
@@ -74,19 +79,25 @@ class Design:
 
 @dataclass(repr=False)
 class Outcome:
-    """An outcome holds what a search has found.
+    """The outcome of a search.
 
-    hall : the best different designs, best first, by all that the search knows of them (see
-    optimize.conclusion; empty if none succeeded); of several objectives the front. Failed designs never
-    enter. estimates : those of each design that succeeded, by its string, in the order they were first
-    estimated. quantities : of the runs of each of these, in the order of problem.quantities, shape (starts,
-    quantities). failures : those of each design that failed, with the reason.
-    logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations requested),
-    failed, box (mean width of the search box it drew from), recentred (box moved after it), best (so far;
-    infinitely bad if there is none), and for one objective mean and std of the successful designs in the
-    population (NaN if there is none), for several the number of designs in the front, and best for each.
-    evaluations, hits : run, and found in the cache. stopped : the rule that ended it.
-    beginning : what it began with. identity : see optimize.settings. name : of its group in the cache file.
+    hall : the best different designs, best first, ranked by all information of the search (see
+        optimize.conclusion; empty if none succeeded); for several objectives the front. Failed designs never
+        enter.
+    estimates : estimates of each successful design, by its string (a point of the unit cube), in the order of
+        their first estimation.
+    quantities : quantities of the runs of each of these, in the order of problem.quantities, shape (starts,
+        quantities).
+    failures : estimates of each failed design, with the reason.
+    logbook : one row for each finished generation: gen, designs (newly estimated), starts (evaluations
+        requested), failed, box (mean width of the search box it drew from), recentred (box moved after it),
+        best (so far; infinitely bad if there is none). For one objective also mean and std of the successful
+        designs in the population (NaN if there is none); for several the number of designs in the front, and
+        best for each.
+    evaluations, hits : numbers of runs made, and of runs found in the cache.
+    stopped : the rule that ended it.
+    beginning : its starting designs and experiments.
+    identity : see optimize.settings. name : name of its group in the cache file.
     """
 
     problem: Problem
@@ -114,7 +125,8 @@ class Outcome:
 
     @property
     def best(self) -> Individual | None:
-        """Return the best design; of several objectives the compromise, the nearest to the best of each."""
+        """Return the best design; for several objectives the compromise, the design nearest to the best of
+        each."""
         if self.hall and self.problem.several:
             return compromise(self.hall)
         return self.hall[0] if self.hall else None
@@ -142,7 +154,7 @@ class Outcome:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, such as json writes: units, designs, logbook by column, counts and settings."""
+        """Return plain data for JSON: units, designs, logbook by column, counts and settings."""
         return {
             "problem": self.problem.name,
             "stopped": self.stopped,
@@ -157,17 +169,20 @@ class Outcome:
 
     @property
     def _units(self) -> dict[str, str]:
-        """The unit of each gene and objective by name, "" where it has none."""
+        """The unit of each gene and objective by name, "" if it has none."""
         genes = {gene.name: gene.unit for gene in self.problem.genome.genes}
         return genes | {objective.name: objective.unit for objective in self.problem.objectives}
 
     def to_frame(self, *, hall: bool = False) -> DataFrame:
-        """Return all designs of the search as a pandas data frame, a row for each: its genes by name, the
-        mean of each objective over random starts, its standard error, how many starts there
-        were, whether the mean converged, and why the design failed ("" if it did not).
+        """Return all designs of the search as a pandas data frame.
 
-        hall : the hall of fame instead, with the columns of best.csv. ``frame.attrs["units"]`` has the unit
-        of each column that has one. InputError where pandas is not installed.
+        It has a row for each design: its genes by name, the mean of each objective over random starts, its
+        standard error, the number of starts, whether the mean converged, and the reason of a failure ("" if
+        it did not fail). ``frame.attrs["units"]`` has the unit of each column that has one.
+
+        hall : return the hall of fame instead, with the columns of best.csv.
+
+        InputError if pandas is not installed.
         """
         if hall:
             return data_frame(best_columns(self.problem, self.hall), units(self.problem))

@@ -1,7 +1,9 @@
-"""A search runs generations of a method until a stopping rule ends it, and keeps all in its cache file.
+"""A search runs generations of a method until a stopping rule ends it, and stores everything in its cache
+file.
 
-A search is a function of its problem, settings and evaluator settings. Resuming is therefore running it again
-on the same cache file: every finished evaluation comes from there, the rest follows as if never stopped.
+A search is a function of its problem, settings and evaluator settings. It is resumed by running it again with
+the same cache file: finished evaluations are read from the file, and the search continues as if it had never
+stopped.
 """
 
 from __future__ import annotations
@@ -30,11 +32,12 @@ from tisim.optimize.storage.cache import Cache
 from tisim.errors import RunError
 
 MOST_REFUSED = 200
-"""A search ends where the scene function has refused this number of designs, and taken none."""
+"""A search ends if the scene function has refused its first designs, this number or more, and accepted
+none."""
 
 
 class _OutOfTime(Exception):
-    """The wall-clock budget has been spent in the middle of a generation."""
+    """The wall-clock budget ran out during a generation."""
 
 
 def search(
@@ -49,18 +52,20 @@ def search(
 ) -> Outcome:
     """Search for the problem's best design, or its front, over its genome.
 
-    beginning : designs that are run first, and what is known of others. on_generation is called after each
-    generation, on_progress as evaluations finish. After each generation settings, versions, logbook and hall
-    of fame are in the cache file, below Outcome.name.
-    KeyboardInterrupt ends the search cleanly and is reported in Outcome.stopped.
-    Raises InputError for a method that cannot work on the problem, RunError if the disk is full.
+    beginning : designs that are run first, and known values of others.
+    on_generation : called after each generation.
+    on_progress : called as evaluations finish.
+
+    After each generation settings, versions, logbook and hall of fame are written to the cache file, below
+    Outcome.name. KeyboardInterrupt ends the search cleanly and is reported in Outcome.stopped.
+    Raises InputError if the method does not support the problem, RunError if the disk is full.
     """
     wished = settings or Settings()
     return _Search(problem, evaluator, cache, wished, beginning, on_generation, on_progress).run()
 
 
 class _Search:
-    """A search under way: its method, its hall of fame, its budget and its outcome so far."""
+    """A running search: its method, hall of fame, budget and outcome so far."""
 
     def __init__(
         self,
@@ -82,16 +87,16 @@ class _Search:
         self.hall = Hall(settings.hall_of_fame)
         self.known: dict[tuple[float, ...], Individual] = {}
         self.ranked: list[Individual] | None = None
-        self.tried: set[tuple[float, ...]] = set()  # designs that did not meet the target for sure
+        self.tried: set[tuple[float, ...]] = set()  # designs that were checked and did not meet the target
         self.stagnation = self.refused = 0
-        self.learned = copy.deepcopy(beginning.learned)  # strings that have not run, whatever they are worth
+        self.learned = copy.deepcopy(beginning.learned)  # individuals with known values that were not run
         identified = identity(problem, settings, evaluator.settings, beginning)
         self.outcome = Outcome(problem, settings, identified, beginning)
         self.began = time.monotonic()
 
     def run(self) -> Outcome:
         if self.outcome.name not in searches(self.cache):
-            self._store()  # from now on the file is known to be of this search
+            self._store()  # from now on the file contains this search
         try:
             self._generations()
             self._conclude()
@@ -105,7 +110,7 @@ class _Search:
         return self.outcome
 
     def _conclude(self) -> None:
-        """Choose the best designs from all that are known, and report them from fresh starts."""
+        """Choose the best of all known designs, and evaluate them with held-out starts."""
         if not self.hall.strings or self._out_of_time():
             return
         self.ensemble.budget = self._budget
@@ -139,7 +144,7 @@ class _Search:
             population = [*asked, *(string for string in first if id(string) not in kept)]
             better = self.hall.update(population)
             self._race(population, generation)
-            if not self.ensemble.exhausted:  # or the generation is not whole, and the last
+            if not self.ensemble.exhausted:  # else this last generation is incomplete
                 self.method.tell(asked, self.hall.strings)
             self.stagnation = 0 if better else self.stagnation + 1
             self.outcome.logbook.record(
@@ -168,8 +173,8 @@ class _Search:
                 return
 
     def _begin(self) -> list[Individual]:
-        """Run the designs that the search begins with, as far as the budget goes; tell the method of them and
-        of those that are known, each by what has more starts."""
+        """Run the starting designs as far as the budget allows, and tell the method their values and the
+        known ones. If a design has both, the one with more starts is used."""
         first = self.outcome.beginning.first(self.problem)
         if first:
             self._estimate(first, 0, part=0.0)
@@ -184,8 +189,10 @@ class _Search:
         return first
 
     def _estimate(self, population: list[Individual], generation: int, part: float = 1.0) -> int:
-        """Estimate strings of unknown fitness, as far as the budget goes; return how many these were. part :
-        of the generation that these are, by which progress is told."""
+        """Estimate the individuals of unknown fitness as far as the budget allows; return their number.
+
+        part : the fraction of the generation that they are, for the progress report.
+        """
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
         new_estimates = self.ensemble.estimate(
@@ -201,7 +208,8 @@ class _Search:
         return sum(string.fitness.valid for string in fresh)
 
     def _constrain(self, fresh: list[Individual]) -> None:
-        """Let designs that do not keep to a constraint of the result come behind all that do, by how far."""
+        """Rank designs that violate a constraint of the result after all feasible ones, by the size of the
+        violation."""
         constraints = self.problem.result_constraints
         ran = [string for string in self.known.values() if not string.failed]
         known = [*(string for string in self.learned if not string.failed), *ran]
@@ -216,7 +224,7 @@ class _Search:
             string.fitness.values = tuple(by_string[tuple(string)])
 
     def _race(self, population: list[Individual], generation: int) -> None:
-        """Spend more starts on the designs of the hall of fame, and rank it by their new estimates."""
+        """Spend more starts on the designs of the hall of fame, and rank it by the new estimates."""
         if not self.settings.ensemble.race:
             return
         racing = self.hall.strings
@@ -277,7 +285,7 @@ class _Search:
         )
 
     def _store(self) -> None:
-        """Bring the outcome up to date and put it into the cache file."""
+        """Update the outcome and write it to the cache file."""
         out = self.outcome
         out.hall = list(self.hall.strings) if self.ranked is None else self.ranked
         out.evaluations, out.hits = self.ensemble.runs.evaluations, self.ensemble.runs.hits

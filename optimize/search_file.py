@@ -1,4 +1,4 @@
-"""What searches have left in a search.h5, as data frames: every run, every design, logbooks, best designs."""
+"""Reads a search.h5 into data frames: every run, every design, logbooks, best designs."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 FACTS = ("start", "seed", "ok", "reason", "wall_s", "created", "key")
-"""The columns of a run beside its genes and values."""
+"""The columns of a run in addition to its genes and values."""
 
 
 def read(path: str | Path) -> SearchFile:
-    """Return what is in the search.h5 of a search, or in its folder, also while the search goes on.
+    """Return the content of a search.h5, given the file or its folder, also while the search is running.
 
-    Nothing is run, and the file stays as it is. InputError where there is none, or it is damaged.
+    Nothing is run, and the file is not changed. InputError if there is none, or it is damaged.
     """
     place = Path(path)
     return SearchFile(existing(place / SEARCH_FILE if is_folder(place) else place))
 
 
 class SearchFile:
-    """The runs and searches in a file, as they were when it was read. Frames have the unit of each column in
-    ``frame.attrs["units"]``; they need pandas.
+    """The runs and searches in a file, at the time of reading.
 
-    A file has several problems or searches where it is of a comparison: then methods are given a name.
+    Data frames have the unit of each column in ``frame.attrs["units"]``; they need pandas. If a file has
+    several problems or searches, as after a comparison, pass the name to the methods.
     """
 
     def __init__(self, cache: Cache) -> None:
@@ -57,7 +57,7 @@ class SearchFile:
 
     @property
     def problems(self) -> list[str]:
-        """Return the names of the problems that there are runs of."""
+        """Return the names of the problems that have runs."""
         return list(dict.fromkeys(part.problem for part in self._runs))
 
     @property
@@ -66,13 +66,15 @@ class SearchFile:
         return [name.removeprefix("searches/") for name in self._searches]
 
     def runs(self, problem: str | None = None) -> DataFrame:
-        """Return every run of a problem, a row for each: the genes of its design, what it gave, and FACTS."""
+        """Return every run of a problem, a row for each: the genes of its design, its values, and FACTS."""
         return self._frame(problem, lambda part: {**part.genes, **part.values, **_facts(part)})
 
     def designs(self, problem: str | None = None) -> DataFrame:
-        """Return every design of a problem, a row for each: genes, the mean of each value over all runs of it
-        that ended well, its standard error, their number, and why the first one that failed
-        did ("" where none has)."""
+        """Return every design of a problem, a row for each.
+
+        The columns are genes, the mean of each value over all successful runs, its standard error, the number
+        of these runs, and the reason of the first failure ("" if none failed).
+        """
         return self._frame(problem, _designs)
 
     def logbook(self, search: str | None = None) -> DataFrame:
@@ -112,7 +114,7 @@ class SearchFile:
             return frames[0]
         from pandas import concat
 
-        # Runs with other genes: of a version of the problem that had other ones.
+        # These runs are from a version of the problem with other genes.
         joined = concat(frames, ignore_index=True)
         joined.attrs["units"] = {head: units[head] for head in joined.columns if units.get(head)}
         return joined
@@ -154,7 +156,7 @@ def _means(values: NDArray[Any], design: NDArray[Any], designs: int) -> tuple[ND
 
 
 def _one(name: str | None, known: Sequence[str], what: str) -> str:
-    """Return the name, or the only one that there is. InputError where it is none, or not clear."""
+    """Return the name, or the only one that exists. InputError if it is unknown or ambiguous."""
     if name is None and len(known) == 1:
         return known[0]
     must(name in known, what, f"one of {', '.join(known) or 'none'}", name)

@@ -1,20 +1,20 @@
-"""The folder of the searches of one problem. They share their runs; another problem is refused there.
+"""The folder of the searches of one problem. They share their runs; a search of another problem is refused.
 
-search.h5         every run, and of each search settings, logbook and best designs: all that it takes to go on
+search.h5         every run; settings, logbook and best designs of each search: all that is needed to resume
 
-All others are of the search that ended last with a design:
+The other files belong to the last finished search that found a design:
 
-shown.json        its name in search.h5
+shown.json        the name of that search in search.h5
 best.csv          the best designs, all digits
-met.csv           all that meet what is asked, where the problem says which do
-calibration.csv   (and .png, .pdf) each gene with its 95 % interval, where the objective is the misfit of what
-                  was measured
-sensitivity.csv   (and .png, .pdf) what each gene does to each objective, around the best and over all
-convergence.png   (and .pdf) best and mean fitness by generation; of several objectives the best of each
+met.csv           all designs with a fitness of ``met_at`` or better, if the problem defines it
+calibration.csv   (and .png, .pdf) each gene with its 95 % interval, if the objective is a Misfit
+sensitivity.csv   (and .png, .pdf) effect of each gene on each objective, around the best design and over the
+                  whole range
+convergence.png   (and .pdf) best and mean fitness by generation; best value of each of several objectives
 front.png         (and .pdf) the front of several objectives
-best_scene.toml   the best design from the first random start, for ``tisim run``; none of a plain function
-best_cloud.png    that run at start and end, where the problem says how to draw it
-best_run.csv      what that run shows beside what was wanted, where the problem says what
+best_scene.toml   the best design from the first random start, for ``tisim run``; not for a plain function
+best_cloud.png    the start and end of that run, if the problem has a ``picture``
+best_run.csv      further quantities of that run, if the problem has ``details``
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ RESULT_FILES = (
     "best_cloud.png",
     "best_run.csv",
 )
-"""Names of the files that a search writes at its end, beside SHOWN_FILE."""
+"""Names of the files that a search writes at its end, in addition to SHOWN_FILE."""
 SHOWN_FILE = "shown.json"
-"""Name of the file that says which search the result files are of."""
+"""Name of the file with the name of the search that the result files belong to."""
 SEARCH_FILES = (
     SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", SHOWN_FILE, *RESULT_FILES, lock.LOCK,
 )  # fmt: skip
@@ -71,11 +71,13 @@ def resume_or_clear(
     command: str = "search", file: str = SEARCH_FILE,
     result_files: Sequence[str] = (SHOWN_FILE, *RESULT_FILES),
 ) -> bool:  # fmt: skip
-    """Return whether a command resumes what is in its folder (``resuming.resumes``); if not, remove that.
+    """Return whether a command resumes the evaluations in its folder (``resuming.resumes``); if not, delete
+    them.
 
-    command : "search", or the name of another one that keeps evaluations. file : its cache file.
-    result_files : its other files. InputError where it may do neither, or where one is still at work there
-    whose files would be removed.
+    command : "search", or the name of another command that stores evaluations.
+    file : its cache file. result_files : its other files.
+
+    InputError if neither is allowed, or if a running command still uses files that would be deleted.
     """
     journal, lock_file = f"{file}.journal", f"{file}.lock"
     resumable = any(file_status(folder / name) is not None for name in (file, journal))
@@ -92,10 +94,10 @@ def resume_or_clear(
 
 
 def check(folder: Path, cache: Cache, requested: Mapping[str, Any], begun: bool = False) -> bool:
-    """Return whether the cache file has the search of this identity, which is then gone on with.
+    """Return whether the cache file contains the search of this identity, which is then resumed.
 
-    The file has none of another problem (``check_problem``). begun : whether it has to; InputError where it
-    has not.
+    The file must not contain another problem (``check_problem``). begun : whether the search must be there;
+    if it is not, and others are, InputError.
     """
     stored = {name: json.loads(attributes["identity"]) for name, attributes in searches(cache).items()}
     known = search_name(requested) in stored
@@ -109,8 +111,10 @@ def check(folder: Path, cache: Cache, requested: Mapping[str, Any], begun: bool 
 
 
 def check_problem(folder: Path, command: str, cache: Cache, requested: Mapping[str, Any]) -> None:
-    """Raise InputError where the cache file has searches of another problem than that of an identity, and say
-    in what it differs. command : "search", or what else the folder is of."""
+    """Raise InputError if the cache file has searches of another problem; the message lists the differences.
+
+    command : "search", or the name of another command that the folder belongs to.
+    """
     for attributes in searches(cache).values():
         stored = json.loads(attributes["identity"])
         must(
@@ -130,8 +134,11 @@ def check_problem(folder: Path, command: str, cache: Cache, requested: Mapping[s
 
 @contextmanager
 def results_of(folder: Path, name: str) -> Iterator[None]:
-    """Write result files of the search of that name within this context, which other processes wait for.
-    SHOWN_FILE says that they are of it; those of another search are removed. RunError if the disk is full."""
+    """Write the result files of the named search within this context; other processes wait until it ends.
+
+    SHOWN_FILE then names this search, and result files of other searches are deleted. RunError if the disk is
+    full.
+    """
     content = (json.dumps({"search": name.removeprefix("searches/")}) + "\n").encode()
     with locked(folder / ownership.MARKER, exclusive=True):
         if regular_file.content(folder / SHOWN_FILE) != content:
@@ -142,10 +149,10 @@ def results_of(folder: Path, name: str) -> Iterator[None]:
 
 
 def _differences(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list[str]:
-    """Return in what two identities differ, in words."""
+    """Return the differences between two identities, in words."""
     old, new = _leaves(stored), _leaves(json.loads(canonical(requested)))
     names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-    # Of the functions only a checksum is kept.
+    # Only a checksum of the functions is stored.
     return [
         "the problem file, or a value that its functions use, has changed"
         if name == "problem_code"
@@ -155,7 +162,7 @@ def _differences(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> lis
 
 
 def _shown(leaves: Mapping[str, Any], name: str) -> str:
-    """Return the value of a setting as a message gives it."""
+    """Return the value of a setting as shown in a message."""
     return abbreviated(leaves[name]) if name in leaves else "not given"
 
 

@@ -1,4 +1,4 @@
-"""A search leaves its settings, versions, logbook and best designs as tables in its cache file."""
+"""Stores the settings, versions, logbook and best designs of a search as tables in its cache file."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from tisim.optimize.tables import best_columns, logbook_columns, units
 from tisim.io.run_folder import versions
 
 WARM_START = "warm_start"
-"""Name of the table of what runs of other searches had found when a search began; in an identity its
-checksum."""
+"""Name of the table of the known designs of a warm start; its checksum has this key in an identity."""
 
 
 def store(cache: Cache, outcome: Outcome) -> None:
-    """Put the tables of a search into the file; on return they are on the disk.
+    """Store the tables of a search in the file; they are on disk on return.
 
-    What is new of them is written to its journal; as the search begins and as it ends, all to the HDF5 file.
+    New rows are written to its journal; at the beginning and the end of the search, all are written to the
+    HDF5 file.
     """
     problem, name = outcome.problem, outcome.name
     attributes = {
@@ -54,7 +54,7 @@ def store(cache: Cache, outcome: Outcome) -> None:
 
 
 def beginning_tables(outcome: Outcome) -> dict[str, dict[str, list[Any]]]:
-    """Return the columns of the tables of what a search begins with, where it begins with anything."""
+    """Return the columns of the tables of a search's beginning, if it has designs."""
     problem, beginning = outcome.problem, outcome.beginning
     tables = {}
     if beginning.designs:
@@ -68,7 +68,7 @@ def beginning_tables(outcome: Outcome) -> dict[str, dict[str, list[Any]]]:
 
 
 def genes(problem: Problem) -> dict[str, list[Any]]:
-    """Return the columns of a table with a row for each gene: all that is declared of it but functions."""
+    """Return the columns of a table with a row for each gene: all its fields except functions."""
     rows = [{one.name: getattr(gene, one.name) for one in fields(gene)} for gene in problem.genome.genes]
     return _columns([{n: value for n, value in row.items() if not callable(value)} for row in rows])
 
@@ -89,7 +89,7 @@ def objectives(problem: Problem) -> dict[str, list[Any]]:
 
 
 def _columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Return rows as columns of numbers or of text; NaN or "" where a row has nothing."""
+    """Return rows as columns of numbers or of text; NaN or "" for missing entries."""
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: [_cell(row.get(name)) for row in rows] for name in names}
     return {name: _filled(column) for name, column in columns.items()}

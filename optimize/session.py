@@ -1,4 +1,5 @@
-"""A session runs a search in a folder: it locks it, shows progress, hears Ctrl-C, and writes the results."""
+"""A session runs a search in a folder: it locks the folder, shows progress, handles Ctrl-C and writes the
+results."""
 
 from __future__ import annotations
 
@@ -56,20 +57,22 @@ def run(
 ) -> Outcome:
     """Search for the best design of a problem, or the front of several objectives.
 
-    settings : fields of Settings, such as ``generations=10``, ``seed=1``, ``options={"population": 12}``,
-    ``ensemble={"max_starts": 8}``. out : folder for what ``tisim optimize`` leaves; a search that was stopped
-    goes on there when it is run again. Without one nothing is kept but what is returned. executor : "batch"
-    (this process), "processes:N" or "dask://HOST:PORT". verbose : show tables and a bar on the terminal.
-
+    out : folder for the files that ``tisim optimize`` writes; running again with the same folder resumes an
+        interrupted search. Without a folder, only the returned outcome is kept.
+    executor : "batch" (this process), "processes:N" or "dask://HOST:PORT".
+    verbose : show tables and a progress bar on the terminal.
     starting_designs : designs that are run before generation 0, with every method: a CSV file with a column
-    for each gene, such as best.csv, or dictionaries by the names of genes. experiments : the same with what
-    was measured of each, and its standard error where that is known; the method learns from them and does not
-    run them (optimize.experiments). warm_start : learn from all runs in the folder that other searches of the
-    problem have left, and run the best of their designs first.
+        for each gene, such as best.csv, or dictionaries by gene name.
+    experiments : the same, with measured values of each design, and standard errors if known; the method
+        learns from them and does not run them (optimize.experiments).
+    warm_start : learn from all runs of other searches of the problem in the folder, and run the best of their
+        designs first.
+    settings : fields of Settings, such as ``generations=10``, ``seed=1``, ``options={"population": 12}``,
+        ``ensemble={"max_starts": 8}``.
 
-    Device, precision and arithmetic are those of ``tisim.init``. Ctrl-C ends the search, which says so in
+    Device, precision and arithmetic are set by ``tisim.init``. Ctrl-C ends the search and is reported in
     ``Outcome.stopped``. Other threads that call ``tisim.run``, or ``tisim.init`` with other settings, wait
-    until a search in this process is over. InputError for settings that cannot be, before anything runs.
+    until a search in this process has ended. InputError for invalid settings, before anything runs.
     """
     search_settings = Settings(**proposed(problem, settings, settings.get("method")))
     beginning = Beginning.of(problem, starting_designs, experiments, warm_start)
@@ -95,8 +98,10 @@ def run(
 
 
 def _evaluator(problem: Problem, executor: str, stack: ExitStack) -> Evaluator:
-    """Return the evaluator of that name with the settings of ``tisim.init``, which for a plain function are
-    not asked for; the stack closes it, and holds the turn of this process meanwhile."""
+    """Return the named evaluator with the settings of ``tisim.init``, which a plain function does not need.
+
+    The stack closes the evaluator, and until then reserves the runtime of this process for it.
+    """
     if problem.function is not None:
         return stack.enter_context(closing(evaluator_for(problem, executor)))
     in_this_process = executor == "batch"
@@ -120,13 +125,16 @@ def session(
     begun: bool = False,
     beginning: Beginning = NOTHING,
 ) -> Outcome:
-    """Search, or go on with the search in the folder, and write what optimize.search_folder lists.
+    """Start or resume a search in the folder, and write the files listed in optimize.search_folder.
 
-    say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
-    search cleanly (Outcome.interrupted). overwrite : replace files of other origin that have such names.
-    begun : refuse a search that has not begun there. InputError when the folder has searches of another
-    problem, or files of other origin, or cannot be written. Other processes may join the search, or make
-    others of the problem, but not begin anew.
+    say : console for lines and tables; bar : console for the progress bar.
+    stopping : called on Ctrl-C, which ends the search cleanly (Outcome.interrupted).
+    overwrite : replace files of other origin that have the same names.
+    begun : refuse a search that has not begun in the folder.
+
+    InputError if the folder contains searches of another problem or files of other origin, or cannot be
+    written. Meanwhile other processes may join the search, or run other searches of the problem, but not
+    clear the folder.
     """
     claim(folder, SEARCH_FILES, overwrite)
     with lock.acquire(folder, exclusive=False):
@@ -151,8 +159,8 @@ def session(
 def _write_results(
     outcome: Outcome, best: Individual, evaluator: Evaluator, folder: Path, say: Console
 ) -> list[Path]:
-    """Print what a search has found, and write its result files in place of those of any search before;
-    return their paths."""
+    """Print the results of a search, and write its result files in place of earlier ones; return their
+    paths."""
     problem = outcome.problem
     analysis = None if outcome.interrupted else Analysis.of(outcome)
     run = None if outcome.interrupted else _BestRun.of(best, outcome, evaluator)
@@ -180,7 +188,7 @@ def _search_with_display(
     bar: Console,
     stopping: Callable[[], None],
 ) -> Outcome:
-    """Run the search behind its progress bar, until it ends or Ctrl-C stops it."""
+    """Run the search with a progress bar, until it ends or Ctrl-C stops it."""
     with Interrupt(stopping) as ctrl_c, Display(problem, settings, bar) as display:
 
         def step(progress: Progress) -> None:
@@ -195,9 +203,9 @@ def _search_with_display(
 
 @dataclass(frozen=True)
 class _BestRun:
-    """The best design of a search, run once more from the first start for its picture and what else it shows.
+    """The best design of a search, run once more from the first start for the report.
 
-    result : None where the problem says of neither.
+    result : None if the problem has neither ``picture`` nor ``details``.
     """
 
     design: dict[str, Any]
@@ -217,7 +225,7 @@ class _BestRun:
         return cls(design, scene, result)
 
     def write(self, problem: Problem, folder: Path, say: Console) -> list[Path]:
-        """Write its scene and what it shows; return the paths."""
+        """Write its scene, picture and details; return the paths."""
         paths = []
         if problem.function is None:
             paths.append(folder / "best_scene.toml")

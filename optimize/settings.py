@@ -1,4 +1,5 @@
-"""Settings decide a search; with its problem they give it an identity, and that a name in the cache file."""
+"""Settings determine a search. Settings and problem together form its identity, which names it in the cache
+file."""
 
 from __future__ import annotations
 
@@ -17,22 +18,27 @@ from tisim.components.component import Checked
 from tisim.errors import must
 
 METHOD = "genetic"
-"""The method of a search for which none is given."""
+"""The default search method."""
 IDENTITY_FORMAT = 5
-"""The version of the identity below; it is raised when a search of before cannot be resumed any more."""
+"""The version of the identity below; raised when older searches can no longer be resumed."""
 
 
 class Settings(Checked):
-    """Settings are all that decides a search, and when it stops.
+    """The settings of a search and its stopping rules.
 
-    seed : of the search and of its random starts. method : by name, see optimize.methods.base; options : its
-    own settings. generations : after generation 0, the random start. ensemble : averaging over starts.
-    hall_of_fame : best designs kept; a front is kept whole.
-    Stopping rules, None = off, looked at after each generation: target - best fitness as good as that;
-    patience - generations without improvement; wall_clock_s - seconds, looked at after every evaluation too:
-    the generation under way is then dropped, its evaluations stay cached.
-    max_evaluations : different runs requested, whether run or found in the cache (so that a resumed search
-    stops at the same place); never more: the last generation is cut short.
+    seed : seed of the search and of its random starts.
+    method : name of the method, see optimize.methods.base; options : its own settings.
+    generations : number of generations after generation 0, the random initial population.
+    ensemble : averaging over starts.
+    hall_of_fame : number of best designs kept; a front is always kept whole.
+
+    Stopping rules are checked after each generation; None disables a rule.
+    target : stop when the best fitness is at least as good.
+    patience : stop after this number of generations without improvement.
+    wall_clock_s : stop after this time in seconds. It is checked after every evaluation, too; the unfinished
+        generation is then discarded, but its evaluations stay cached.
+    max_evaluations : limit on the number of different runs requested, cached ones included, so that a resumed
+        search stops at the same point. It is never exceeded: the last generation is cut short.
     """
 
     seed: int = Field(0, ge=0)
@@ -48,7 +54,7 @@ class Settings(Checked):
 
     @classmethod
     def kind(cls) -> str:
-        """Return the word for it in commands, as in ``--set search.generations=30``."""
+        """Return the prefix of these settings in commands, as in ``--set search.generations=30``."""
         return "search"
 
     @model_validator(mode="before")
@@ -65,14 +71,14 @@ class Settings(Checked):
 
 
 def _ensemble(method: type[SearchMethod], options: Any, given: Any) -> Any:
-    """Return the settings of the ensemble: those that are given, else those that suit the method."""
+    """Return the ensemble settings: the given ones, and the method's defaults for the others."""
     common = not method.starts_of_its_own(options)
     if isinstance(given, EnsembleSettings):
         return (
             given if given.common_starts is not None else given.model_copy(update={"common_starts": common})
         )
     if not isinstance(given, Mapping):
-        return given  # which is refused with its name
+        return given  # refused later by the validation of the field
     return {"common_starts": common, **method.ensemble, **given}
 
 
@@ -82,15 +88,16 @@ _OF_THE_PROBLEM = (
     "format", "problem", "problem_version", "problem_code", "units", "objectives", "objective_order",
     "evaluator",
 )  # fmt: skip
-"""What two searches have in common whose runs are of the same kind."""
+"""The parts of the identity that two searches must share to share their runs."""
 
 
 def identity(
     problem: Problem, settings: Settings, evaluator: Mapping[str, Any], beginning: Beginning | None = None
 ) -> dict[str, Any]:
-    """Return all that decides the course of a search: not when it stops, nor what is run again at its end.
+    """Return everything that determines the course of a search.
 
-    evaluator : the settings of the evaluator. beginning : what it begins with; nothing unless given.
+    Stopping rules and the repeated runs at its end are not included. evaluator : the settings of the
+        evaluator. beginning : starting designs and experiments; none by default.
     """
     left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
     method_code = code_of(settings.method)
@@ -122,24 +129,27 @@ def identity(
 
 
 def of_the_problem(identity: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an identity that decides what a run of a design is, and what its values mean. Where
-    it is the same, runs are shared; ranges of genes, bounds of constraints, method, seed and all other
-    settings may differ."""
+    """Return the part of an identity that determines the run of a design and the meaning of its values.
+
+    Searches in which it is equal share their runs. Ranges of genes, bounds of constraints, method, seed and
+    all other settings may differ.
+    """
     return {name: identity[name] for name in _OF_THE_PROBLEM if name in identity}
 
 
 def search_name(identity: Mapping[str, Any]) -> str:
-    """Return the name of the group of a search in its cache file: by problem, method, seed, and a checksum of
-    all that decides its course."""
+    """Return the name of a search's group in its cache file: problem, method, seed, and a checksum of the
+    identity."""
     named = identity["problem"], identity["search"]["method"], str(identity["search"]["seed"])
     return f"searches/{'-'.join(named)}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
 
 
 def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a case without those options whose defaults depend on an option that changes.
+    """Return the settings of a case without the options whose defaults depend on a changed option.
 
-    Where a case has 24 strings and 8 parents, 12 strings shall have as many parents as go with 12.
-    usual : settings of the case. changes : settings in place of them, by dotted name.
+    Example: a case sets 24 individuals and 8 parents; if 12 individuals are requested, the number of parents
+    is dropped and takes its default for 12.
+    usual : settings of the case. changes : settings that replace them, by dotted name.
     """
     method = find(changes.get("method", usual.get("method", METHOD)))
     dropped = {
@@ -153,8 +163,8 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
 
 
 def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None) -> None:
-    """Raise InputError when the method, a stopping rule or the number of starts cannot be for the problem's
-    objectives, or not for what the search begins with."""
+    """Raise InputError if the method, a stopping rule or the number of starts does not suit the objectives or
+    the beginning of the search."""
     for objective in problem.objectives:
         fewest = objective.statistic.fewest_starts
         must(
@@ -177,11 +187,13 @@ def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None
 
 
 def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:
-    """Return the settings of a case with another method, whose options are then its own defaults; a method
-    that takes all options of the case's method, as restart those of zohdi, keeps them.
+    """Return the settings of a case for a method.
 
-    base : of the case; under "methods" it may have settings for methods other than its own, by name.
-    method : by name; None for the case's, or what its objectives need.
+    Another method than the case's gets its own default options, unless it accepts all options of the case's
+    method (as restart accepts the options of zohdi); it then keeps them.
+
+    base : settings of the case; "methods" may contain settings for other methods, by name.
+    method : name of the method; None for the case's own, or for one that supports its objectives.
     """
     of_methods = base.get("methods", {})
     base = {key: value for key, value in base.items() if key != "methods"}

@@ -1,5 +1,4 @@
-"""Hall of fame, designs that meet what is asked, and logbook as plain columns: what the report prints and the
-cache file keeps."""
+"""Hall of fame, logbook and designs that meet the requirement, as plain columns for report and cache file."""
 
 from __future__ import annotations
 
@@ -18,16 +17,16 @@ FRESH_STARTS = ", fresh starts"
 ERROR, LOW, HIGH = "std. error", "95 % low", "95 % high"
 """Headings, or ends of headings."""
 Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
-"""What is known of designs, by their strings."""
+"""Estimates of designs, by their strings."""
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
-    """Return the columns of Z04's tables 1 to 3 in one.
+    """Return the columns of Z04's tables 1 to 3 in one: heading -> values, best design first.
 
-    Rank, every gene in its unit, each constraint, each objective as the search knows it with its standard
-    error, the derived columns of the problem, starts, whether their mean converged (where that was asked of
-    any). From fresh starts, where the designs have had some, each objective with the ends of its 95 %
-    confidence interval. Heading -> values, best first; of several objectives the front along the first.
+    They are rank, every gene in its unit, each constraint, each objective as estimated by the search with its
+    standard error, the derived columns of the problem, starts, and whether the mean converged (if a tolerance
+    was set). With held-out starts, each objective follows with the ends of its 95 % confidence interval. With
+    several objectives, the front is sorted by the first.
     """
     estimates = [string.estimates for string in hall]
     number = "front" if problem.several else "rank"
@@ -71,7 +70,7 @@ def _objectives(
 
 
 def interval_of_value(estimate: FitnessEstimate, objective: Objective) -> tuple[float, float]:
-    """Return the ends of the interval of an objective's value, of that of its cost."""
+    """Return the ends of the interval of an objective's value from the interval of its cost."""
     low, high = sorted((objective.sign * estimate.low, objective.sign * estimate.high))
     return low, high
 
@@ -89,8 +88,11 @@ def units(problem: Problem) -> dict[str, str]:
 
 
 def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
-    """Return the columns of designs by the names of genes and objectives: every gene, the mean of each
-    objective and its standard error (NaN where the design failed), starts, converged, and why it failed."""
+    """Return the columns of designs by the names of genes and objectives.
+
+    They are every gene, the mean of each objective and its standard error (NaN if the design failed), starts,
+    converged, and the reason of a failure.
+    """
     designs = [problem.genome.decode(string) for string in estimates]
     columns: dict[str, list[Any]] = {
         gene.name: [design[gene.name] for design in designs] for gene in problem.genome.genes
@@ -112,8 +114,8 @@ def error_of(name: str) -> str:
 
 
 def met_strings(problem: Problem, estimates: Estimates) -> list[tuple[float, ...]]:
-    """Return the strings of the designs that meet what is asked, best first; none where the problem does not
-    say which do."""
+    """Return the strings of the designs with a fitness of ``met_at`` or better, best first; none without
+    ``met_at``."""
     if problem.met_at is None:
         return []
     (objective,) = problem.objectives
@@ -123,7 +125,7 @@ def met_strings(problem: Problem, estimates: Estimates) -> list[tuple[float, ...
 
 
 def met_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
-    """Return every gene and the fitness of the designs that meet what is asked, best first: heading ->
+    """Return every gene and the fitness of the designs with ``met_at`` or better, best first: heading ->
     values."""
     strings, (objective,) = met_strings(problem, estimates), problem.objectives
     designs = [problem.genome.decode(string) for string in strings]
@@ -132,7 +134,7 @@ def met_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
 
 
 def logbook_columns(problem: Problem, logbook: tools.Logbook) -> dict[str, list[Any]]:
-    """Return the logbook and the derived values of each generation's best. Heading -> values by
+    """Return the logbook and the derived values of each generation's best: heading -> values by
     generation."""
     columns = {name: list(logbook.select(name)) for name in (logbook[0] if logbook else {})}
     for heading, function in problem.derived.items() if columns else ():

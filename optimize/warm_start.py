@@ -1,7 +1,7 @@
-"""A warm start: a search learns from the runs that others have left in its file.
+"""A warm start: a search learns from the runs of other searches in its file.
 
-What it learns from is written down as the search begins, and read back when it goes on: by then the file has
-more runs, its own among them.
+The designs that it learns from are stored when the search begins, and read back when it is resumed: by then
+the file has more runs, including its own.
 """
 
 from __future__ import annotations
@@ -38,8 +38,11 @@ from tisim.errors import InputError, is_number
 def warmed(
     cache: Cache, problem: Problem, settings: Settings, evaluator: Mapping[str, Any], beginning: Beginning
 ) -> Beginning:
-    """Return a beginning with what it learns from, where it has a warm start: what the same search has
-    learnt from when it began, if it has; else the runs that are in the file now."""
+    """Return a beginning with the designs of its warm start, if it has one.
+
+    A resumed search gets the designs that it stored when it began; a new one the runs that are in the file
+    now.
+    """
     if beginning.warm is None:
         return beginning
     requested = json.loads(canonical(identity(problem, settings, evaluator, beginning)))
@@ -52,8 +55,8 @@ def warmed(
 
 
 def _of_runs(problem: Problem, part: RunsTable) -> list[Individual]:
-    """Return the designs of a table of runs that are within the genome, as many as a surrogate learns from;
-    none where all have failed."""
+    """Return the designs in a table of runs that lie within the genome, at most the number that a surrogate
+    learns from; none if all have failed."""
     values_needed = {*problem.quantities, *(one.name for one in problem.result_constraints)}
     genes = {gene.name for gene in problem.genome.searched}
     if part.problem != problem.name or not (genes <= set(part.genes) and values_needed <= set(part.values)):
@@ -71,7 +74,7 @@ def _of_runs(problem: Problem, part: RunsTable) -> list[Individual]:
     strings = [string for string, _ in found]
     if not strings or all(string.failed for string in strings):
         return []
-    # The points are made last, as to find one takes longer than all else.
+    # The points are computed last, since this is the slowest step.
     costs, _ = costs_and_noise(strings)
     chosen = [found[k] for k in representative(costs, MOST_LEARNED, all_exact(strings))]
     learned = []
@@ -84,7 +87,7 @@ def _of_runs(problem: Problem, part: RunsTable) -> list[Individual]:
 
 
 def _allows(gene: AnyGene, value: Any) -> bool:
-    """Return whether a design may have this value of a gene; None where a run has none of it."""
+    """Return whether a gene allows this value; None stands for a run without the gene."""
     if isinstance(gene, Gene):
         within = is_number(value) and gene.low <= value <= gene.high
         return within and (not gene.integer or float(value).is_integer())
@@ -94,7 +97,7 @@ def _allows(gene: AnyGene, value: Any) -> bool:
 
 
 def _string(problem: Problem, part: RunsTable, rows: NDArray[np.intp]) -> Individual:
-    """Return the string of a design by the rows of its runs, still without its point."""
+    """Return the individual of a design from the rows of its runs, without its point."""
     string = Individual((), len(problem.objectives))
     failed = rows[part.facts["ok"][rows] == 0]
     if len(failed):
@@ -110,7 +113,7 @@ def _string(problem: Problem, part: RunsTable, rows: NDArray[np.intp]) -> Indivi
 
 
 def _estimate(objective: Objective, part: RunsTable, rows: NDArray[np.intp]) -> FitnessEstimate:
-    """Return the estimate of a cost by some rows of runs, without an interval."""
+    """Return the estimate of a cost from some rows of runs, without an interval."""
     values = np.column_stack([part.values[name][rows] for name in objective.quantities])
     std = float(np.std(objective.pseudo_costs(values), ddof=1)) if len(rows) > 1 else np.nan
     return FitnessEstimate(objective.cost(values), std, np.nan, np.nan, len(rows), False)

@@ -1,1 +1,1 @@
-"""What a search has learnt beside the best design: how well genes are known, and which of them matter."""
+"""Analyses of a finished search: confidence intervals of the genes, and their effect on the objectives."""

@@ -1,9 +1,9 @@
-"""How well each gene is known from what was measured, and which genes cannot be told apart.
+"""Calibration: the 95 % interval of each gene from measurements, and genes that cannot be distinguished.
 
-It is for a problem whose objective is the Misfit of measured quantities. A quadratic form through the chi^2
-of the designs that the search has run (optimize.analysis.misfit_shape) gives the estimate of each gene, its
-95 % interval and the correlations. The interval is one of the likelihood: it holds where the uncertainties of
-the measurements do, and their errors are normal and independent.
+It needs a problem whose objective is the Misfit of measured quantities. A quadratic form is fitted to the
+chi^2 of the designs of the search (optimize.analysis.misfit_shape). It gives the estimate of each gene, its
+95 % interval and the correlations. The interval is a likelihood interval: it is valid if the uncertainties of
+the measurements are right and their errors are normal and independent.
 """
 
 from __future__ import annotations
@@ -35,24 +35,28 @@ from tisim.errors import Words, must
 Array = NDArray[np.float64]
 
 UNTOLD = 1.0
-"""Along a direction in which chi^2 grows less than this over the range of its genes, nothing is told."""
+"""A direction is undetermined if chi^2 grows less than this along it within the ranges of the genes."""
 _ALMOST_ALL = 0.95
-"""A gene whose interval is more of its range than this is not told."""
+"""A gene is undetermined if its interval covers a larger part of its range than this."""
 _TOGETHER = 0.9
-"""Correlation of two estimates from which on it is said."""
+"""Correlations of two estimates from this magnitude on are mentioned in the remarks."""
 _LITTLE = 0.05
-"""A gene whose part of the directions of which nothing is told is less than this does not belong to them."""
+"""A gene with a smaller share in the undetermined directions than this is not listed with them."""
 _UNLIKELY = 0.01
-"""Probability of so large a chi^2 by chance, below which it is said that the measurements are not met."""
+"""If a chi^2 this large or larger has a lower probability, a remark says that the measurements are not
+met."""
 
 
 @dataclass(frozen=True)
 class GeneEstimate:
-    """What is known of a gene, in its unit.
+    """The estimate of a gene and its 95 % interval, in the unit of the gene.
 
-    estimate : where chi^2 is least. low, high : of the 95 % interval. open_low, open_high : whether the
-    interval goes on to that end of the gene's range, and maybe beyond, so that it is a bound from one side
-    only. estimate_part, low_part, high_part : where these are within the range, 0..1, on the gene's scale.
+    estimate : the value of least chi^2.
+    low, high : ends of the 95 % interval.
+    open_low, open_high : whether the interval extends to that end of the gene's range, and possibly beyond;
+        it is then a one-sided bound.
+    estimate_part, low_part, high_part : positions of these values within the range, 0..1, on the gene's
+        scale.
     """
 
     name: str
@@ -73,12 +77,12 @@ class GeneEstimate:
 
     @property
     def told(self) -> bool:
-        """Whether the interval is less than the range."""
+        """Whether the interval is narrower than the range."""
         return not (self.open_low and self.open_high) and self.part < _ALMOST_ALL
 
     @property
     def words(self) -> str:
-        """What kind of interval it is."""
+        """The kind of interval, in words."""
         if not self.told:
             return "not told: its whole range"
         if self.open_low:
@@ -88,15 +92,18 @@ class GeneEstimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration says how well each gene is known.
+    """The result of a calibration.
 
-    genes : numbers that are searched, in the order of the genome. Empty where too few designs are near the
-    least misfit. choices : of genes that are choices, by name, those with which a design has been run whose
-    chi^2 is less than 3.84 above the least. correlation : of the estimates, shape (genes, genes); NaN
-    for a gene of which nothing is told. chi2 : the least, of ``measurements`` quantities. designs : how many
-    the estimate stands on. missing : how many more designs near the least are needed. wanted : designs that
-    are worth running for that, as many.
-    remarks : what cannot be told apart, and what else has to be known, in sentences.
+    genes : estimates of the numeric genes, in the order of the genome. Empty if too few designs are near the
+        least misfit.
+    choices : for each gene that is a choice, the choices of all designs whose chi^2 is less than 3.84 above
+        the least.
+    correlation : of the estimates, shape (genes, genes); NaN for an undetermined gene.
+    chi2 : the least chi^2, of ``measurements`` quantities.
+    designs : number of designs in the fit.
+    missing : number of further designs near the least misfit that are needed for a fit.
+    wanted : that number of designs, proposed for running.
+    remarks : sentences on genes that cannot be distinguished, and on reasons to doubt the intervals.
     """
 
     genes: tuple[GeneEstimate, ...]
@@ -111,14 +118,14 @@ class Calibration:
 
 
 def calibration(outcome: Outcome) -> Calibration:
-    """Return how well each gene is known from what was measured, by all designs of a search.
+    """Return the calibration of the genes by the measurements, from all designs of a search.
 
-    Genes that are choices are kept at those of the best design. InputError for a problem whose objective is
-    no Misfit, and for a search without a design.
+    Genes that are choices are fixed at the choices of the best design. InputError if the objective is not a
+    Misfit, or the search has no design.
     """
     problem = outcome.problem
     measured = problem.measured
-    rule = "the Misfit of what was measured in a problem that is calibrated"
+    rule = "a Misfit in a problem that is calibrated"
     must(measured is not None, "statistic of the objective", rule, problem.objectives[0].statistic)
     must(outcome.best is not None, "search", "one with a design that has not failed", Words("none"))
     assert measured is not None
@@ -161,7 +168,7 @@ def calibration(outcome: Outcome) -> Calibration:
 
 
 def _evidence(outcome: Outcome, measured: Misfit) -> tuple[Array, Evidence]:
-    """Return the points of the designs that have not failed, and their chi^2."""
+    """Return the points of the designs that did not fail, and their chi^2."""
     points = outcome.problem.genome.canonical(list(outcome.estimates))
     off = [measured.off(outcome.quantities[string]) for string in outcome.estimates]
     return points, Evidence.of_quantities(points, off, bool(outcome.settings.ensemble.common_starts))
@@ -178,7 +185,7 @@ def _estimate(gene: Searched, shape: MisfitShape, k: int) -> GeneEstimate:
 def _choices(
     problem: Problem, points: Array, chi2: Array, others: Sequence[int]
 ) -> dict[str, tuple[Value, ...]]:
-    """Return for each gene that is a choice those that a design of nearly the least chi^2 has."""
+    """Return for each gene that is a choice the choices of all designs close to the least chi^2."""
     good = points[chi2 < chi2.min() + ONE_GENE_95]
     genes = [(problem.genome.searched[k], k) for k in others]
     return {gene.name: tuple(dict.fromkeys(gene.decode(u) for u in good[:, k])) for gene, k in genes}
@@ -187,7 +194,7 @@ def _choices(
 def _wanted(
     problem: Problem, points: Array, chi2: Array, numbers: Sequence[int], count: int
 ) -> tuple[dict[str, Any], ...]:
-    """Return designs around the best, spread as the best of those that were run are."""
+    """Return new designs around the best one, spread like the best of the designs that were run."""
     if not count:
         return ()
     least = np.argsort(chi2, kind="stable")
@@ -206,7 +213,7 @@ def _remarks(
     estimates: Sequence[GeneEstimate],
     evidence: Evidence,
 ) -> list[str]:
-    """Return what cannot be told apart, and what makes the intervals doubtful."""
+    """Return remarks on genes that cannot be distinguished, and on reasons to doubt the intervals."""
     remarks = []
     growth, directions = shape.growth()
     free = growth < UNTOLD
@@ -219,26 +226,28 @@ def _remarks(
             if abs(rho) > _TOGETHER and {one.name, other.name} <= known:
                 more = "less" if rho < 0 else "more"
                 remarks.append(
-                    f"{other.name} and {one.name} are hardly told apart: more of one goes with {more} of "
+                    f"{other.name} and {one.name} are hard to distinguish: more of one fits with {more} of "
                     f"the other (correlation {rho:.2f})."
                 )
     freedom = max(measurements - len(genes), 1)
     if chi2_distribution.sf(shape.least / (1.0 + evidence.shift), freedom) < _UNLIKELY:
         remarks.append(
-            f"The measurements are not met together: the least chi^2 is {shape.least:.3g} of "
-            f"{measurements} quantities. The intervals hold for a model that can meet them."
+            f"The model does not meet all measurements: the least chi^2 is {shape.least:.3g} of "
+            f"{measurements} quantities. The intervals are valid only if it can."
         )
     if not np.any(evidence.noise) and shape.scatter > 1.0:
         remarks.append(
-            f"chi^2 is off a quadratic form by {shape.scatter:.2g} in the root of the mean square, over "
-            f"designs up to {shape.within:.3g} above the least: the intervals are rough."
+            f"chi^2 deviates from a quadratic form by {shape.scatter:.2g} (root mean square) for "
+            f"designs up to {shape.within:.3g} above the least: the intervals are approximate."
         )
     return remarks
 
 
 def _correlation(shape: MisfitShape) -> Array:
-    """Return the correlations of the estimates, NaN for a gene that is free by itself: it is as good at any
-    value, and the little that it is tied to others is chance."""
+    """Return the correlations of the estimates, NaN for a gene that is undetermined by itself.
+
+    Such a gene fits equally well at any value, and its small correlations with others are due to chance.
+    """
     growth, directions = shape.growth()
     alone = (directions[:, growth < UNTOLD] ** 2).sum(axis=1) > 1.0 - _LITTLE
     correlation = shape.correlation.copy()
@@ -247,25 +256,25 @@ def _correlation(shape: MisfitShape) -> Array:
 
 
 def _untold(directions: Array, grown: float, genes: Sequence[Searched]) -> list[str]:
-    """Return in words of which genes, or combinations of them, nothing is told.
+    """Return sentences that name the genes, or combinations of genes, that are undetermined.
 
     directions : shape (genes, directions), of the unit cube; chi^2 changes by ``grown`` or less along them.
     """
     parts = (directions**2).sum(axis=1)
     change = f"chi^2 changes by {grown:.2g} or less"
     alone = [gene.name for gene, part in zip(genes, parts, strict=True) if part > 1.0 - _LITTLE]
-    told = [f"Nothing is told of {_listed(alone)}: {change} over the range."] if alone else []
+    told = [f"The measurements do not determine {_listed(alone)}: {change} over the range."] if alone else []
     mixed = [k for k, part in enumerate(parts) if _LITTLE <= part <= 1.0 - _LITTLE]
     if len(mixed) < 2:
         return told
     names = _listed([genes[k].name for k in mixed])
     if directions.shape[1] - len(alone) > 1:
-        return [*told, f"{names} cannot be told apart: {change} along several combinations of them."]
+        return [*told, f"{names} cannot be distinguished: {change} along several combinations of them."]
     one = directions[mixed, int(np.argmax((directions[mixed] ** 2).sum(axis=0)))]
     up = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] > 0]
     down = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] < 0]
-    goes = f"where more {_listed(up)} goes with less {_listed(down)}" if down else "where all grow together"
-    return [*told, f"{names} cannot be told apart: {change} {goes}."]
+    goes = f"for more {_listed(up)} with less {_listed(down)}" if down else "if all increase together"
+    return [*told, f"{names} cannot be distinguished: {change} {goes}."]
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -290,7 +299,7 @@ def columns(result: Calibration) -> dict[str, list[Any]]:
 
 
 def summary(result: Calibration) -> str:
-    """Return in a line what the estimate stands on."""
+    """Return one line on the data of the estimate."""
     if not math.isfinite(result.chi2) or not result.designs:
         return "no intervals"
     return (
@@ -300,8 +309,7 @@ def summary(result: Calibration) -> str:
 
 
 def shown(one: GeneEstimate) -> tuple[str, str, str]:
-    """Return estimate ("-" where it is not told) and ends of the interval of a gene as text, an open end in
-    brackets."""
+    """Return estimate and interval ends of a gene as text: "-" for no estimate, an open end in brackets."""
     low, high = brief(one.low), brief(one.high)
     estimate = brief(one.estimate) if one.told else "-"
     return estimate, f"[{low}]" if one.open_low else low, f"[{high}]" if one.open_high else high

@@ -1,9 +1,10 @@
-"""The shape of a misfit around its least value: a quadratic form through the designs that a search has run.
+"""The shape of a misfit around its minimum: a quadratic form fitted to the designs of a search.
 
-With chi^2 the sum of the squared distances from what was measured, in uncertainties, the designs with chi^2
-less than its minimum + 3.84 have 95 % of the likelihood ratio of one parameter (W. H. Press and others,
-Numerical Recipes, 3rd ed. (2007), section 15.6), and the covariance of the estimate is twice the inverse of
-the matrix of second derivatives (section 15.4).
+chi^2 is the sum of the squared distances from the measurements, in uncertainties. The designs with chi^2 less
+than its minimum + 3.84 form the 95 % likelihood-ratio interval of one parameter. The covariance of the
+estimate is twice the inverse of the matrix of second derivatives.
+
+Source: W. H. Press and others, Numerical Recipes, 3rd ed. (2007), sections 15.6 and 15.4.
 """
 
 from __future__ import annotations
@@ -19,29 +20,32 @@ from scipy.optimize import brentq, lsq_linear
 Array = NDArray[np.float64]
 
 NEAR_CHI2 = 12.0
-"""Designs whose chi^2 is less than this above the least are near: 3.5 standard deviations along one gene."""
+"""Designs with chi^2 less than this above the least are near: 3.5 standard deviations along one gene."""
 FAR_CHI2 = 60.0
-"""What near may be at most, where few designs are."""
+"""Upper limit of that distance, which is enlarged if few designs are near."""
 ONE_GENE_95 = 3.841
-"""The 0.95 quantile of chi^2 of one degree of freedom."""
+"""The 0.95 quantile of chi^2 with one degree of freedom."""
 _PER_COEFFICIENT = 2.0
-"""Designs that are wanted for each coefficient of the form; with fewer within NEAR_CHI2 others are in it."""
+"""Number of near designs wanted for each coefficient of the form; the limit is enlarged beyond NEAR_CHI2 to
+reach it."""
 _ROUNDS = 6
-"""Times that the near designs are chosen by the form and the form is fitted to them."""
+"""Number of iterations: the form selects the near designs, and is then fitted to them."""
 _FLAT = 2e-3
-"""Least second derivative, chi^2 per squared width of a range; with less no range ends anything."""
+"""Smallest second derivative, chi^2 per squared width of a range. Below it no interval ends within its
+range."""
 _MODEL_ERROR = 0.1
-"""How far chi^2 is taken to be from its quadratic form at 1 above the minimum; it grows as distance^3."""
+"""Assumed deviation of chi^2 from its quadratic form at 1 above the minimum; it grows as distance^3."""
 
 
 @dataclass(frozen=True)
 class Evidence:
     """Designs and their chi^2.
 
-    points : shape (designs, genes), of the unit cube. chi2 : shape (designs,). noise : the variance of each
-    chi2 that random starts have left in it, shape (designs,), 0 where runs have no noise. shift : by random
-    starts that are the same for all designs, the variance of what they add to a measured quantity, in squared
-    uncertainties.
+    points : shape (designs, genes), of the unit cube.
+    chi2 : shape (designs,).
+    noise : variance of each chi2 due to the random starts, shape (designs,); 0 if runs have no noise.
+    shift : with starts common to all designs, the variance that they add to a measured quantity, in squared
+        uncertainties.
     """
 
     points: Array
@@ -51,12 +55,14 @@ class Evidence:
 
     @classmethod
     def of_quantities(cls, points: Array, off: Sequence[Array], common: bool) -> Evidence:
-        """Return the evidence of the quantities of all runs: the chi^2 of their means over the starts.
+        """Return the evidence of all runs: the chi^2 of the means of the quantities over the starts.
 
-        off : of each design how far its runs are from what was measured, in uncertainties, shape (starts,
-        quantities); of designs with one start that have no other the runs are taken to have no noise.
-        common : whether all designs have the same starts. The squared distance of a mean over n starts is too
-        large by its variance, s^2 / n, which is subtracted.
+        off : for each design the distance of its runs from the measurements, in uncertainties, shape (starts,
+            quantities). If every design has one start, the runs are assumed to have no noise.
+        common : whether all designs have the same starts.
+
+        The squared distance of a mean over n starts is too large by its variance, s^2 / n, which is
+        subtracted.
         """
         starts = np.array([len(one) for one in off], dtype=float)[:, None]
         means = np.array([one.mean(axis=0) for one in off])
@@ -72,12 +78,17 @@ class Evidence:
 
 @dataclass(frozen=True)
 class MisfitShape:
-    """chi^2 = least + (u - centre) H (u - centre) / 2 for u of the unit cube.
+    """A quadratic form of chi^2 on the unit cube.
 
-    curvature : H as it was fitted, without negative eigenvalues. covariance : of the estimate of the genes:
-    of what was measured, 2 / H, of the random starts, and of the fit. best : the point of least chi^2 within
-    the unit cube. designs : how many are near. within : chi^2 above the least that is called near. scatter :
-    the root of the mean square by which near designs are off the form, chi^2.
+        chi^2 = least + (u - centre) H (u - centre) / 2
+
+    curvature : the fitted H, without negative eigenvalues.
+    covariance : of the estimated genes. It is the sum of three parts: the measurements, 2 / H; the random
+        starts; the fit.
+    best : the point of least chi^2 within the unit cube.
+    designs : number of near designs.
+    within : limit of chi^2 above the least for near designs.
+    scatter : root mean square deviation of near designs from the form, in chi^2.
     """
 
     centre: Array
@@ -91,10 +102,10 @@ class MisfitShape:
 
     @property
     def correlation(self) -> Array:
-        """The correlation matrix of the estimates, each known to be within its range.
+        """The correlation matrix of the estimates, given that each gene lies within its range.
 
-        Along a direction that is not told rounding would tie all genes; a range has a variance of 1/12, and
-        ends such a direction.
+        Along an undetermined direction rounding errors would correlate all genes. The variance 1/12 of a
+        range, added as prior information, limits such a direction.
         """
         values, vectors = np.linalg.eigh(self.covariance)
         covariance = (vectors / (1.0 / np.maximum(values, 1e-12) + 12.0)) @ vectors.T
@@ -102,8 +113,11 @@ class MisfitShape:
         return covariance / np.outer(deviation, deviation)
 
     def interval(self, gene: int) -> tuple[float, float]:
-        """Return the 95 % interval of a gene, 0..1: where the least chi^2 of all designs with that value is
-        less than 3.84 above the least of all. Other genes are kept within their ranges."""
+        """Return the 95 % interval of a gene, 0..1.
+
+        It contains the values at which the least chi^2 over the other genes, within their ranges, is less
+        than 3.84 above the overall least.
+        """
         half = math.sqrt(ONE_GENE_95 * self.covariance[gene, gene])
         reach = np.sqrt(ONE_GENE_95 * np.diag(self.covariance))
         if np.all(self.centre - reach >= 0) and np.all(self.centre + reach <= 1):
@@ -119,7 +133,7 @@ class MisfitShape:
         return ends[0], ends[1]
 
     def _profile(self, gene: int, value: float) -> float:
-        """Return the least of the form over the other genes, within their ranges."""
+        """Return the least value of the form over the other genes, within their ranges."""
         root = self._root
         others = np.arange(len(self.centre)) != gene
         target = root @ self.centre - root[:, gene] * value
@@ -135,20 +149,20 @@ class MisfitShape:
         return np.asarray((vectors / np.sqrt(np.maximum(values, 1e-12))).T)
 
     def growth(self) -> tuple[Array, Array]:
-        """Return by how much chi^2 grows along each principal direction from the middle of the unit cube to
-        where it leaves it, least first, and the directions, shape (genes, directions)."""
+        """Return the growth of chi^2 along each principal direction, from the centre of the unit cube to its
+        surface, smallest first; and the directions, shape (genes, directions)."""
         values, vectors = np.linalg.eigh(self.curvature)
         length = 0.5 / np.max(np.abs(vectors), axis=0)
         return 0.5 * values * length**2, vectors
 
 
 def coefficients(genes: int) -> int:
-    """Return how many coefficients the quadratic form of so many genes has."""
+    """Return the number of coefficients of a quadratic form of this number of genes."""
     return (genes + 1) * (genes + 2) // 2
 
 
 def fit(evidence: Evidence) -> MisfitShape | None:
-    """Return the shape of chi^2 around its least value; None where too few designs are near it."""
+    """Return the shape of chi^2 around its minimum; None if too few designs are near it."""
     genes = evidence.points.shape[1]
     wanted = coefficients(genes) + 2
     best = int(np.argmin(evidence.chi2))
@@ -161,7 +175,8 @@ def fit(evidence: Evidence) -> MisfitShape | None:
             return shape
         shape = _fitted(evidence, near, np.maximum(above, 0.0), centre, within)
         centre = shape.best
-        # Of designs with noise those with the least chi^2 are lucky; the form tells which are near.
+        # With noise, the designs of least chi^2 are partly lucky; the fitted form decides which designs are
+        # near.
         off = evidence.points - shape.centre
         form = 0.5 * np.einsum("ij,jk,ik->i", off, shape.curvature, off)
         at_best = shape.best - shape.centre
@@ -171,7 +186,7 @@ def fit(evidence: Evidence) -> MisfitShape | None:
 
 
 def _near(above: Array, count: int) -> float:
-    """Return how far above the least chi^2 designs are taken in."""
+    """Return the limit of chi^2, above the least, up to which designs are used."""
     enough = math.ceil(_PER_COEFFICIENT * count)
     reached = np.sort(above)[min(enough, len(above)) - 1]
     return min(max(NEAR_CHI2, float(reached) * (1 + 1e-12)), FAR_CHI2)
@@ -180,7 +195,7 @@ def _near(above: Array, count: int) -> float:
 def _fitted(
     evidence: Evidence, near: NDArray[np.bool_], above: Array, centre: Array, within: float
 ) -> MisfitShape:
-    """Return the form of least weighted squares through the near designs."""
+    """Return the weighted least-squares fit of the form to the near designs."""
     points, chi2, noise = evidence.points[near], evidence.chi2[near], evidence.noise[near]
     genes = points.shape[1]
     scale = np.maximum(np.std(points - centre, axis=0), 1e-9)
@@ -206,7 +221,7 @@ def _fitted(
     best = _within_cube(middle, curvature)
     at = (best - centre) / scale
     least = float(np.concatenate([[1.0], at, at[row] * at[column]]) @ solution)
-    # The error of the minimum is H^-1 times that of the slope there, but for flat directions.
+    # The error of the minimum is H^-1 times the error of the gradient there, except along flat directions.
     slope = np.zeros((genes, columns.shape[1]))
     slope[:, 1 : 1 + genes] = np.eye(genes)
     for k, (i, j) in enumerate(zip(row, column, strict=True)):
@@ -222,7 +237,7 @@ def _fitted(
 
 
 def _within_cube(centre: Array, curvature: Array) -> Array:
-    """Return the point of the unit cube where the form is least."""
+    """Return the point of the unit cube at which the form is least."""
     if np.all((centre >= 0) & (centre <= 1)):
         return centre
     root = np.linalg.cholesky(curvature).T

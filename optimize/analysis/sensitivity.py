@@ -1,10 +1,12 @@
-"""Which genes matter: around the best design, and over the whole range.
+"""Sensitivity: the effect of each gene around the best design, and over its whole range.
 
-A Gaussian process (optimize.surrogate) through the designs that a search has run tells both. Around the best
-design one gene moves at a time. Over the whole range the variance of an objective is divided among the genes:
-the first-order index of a gene is the part that it explains alone, the total index the part that would be
-left if all others were known (I. M. Sobol', Math. Comput. Simul. 55 (2001) 271-280; A. Saltelli and others,
-Comput. Phys. Commun. 181 (2010) 259-270). Intervals are those of functions drawn from the process.
+Both are computed from a Gaussian process (optimize.surrogate) through the designs of the search. Around the
+best design, one gene moves at a time. Over the whole range, the variance of an objective is divided among the
+genes. The first-order index of a gene is the part that it explains alone; the total index is the part that
+would be left if all other genes were known. The intervals come from functions drawn from the process.
+
+Source: I. M. Sobol', Math. Comput. Simul. 55 (2001) 271-280; A. Saltelli and others, Comput. Phys. Commun.
+181 (2010) 259-270.
 """
 
 from __future__ import annotations
@@ -32,16 +34,17 @@ from tisim.errors import Words, must
 Array = NDArray[np.float64]
 
 MOVES = (-0.1, -0.01, 0.01, 0.1)
-"""Parts of a gene's range by which it is moved from the best design."""
+"""Moves of a gene from the best design, as fractions of its range."""
 LEAST_Q2 = 0.5
-"""Indices are given where the surrogate predicts this part of the variance of designs left out, or more."""
+"""Indices are reported if the surrogate predicts at least this part of the variance of left-out designs."""
 _SAMPLES = 1024
-"""Points of each of the two sets of which indices are had, a power of two; half of them for intervals."""
+"""Number of points in each of the two sample sets for the indices, a power of two; half of it for the
+intervals."""
 _DRAWN, _SETS, _RESAMPLED = 4, 3, 8
-"""Functions that are drawn from a process, each set of them with points of its own; sets from the process of
-all designs, and from those of designs that are drawn."""
+"""Number of functions drawn from a process; number of such draws, with their own points, from the process of
+all designs; number of processes refitted to resampled designs."""
 _NORMAL_95 = 1.96
-"""Half of the 95 % interval of a normal number, in standard deviations."""
+"""Half width of the 95 % interval of a normal variable, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,13 @@ UNKNOWN = Between(math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True)
 class GeneSensitivity:
-    """What a gene does to an objective.
+    """The effect of a gene on an objective.
 
-    at : its value in the best design. changes : of the objective when the gene moves by a part of its range,
-    by that part (-0.1, -0.01, 0.01, 0.1); unknown for a choice, and where its value stays what it is: at an
-    end of its range, or a whole number. first, total : Sobol' indices over the whole range, unknown where the
-    surrogate predicts too little.
+    at : the gene's value in the best design.
+    changes : change of the objective when the gene moves by a fraction of its range, by that fraction (-0.1,
+        -0.01, 0.01, 0.1). It is unknown for a choice, and if the move does not change the value: at an end of
+        the range, or for an integer.
+    first, total : Sobol' indices over the whole range; unknown if the surrogate predicts too little.
     """
 
     name: str
@@ -76,11 +80,13 @@ class GeneSensitivity:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """A sensitivity says what each gene does to one objective.
+    """The effects of all genes on one objective.
 
-    label : of the objective, with its unit. genes : those that are searched. designs : that the surrogate is
-    made of. q2 : the part of the variance over all ranges that it predicts of each of them from the others,
-    beyond what random starts leave to chance; 0 to 1.
+    label : the objective, with its unit.
+    genes : the searched genes.
+    designs : number of designs that the surrogate is fitted to.
+    q2 : predictive power of the surrogate, 0 to 1: the part of the variance over all ranges, without noise,
+        that it predicts for each design from the others.
     """
 
     objective: str
@@ -92,19 +98,19 @@ class Sensitivity:
 
     @property
     def trusted(self) -> bool:
-        """Whether the surrogate predicts enough for indices."""
+        """Whether the surrogate predicts enough of the variance for indices."""
         return self.q2.value >= LEAST_Q2
 
 
 def least_designs(genome: Genome) -> int:
-    """Return the number of designs below which nothing is told."""
+    """Return the smallest number of designs for an analysis."""
     return max(8, len(genome) + 2)
 
 
 def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
-    """Return what each gene does to each objective, by the designs of a search.
+    """Return the effect of each gene on each objective, from the designs of a search.
 
-    InputError where fewer designs than two more than genes, or than eight, have not failed.
+    InputError if fewer than max(8, genes + 2) designs did not fail.
     """
     genome = outcome.problem.genome
     least = least_designs(genome)
@@ -136,7 +142,7 @@ def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
 
 
 def _known(outcome: Outcome) -> tuple[Array, Array, Array]:
-    """Return points, costs and variances of the costs of the designs that a surrogate is made of."""
+    """Return points, costs and variances of the costs of the designs that a surrogate is fitted to."""
     strings = []
     for point, estimates in outcome.estimates.items():
         string = Individual(point, len(estimates))
@@ -149,12 +155,13 @@ def _known(outcome: Outcome) -> tuple[Array, Array, Array]:
 
 
 def _predicted(model: GaussianProcess, genome: Genome) -> Between:
-    """Return the part of the variance over all ranges that the process predicts of designs left out.
+    """Return the part of the variance over all ranges that the process predicts for left-out designs.
 
-    Each design counts for the part of the unit cube to which it is the nearest: most designs of a search lie
-    close together, where each is told by its neighbours. The noise of a mean is nobody's to predict, and is
-    subtracted from both variances. The interval is that of a ratio of two weighted sums (W. G. Cochran,
-    Sampling Techniques, 3rd ed. (1977), Eq. 6.13).
+    Each design is weighted by the part of the unit cube to which it is the nearest: most designs of a search
+    lie close together, and are predicted well by their neighbours. The noise of a mean cannot be predicted,
+    and is subtracted from both variances. The interval is that for a ratio of two weighted sums.
+
+    Source: W. G. Cochran, Sampling Techniques, 3rd ed. (1977), Eq. 6.13.
     """
     drawn = qmc.Sobol(len(genome), rng=np.random.default_rng(3)).random_base2(12)
     _, nearest = cKDTree(model.points).query(genome.features(drawn))
@@ -174,8 +181,8 @@ def _changes(
 ) -> dict[float, Between]:
     """Return the changes of an objective when gene j moves from the best design.
 
-    Half of the interval is 1.96 times the root of the mean square by which the changes of functions of the
-    other processes are off the value.
+    The half width of an interval is 1.96 times the root mean square deviation of the other processes'
+    functions from the value.
     """
     gene = genome.searched[j]
     if gene.kind == "category":
@@ -187,7 +194,7 @@ def _changes(
     change, _ = _differences(model, at)
     means, variances = zip(*(_differences(one, at) for one in others), strict=True)
     half = _NORMAL_95 * np.sqrt(np.mean((np.array(means) - change) ** 2 + np.array(variances), axis=0))
-    # At the end of a range a move is shorter than its name says.
+    # At the end of a range the move is cut short.
     whole = np.abs(np.abs(moved[:, j] - best[j]) - np.abs(MOVES)) < 1e-9
     whole |= (gene.kind != "real") & (moved[:, j] != best[j])
     return {
@@ -197,7 +204,7 @@ def _changes(
 
 
 def _differences(model: GaussianProcess, at: Array) -> tuple[Array, Array]:
-    """Return mean and variance of how far a process is at all points but the first from what it is there."""
+    """Return mean and variance of the process at all points but the first, relative to the first."""
     means, _ = model.predict(at)
     explained = model.half_solved(at)
     joint = model.covariance(at, at) - explained.T @ explained
@@ -210,8 +217,8 @@ def _indices(
 ) -> tuple[list[Between], list[Between]]:
     """Return the first-order and total indices of each gene.
 
-    Values are means over functions drawn from the process. Half of the interval is 1.96 times the root of the
-    mean square by which functions of the other processes are off the values.
+    Values are means over functions drawn from the process. The half width of an interval is 1.96 times the
+    root mean square deviation of the other processes' functions from the value.
     """
     whole = np.concatenate([_drawn(model, genome, [k, 0], _SAMPLES) for k in range(_SETS)])
     value = whole.mean(axis=0)
@@ -236,8 +243,12 @@ def _drawn(model: GaussianProcess, genome: Genome, seed: list[int], samples: int
 
 
 def _resampled(model: GaussianProcess, k: int) -> GaussianProcess:
-    """Return the process through as many of its designs, drawn with replacement (B. Efron, Ann. Statist. 7
-    (1979) 1-26); each is used once. One process takes its length scales for known, and is too sure."""
+    """Return a process fitted to a bootstrap sample of the designs; each drawn design is used once.
+
+    A single process treats its length scales as known, and its intervals are too narrow.
+
+    Source: B. Efron, Ann. Statist. 7 (1979) 1-26.
+    """
     count = len(model.points)
     chosen = np.unique(np.random.default_rng([k, 2]).integers(count, size=count))
     values = model.centre + model.scale * model.values[chosen]

@@ -1,4 +1,5 @@
-"""Fitness of designs averaged over random starts: few for each, more for those that compete to be best."""
+"""Fitness of designs averaged over random starts: few starts for each design, more for the best
+candidates."""
 
 from __future__ import annotations
 
@@ -24,25 +25,27 @@ from tisim.numerics.statistics import CONFIDENCE, half_width
 Design = Mapping[str, Any]
 Report = Callable[[float], None]
 LOOKED_AT = 2
-"""Designs that are run from two starts, to see whether these differ."""
+"""Number of designs that are run from two starts, to check whether the starts matter."""
 FRESH = 10**6
-"""The number of the first start that only reports use. None of a search is as large."""
+"""The number of the first held-out start, used only for reports. Starts of a search have smaller numbers."""
 
 
 class EnsembleSettings(Checked):
-    """How many random starts a fitness is averaged over.
+    """The numbers of random starts (seeds) over which a fitness is averaged.
 
-    min_starts : starts of every design, more where the statistic of an objective needs more (10 for a 0.9
-    quantile). tolerance : TOL of Z04 Eq. 8.1: starts are added, ``block`` in each call of the evaluator,
-    until the mean changes by less than this part of it, max_starts at most. None: no more are added.
-    common_starts : start k is the same for every design, so that designs are compared on equal terms; False:
-    each design has starts of its own; None: what is best for the method.
-    race : starts that a generation spends on telling the best designs apart (0: none).
-    select : starts that each of the best designs gets once the search has ended, before the best is chosen.
-    confirm : fresh starts of each of the best designs after that, from which they are reported (0: none, and
-    no intervals); more where the interval of a statistic needs more. Of max_evaluations an eighth is kept for
-    both, if they need as much, and a quarter for several objectives; where that does not suffice, fewer
-    designs are reported.
+    min_starts : starts of every design; raised if the statistic of an objective needs more (10 for a 0.9
+        quantile).
+    tolerance : TOL of Z04 Eq. 8.1: starts are added, ``block`` in each call of the evaluator, until the mean
+        changes by less than this fraction of it, or max_starts is reached. None: no starts are added.
+    common_starts : True: start k is the same for every design, so that designs are compared on equal terms;
+        False: each design has its own starts; None: the default of the method.
+    race : starts that a generation spends on separating the best designs (0: none).
+    select : further starts of each of the best designs at the end of the search, before the best is chosen.
+    confirm : held-out starts of each of the best designs afterwards, from which their values are reported (0:
+        none, and no intervals); raised if the interval of a statistic needs more.
+
+    An eighth of max_evaluations, or less if that suffices, is reserved for select and confirm; with several
+    objectives a quarter. If the reserve is not enough, fewer designs are reported.
     """
 
     min_starts: int = Field(2, ge=1)
@@ -71,13 +74,16 @@ class EnsembleSettings(Checked):
 
 
 class Ensemble:
-    """Estimates the objectives of designs; each design is known once it has been estimated.
+    """Estimates the objectives of designs, and remembers each estimated design.
 
-    budget : most runs that may be asked for (inf: no end); exhausted : it has cut an estimate short.
-    repeatable : whether all starts of a design give the same run, so that one is enough; found out by looking
-    at the first designs, None before. runs : counts them. min_starts : of every design: those asked for, or
-    what the statistics of the objectives need. An estimate is a tuple, one FitnessEstimate of the cost for
-    each objective.
+    budget : limit on the number of requested runs (inf: no limit).
+    exhausted : whether the budget has cut an estimate short.
+    repeatable : whether all starts of a design give the same run, so that one is enough. Determined from the
+        first designs; None before.
+    runs : runs and counts the evaluations.
+    min_starts : starts of every design: the setting, or more if the statistics of the objectives need more.
+
+    An estimate is a tuple with the FitnessEstimate of the cost of each objective.
     """
 
     def __init__(
@@ -98,17 +104,16 @@ class Ensemble:
 
     @property
     def requested(self) -> int:
-        """The number of different runs that have been requested."""
+        """The number of different runs requested."""
         return self.runs.evaluations + self.runs.hits
 
     def estimate(
         self, designs: Sequence[Design], progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...] | None]:
-        """Return the estimates of each design, in order; None where the budget was spent before its first
-        block.
+        """Return the estimates of each design, in order; None if the budget ended before its first block.
 
-        progress is called with the finished fraction, never decreasing. A design with any failed start has
-        cost +inf.
+        progress : called with the finished fraction, which never decreases. A design with any failed start
+            has cost +inf.
         """
         settings = self.settings
         samples = [self._sample(design) for design in designs]
@@ -141,7 +146,7 @@ class Ensemble:
         return [self._summary(sample) if sample.used or sample.reason else None for sample in samples]
 
     def _judge(self, sample: Sample, most: int) -> None:
-        """Say whether a sample has all the starts that it is to have."""
+        """Decide whether a sample has all its starts."""
         if sample.reason:
             sample.open = False
             return
@@ -152,14 +157,17 @@ class Ensemble:
         sample.open = converged is None and len(sample.values) < most
 
     def look(self) -> None:
-        """Find out whether all starts of a design give the same run, where that is not known yet."""
+        """Determine whether all starts of a design give the same run, if that is not known yet."""
         if self.repeatable is None:
             self._look([sample for sample in self._known.values() if sample.values and not sample.reason])
 
     def _look(self, samples: Sequence[Sample]) -> None:
-        """Run the first designs from two starts each, and see whether these end in the same state, to the
-        last bit, after the same work. Of what leaves no state, as a function of design and seed, equal values
-        do not tell: rare outcomes are equal by chance, too."""
+        """Run the first designs from two starts each, and compare their final states bit by bit, and their
+        work.
+
+        Runs without a final state, such as a function of design and seed, are never considered repeatable:
+        equal values may be due to chance.
+        """
         additions = [(sample, range(len(sample.values), 2)) for sample in samples[:LOOKED_AT]]
         if sum(len(starts) for _, starts in additions) > self.budget - self.requested:
             return
@@ -171,12 +179,14 @@ class Ensemble:
     def race(
         self, designs: Sequence[Design], progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Spend starts on those of the designs that may still be the best; all their estimates afterwards.
+        """Spend starts on the designs that may still be the best; return all estimates afterwards.
 
-        Every round gives a block of starts more, up to max_starts, to each design that no other one beats
-        surely: by the 95 % confidence interval of the mean difference, start by start, in every objective.
-        Racing with paired t tests: O. Maron and A. W. Moore, NIPS 6 (1994) 59-66; M. Birattari et al., GECCO
-        (2002) 11-18 (there "tNo-Race": no correction for repeated tests).
+        Every round gives one more block of starts, up to max_starts, to each remaining design. A design is
+        dropped when another one is significantly better in every objective: the 95 % confidence interval of
+        the mean paired difference is above 0.
+
+        Source: racing with paired t tests: O. Maron and A. W. Moore, NIPS 6 (1994) 59-66; M. Birattari et
+        al., GECCO (2002) 11-18 (there "tNo-Race": no correction for repeated tests).
         """
         samples = [self._sample(design) for design in designs]
         racing = self._unbeaten(samples)
@@ -201,7 +211,7 @@ class Ensemble:
     def more(
         self, designs: Sequence[Design], starts: int, progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Give each of these designs that number of starts more; their estimates afterwards."""
+        """Add this number of starts to each design; return the estimates afterwards."""
         samples = [self._sample(design) for design in designs]
         additions = [(s, range(len(s.values), len(s.values) + starts)) for s in dict.fromkeys(samples)]
         self.runs.add(additions, progress or (lambda fraction: None))
@@ -218,12 +228,15 @@ class Ensemble:
         noise: Sequence[Moments] | None = None,
         confidence: float = CONFIDENCE,
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Return the estimates of each design from that number of starts that nothing else has used, and that
-        are its own.
+        """Return the estimates of each design from held-out starts, which are its own and not used elsewhere.
 
-        A winner has won by being good and by being lucky in its starts; this is without the luck. Designs
-        tell each other how skewed noise is: rare outcomes have come to some of them. first : the number of
-        the first start. noise : what the search knows of the noise of each cost. confidence : of intervals.
+        The values of a selected design are biased by lucky starts; held-out starts remove this bias. The
+        skewness of the noise is estimated from all designs together, because rare outcomes occur in only some
+        of them.
+
+        starts : number of held-out starts. first : number of the first one.
+        noise : moments of the noise of each cost, as known from the search.
+        confidence : of the intervals.
         """
         samples = [Sample(design, own=True) for design in designs]
         additions = [(sample, range(first, first + starts)) for sample in samples]
@@ -241,13 +254,12 @@ class Ensemble:
         return [self._summary(sample, skewness, ranges, confidence) for sample in samples]
 
     def constraint_means(self, design: Design) -> tuple[float, ...]:
-        """Return the mean of each constraint of the result over the starts of a design that has run."""
+        """Return the mean of each result constraint over the starts of a design that has run."""
         limited = self._sample(design).limited
         return tuple(float(np.mean(column)) for column in zip(*limited, strict=True))
 
     def values(self, design: Design) -> np.ndarray:
-        """Return the quantities of each start that the estimate of a design stands on, (starts,
-        quantities)."""
+        """Return the quantities of each start in a design's estimate, shape (starts, quantities)."""
         sample = self._sample(design)
         return np.array(sample.values[: sample.used], dtype=float).reshape(sample.used, -1)
 
@@ -255,7 +267,7 @@ class Ensemble:
         return self._known.setdefault(canonical(dict(design)), Sample(design))
 
     def _afforded(self, running: list[Sample], goals: Mapping[Sample, int]) -> list[Sample]:
-        """Return those of the samples, from the first, whose starts the budget can pay."""
+        """Return the leading samples whose starts fit into the budget."""
         left = self.budget - self.requested
         for count, sample in enumerate(running):
             left -= goals[sample] - len(sample.values)
@@ -269,8 +281,7 @@ class Ensemble:
         return [one for one in good if not any(self._beats(other, one) for other in good)]
 
     def _beats(self, one: Sample, other: Sample) -> bool:
-        """Return whether one is better in every objective, its 95 % confidence interval of the difference
-        above 0."""
+        """Return whether one is better in every objective: the 95 % interval of the difference is above 0."""
         n = min(one.used, other.used)
         if n < 2:
             return False
@@ -283,7 +294,7 @@ class Ensemble:
         return np.column_stack([one.pseudo_costs(part) for one, part in parts])
 
     def _running(self, sample: Sample) -> np.ndarray:
-        """Return the costs by the first 1, 2, ... starts, (starts, objectives)."""
+        """Return the costs from the first 1, 2, ... starts, (starts, objectives)."""
         parts = self._of_objectives(sample.values)
         counts = range(1, len(sample.values) + 1)
         return np.array([[one.cost(part[:n]) for one, part in parts] for n in counts])
@@ -316,7 +327,7 @@ class Ensemble:
         return tuple(estimates)
 
     def _costs(self, sample: Sample) -> list[np.ndarray]:
-        """Return for each objective a cost of each start that the estimate of a design stands on."""
+        """Return for each objective the costs of the starts in a design's estimate."""
         parts = self._of_objectives(sample.values[: sample.used])
         return [one.pseudo_costs(part) for one, part in parts]
 
@@ -327,9 +338,12 @@ class Ensemble:
 
 
 def _may_occur(costs: np.ndarray, seen: Sequence[float], most: float) -> Sequence[float]:
-    """Return costs that may occur beside equal ones of a design: those that differ by no more than ``most``
-    from them, between the least and the largest of all designs. Where only two are known at all, these; where
-    no difference between starts is known, all."""
+    """Return the costs that may occur for a design whose own costs are all equal.
+
+    They are the two ends of a range: at most ``most`` from the design's cost, and within the costs ``seen``
+    of all designs. If fewer than three costs or no differences between starts are known, ``seen`` itself is
+    returned.
+    """
     if len(seen) < 3 or not most:
         return seen
     return max(seen[0], float(costs[0]) - most), min(seen[-1], float(costs[0]) + most)

@@ -1,4 +1,4 @@
-"""Fitness over random starts, and when it has converged (Z04 Eq. 8.1)."""
+"""Fitness over random starts, and the test for its convergence (Z04 Eq. 8.1)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,15 @@ from tisim.numerics.statistics import CONFIDENCE
 class FitnessEstimate:
     """Fitness of one design.
 
-    mean : of the first `starts` starts, or another statistic where the objective has one; +inf if the design
-    failed. std : standard deviation from start to start; of another statistic, of its pseudo-values.
-    low, high : ends of the confidence interval, 95 % unless said otherwise. It holds for starts that have not
-    had a part in choosing the design. converged : Eq. 8.1 was met. reason : "" or why the design failed.
-    std, low and high are NaN where they are not known, and for failed designs.
+    mean : mean over the first `starts` starts, or another statistic if the objective has one; +inf if the
+        design failed.
+    std : standard deviation between starts; for another statistic, of its pseudo-values.
+    low, high : ends of the confidence interval, 95 % by default. It is valid for starts that were not used to
+        choose the design.
+    converged : whether Eq. 8.1 was met.
+    reason : "" or why the design failed.
+
+    std, low and high are NaN if not known, and for failed designs.
     """
 
     mean: float
@@ -38,8 +42,8 @@ class FitnessEstimate:
 
     @property
     def exact(self) -> bool:
-        """Whether it is known that all starts of the design give the same; starts that happen to be equal do
-        not tell that."""
+        """Whether all starts of the design are known to give the same value; equal values alone do not prove
+        it."""
         return self.starts == 1 and self.std == 0
 
     @property
@@ -59,8 +63,10 @@ class FitnessEstimate:
     ) -> FitnessEstimate:  # fmt: skip
         """Return the estimate of an objective's cost from the values of each start; at least one.
 
-        values : shape (starts, quantities). others : costs that may occur besides, which starts that are all
-        equal do not exclude, and the skewness of the costs. confidence : of the interval.
+        values : shape (starts, quantities).
+        others : further costs that may occur, even if all starts gave equal ones, and the skewness of the
+            costs.
+        confidence : of the interval.
         """
         costs, statistic = objective.costs(values), objective.statistic_of_costs
         n = len(costs)
@@ -70,22 +76,22 @@ class FitnessEstimate:
 
     @classmethod
     def certain(cls, value: float) -> FitnessEstimate:
-        """Return the estimate of a design all of whose starts are the same."""
+        """Return the estimate of a design whose starts are all the same."""
         return cls(value, 0.0, value, value, 1, True)
 
     @classmethod
     def failed(cls, starts: int, reason: str) -> FitnessEstimate:
-        """Return the estimate of a design of which a run failed, or could not be made."""
+        """Return the estimate of a design with a failed run, or without a valid scene."""
         return cls(math.inf, math.nan, math.nan, math.nan, starts, False, reason)
 
 
 def converged_after(costs: ArrayLike, tolerance: float, min_starts: int) -> int | None:
-    """Return the least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04
-    Eq. 8.1).
+    """Return the least number of starts n = E + 1 >= min_starts that meets Z04 Eq. 8.1, or None.
 
-    costs : the mean of the first 1, 2, ... starts, shape (starts,) or (starts, objectives); of several
-    objectives each must meet it at once. Two equal means count as converged, also when both are zero. None if
-    there is no such n.
+        |mean_n - mean_E| < TOL |mean_n|
+
+    costs : the mean of the first 1, 2, ... starts, shape (starts,) or (starts, objectives); all objectives
+        must meet the equation at the same n. Two equal means count as converged, also if both are zero.
     """
     numbers = np.asarray(costs, dtype=float)
     means = numbers.reshape(len(numbers), -1)

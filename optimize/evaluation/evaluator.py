@@ -1,4 +1,4 @@
-"""Runs the scenes of a search, under the running settings of tisim.backend.runtime."""
+"""Runs the scenes of a search, with the current settings of tisim.backend.runtime."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from tisim.engine.batches import Batches
 
 
 class BatchEvaluator:
-    """Scenes to results, many worlds at a time; a start that cannot be made gives a failed Result.
+    """Runs scenes as batches of many worlds; an invalid start gives a failed Result.
 
-    batch : most worlds that run side by side. settings : what decides the last bits of a result beside the
-    scene - precision, device, arithmetic, compiler; part of the key under which it is cached.
+    batch : largest number of worlds that run side by side.
+    settings : everything except the scene that affects the last bits of a result - precision, device,
+        arithmetic, compiler; part of the cache key.
     """
 
     def __init__(self, batch: int = 256) -> None:
@@ -24,9 +25,9 @@ class BatchEvaluator:
     def evaluate(
         self, scenes: Sequence[Scene], progress: Callable[[float], None] | None = None
     ) -> Iterator[tuple[int, Result]]:
-        """Yield (index into scenes, Result) as worlds end; what has been yielded stands."""
+        """Yield (index into scenes, Result) as worlds end; yielded results are final."""
         return self.batches.run(scenes, progress, strict=False)
 
     def close(self) -> None:
-        """Give the device memory back."""
+        """Release the device memory."""
         self.batches.close()

@@ -1,4 +1,4 @@
-"""Calls plain functions of designs where others run scenes; neither Taichi nor a device is asked for."""
+"""Calls plain functions of designs in place of running scenes; Taichi and a device are not needed."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from tisim.optimize.problem.function import FunctionCall, FunctionResult
 
 
 class FunctionEvaluator:
-    """Calls to results, one after the other; an evaluator (optimize.evaluation.runs.Evaluator).
+    """Calls functions one after the other; an evaluator (optimize.evaluation.runs.Evaluator).
 
-    settings : empty, as neither precision nor device changes what a function of Python gives.
+    settings : empty, since neither precision nor device changes the value of a Python function.
     """
 
     def __init__(self) -> None:
@@ -27,4 +27,4 @@ class FunctionEvaluator:
                 progress((index + 1) / len(calls))
 
     def close(self) -> None:
-        """There is nothing to give back."""
+        """Do nothing: there is nothing to release."""

@@ -1,4 +1,4 @@
-"""Runs of designs from random starts: each is run once, and every one goes through the cache."""
+"""Runs of designs from random starts: each is run once, and all of them are cached."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 
 END = "end"
-"""The name of the checksum of the last state of a run among its counts."""
+"""The key, among the counts of a run, of the checksum of its final state."""
 
 
 class Evaluator(Protocol):
     """Runs scenes, or calls functions (FunctionCall to FunctionResult).
 
-    settings : all about it that may change a fitness (precision, device kind); part of the cache key.
+    settings : everything that may change a fitness (precision, device kind); part of the cache key.
     """
 
     settings: dict[str, Any]
@@ -39,12 +39,12 @@ class Evaluator(Protocol):
     ) -> Iterator[tuple[int, Any]]:
         """Yield (index into scenes, Result) once for each scene, in any order, as soon as it is finished.
 
-        progress, if given, is called now and then with the finished fraction of this call, 0..1.
+        progress : called from time to time with the finished fraction of this call, 0..1.
         """
         ...
 
     def close(self) -> None:
-        """Give back what it holds; it is not used any more."""
+        """Release its resources; it is not used any more."""
         ...
 
 
@@ -58,7 +58,7 @@ def start_seed(seed: int, start: int, design: Mapping[str, float] | None = None)
 
 
 def work_of(result: Any) -> dict[str, Any]:
-    """Return the counts of a run and, under END, a checksum of its last state, where it has one."""
+    """Return the counts of a run and, under END, a checksum of its final state, if it has one."""
     work, state = dict(result.work), getattr(result, "state", None)
     if result.status.ok and state:
         end = zlib.crc32(repr(sorted(work.items())).encode())
@@ -69,7 +69,7 @@ def work_of(result: Any) -> dict[str, Any]:
 
 
 def _widen(seen: list[float], value: float) -> None:
-    """Take a value into the least, the largest and one other of those seen."""
+    """Add a value to the list of seen ones: the least, the largest and one other."""
     if value not in seen:
         seen.append(value)
         if len(seen) > 3:
@@ -80,12 +80,14 @@ def _widen(seen: list[float], value: float) -> None:
 class Sample:
     """The starts of one design so far.
 
-    values, limited : of each start, the quantities of the problem's objectives and the values of the
-    constraints of the result.
-    ends : of each start, what tells its run from another (see ``work_of``). used : how many of the starts,
-    from the first, its estimate stands on. converged : see FitnessEstimate. reason : "" or why the design
-    failed. open : whether more starts are to come. own : its starts are its own, though others have common
-    ones.
+    values : for each start the quantities of the problem's objectives.
+    limited : for each start the values of the constraints of the result.
+    ends : for each start the counts and final state that distinguish its run (see ``work_of``).
+    used : number of the first starts that its estimate is computed from.
+    converged : see FitnessEstimate.
+    reason : "" or why the design failed.
+    open : whether more starts follow.
+    own : whether its starts are its own even if other designs have common ones.
     """
 
     design: Mapping[str, float]
@@ -100,12 +102,13 @@ class Sample:
 
 
 class Runs:
-    """Runs what is requested and not known. evaluations, hits : runs made, and found in the cache instead;
-    together they are the different runs that were requested, the same for a search that was resumed.
-    requested : all of them, those that were asked for twice too. seen : for each quantity the least and the
-    largest value so far, and one between.
+    """Makes the requested runs that are not in the cache.
 
-    common : start k is the same for every design.
+    evaluations, hits : numbers of runs made, and of runs found in the cache. Their sum is the number of
+        different runs requested, and is the same for a resumed search.
+    requested : number of all requests, repeated ones included.
+    seen : for each quantity the least and the largest value so far, and one other.
+    common : whether start k is the same for every design.
     """
 
     def __init__(
@@ -124,10 +127,10 @@ class Runs:
         additions: Iterable[tuple[Sample, range]],
         report: Callable[[float], None] = lambda fraction: None,
     ) -> None:
-        """Add to each sample the values of these starts; all that is not in the cache in one call.
+        """Add the values of these starts to each sample; all runs that are not cached are made in one call.
 
-        report is called with the finished fraction. Errors of the evaluator itself and KeyboardInterrupt pass
-        through; what was finished by then is in the cache.
+        report : called with the finished fraction. Errors of the evaluator and KeyboardInterrupt are passed
+            on; runs finished before are in the cache.
         """
         self.cache.refresh()
         requested: list[tuple[Sample, int, int, str]] = []

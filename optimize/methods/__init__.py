@@ -1,1 +1,1 @@
-"""Search methods, one a file; what they must do stands in optimize/methods/base.py."""
+"""Search methods, one in each file; their interface is defined in optimize/methods/base.py."""

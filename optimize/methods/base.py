@@ -1,5 +1,7 @@
-"""The contract of a search method: a file of optimize/methods, or of the user. It is found by looking and
-registered nowhere."""
+"""The interface of a search method: a class in a file of optimize/methods, or the user's own.
+
+All subclasses are found automatically; no registration is needed.
+"""
 
 from __future__ import annotations
 
@@ -21,28 +23,31 @@ from tisim.errors import must
 
 
 class SearchMethod(ABC):
-    """Proposes designs and is told what they are worth.
+    """Proposes designs and is told their fitness.
 
-    1. ``ask`` gives the strings of the next generation, in the unit cube. Those whose fitness is not valid
-       are estimated; those whose fitness is (parents that were kept) are not estimated again.
-    2. ``tell`` gets all of them, all with a fitness (of costs, to be minimised; +inf for failed ones), and
-       the hall: the best designs so far, or the front. Strings keep their identity: a fitness may have
+    1. ``ask`` returns the individuals of the next generation, in the unit cube. Those without a valid fitness
+       are estimated; those with one (parents that were kept) are not estimated again.
+    2. ``tell`` receives all of them, all with a fitness (costs, to be minimised; +inf for failed ones), and
+       the hall: the best designs so far, or the front. The objects are the same ones, but a fitness may have
        changed since, because more starts were spent on the design.
-    3. ``learn`` gets strings that it has not asked for, between generations: designs of the user, which have
-       run before generation 0, and designs whose worth is known.
-    4. Its random numbers are its own and follow from the seed alone. What it asks is a function of the seed
-       and of what it was told: to resume a search is to run it again from the start with the same cache.
+    3. ``learn`` receives individuals that the method did not ask for, between generations: designs of the
+       user, which were run before generation 0, and designs with known values.
+    4. The method has its own random numbers, determined by the seed alone. Its proposals are a function of
+       the seed and of the fitnesses that it was told: a search is resumed by running it again from the
+       beginning with the same cache.
 
-    name : as in ``--method NAME``; several : whether it can search for several objectives at once.
-    own_starts : whether it works best where each design has random starts of its own, and not the same as all
-    others: a method that fits a function through noisy means is led astray by noise that they share.
-    takes_experiments : whether it learns from designs that the search has not run: it asks for none of what
-    ``learn`` has given it.
-    ensemble : settings of the ensemble that are its own.
-    Options : its settings, as in ``--set search.options.KEY=VALUE``. dependent_options : by option, those
-    whose defaults depend on it: a case's own values of those go with its own value of this one.
-    width : mean width of the part of the unit cube that it draws from now. moved : the last ``tell`` has put
-    that part elsewhere.
+    name : as in ``--method NAME``.
+    several : whether it supports several objectives at once.
+    own_starts : whether it works best if each design has its own random starts, instead of common ones. This
+        applies to methods that fit a function through noisy means, because shared noise would bias the fit.
+    takes_experiments : whether it can learn from designs that the search has not run. It never asks for a
+        design given to ``learn``.
+    ensemble : the method's own defaults for the settings of the ensemble.
+    Options : its settings, as in ``--set search.options.KEY=VALUE``.
+    dependent_options : option -> options whose defaults depend on it. If the user sets the option, a case's
+        values of the dependent ones are dropped.
+    width : mean width of the part of the unit cube that it currently draws from.
+    moved : whether the last ``tell`` moved that part.
     """
 
     name: ClassVar[str]
@@ -57,7 +62,7 @@ class SearchMethod(ABC):
 
     @abstractmethod
     def __init__(self, genome: Genome, objectives: int, options: Any, seed: int) -> None:
-        """Raise InputError for options that cannot work on the genome."""
+        """Raise InputError for options that are invalid for the genome."""
 
     @classmethod
     def starts_of_its_own(cls, options: Any) -> bool:
@@ -66,27 +71,31 @@ class SearchMethod(ABC):
 
     @abstractmethod
     def ask(self) -> list[Individual]:
-        """Return the strings of the next generation."""
+        """Return the individuals of the next generation."""
 
     @abstractmethod
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
-        """Learn what the strings of the last ``ask`` are worth."""
+        """Learn the fitness of the individuals of the last ``ask``."""
 
     def learn(self, strings: Sequence[Individual]) -> None:  # noqa: B027
-        """Take in strings that it has not asked for, all with a fitness and different. A method that does not
-        say how knows of them by the hall alone."""
+        """Learn from individuals that it did not ask for, all with a fitness and all different.
+
+        A method without this function sees them only through the hall.
+        """
 
 
 def every() -> dict[str, type[SearchMethod]]:
-    """Return all search methods by their names: those of this package, and those of modules of the user that
-    have been imported. InputError where one of these cannot be used."""
+    """Return all search methods by name, from this package and from imported modules of the user.
+
+    InputError if one of the user's cannot be used.
+    """
     for entry in pkgutil.iter_modules(methods.__path__):
         importlib.import_module(f"{methods.__name__}.{entry.name}")
     kinds = [kind for kind in _made_after(SearchMethod) if not inspect.isabstract(kind)]
     by_name = {kind.name: kind for kind in kinds if _of_package(kind)}
     by_name = dict(sorted(by_name.items()))
     for kind in kinds:
-        # A class that is no longer to be found in its module is of a file that has been loaded anew.
+        # A class that its module no longer contains is from a file that was reloaded since.
         if _of_package(kind) or vars(sys.modules.get(kind.__module__, object)).get(kind.__name__) is not kind:
             continue
         where = f"{kind.__module__}.{kind.__name__}"
@@ -100,7 +109,7 @@ def every() -> dict[str, type[SearchMethod]]:
 
 
 def find(name: str) -> type[SearchMethod]:
-    """Return a method by name; InputError naming the known ones when there is none."""
+    """Return a method by name; InputError with the known names if there is none."""
     by_name = every()
     rule = f"one of {', '.join(by_name)}, or your own (--plugin, import)"
     must(isinstance(name, str) and name in by_name, "method", rule, name)
@@ -108,8 +117,7 @@ def find(name: str) -> type[SearchMethod]:
 
 
 def code_of(name: str) -> str:
-    """Return a checksum of the code of a method of the user; "" for one of this package, which has a
-    version."""
+    """Return a checksum of the code of a user's method; "" for one of this package, which has a version."""
     kind = find(name)
     return "" if _of_package(kind) else checksum_of(kind, f"method {name}")
 

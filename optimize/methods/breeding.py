@@ -1,4 +1,4 @@
-"""How a generation of strings follows from the one before, Z04 sections 7 and 8, as a toolbox of DEAP."""
+"""Breeding of a generation from the one before, Z04 sections 7 and 8, with DEAP's toolbox."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tisim.optimize.problem.genome import SearchBox
 
 
 class Breeder:
-    """Makes generations. Its random numbers are its own: nothing global is read or left changed.
+    """Makes generations. It has its own random numbers: no global state is read or changed.
 
     box : the current search box, in the unit cube.
     """
@@ -28,18 +28,18 @@ class Breeder:
         self.toolbox.register("mate", mate_z04, rng=self._rng)
 
     def first(self) -> list[Individual]:
-        """Return, as Z04 step 1, a population of random strings."""
+        """Return a population of random individuals (Z04 step 1)."""
         return self._fresh(self.settings.population)
 
     def next_generation(self, population: Sequence[Individual]) -> list[Individual]:
-        """Return the best strings (with a valid fitness), their offspring and fresh ones (Z04 3 to 6)."""
+        """Return the best individuals (with a valid fitness), their offspring and fresh ones (Z04 3 to 6)."""
         best = self.toolbox.select(population, self.settings.parents)
         offspring = self._offspring(population, self.settings.bred)
         fresh = self._fresh(self.settings.population - len(best) - len(offspring))
         return [*best, *offspring, *fresh]
 
     def recentre(self, best: Individual) -> None:
-        """Shrink the search box around the best string (Z04 section 8)."""
+        """Shrink the search box around the best individual (Z04 section 8)."""
         self.box = self.box.recentre(np.array(best), self.settings.recentre_factor)
 
     def _fresh(self, count: int) -> list[Individual]:
@@ -54,13 +54,15 @@ class Breeder:
 def mate_z04(
     first: Sequence[float], second: Sequence[float], rng: np.random.Generator
 ) -> tuple[Individual, Individual]:
-    """Return two offspring, as in Z04 step 4: phi A + (1 - phi) B.
+    """Return two offspring, as in Z04 step 4.
 
-    A fresh weight 0 <= phi <= 1 for every component of both. first, second : shape (genes,).
-    Each component of an offspring lies between its parents'.
+        phi A + (1 - phi) B
+
+    A new weight 0 <= phi <= 1 is drawn for every component of both. first, second : shape (genes,). Each
+    component of an offspring lies between the parents' components.
     """
     a, b = np.array(first), np.array(second)
     phi = rng.random((2, len(a)))
-    # rounding must not carry a component past a parent, or out of the unit cube
+    # Rounding must not carry a component past a parent, or out of the unit cube.
     one, two = np.clip(phi * a + (1 - phi) * b, np.minimum(a, b), np.maximum(a, b))
     return Individual(one), Individual(two)

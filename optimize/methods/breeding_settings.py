@@ -1,4 +1,4 @@
-"""What a generation of strings is made of in Z04's genetic algorithm."""
+"""The composition of a generation in Z04's genetic algorithm."""
 
 from __future__ import annotations
 
@@ -11,19 +11,22 @@ from tisim.components.component import Checked
 from tisim.errors import must
 
 POPULATION, PARENTS = 20, 6
-"""Strings per generation, and how many of them are parents (Z04 section 8)."""
+"""Individuals in a generation, and the number of parents among them (Z04 section 8)."""
 _WHOLE = TypeAdapter(int)
 
 
 class Breeding(Checked):
-    """Composition of a generation. Defaults are Z04 section 8; of population, parents and offspring, what is
-    not given follows what is, in the proportions that Z04 has (20, 6 and 6).
+    """Composition of a generation. Defaults are Z04 section 8.
 
-    population : strings per generation (S). parents : the best, kept unchanged and never evaluated again (K).
-    offspring : bred strings (None: as many as parents, or as there is room for, in pairs). The rest are fresh
-    random strings of the search box.
-    recentre_every : generations between re-centrings of the box on the best (0: never);
-    recentre_factor : its shrinking each time.
+    If only some of population, parents and offspring are given, the others follow in the proportions of Z04
+    (20, 6 and 6).
+
+    population : individuals in a generation (S).
+    parents : number of best ones, kept unchanged and never evaluated again (K).
+    offspring : number of bred individuals (None: equal to parents, or the largest even number that fits). The
+        rest are random individuals drawn from the search box.
+    recentre_every : generations between re-centrings of the box on the best (0: never).
+    recentre_factor : factor by which the box shrinks each time.
     """
 
     population: int = Field(POPULATION, ge=2)
@@ -47,13 +50,13 @@ class Breeding(Checked):
     @model_validator(mode="before")
     @classmethod
     def _following(cls, data: dict[str, Any]) -> dict[str, Any]:
-        """Return what the numbers that are given make of those that are not."""
+        """Return the settings with the numbers that are not given derived from those that are."""
         population, parents, offspring = (
             _whole(data.get(name)) for name in ("population", "parents", "offspring")
         )
         follow: dict[str, int] = {}
         if "parents" not in data:
-            # each parent has one offspring at most
+            # each parent has at most one offspring
             fitting = max(proportional(population or POPULATION), offspring or 0)
             room = fitting if population is None else population - (offspring or 0)
             follow["parents"] = max(1, min(fitting, room))
@@ -75,8 +78,8 @@ class Breeding(Checked):
 
 
 def _whole(value: Any) -> int | None:
-    """Return the whole number that a field makes of a value, say of 8.0 or "8"; None where it will refuse
-    it."""
+    """Return the integer that a field accepts for a value such as 8.0 or "8"; None if it would refuse the
+    value."""
     try:
         return _WHOLE.validate_python(value)
     except ValidationError:
@@ -84,6 +87,6 @@ def _whole(value: Any) -> int | None:
 
 
 def proportional(population: int) -> int:
-    """Return how many parents go with a population: the even number nearest to Z04's part of it, 6 of 20; one
-    where that is none."""
+    """Return the number of parents for a population: the even number nearest to Z04's fraction of it, 6 of
+    20, or one if that is zero."""
     return 2 * round(population * PARENTS / POPULATION / 2) or 1

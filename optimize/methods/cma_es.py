@@ -1,4 +1,4 @@
-"""CMA-ES: evolution strategy with covariance matrix adaptation, DEAP's, on genes scaled to the unit cube."""
+"""CMA-ES: DEAP's evolution strategy with covariance matrix adaptation, on genes scaled to the unit cube."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from tisim.optimize.problem.genome import Genome
 from tisim.components.component import Checked
 
 EDGE = 0.05
-"""Distance from a bound within which the genes are bent towards it, in widths of the range."""
+"""Distance from a bound within which the mapping is bent, as a fraction of the range."""
 
 
 class CmaOptions(Checked):
     """The settings of CMA-ES.
 
-    population : strings per generation (None: 4 + 3 ln(genes)). sigma : first standard deviation, in
-    widths of the search range. smallest : the standard deviation along the widest axis at which the search
-    has converged and begins again elsewhere.
+    population : individuals in a generation (None: 4 + 3 ln(genes)).
+    sigma : initial standard deviation, as a fraction of the search range.
+    smallest : the search has converged, and restarts elsewhere, when the standard deviation along the widest
+        axis falls below this.
     """
 
     population: int | None = Field(None, ge=4)
@@ -37,11 +38,14 @@ class CmaOptions(Checked):
 
 
 class CmaEs(SearchMethod):
-    """N. Hansen and A. Ostermeier, Evol. Comput. 9 (2001) 159-195, as deap.cma.Strategy has it.
+    """CMA-ES, as implemented in deap.cma.Strategy, with restarts.
 
-    Starts in the middle of the range, or at the best design that is known by then. The strategy searches a
-    space without bounds, of which ``within`` gives the genes. Converged, it begins again from a random middle
-    with twice the population (A. Auger and N. Hansen, IEEE CEC (2005) 1769-1776).
+    It starts at the centre of the range, or at the best known design. The strategy searches an unbounded
+    space, which ``within`` maps to the genes. After convergence it restarts from a random centre with twice
+    the population.
+
+    Source: N. Hansen and A. Ostermeier, Evol. Comput. 9 (2001) 159-195; restarts: A. Auger and N. Hansen,
+    IEEE CEC (2005) 1769-1776.
     """
 
     name = "cma-es"
@@ -74,7 +78,7 @@ class CmaEs(SearchMethod):
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         self.moved = False
         if all(string.failed for string in population):
-            return  # ranks of nothing but failures would lead it astray; the next strings are others
+            return  # ranks of failures only would mislead the strategy; the next individuals are others
         self.strategy.update([self._as_drawn(string) for string in population])
         now = self.strategy
         if now.sigma * now.diagD[-1] < self.options.smallest or not now.diagD[0] > 0:
@@ -89,17 +93,19 @@ class CmaEs(SearchMethod):
             self.strategy.centroid = drawn_of(np.array(self.start))
 
     def _as_drawn(self, string: Individual) -> Individual:
-        """Return a string where the strategy has drawn it, with its fitness."""
+        """Return an individual at the position that the strategy drew, with its fitness."""
         drawn = Individual(self.asked.get(tuple(string), string))
         drawn.fitness = string.fitness
         return drawn
 
 
 def within(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points of [-EDGE, 1 + EDGE] as points of [0, 1]: the same but within EDGE of a bound, where a
-    parabola leads smoothly up to it. A best design on a bound is then a smooth minimum of the strategy.
+    """Return points of [-EDGE, 1 + EDGE] mapped to [0, 1].
 
-    The transformation of N. Hansen's program cma, BoundTransform.
+    The mapping is the identity except within EDGE of a bound; there a parabola leads smoothly to the bound. A
+    best design on a bound is then a smooth minimum of the strategy.
+
+    Source: the transformation BoundTransform of N. Hansen's program cma.
     """
     low, high = points < EDGE, points > 1 - EDGE
     inside = np.where(low, (points + EDGE) ** 2 / (4 * EDGE), points)
@@ -107,13 +113,13 @@ def within(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def drawn_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the points of [-EDGE, 1 + EDGE] of which ``within`` gives these."""
+    """Return the points of [-EDGE, 1 + EDGE] that ``within`` maps to these."""
     low, high = 2 * np.sqrt(EDGE * points) - EDGE, 1 + EDGE - 2 * np.sqrt(EDGE * (1 - points))
     return np.where(points < EDGE, low, np.where(points > 1 - EDGE, high, points))
 
 
 def folded(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points, shape (strings, genes), with what lies outside [-EDGE, 1 + EDGE] reflected at its ends,
-    where the transformation is level."""
+    """Return points, shape (strings, genes), with values outside [-EDGE, 1 + EDGE] reflected at its ends, at
+    which the transformation is level."""
     width = 1 + 2 * EDGE
     return width - np.abs(width - np.mod(points + EDGE, 2 * width)) - EDGE

@@ -1,4 +1,4 @@
-"""Bayesian optimisation: a Gaussian process of the designs that were run tells which to run next."""
+"""Bayesian optimisation: a Gaussian process of the designs that were run proposes the next ones."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from tisim.optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
 from tisim.components.component import Checked
 
 _ROUNDS, _DRAWN = 6, 200
-"""Rounds in which the designs worth most are changed a little, and how many are made in each."""
+"""Number of rounds in which the best candidates are varied, and number of variations in each."""
 _WIDE = 0.2
-"""Largest standard deviation of a change, in widths of a gene's range."""
+"""Largest standard deviation of a variation, as a fraction of a gene's range."""
 _GROWTH = 20
-"""A batch is at least the number of designs that are known over this, so that making the process anew does
-not cost more and more of the search."""
+"""A batch has at least 1 / this of the number of known designs, to limit the share of time for refitting the
+process."""
 
 
 class GaussianProcessOptions(Checked):
     """The settings of Bayesian optimisation.
 
-    population : designs per generation, more once some hundred are known. first : designs of generation 0
-    (None: twice the genes, 10 at least).
+    population : designs in a generation; more once about a hundred are known.
+    first : designs of generation 0 (None: twice the number of genes, at least 10).
     """
 
     population: int = Field(8, ge=1)
@@ -45,11 +45,12 @@ class GaussianProcessOptions(Checked):
 class GaussianProcessSearch(SearchMethod):
     """Bayesian optimisation with a Gaussian process of known noise; see optimize.surrogate.
 
-    Generation 0 is a scrambled Sobol' sequence, of fewer designs where some are known. Then each batch is
-    chosen by expected improvement, or by the hypervolume of several objectives, from designs all over the
-    range and around the best. Where designs are without noise, half of the batch is chosen by a process of
-    its own in a region around the best, which shrinks and grows as it finds less or more (D. Eriksson and
-    others, NeurIPS 32 (2019)).
+    Generation 0 is a scrambled Sobol' sequence, shorter if some designs are already known. Then each batch is
+    chosen by expected improvement, or by hypervolume for several objectives, from candidates over the whole
+    range and around the best designs. With one objective without noise, half of the batch comes from a trust
+    region around the best design, which grows on success and shrinks on failure.
+
+    Source: trust region: D. Eriksson and others, NeurIPS 32 (2019).
     """
 
     name = "gaussian-process"
@@ -96,7 +97,8 @@ class GaussianProcessSearch(SearchMethod):
         self.strings += [string for string in strings if tuple(string) not in known]
 
     def _candidates(self, worth: Worth) -> Array:
-        """Return designs all over the range and around the best, and around those of them worth most."""
+        """Return candidates over the whole range and around the best designs, and variations of the best
+        candidates."""
         belief = self.belief
         order = belief.chosen[np.argsort(belief.means[:, 0], kind="stable")]
         best = belief.points[order[:5] if self.objectives == 1 else worth.on_front]
@@ -111,19 +113,22 @@ class GaussianProcessSearch(SearchMethod):
         return self._new(self.genome.canonical(np.vstack(drawn)))
 
     def _open(self, points: Array) -> Array:
-        """Return the points that are not the trust region's, where there is one."""
+        """Return the points outside the trust region, if there is one."""
         return points if self.local is None else points[self.region.outside(points)]
 
     def _new(self, points: Array) -> Array:
-        """Return those of the points that have not run, each once, in their order."""
+        """Return the points that have not run, each once, in order."""
         known = {tuple(string) for string in self.strings}
         rows = dict.fromkeys(map(tuple, points.tolist()))
         return np.array([row for row in rows if row not in known]).reshape(-1, self.genes)
 
 
 def missing(first: int, known: int, begun: bool) -> int:
-    """Return how many designs are to be drawn before a surrogate is made: what is missing to the first ones
-    where some are known as the search begins; all anew while hardly any has run to its end."""
+    """Return the number of random designs still needed before a surrogate is fitted.
+
+    When a search begins, known designs reduce this number. The full number is drawn again while hardly any
+    design has succeeded.
+    """
     if known < 2:
         return first
     return 0 if begun else max(0, first - known)
@@ -136,8 +141,10 @@ def sobol(genes: int, count: int, rng: np.random.Generator) -> Array:
 
 
 def changed(points: Array, widest: float, count: int, rng: np.random.Generator) -> Array:
-    """Return points of the unit cube, (count, genes), that differ from some of these in one gene or more, by
-    normal numbers whose standard deviation is ``widest`` or less, on a logarithmic scale."""
+    """Return variations of points of the unit cube, (count, genes), that differ in at least one gene.
+
+    The changes are normal, with standard deviations of ``widest`` or less, on a logarithmic scale.
+    """
     genes = points.shape[1]
     base = points[rng.integers(len(points), size=count)]
     which = rng.random((count, genes)) < max(0.3, 2.0 / genes)

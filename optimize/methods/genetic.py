@@ -1,4 +1,4 @@
-"""A genetic algorithm of DEAP's operators: it proposes, a surrogate ranks, and what is worth most is run."""
+"""A genetic algorithm of DEAP's operators, with or without a surrogate that selects the designs to run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from tisim.components.component import Checked
 from tisim.errors import must
 
 _GROWTH = 20
-"""A generation has at least the number of designs that are known over this, so that making the surrogate anew
-does not cost more and more of the search."""
+"""A generation has at least 1 / this of the number of known designs, to limit the share of time for refitting
+the surrogate."""
 _PARENTS = 20
 """Parents of a generation with a surrogate, for each objective."""
 _MOST_BRED = 2000
-"""Strings that are bred on the surrogate in each inner generation at most, or as many as are run."""
+"""Largest number of individuals bred on the surrogate in an inner generation, unless more are run."""
 _TRIES = 10
-"""Times that a generation is bred anew where it has designs that are known already."""
+"""Number of times that a generation is bred again if it contains known designs."""
 SELECT = GeneticOperator(name="selTournament", options={"tournsize": 2})
 SELECT_SEVERAL = GeneticOperator(name="selTournamentDCD")
 
@@ -37,11 +37,13 @@ SELECT_SEVERAL = GeneticOperator(name="selTournamentDCD")
 class BreedingOptions(Checked):
     """The settings of a genetic algorithm.
 
-    population : designs per generation (None: 8 with a surrogate; without one 20, and for several objectives
-    40). select, mate, mutate : operators of deap.tools by name, with their options, or functions that are
-    called in the same way. select None: tournaments of two, by rank and crowding for several objectives.
-    mutate None: polynomial, of each gene with probability 1/2 with a surrogate and 1/genes without.
-    crossover_probability : that a pair is mated. mutation_probability : that a string is then mutated.
+    population : designs in a generation (None: 8 with a surrogate; without one 20, or 40 for several
+        objectives).
+    select, mate, mutate : operators of deap.tools by name, with their options, or functions with the same
+        signature. select None: tournaments of two, by rank and crowding for several objectives. mutate None:
+        polynomial, of each gene with probability 1/2 with a surrogate and 1/genes without.
+    crossover_probability : probability that a pair is mated.
+    mutation_probability : probability that an individual is then mutated.
     """
 
     population: int | None = Field(None, ge=1)
@@ -58,10 +60,11 @@ class BreedingOptions(Checked):
 
 
 class GeneticOptions(BreedingOptions):
-    """The settings of a genetic algorithm that a surrogate assists.
+    """The settings of a surrogate-assisted genetic algorithm.
 
-    surrogate : whether one does. first : designs of generation 0 (None: twice the genes, 10 at least).
-    proposals : strings bred on the surrogate for each one that is run, in each of ``inner`` generations.
+    surrogate : whether a surrogate is used.
+    first : designs of generation 0 (None: twice the number of genes, at least 10).
+    proposals : individuals bred on the surrogate for each one that is run, in each of ``inner`` generations.
     """
 
     surrogate: bool = True
@@ -75,18 +78,20 @@ class GeneticOptions(BreedingOptions):
             for name in ("first", "proposals", "inner"):
                 value = getattr(self, name)
                 unused = value == type(self).model_fields[name].get_default()
-                must(unused, f"search.options.{name}", "left out where surrogate is false", value)
+                must(unused, f"search.options.{name}", "left out if surrogate is false", value)
         return self
 
 
 class Genetic(SearchMethod):
-    """A genetic algorithm put together from DEAP, for one objective or several.
+    """A genetic algorithm built from DEAP operators, for one objective or several.
 
-    Without a surrogate the parents are the best designs so far (selBest), or those that NSGA-II selects, and
-    a generation is their offspring. With one, parents are selected by posterior mean, a population evolves on
-    the surrogate for some generations, and of all strings bred there those are run which are worth most
-    together (Y. Jin, Swarm Evol. Comput. 1 (2011) 61-70, has a review of such algorithms). Half of the
-    designs of one objective without noise come from a trust region, as in gaussian_process.py.
+    Without a surrogate, the parents are the best designs so far (selBest), or the selection of NSGA-II, and a
+    generation consists of their offspring. With a surrogate, parents are selected by posterior mean and a
+    population evolves on the surrogate for some generations; of all individuals bred there, the ones with the
+    greatest joint worth are run. With one objective without noise, half of the designs come from a trust
+    region, as in gaussian_process.py.
+
+    Source: Y. Jin, Swarm Evol. Comput. 1 (2011) 61-70, reviews such algorithms.
     """
 
     name = "genetic"
@@ -147,7 +152,7 @@ class Genetic(SearchMethod):
         if self.options.surrogate:
             self.strings += new
         else:
-            # What is not among the best designs now will never be again.
+            # A design that is not among the best now never will be.
             good = [string for string in [*self.strings, *new] if not string.failed]
             self.strings = self._best(good, self.population)
 
@@ -159,7 +164,7 @@ class Genetic(SearchMethod):
         return self.genome.canonical(points)
 
     def _offspring(self) -> Array:
-        """Return designs that are not known, bred from the best; where they bring forth none, random ones."""
+        """Return new designs bred from the best; random ones if breeding gives none."""
         bred = np.empty((0, self.genes))
         for _ in range(_TRIES):
             more = self.genome.canonical(self.operators.bred(self.strings, self.population))
@@ -170,7 +175,7 @@ class Genetic(SearchMethod):
         return self._new(np.vstack([bred, drawn]))[: self.population]
 
     def _worth_most(self) -> Array:
-        """Return the designs that are worth most together by the surrogate."""
+        """Return the designs with the greatest joint worth according to the surrogate."""
         count = max(self.population, len(self.strings) // _GROWTH)
         self.belief.learn(self.strings, apart=SAME_PLACE)
         local = np.empty((0, self.genes))
@@ -184,10 +189,10 @@ class Genetic(SearchMethod):
         return np.vstack([local, worth.batch(evolved, count - len(local))])
 
     def _evolved(self, worth: Worth, count: int) -> Array:
-        """Return the strings of some generations on the surrogate, ``count`` in each, and as many random ones
-        in the first.
+        """Return the individuals of some generations on the surrogate, ``count`` in each.
 
-        Their fitness is what a run is worth for one cost, and the posterior means of several.
+        The first generation also has ``count`` random individuals. The fitness is the worth of a run for one
+        cost, and the posterior means for several.
         """
         belief, most = self.belief, _PARENTS * self.objectives
         parents = self._best(self._strings(belief.points[belief.chosen], belief.means), most)
@@ -202,12 +207,12 @@ class Genetic(SearchMethod):
         return np.vstack(drawn)
 
     def _open(self, points: Array) -> Array:
-        """Return the points that are not the trust region's, where there is one."""
+        """Return the points outside the trust region, if there is one."""
         points = self.genome.canonical(points)
         return points if self.local is None else points[self.region.outside(points)]
 
     def _best(self, strings: list[Individual], most: int) -> list[Individual]:
-        """Return the strings of so many that are selected as parents."""
+        """Return the individuals selected as parents, at most ``most`` of these."""
         if not strings:
             return []
         if self.objectives == 1:
@@ -215,13 +220,13 @@ class Genetic(SearchMethod):
         return list(tools.selNSGA2(strings, most, nd="log"))
 
     def _strings(self, points: Array, costs: Array | None = None) -> list[Individual]:
-        """Return strings, with costs where these are given."""
+        """Return individuals, with costs if given."""
         strings = [Individual(point, self.objectives) for point in points]
         for string, values in zip(strings, () if costs is None else costs, strict=False):
             string.fitness.values = tuple(map(float, values))
         return strings
 
     def _new(self, points: Array) -> Array:
-        """Return those of the points that are not known, each once, in their order."""
+        """Return the points that are not known, each once, in order."""
         rows = dict.fromkeys(map(tuple, points.tolist()))
         return np.array([row for row in rows if row not in self.known]).reshape(-1, self.genes)

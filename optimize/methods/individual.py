@@ -1,4 +1,4 @@
-"""Genetic strings as DEAP handles them."""
+"""Individuals (genetic strings) as DEAP handles them."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from tisim.optimize.problem.feasibility import total_violation
 
 @cache
 def minimised(objectives: int) -> type:
-    """Return the DEAP fitness of so many costs."""
+    """Return the DEAP fitness class for this number of costs."""
     return type(f"Minimised{objectives}", (base.Fitness,), {"weights": (-1.0,) * objectives})
 
 
 class Individual(list[float]):
-    """A genetic string: a point of the unit cube, its DEAP fitness (invalid until known) and its estimates.
+    """An individual: a point of the unit cube, its DEAP fitness (invalid until known) and its estimates.
 
-    estimates, confirmed : of the cost of each objective, from the search and from fresh starts; else ().
-    limited : the mean of each constraint of the result. violation : 0 where the design keeps to all of them.
+    estimates, confirmed : estimates of the cost of each objective, from the search and from held-out starts;
+        () if there are none.
+    limited : the mean of each constraint of the result.
+    violation : total constraint violation, 0 for a feasible design.
     """
 
     def __init__(self, genes: Iterable[float], objectives: int = 1) -> None:
@@ -33,12 +35,12 @@ class Individual(list[float]):
         self.violation = 0.0
 
     def know(self, estimates: tuple[FitnessEstimate, ...]) -> None:
-        """Take these estimates as its fitness."""
+        """Set these estimates as its fitness."""
         self.estimates = estimates
         self.fitness.values = tuple(estimate.mean for estimate in estimates)
 
     def limit(self, constraints: Sequence[InequalityConstraint], means: Sequence[float]) -> None:
-        """Take these means of the constraints of the result, in their order."""
+        """Set these means of the constraints of the result, in order."""
         self.limited = tuple(means)
         parts = [one.violation(mean) for one, mean in zip(constraints, means, strict=True)]
         self.violation = float(total_violation(parts))

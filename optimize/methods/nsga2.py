@@ -7,8 +7,10 @@ from tisim.optimize.problem.genome import Genome
 
 
 class Nsga2(Genetic):
-    """K. Deb, A. Pratap, S. Agarwal and T. Meyarivan, IEEE Trans. Evol. Comput. 6 (2002) 182-197: a short
-    name for ``genetic`` with ``surrogate=False``."""
+    """NSGA-II, a short name for ``genetic`` with ``surrogate=False``.
+
+    Source: K. Deb, A. Pratap, S. Agarwal and T. Meyarivan, IEEE Trans. Evol. Comput. 6 (2002) 182-197.
+    """
 
     name = "nsga2"
     Options = BreedingOptions

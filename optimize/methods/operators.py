@@ -21,9 +21,9 @@ from tisim.components.component import Checked
 from tisim.errors import Words, must
 
 _PREFIXES = {"select": "sel", "mate": "cx", "mutate": "mut"}
-"""The operators of a genetic algorithm, and how their names in deap.tools begin."""
+"""The operators of a genetic algorithm, and the prefixes of their names in deap.tools."""
 _ARITY = {"select": 2, "mate": 2, "mutate": 1}
-"""The arguments that DEAP calls them with."""
+"""Number of positional arguments in DEAP's calls of each operator."""
 _LARGEST = dict.fromkeys(("selRoulette", "selStochasticUniversalSampling"), "favours large fitness values")
 _FRONT = dict.fromkeys(
     ("selNSGA2", "selNSGA3", "selNSGA3WithMemory", "selSPEA2", "selTournamentDCD"),
@@ -32,15 +32,16 @@ _FRONT = dict.fromkeys(
 _SEVERAL = (
     "selTournamentDCD", "selRandom", "selLexicase", "selEpsilonLexicase", "selAutomaticEpsilonLexicase",
 )  # fmt: skip
-"""Selections in which all objectives count; others rank by the first, or leave no string out."""
+"""Selections that use all objectives; others rank by the first, or omit no individual."""
 
 
 class GeneticOperator(Checked):
-    """An operator of deap.tools by name, or a function of the user that is called as those are.
+    """An operator of deap.tools by name, or a user's function with the same signature.
 
-    options : keyword arguments. The bounds ``low`` and ``up`` of the unit cube are filled in where the
-    operator has such arguments and they are not given. checksum : of a function of the user, and of all that
-    it uses; it stands for the function in what is stored of a search.
+    options : keyword arguments. The bounds ``low`` and ``up`` of the unit cube are added if the operator has
+        such arguments and they are not given.
+    checksum : checksum of a user's function and of everything that it uses; it represents the function in the
+        stored settings of a search.
     """
 
     name: str
@@ -51,7 +52,7 @@ class GeneticOperator(Checked):
     @model_validator(mode="before")
     @classmethod
     def _called(cls, given: Any) -> Any:
-        """Return what a function, or a name alone, stands for."""
+        """Return the settings that a bare function or name stands for."""
         if isinstance(given, str):
             return {"name": given}
         if callable(given):
@@ -61,7 +62,9 @@ class GeneticOperator(Checked):
 
     def bound(self, role: str, objectives: int) -> tuple[Callable[..., Any], dict[str, Any]]:
         """Return the function for a role, ``select``, ``mate`` or ``mutate``, and its keyword arguments.
-        InputError unless name and arguments fit."""
+
+        InputError unless name and arguments are valid.
+        """
         function = self.function or self._of_deap(role, objectives)
         free = _parameters(function)[_ARITY[role] :]
         given = set(self.options)
@@ -86,7 +89,7 @@ class GeneticOperator(Checked):
 
 
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
-    """Return the parameters that can be given by name; of a function of C that does not tell them none."""
+    """Return the parameters that can be given by name; none for a C function without a signature."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except ValueError:
@@ -96,10 +99,10 @@ def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
 
 
 class Operators:
-    """A toolbox of DEAP: select, mate and mutate. Its random numbers are its own.
+    """A DEAP toolbox with select, mate and mutate, and its own random numbers.
 
-    crossover, mutation : probabilities that a pair is mated, and that a string is then mutated.
-    Raises InputError where the operators are not fit for strings of so many real genes: before any run.
+    crossover, mutation : probabilities that a pair is mated, and that an individual is then mutated.
+    Raises InputError, before any run, if the operators do not support strings of this number of real genes.
     """
 
     def __init__(
@@ -120,7 +123,7 @@ class Operators:
         self._rehearse({role: operator.name for role, operator in operators.items()})
 
     def bred(self, parents: Sequence[Individual], count: int) -> Array:
-        """Return the strings that parents of known fitness bring forth, (count, genes), in the unit cube."""
+        """Return the offspring of parents of known fitness, (count, genes), in the unit cube."""
         with self.random:
             selected = self._selected(list(parents), count + count % 2)
             children = [Individual(string, self.objectives) for string in selected]
@@ -133,23 +136,24 @@ class Operators:
         return np.clip(np.array(children[:count], dtype=float), 0.0, 1.0)
 
     def _selected(self, parents: list[Individual], count: int) -> list[Individual]:
-        """Return so many of the parents, however few these are."""
+        """Return ``count`` selected parents, with repetition if there are fewer."""
         tournament = self.toolbox.select.func is tools.selTournamentDCD
         if tournament and len(parents) < 4:
             parents = parents * (4 // len(parents) + 1)
         chosen: list[Individual] = []
         while len(chosen) < count:
-            if tournament:  # It takes fours, each of the parents twice at most.
+            if tournament:  # It selects a multiple of four, each parent at most twice.
                 fours = len(parents) // 4 * 4
                 more = self.toolbox.select(random.sample(parents, fours), fours)
-            else:  # Some return each of the parents once at most.
+            else:  # Some operators return each parent at most once.
                 more = self.toolbox.select(parents, count - len(chosen))
             must(len(more) > 0, "select", "a function that returns strings", more)
             chosen += more
         return chosen[:count]
 
     def _rehearse(self, names: Mapping[str, str]) -> None:
-        """Breed from throwaway strings, one of them failed, twice from the same random numbers."""
+        """Test the operators: breed from dummy individuals, one of them failed, twice with the same random
+        numbers."""
         state = self.random.state
         try:
             once = self._trial()

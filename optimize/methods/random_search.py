@@ -1,4 +1,4 @@
-"""Designs at random: what every other method must beat."""
+"""Random search: the baseline for all other methods."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from tisim.components.component import Checked
 
 
 class RandomSearchOptions(Checked):
-    """The settings of random search. population : strings per generation."""
+    """The settings of random search.
+
+    population : individuals in a generation.
+    """
 
     population: int = Field(20, ge=1)
 
@@ -25,7 +28,7 @@ class RandomSearchOptions(Checked):
 
 
 class RandomSearch(SearchMethod):
-    """Uniform over the whole range, whatever it is told."""
+    """Draws designs uniformly from the whole range, independent of earlier results."""
 
     name = "random"
     several = True
@@ -39,4 +42,4 @@ class RandomSearch(SearchMethod):
         return [Individual(point, self.objectives) for point in self.rng.random(self.shape)]
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
-        """Random search learns nothing from what its strings are worth."""
+        """Do nothing: random search does not learn."""

@@ -1,4 +1,4 @@
-"""DEAP draws from Python's random module; a search must not share its state with anyone."""
+"""Private random state for DEAP, which draws from Python's global random module."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ import numpy as np
 
 
 class OwnRandom:
-    """Within ``with``, the random module and that of NumPy have this object's states; afterwards the caller's
-    again. DEAP uses the first; operators of the user may use the second."""
+    """Within ``with``, the modules random and numpy.random have this object's states; afterwards the
+    caller's.
+
+    DEAP uses random; operators of the user may use numpy.random.
+    """
 
     def __init__(self, seed: int) -> None:
         legacy = np.random.RandomState(seed % 2**32)

@@ -1,4 +1,4 @@
-"""Z04's genetic algorithm, begun again around the best design whenever it has converged."""
+"""Z04's genetic algorithm, restarted around the best design whenever it has converged."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from tisim.optimize.problem.genome import Genome, SearchBox
 
 
 class RestartOptions(Breeding):
-    """The settings of ``zohdi``, and when to begin again.
+    """The settings of ``zohdi``, and the criteria for restarts.
 
-    stalled : generations without a better best, after which the search is taken to have converged.
-    smallest : width of the search box below which the next restart is in the whole range.
-    The box shrinks by recentre_factor at each restart, and is not moved between (recentre_every = 0).
+    stalled : number of generations without improvement after which the search counts as converged.
+    smallest : if the search box would become narrower than this, the next restart uses the whole range.
+
+    The box shrinks by recentre_factor at each restart, and does not move in between (recentre_every = 0).
     """
 
     recentre_every: int = Field(0, ge=0, le=0)
@@ -27,8 +28,8 @@ class RestartOptions(Breeding):
 class Restart(Zohdi):
     """Z04 section 7, option: "Rescale and restart the search around best design every few generations".
 
-    Where ``zohdi`` only draws its fresh strings from the rescaled box, here the whole population is drawn
-    anew from it, but for the best design: the parents, and what they have bred towards, are given up.
+    ``zohdi`` draws only its fresh individuals from the rescaled box. Here the whole population except the
+    best design is drawn anew from it; the other parents and their offspring are discarded.
     """
 
     name = "restart"

@@ -1,4 +1,4 @@
-"""Z04: T. I. Zohdi, Proc. R. Soc. Lond. A 460 (2004) 3421-3445, its genetic algorithm."""
+"""The genetic algorithm of Z04: T. I. Zohdi, Proc. R. Soc. Lond. A 460 (2004) 3421-3445."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Zohdi(SearchMethod):
         return self.next_strings or self.breeder.first()
 
     def learn(self, strings: Sequence[Individual]) -> None:
-        """Put the best of them, as many as there are parents, in the place of random strings."""
+        """Replace random individuals by the best of these, at most the number of parents."""
         good = [string for string in strings if not string.failed]
         best = tools.selBest(good, self.options.parents)
         population = self.next_strings or self.breeder.first()

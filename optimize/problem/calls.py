@@ -1,4 +1,5 @@
-"""Calls of the functions of a problem: whatever is wrong with one is said in a line, with its place."""
+"""Calls of the user's functions of a problem. An error in one is reported in one line, with its place in the
+file."""
 
 from __future__ import annotations
 
@@ -27,14 +28,17 @@ if TYPE_CHECKING:
     from tisim import Scene
 
 SOURCES = (".py", ".pyc", ".so", ".pyd")
-"""Files with these endings are opened by imports."""
+"""Endings of files that are opened by imports."""
 SYSTEM = tuple(map(Path, ("/usr", "/lib", "/etc", "/dev", "/proc", "/sys")))
-"""What is in these folders is no data of a user."""
+"""System folders, which contain no data of a user."""
 
 
 def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scene:
-    """Return the scene of a design. InputError where its function refuses the design, which is its right, or
-    the design does not keep to a constraint; FaultyProblem where the function is at fault."""
+    """Return the scene of a design.
+
+    InputError if its function refuses the design or the design violates a constraint; FaultyProblem if the
+    function fails.
+    """
     check_design(problem, design)
     rule = f"scene of problem {problem.name} must return a Scene, or raise InputError to refuse a design"
     try:
@@ -49,8 +53,8 @@ def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scen
 
 
 def check_design(problem: Problem, design: Mapping[str, Any]) -> None:
-    """Raise InputError for a design that does not keep to a constraint of the design, before anything of it
-    is made; FaultyProblem where such a function is at fault."""
+    """Raise InputError if a design violates a design constraint; FaultyProblem if a constraint function
+    fails."""
     for constraint in problem.design_constraints:
         value = constraint_value(constraint, design, problem)
         must(constraint.violation(value) == 0, constraint.name, constraint.rule,
@@ -58,8 +62,11 @@ def check_design(problem: Problem, design: Mapping[str, Any]) -> None:
 
 
 def values_of(objective: Objective, result: Any, problem: Problem) -> dict[str, float]:
-    """Return the values of an objective's quantities by name. FaultyProblem unless each is a real number, NaN
-    and infinity among them, and no file was read for it that is not in the files of the problem."""
+    """Return the values of an objective's quantities by name.
+
+    FaultyProblem unless each is a real number (NaN and infinity included) and only files listed in
+    ``Problem.files`` were read.
+    """
     what = f"objective {objective.name}"
     names = objective.statistic.quantities
     if not names:
@@ -72,14 +79,16 @@ def values_of(objective: Objective, result: Any, problem: Problem) -> dict[str, 
 
 
 def constraint_value(constraint: InequalityConstraint, of: Any, problem: Problem) -> float:
-    """Return the value of a constraint of a result, or of a design; as ``values_of`` an objective's."""
+    """Return the value of a constraint on a result or on a design, with the checks of ``values_of``."""
     what = f"constraint {constraint.name}"
     return _number(what, _called(what, "a number", constraint.of, of, problem))
 
 
 def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, frozenset[Path]]:
-    """Return what a plain function of a design gives, and the user's files that it has read. InputError where
-    it refuses the design, which is its right; FaultyProblem where it is at fault."""
+    """Return the value of a plain function of a design, and the user's files that it read.
+
+    InputError if it refuses the design; FaultyProblem if it fails.
+    """
     try:
         with _files_read() as read:
             value = of(*arguments)
@@ -92,14 +101,14 @@ def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, frozens
 
 
 def function_name(of: Callable[..., Any]) -> str:
-    """Return the name of a function, of that within a partial, or of the class of an object."""
+    """Return the name of a function, of the function in a partial, or of the class of an object."""
     while isinstance(of, functools.partial):
         of = of.func
     return getattr(of, "__name__", type(of).__name__).strip("<>")
 
 
 def _called(what: str, wanted: str, of: Callable[[Any], Any], argument: Any, problem: Problem) -> Any:
-    """Return what a function of the problem gives of a result or a design."""
+    """Return the value of a function of the problem for a result or a design."""
     rule = f"{what} must return {wanted}"
     known = {Path(file).resolve() for file in problem.files}
     try:
@@ -109,7 +118,7 @@ def _called(what: str, wanted: str, of: Callable[[Any], Any], argument: Any, pro
         raise
     except Exception as error:
         raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
-    # A plain function has read its files when it was called.
+    # A plain function read its files earlier, when it was called.
     if unknown := sorted(str(path) for path in (read | getattr(argument, "files_read", read)) - known):
         raise FaultyProblem(
             f"{what} must read no file but those in Problem(files=[...]), as its values "
@@ -119,7 +128,7 @@ def _called(what: str, wanted: str, of: Callable[[Any], Any], argument: Any, pro
 
 
 def _number(what: str, value: Any) -> float:
-    """Return what a function has given as a number of 64 bits."""
+    """Return a value of a user's function as a 64-bit float."""
     rule = f"{what} must return a number"
     if isinstance(value, np.ndarray) and value.shape == () and not np.ma.is_masked(value):
         value = value[()]
@@ -132,11 +141,11 @@ def _number(what: str, value: Any) -> float:
 
 
 class FaultyProblem(InputError):
-    """A function of a problem is at fault: the search ends, and what it has found so far stays."""
+    """A function of a problem fails: the search ends, and its results so far are kept."""
 
 
 def error_told(error: Exception) -> str:
-    """Return an error of a function of the user in a line, with its place in the user's file."""
+    """Return an error in a user's function as one line, with its place in the user's file."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [one for one in frames if _is_of_user(Path(one.filename))]
     place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
@@ -147,7 +156,7 @@ _reading = threading.local()
 
 
 def _note(event: str, arguments: tuple[Any, ...]) -> None:
-    """Note a file that is opened for reading while an objective is called in this thread."""
+    """Record a file that is opened for reading while an objective runs in this thread."""
     files: set[Path] | None = getattr(_reading, "files", None)
     if files is None or event != "open":
         return
@@ -157,7 +166,7 @@ def _note(event: str, arguments: tuple[Any, ...]) -> None:
     name = path.decode(errors="surrogateescape") if isinstance(path, bytes) else path
     writes = flags & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     if writes:
-        # What is read back later was written for that.
+        # A file that is read back later was written by the objective itself.
         _reading.written.add(Path(name).absolute())
     elif not name.endswith(SOURCES) and Path(name).absolute() not in _reading.written:
         files.add(Path(name).absolute())
@@ -168,9 +177,9 @@ _hook: list[Callable[..., Any]] = []
 
 @contextmanager
 def _files_read() -> Iterator[set[Path]]:
-    """Collect the paths of the user's files that are opened for reading within, links followed."""
+    """Collect the paths of the user's files that are opened for reading in the block, links resolved."""
     if not _hook:
-        # A hook is for ever.
+        # An audit hook cannot be removed.
         sys.addaudithook(_note)
         _hook.append(_note)
     found: set[Path] = set()
@@ -185,7 +194,8 @@ def _files_read() -> Iterator[set[Path]]:
 
 
 def _is_of_user(path: Path) -> bool:
-    """Return whether a file is neither installed, nor the system's, nor kept by a program in the home."""
+    """Return whether a file is neither installed, nor part of the system, nor in a program's folder in the
+    home."""
     installed = Path(sys.prefix), Path(sys.base_prefix), *own_folders()
     home = os.environ.get("HOME") or os.environ.get("USERPROFILE") or "."
     kept = tuple(Path(home) / name for name in (".cache", ".config", ".local", ".matplotlib"))

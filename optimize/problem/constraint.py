@@ -1,4 +1,4 @@
-"""What a design must keep to: an inequality of a quantity of its run, or of the design itself."""
+"""Constraints: inequalities on a quantity of a run, or on the design itself."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from tisim.errors import is_number, must
 
 @dataclass(frozen=True)
 class InequalityConstraint:
-    """A quantity that must not be above, or below, a bound. A design that keeps to all is feasible.
+    """An inequality: a quantity that must not exceed, or fall below, a bound. A feasible design satisfies
+    all.
 
-    name : heading in tables; unit : of the values, "" if they have none.
-    of : gives the value in that unit, of what the kind of constraint says.
-    at_most, at_least : the bounds, one or both; a value at a bound is allowed.
-    scale : the excess that counts as much as an excess of 1 of another constraint; None for the magnitude of
-        the bound, or 1 where that is 0. It orders infeasible designs among each other, and nothing else.
-    InputError for an empty name, for no bound, and for bounds that leave no value.
+    name : heading in tables; unit : of the values, "" if there is none.
+    of : function that returns the value in that unit; its argument depends on the kind of constraint.
+    at_most, at_least : the bounds, one or both; a value equal to a bound is allowed.
+    scale : the excess that counts the same as an excess of 1 of another constraint; None for the magnitude of
+        the bound, or 1 if the bound is 0. It only affects the ranking of infeasible designs.
+    InputError for an empty name, for no bound, and for bounds that allow no value.
     """
 
     name: str
@@ -46,12 +47,12 @@ class InequalityConstraint:
 
     @property
     def bounds(self) -> tuple[float, ...]:
-        """The bounds that there are."""
+        """The given bounds."""
         return tuple(bound for bound in (self.at_least, self.at_most) if bound is not None)
 
     @property
     def rule(self) -> str:
-        """What a value must be, in words: "at most 3 kg"."""
+        """The allowed values, in words: "at most 3 kg"."""
         named = (("at least", self.at_least), ("at most", self.at_most))
         words = [f"{side} {bound:.10g}" for side, bound in named if bound is not None]
         return f"{' and '.join(words)} {self.unit}".rstrip()
@@ -63,14 +64,14 @@ class InequalityConstraint:
 
     @property
     def described(self) -> str:
-        """All that decides what is allowed, in words; part of the identity of a search."""
+        """A text of the rule and scale; part of the identity of a search."""
         scale = "" if self.scale is None else f", scale {self.scale!r}"
         ends = f"{self.at_least!r} to {self.at_most!r}"
         return f"{ends} {self.unit}".rstrip() + f", of the {self.kind}{scale}"
 
     def violation(self, value: float) -> float:
-        """Return 0 where a value is allowed; else how far it is beyond the bound, in parts of ``scale``.
-        Infinite for what is no number."""
+        """Return 0 for an allowed value, else its distance from the bound divided by ``scale``. Infinite for
+        NaN."""
         if math.isnan(value):
             return math.inf
         below = 0.0 if self.at_least is None else (self.at_least - value) / self._scale(self.at_least)
@@ -83,15 +84,19 @@ class InequalityConstraint:
 
 @dataclass(frozen=True)
 class ResultConstraint(InequalityConstraint):
-    """An inequality of a run: ``of`` takes its Result (of a plain function its FunctionResult). Like an
-    objective it is a mean over the random starts."""
+    """An inequality on a run: ``of`` takes its Result, or the FunctionResult of a plain function.
+
+    The value that is compared is the mean over the random starts.
+    """
 
     kind = "result"
 
 
 @dataclass(frozen=True)
 class DesignConstraint(InequalityConstraint):
-    """An inequality of a design: ``of`` takes its values by name. It is known before anything runs, so that a
-    design that does not keep to it costs no run."""
+    """An inequality on a design: ``of`` takes its values by name.
+
+    It is checked before anything runs, so a design that violates it costs no run.
+    """
 
     kind = "design"

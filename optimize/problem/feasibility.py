@@ -1,12 +1,14 @@
-"""Which of two designs is better where there are constraints: feasibility first.
+"""The order of designs under constraints: feasible designs come first.
 
-Of two feasible designs the better one counts, a feasible one is better than one that is not, and of two that
-are not feasible the one that violates less is better: K. Deb, Comput. Methods Appl. Mech. Eng. 186 (2000)
-311-338, section 3; for several objectives, where the better one dominates: K. Deb et al., IEEE Trans. Evol.
-Comput. 6 (2002) 182-197, section VI. So no weight of a penalty is to be chosen.
+Of two feasible designs the one with the better cost is better; a feasible design is better than an infeasible
+one; of two infeasible designs the one with the smaller violation is better. With several objectives, "better
+cost" means that one dominates the other. No penalty weight has to be chosen.
 
-Costs are of shape (designs,) or (designs, objectives) and to be minimised. Violations are totals of designs,
-shape (designs,), 0 for feasible ones; infinite for a design that failed, whose values nobody knows.
+Costs have the shape (designs,) or (designs, objectives) and are minimised. Violations are the totals of
+designs, shape (designs,): 0 for feasible ones, infinite for a failed design, whose values are not known.
+
+Source: K. Deb, Comput. Methods Appl. Mech. Eng. 186 (2000) 311-338, section 3; for several objectives K. Deb
+et al., IEEE Trans. Evol. Comput. 6 (2002) 182-197, section VI.
 """
 
 from __future__ import annotations
@@ -16,14 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def total_violation(violations: ArrayLike) -> NDArray[np.float64]:
-    """Return the sum over the constraints, the last axis, of scaled excesses
-    (``InequalityConstraint.violation``)."""
+    """Return the sum of scaled excesses (``InequalityConstraint.violation``) over the constraints, the last
+    axis."""
     return np.sum(np.asarray(violations, dtype=float), axis=-1)
 
 
 def beats(costs: ArrayLike, violation: float, other_costs: ArrayLike, other_violation: float) -> bool:
-    """Return whether a design is better than another one: feasible before infeasible, then by violation; two
-    feasible ones by their costs, of several objectives one that dominates."""
+    """Return whether a design is better than another: feasible before infeasible, then by violation; two
+    feasible ones by cost, or by dominance for several objectives."""
     if violation > 0 or other_violation > 0:
         return bool(violation < other_violation)
     mine, others = np.atleast_1d(costs), np.atleast_1d(other_costs)
@@ -31,8 +33,11 @@ def beats(costs: ArrayLike, violation: float, other_costs: ArrayLike, other_viol
 
 
 def ranks(costs: ArrayLike, violations: ArrayLike) -> NDArray[np.intp]:
-    """Return at which place each design is, from 0: of one objective by its cost, equal costs sharing a
-    place; of several by its front. Behind all feasible designs the others, by their violation."""
+    """Return the rank of each design, from 0.
+
+    Feasible designs are ranked by cost, equal costs sharing a rank; with several objectives by front.
+    Infeasible designs follow, by their violation.
+    """
     values, excess = _checked(costs, violations)
     place = np.zeros(len(excess), dtype=np.intp)
     feasible = excess == 0
@@ -43,11 +48,13 @@ def ranks(costs: ArrayLike, violations: ArrayLike) -> NDArray[np.intp]:
 
 
 def penalised(costs: ArrayLike, violations: ArrayLike) -> NDArray[np.float64]:
-    """Return costs that put these designs into the order of feasibility first, for a method that knows costs
-    only: those of infeasible designs are the worst of the feasible ones plus the violation, in each
-    objective; the worst is taken for 0 where no design is feasible (Deb 2000, section 3).
+    """Return costs that sort designs feasible-first, for a method that only knows costs.
 
-    They compare the designs of one call; those of another may have another worst one.
+    The cost of an infeasible design is the worst feasible cost plus the violation, in each objective. Without
+    a feasible design the worst cost is taken as 0. Only costs from the same call can be compared, since the
+    worst feasible cost may differ in another call.
+
+    Source: Deb 2000, section 3.
     """
     values, excess = _checked(costs, violations)
     infeasible = excess > 0
@@ -58,13 +65,13 @@ def penalised(costs: ArrayLike, violations: ArrayLike) -> NDArray[np.float64]:
 
 
 def _checked(costs: ArrayLike, violations: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return costs, shape (designs, objectives), in an array of their own, and violations."""
+    """Return a copy of the costs, shape (designs, objectives), and the violations."""
     values, excess = np.array(costs, dtype=float), np.asarray(violations, dtype=float)
     return values if values.ndim == 2 else values[:, None], excess
 
 
 def _fronts(costs: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return in which front each design is, 0 for those that nothing dominates."""
+    """Return the front of each design, 0 for non-dominated ones."""
     if costs.shape[1] == 1:
         return np.unique(costs[:, 0], return_inverse=True)[1]
     no_worse = np.all(costs[:, None] <= costs[None], axis=2)

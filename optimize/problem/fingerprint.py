@@ -1,10 +1,10 @@
-"""Fingerprints of functions: checksums that differ where a function may give something else.
+"""Fingerprints of functions: checksums that change whenever a function may return something else.
 
-An objective is a function, and the cache of a search reuses the values that it gave. So the key of a value
-has the code of the function and all that it is bound to: arguments of a ``functools.partial``, variables of
-the functions around it, default values, attributes of objects, global variables that it names, and the same
-of each function that it calls. Two equal fingerprints stand for equal functions, in any process. What cannot
-be compared by its value is refused.
+The cache of a search reuses the values of objectives, which are functions. The key of a value therefore
+includes the code of the function and everything that it is bound to: arguments of a ``functools.partial``,
+variables of enclosing functions, default values, attributes of objects, the global variables that it names,
+and the same for each function that it calls. Equal fingerprints mean equal functions, in any process. An
+object that cannot be compared by value is refused.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ from tisim.errors import InputError, abbreviated
 from tisim.files.python_file import is_own, sha256
 
 BY_REPR = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
-"""Types whose ``repr`` says all of a value."""
+"""Types whose values are fully described by ``repr``."""
 
 
 def fingerprint(value: Any, what: str = "") -> str:
     """Return the fingerprint of a function, or of another value, hex.
 
-    what : it, in the InputError that is raised where it is bound to something that cannot be compared; where
-    it is empty, such a thing counts by its class alone.
+    what : name of the value in the InputError that is raised if it is bound to an object that cannot be
+        compared. If it is empty, no error is raised, and only the class of such an object counts.
     """
     return _Fingerprint(what).of(value).hex()
 
 
 class _Fingerprint:
-    """A walk through what a value is made of; an object that is part of itself is entered once."""
+    """A recursive walk through the parts of a value; an object that contains itself is entered once."""
 
     def __init__(self, what: str) -> None:
         self.what = what
         self.depths: dict[int, int] = {}
-        # With the object, or another one could come to have the same number.
+        # The object is kept, too: otherwise a later object could get the same id.
         self.known: dict[int, tuple[Any, bytes]] = {}
 
     def of(self, value: Any) -> bytes:
@@ -69,7 +69,7 @@ class _Fingerprint:
         return digest
 
     def parts(self, value: Any) -> Iterator[bytes | str]:
-        """Yield what a value is made of."""
+        """Yield the parts of a value."""
         kind = type(value)
         yield f"{kind.__module__}.{kind.__qualname__}"
         if isinstance(value, types.FunctionType):
@@ -94,12 +94,12 @@ class _Fingerprint:
             yield from self.object(value)
 
     def unordered(self, items: Iterable[Any]) -> Iterator[bytes]:
-        """Yield the digests of items in an order of their own."""
+        """Yield the digests of items, sorted."""
         yield from sorted(map(self.of, items))
 
     def named(self, value: Any) -> Iterator[bytes | str]:
-        """Yield the name of a class, a module or a built-in function; of a class of the user its members
-        too, and of a module of the user its file."""
+        """Yield the name of a class, module or built-in function; for a user's class also its members, and
+        for a user's module its file."""
         yield f"{getattr(value, '__module__', '')}:{getattr(value, '__qualname__', value.__name__)}"
         if isinstance(value, type) and _of_user(value):
             yield from map(self.of, value.__bases__)
@@ -113,7 +113,7 @@ class _Fingerprint:
             yield self.of(own)
 
     def member(self, name: str, member: Any) -> Iterator[bytes | str]:
-        """Yield a member of a class of the user: a method, or a value that is not made by Python itself."""
+        """Yield a member of a user's class: a method, or a value that Python did not create itself."""
         function = next(
             (getattr(member, at) for at in ("__func__", "fget", "func") if hasattr(member, at)), member
         )
@@ -123,8 +123,11 @@ class _Fingerprint:
             yield from (name, self.of(member))
 
     def function(self, function: types.FunctionType) -> Iterator[bytes | str]:
-        """Yield what a function is: by its name where it is of a package, which has a version; by its code
-        and the globals that this names where it is the user's. And what it is bound to."""
+        """Yield the parts of a function, and all values that it is bound to.
+
+        A function of a package, which has a version, is identified by its name; a user's function by its code
+        and the globals that the code names.
+        """
         yield f"{function.__module__}:{function.__qualname__}"
         if hasattr(function, "__wrapped__"):
             yield self.of(function.__wrapped__)
@@ -143,12 +146,12 @@ class _Fingerprint:
                 value = function.__globals__[name]
                 yield from (name, self.of(value))
                 if isinstance(value, types.ModuleType) and _of_user(value):
-                    # What is named of it, such as ``target`` in ``settings.target``.
+                    # The attributes that the code names, such as ``target`` in ``settings.target``.
                     for attribute in sorted(names & vars(value).keys()):
                         yield from (attribute, self.of(vars(value)[attribute]))
 
     def code(self, code: types.CodeType, names: set[str]) -> Iterator[bytes | str]:
-        """Yield a code, without its places in a file, and add the names that it uses."""
+        """Yield a code object without its line numbers, and add the names that it uses to ``names``."""
         names.update(code.co_names)
         yield from (code.co_code, repr(code.co_names), repr(code.co_varnames), repr(code.co_freevars))
         for constant in code.co_consts:
@@ -158,10 +161,10 @@ class _Fingerprint:
                 yield self.of(constant)
 
     def object(self, value: Any) -> Iterator[bytes | str]:
-        """Yield an object by its class and its attributes; one without any, by its pickle."""
+        """Yield an object by its class and attributes; an object without attributes by its pickle."""
         yield self.of(type(value))
         if isinstance(value, BaseModel):
-            # Of those of tisim not what they have computed of their fields since.
+            # Only the fields of a model count, not values computed from them later.
             yield self.of({name: getattr(value, name) for name in type(value).model_fields})
             if _of_user(type(value)):
                 yield self.of([value.__pydantic_private__, value.__pydantic_extra__])
@@ -189,7 +192,7 @@ class _Fingerprint:
 
 
 def _digest(*parts: bytes | str) -> bytes:
-    """Return the SHA-256 of parts, each with its length."""
+    """Return the SHA-256 of parts, each preceded by its length."""
     total = hashlib.sha256()
     for part in parts:
         data = part.encode(errors="surrogatepass") if isinstance(part, str) else part
@@ -199,15 +202,16 @@ def _digest(*parts: bytes | str) -> bytes:
 
 
 def _plain_attributes(kind: type) -> bool:
-    """Return whether all classes of an object are made in Python, so that its attributes are all of it."""
+    """Return whether all classes of an object are defined in Python, so that its attributes describe it
+    completely."""
     return kind.__reduce__ is object.__reduce__ and all(
         base is object or base.__flags__ & (1 << 9) for base in kind.__mro__
     )
 
 
 def _of_user(item: Callable[..., Any] | type | types.ModuleType) -> bool:
-    """Return whether a function, class or module is of a file of the user, a notebook or a terminal: neither
-    of tisim, nor of Python, nor installed."""
+    """Return whether a function, class or module is the user's: from a file, a notebook or a terminal, and
+    not from tisim, Python or an installed package."""
     whose = item.__name__ if isinstance(item, types.ModuleType) else getattr(item, "__module__", None) or ""
     root = whose.partition(".")[0]
     if is_own(whose) or root in sys.stdlib_module_names - {"__main__"}:

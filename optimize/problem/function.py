@@ -1,7 +1,7 @@
-"""A plain function of a design in the place of a scene: what it gives is judged, and nothing is simulated.
+"""A plain function of a design that replaces the simulation.
 
-A problem makes of each design a ``FunctionCall``, as others make a scene, and running it gives a
-``FunctionResult``, of which objectives and constraints read their values.
+A problem turns each design into a ``FunctionCall``, in the way that others make a scene. Running it returns a
+``FunctionResult``, from which objectives and constraints read their values.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from tisim.errors import InputError, abbreviated, must
 
 @dataclass(frozen=True)
 class PlainFunction:
-    """Makes of a design the call of a function, in the place of ``Problem.scene``.
+    """Turns a design into a call of a function; takes the place of ``Problem.scene``.
 
-    of : f(design) or f(design, seed) -> a number, several, or a dictionary of them by name. It takes a seed
-    where its second parameter must be given, or is named seed; else its value is one of the design alone, and
-    one call of each design is enough. It may raise InputError for a design that cannot be.
+    of : f(design) or f(design, seed) -> one number, several, or a dictionary by name. The seed is passed if
+        the second parameter is required, or is named seed; otherwise the value depends on the design alone,
+        and each design is called once. It may raise InputError to refuse a design.
     """
 
     of: Callable[..., Any]
@@ -39,7 +39,7 @@ class PlainFunction:
 
     @cached_property
     def takes_seed(self) -> bool:
-        """Whether its values have noise."""
+        """Whether its values depend on a seed."""
         try:
             parameters = [*inspect.signature(self.of).parameters.values()]
         except (TypeError, ValueError):
@@ -53,23 +53,24 @@ class PlainFunction:
 
 @dataclass(frozen=True)
 class FunctionCall:
-    """A call of a function that is to be made: of a design, from the seed of a random start if it has one."""
+    """A call to be made: the function, a design, and the seed of a random start if the function takes one."""
 
     of: Callable[..., Any]
     design: Mapping[str, Any]
     seed: int | None
 
     def digest(self) -> str:
-        """Return a checksum of its arguments; that of the function is in ``Problem.objective_identity``."""
+        """Return a checksum of its arguments; the checksum of the function is in
+        ``Problem.objective_identity``."""
         arguments = json.dumps(["function", dict(self.design), self.seed], sort_keys=True)
         return hashlib.sha256(arguments.encode()).hexdigest()
 
     def structure(self) -> str:
-        """Return what calls that go side by side have in common."""
+        """Return the key that calls of one batch share."""
         return "function"
 
     def run(self) -> FunctionResult:
-        """Call it. A design that it refuses is a failed result; FaultyProblem where it is at fault."""
+        """Call the function. A refused design gives a failed result; FaultyProblem if the function fails."""
         begun = time.perf_counter()
         arguments = (dict(self.design),) if self.seed is None else (dict(self.design), self.seed)
         try:
@@ -84,9 +85,9 @@ class FunctionCall:
 
 @dataclass(frozen=True)
 class FunctionResult:
-    """What a plain function has given.
+    """The result of a plain function.
 
-    value : as it was returned. status, wall_s, work : as of ``tisim.Result``. files_read : files of the user.
+    value : the returned value. status, wall_s, work : as in ``tisim.Result``. files_read : user's files read.
     """
 
     design: Mapping[str, Any]
@@ -99,7 +100,7 @@ class FunctionResult:
 
 @dataclass(frozen=True)
 class ValueOf:
-    """Reads a value of a function's result: by name of a dictionary, else by its place among so many.
+    """Reads a value from the result of a function: by name from a dictionary, else by its position.
 
     function : its name, for messages.
     """

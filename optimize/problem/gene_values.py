@@ -11,15 +11,15 @@ import numpy as np
 from tisim.errors import is_number, must
 
 Value = float | int | str | bool
-"""What a gene may be in a design."""
+"""The value of a gene in a design."""
 WHOLE_WITHIN = 2**50
-"""Whole numbers between plus and minus this have a middle of their cell that is told from its ends."""
+"""The largest magnitude of an integer gene; beyond it, the centre and ends of a cell are not distinct."""
 LONGEST_CHOICE = 40
-"""Texts of more characters are wider than the tables of a terminal."""
+"""Longest text of a choice, in characters, so that it fits the tables of a terminal."""
 
 
 class Named:
-    """What all kinds of genes have."""
+    """Base class of all genes."""
 
     name: str
     unit: str
@@ -36,7 +36,7 @@ def check_name(name: Any) -> None:
 
 
 def plain_value(value: Any, what: str) -> Value:
-    """Return a value of a design as Python has it; InputError unless it is one."""
+    """Return a value of a design as a plain Python object; InputError if it is not allowed."""
     if isinstance(value, np.ndarray) and value.shape == ():
         value = value[()]
     value = value.item() if isinstance(value, np.generic) else value
@@ -49,10 +49,10 @@ def plain_value(value: Any, what: str) -> Value:
     must(is_number(value), what, "a text, a number or a flag", value)
     whole = isinstance(value, numbers.Integral)
     able = abs(value) <= WHOLE_WITHIN if whole else math.isfinite(value)
-    must(able, what, "finite, and within +-2^50 where it is whole", value)
+    must(able, what, "finite, and within +-2^50 if it is whole", value)
     return int(value) if whole else float(value)
 
 
 def brief(value: Value) -> str:
-    """Return a value of a design with four digits, or as it is where it is no number with a fraction."""
+    """Return a value of a design with four digits; texts, flags and integers unchanged."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

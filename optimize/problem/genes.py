@@ -1,7 +1,7 @@
-"""Genes that are searched: numbers, whole numbers and choices.
+"""Genes that are searched: real numbers, integers and choices.
 
-Each has one coordinate u of the unit cube. A whole number or a choice has a cell of that, 0..1
-being divided among its values, and every u of a cell stands for the same value.
+Each gene has one coordinate u, 0..1, of the unit cube. For an integer or a choice the interval 0..1 is
+divided into cells, one for each value, and every u in a cell decodes to the value of that cell.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from tisim.errors import InputError, abbreviated, is_number, must
 
 Scale = Literal["linear", "log"]
 NEAR = 64
-"""The inverse of a scale is looked for among so many neighbours at either side of what its formula gives."""
+"""Number of neighbours on either side of the formula's result that are tried as the exact inverse of a
+scale."""
 
 
 @dataclass(frozen=True)
 class Gene(Named):
     """A number that is searched.
 
-    name : the key of the design; unit : for people, "" if it has none.
-    low, high : the full search range in that unit, both ends within it, low < high.
-    scale : "linear", or "log" when the range spans decades (low > 0); the search is uniform on this scale.
-    integer : whether only whole numbers are meant. On the linear scale all have equal parts of 0..1; on the
-    log scale k has the part of it between k - 1/2 and k + 1/2.
+    name : the key in a design; unit : for display, "" if there is none.
+    low, high : the search range in that unit, both ends included, low < high.
+    scale : "linear", or "log" for a range that spans decades (low > 0); the search is uniform on this scale.
+    integer : whether only integers are allowed. On the linear scale all integers have equal parts of 0..1; on
+        the log scale k has the part between k - 1/2 and k + 1/2.
     Raises InputError for an empty name, a range that is not finite and increasing, or an unknown scale.
     """
 
@@ -49,7 +50,7 @@ class Gene(Named):
             if self.integer:
                 whole = float(value).is_integer() and abs(value) <= WHOLE_WITHIN
                 must(whole, f"{which} of integer gene {self.name}", "a whole number within +-2^50", value)
-            # In 8 bits a range of 200 is below 0.
+            # A range of 200 overflows an 8-bit NumPy integer.
             object.__setattr__(self, which, int(value) if self.integer else float(value))
         finite = math.isfinite(self.low) and math.isfinite(self.high)
         must(
@@ -75,7 +76,7 @@ class Gene(Named):
 
     @property
     def described(self) -> str:
-        """All that decides what it stands for, in words; part of the identity of a search."""
+        """A text of all properties that define the gene; part of the identity of a search."""
         words = f"{self.low!r} to {self.high!r} {self.unit}".rstrip() + f", {self.scale}"
         return f"{words}, whole" if self.integer else words
 
@@ -90,8 +91,10 @@ class Gene(Named):
         return float(min(max(value, self.low), self.high))
 
     def encode(self, value: Any) -> float:
-        """Return a u that decodes to the value: for a number that has been decoded, to its last bit.
-        InputError outside the range."""
+        """Return a u that decodes to the value, to the last bit if the value was itself decoded.
+
+        InputError outside the range.
+        """
         within = is_number(value) and self.low <= value <= self.high
         within = within and (not self.integer or float(value).is_integer())
         kind = "a whole number" if self.integer else "a number"
@@ -107,15 +110,16 @@ class Gene(Named):
         return min(_neighbours(u), key=lambda near: abs(self.decode(near) - number))
 
     def snap(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return for each u that which stands for its value: the middle of its cell, or itself."""
+        """Return for each u the canonical u of its value: the centre of its cell, or u itself for a real
+        number."""
         return self._middles(self._places(u)) if self.integer else u
 
     def features(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the columns of the values at u, shape (points, 1), for a surrogate."""
+        """Return the feature columns of the values at u, shape (points, 1), for a surrogate."""
         return self.snap(u)[:, None]
 
     def parse(self, text: str) -> float | int:
-        """Return the value that a cell of a table has; InputError where it is no number."""
+        """Return the value in a cell of a table; InputError if it is not a number."""
         try:
             number = float(text)
         except ValueError:
@@ -124,7 +128,7 @@ class Gene(Named):
         return int(number) if self.integer and number.is_integer() else number
 
     def _places(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return at which place from 0 the whole numbers at u are."""
+        """Return the index, from 0, of the integer at each u."""
         last = self.high - self.low
         if self.scale == "linear":
             return np.clip(np.floor(u * (last + 1)), 0, last)
@@ -132,7 +136,7 @@ class Gene(Named):
         return np.clip(np.floor(np.exp(bottom + u * span) + 0.5) - self.low, 0, last)
 
     def _middles(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the middles of the cells of the whole numbers at these places."""
+        """Return the cell centres of the integers with these indices."""
         if self.scale == "linear":
             return (places + 0.5) / (self.high - self.low + 1)
         bottom, span = self._log_ends()
@@ -140,17 +144,18 @@ class Gene(Named):
         return (0.5 * (np.log(k - 0.5) + np.log(k + 0.5)) - bottom) / span
 
     def _log_ends(self) -> tuple[float, float]:
-        """Return where the log scale of whole numbers begins, and its length."""
+        """Return the lower end and the length of the log scale of integers."""
         bottom = math.log(self.low - 0.5)
         return bottom, math.log(self.high + 0.5) - bottom
 
 
 @dataclass(frozen=True)
 class Choice(Named):
-    """One of several texts, numbers or flags, each with the same part of 0..1.
+    """One of several texts, numbers or flags, each with an equal part of 0..1.
 
-    choices : at least two, all different; texts, or numbers, or flags, or texts among others. ordered :
-    whether neighbours in the list are alike, as in (32, 64, 128); else each is as far from any other.
+    choices : at least two, all different: texts, numbers, flags, or a mixture that contains texts.
+    ordered : whether neighbours in the list are similar, as in (32, 64, 128); otherwise all choices are
+        equally far from each other.
     """
 
     name: str
@@ -183,35 +188,38 @@ class Choice(Named):
 
     @property
     def described(self) -> str:
-        """All that decides what it stands for, in words; part of the identity of a search."""
+        """A text of all properties that define the gene; part of the identity of a search."""
         return (
             f"one of {', '.join(map(repr, self.choices))} {self.unit}".rstrip() + ", ordered" * self.ordered
         )
 
     def decode(self, u: float) -> Value:
-        """Return the choice in whose part of 0..1 u is."""
+        """Return the choice whose part of 0..1 contains u."""
         return self.choices[int(self._places(np.array([u]))[0])]
 
     def encode(self, value: Any) -> float:
-        """Return the middle of the part of a choice; InputError for none of them."""
+        """Return the centre of the part of a choice; InputError for any other value."""
         value = value.item() if isinstance(value, np.generic) else value
         known = [k for k, choice in enumerate(self.choices) if _same(choice, value)]
         must(bool(known), f"gene {self.name}", f"one of {', '.join(map(repr, self.choices))}", value)
         return (known[0] + 0.5) / len(self.choices)
 
     def snap(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return for each u the middle of its part of 0..1."""
+        """Return for each u the centre of its part of 0..1."""
         return (self._places(u) + 0.5) / len(self.choices)
 
     def features(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the columns of the choices at u for a surrogate: a column for each choice, so scaled that
-        two different ones are at distance 1; one column where they are ordered."""
+        """Return the feature columns of the choices at u for a surrogate.
+
+        An ordered gene has one column. Otherwise there is a column for each choice, scaled so that any two
+        choices are at distance 1.
+        """
         if self.ordered:
             return self.snap(u)[:, None]
         return (self._places(u)[:, None] == np.arange(len(self.choices))) / math.sqrt(2.0)
 
     def parse(self, text: str) -> Value:
-        """Return the choice that a cell of a table has; InputError where it has none."""
+        """Return the choice in a cell of a table; InputError if it is none of them."""
         for choice in self.choices:
             if text.strip() == str(choice) or (is_number(choice) and _number(text) == choice):
                 return choice
@@ -228,7 +236,7 @@ Searched = Gene | Choice
 
 
 def _same(one: Value, other: Any) -> bool:
-    """Return whether two values are equal, a flag being no number."""
+    """Return whether two values are equal; a flag does not equal a number."""
     return isinstance(one, bool) == isinstance(other, bool) and bool(one == other)
 
 
@@ -240,7 +248,10 @@ def _number(text: str) -> float:
 
 
 def _neighbours(u: float) -> list[float]:
-    """Return u in 0..1 and what is next to it, the nearest first: steps of its own last bit, in which a value
-    is told from the next near 0, and of the last bit of 1, by which a logarithm may be wrong."""
+    """Return u in 0..1 and its neighbours, nearest first.
+
+    They differ by steps of the last bit of u, which separate values near 0, and by steps of the last bit of
+    1, the possible error of a logarithm.
+    """
     steps = sorted((k * size for k in range(-NEAR, NEAR + 1) for size in (math.ulp(u), 2.0**-56)), key=abs)
     return [min(max(u + step, 0.0), 1.0) for step in steps]

@@ -52,12 +52,14 @@ class Genome:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What each coordinate is: "real", "integer", "ordered" or "category"."""
+        """The kind of each coordinate: "real", "integer", "ordered" or "category"."""
         return tuple(gene.kind for gene in self.searched)
 
     def decode(self, u: Sequence[float] | NDArray[np.float64]) -> dict[str, Any]:
         """Return the design in physical units of a point u, shape (searched genes,), of the unit cube.
-        InputError outside it."""
+
+        InputError outside it.
+        """
         point = np.asarray(u, dtype=float)
         must(point.shape == (len(self),), "unit-cube point", f"of shape ({len(self)},)", point.shape)
         must(bool(np.all((point >= 0) & (point <= 1))), "unit-cube point", "within 0..1", point.tolist())
@@ -66,10 +68,11 @@ class Genome:
         )
 
     def encode(self, design: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Return a point of the unit cube that decodes to a design, one that was decoded to its last bit.
+        """Return a point of the unit cube that decodes to a design, to the last bit if the design was itself
+        decoded.
 
-        Dependent genes are not looked at. InputError for a gene that is missing, unknown or out of its range,
-        and for a fixed one of another value.
+        Dependent genes are ignored. InputError for a gene that is missing, unknown or out of its range, and
+        for a fixed gene with another value.
         """
         whole = self.complete(design)
         for gene in self.genes:
@@ -78,8 +81,11 @@ class Genome:
         return np.array([gene.encode(whole[gene.name]) for gene in self.searched])
 
     def complete(self, design: Mapping[str, Any], what: str = "design") -> dict[str, Any]:
-        """Return a design with its fixed and dependent values, in the order of the genome. InputError, naming
-        it as ``what``, where a searched gene is missing, or one is unknown."""
+        """Return a design with its fixed and dependent values, in the order of the genome.
+
+        InputError if a searched gene is missing or a gene is unknown; ``what`` names the design in the
+        message.
+        """
         searched = [gene.name for gene in self.searched]
         right = set(searched) <= set(design) <= set(self.names)
         must(right, what, f"of the genes {', '.join(searched)}", [*design])
@@ -91,8 +97,11 @@ class Genome:
         return {name: values[name] for name in self.names}
 
     def parse(self, row: Mapping[str, str]) -> dict[str, Any]:
-        """Return the design in a row of a CSV file, texts by heading: names of genes, or their labels as in
-        best.csv. Other columns are not looked at. InputError for a searched gene without one."""
+        """Return the design in a row of a CSV file, texts by heading: gene names, or their labels as in
+        best.csv.
+
+        Other columns are ignored. InputError if a searched gene has no column.
+        """
         design = {}
         for gene in self.searched:
             heading = gene.label if gene.label in row else gene.name
@@ -113,41 +122,46 @@ class Genome:
         return Genome(tuple(genes.values()))
 
     def canonical(self, u: ArrayLike) -> NDArray[np.float64]:
-        """Return the point that stands for all that decode to the same design: in the middle of the cells of
-        whole numbers and choices. u : shape (..., searched genes)."""
+        """Return the canonical one of all points that decode to the same design: the cell centres of integers
+        and choices.
+
+        u : shape (..., searched genes).
+        """
         points = np.array(u, dtype=float)
         for k, gene in enumerate(self.searched):
             points[..., k] = gene.snap(points[..., k])
         return points
 
     def features(self, u: ArrayLike) -> NDArray[np.float64]:
-        """Return the columns by which a surrogate knows designs, shape (points, columns): the same for all
-        points of one design. Numbers have their place in 0..1, whole ones the middle of their cell; a choice
-        has a column for each of its values, any two of them at distance 1.
+        """Return the features of designs for a surrogate, shape (points, columns): equal for all points of
+        one design.
 
-        E. C. Garrido-Merchan and D. Hernandez-Lobato, Neurocomputing 380 (2020) 20-35: a Gaussian process of
-        points that are rounded before its kernel sees them. u : shape (points, searched genes).
+        A number has its position in 0..1, an integer the centre of its cell; a choice has a column for each
+        of its values, any two of them at distance 1. u : shape (points, searched genes).
+
+        Source: E. C. Garrido-Merchan and D. Hernandez-Lobato, Neurocomputing 380 (2020) 20-35: a Gaussian
+        process of points that are rounded before they enter its kernel.
         """
         points = np.atleast_2d(np.asarray(u, dtype=float))
         return np.hstack([gene.features(points[:, k]) for k, gene in enumerate(self.searched)])
 
     @property
     def feature_genes(self) -> NDArray[np.intp]:
-        """For each column of ``features`` which coordinate it is of, so that those of a choice can have one
+        """The coordinate that each column of ``features`` belongs to. All columns of a choice share one
         length scale."""
         return np.repeat(np.arange(len(self)), [gene.width for gene in self.searched])
 
 
 @dataclass(frozen=True, eq=False)
 class SearchBox:
-    """The part of the unit cube that fresh strings are drawn from: arrays low and high, shape (genes,)."""
+    """The part of the unit cube that new individuals are drawn from: arrays low and high, shape (genes,)."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
     @classmethod
     def full(cls, genes: int) -> SearchBox:
-        """Return the whole unit cube of that many genes."""
+        """Return the whole unit cube for this number of genes."""
         return cls(np.zeros(genes), np.ones(genes))
 
     @property
@@ -161,9 +175,11 @@ class SearchBox:
     def recentre(self, best: ArrayLike, factor: float) -> SearchBox:
         """Return the box shrunk by factor (0 < factor <= 1) around best, shifted to stay in the unit cube.
 
-        The new box contains best but may reach beyond the old one, so an optimum that an earlier box cut
-        off can still be found. Z04 section 8: every four generations the search domain was restricted and
-        rescaled to be centred around the best parameter set. InputError outside the unit cube.
+        The new box contains best but may extend beyond the old one, so an optimum that an earlier box
+        excluded can still be found. InputError outside the unit cube.
+
+        Source: Z04 section 8: every four generations the search domain was restricted and rescaled to be
+        centred around the best parameter set.
         """
         centre = np.asarray(best, dtype=float)
         must(0 < factor <= 1, "recentre factor", "within 0 < factor <= 1", factor)

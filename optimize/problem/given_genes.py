@@ -1,4 +1,4 @@
-"""Genes that are in a design and are not searched: fixed values, and those that follow from the others."""
+"""Genes in a design that are not searched: fixed ones, and ones that depend on the others."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ class FixedGene(Named):
 
     @property
     def described(self) -> str:
-        """All that decides what it stands for, in words; part of the identity of a search."""
+        """A text of all properties that define the gene; part of the identity of a search."""
         return f"{self.value!r} {self.unit}".rstrip() + ", fixed"
 
 
 @dataclass(frozen=True)
 class DependentGene(Named):
-    """A value that follows from the others of a design: it is in tables and reports, and not searched.
+    """A value computed from the others of a design: it is in tables and reports, and not searched.
 
-    of : function of the design, which has all genes but the dependent ones, and of these those that stand
-    before it. It gives a value for every design; which of them are allowed is what constraints say.
+    of : function of the design, which contains all other genes and the dependent genes before this one. It
+        must return a value for every design; use constraints to restrict the allowed values.
     """
 
     name: str
@@ -59,11 +59,11 @@ class DependentGene(Named):
 
     @property
     def described(self) -> str:
-        """What it is, in words; its function is in the checksum of the problem's code."""
+        """A text of its properties; its function is in the checksum of the problem's code."""
         return f"computed {self.unit}".rstrip()
 
     def value(self, design: Mapping[str, Any]) -> Value:
-        """Return its value in a design. FaultyProblem where the function fails or gives none."""
+        """Return its value in a design. FaultyProblem if the function fails or returns no value."""
         rule = f"dependent gene {self.name} must return a finite number, a text or a flag"
         try:
             value = self.of(MappingProxyType(dict(design)))

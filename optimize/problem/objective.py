@@ -1,4 +1,4 @@
-"""What a design is judged by: a quantity of its runs, and whether much or little of it is wanted."""
+"""Objectives: quantities of a run that are minimised or maximised."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from tisim.errors import must
 
 @dataclass(frozen=True)
 class Objective:
-    """A quantity that is to be made small, or large.
+    """A quantity that is minimised, or maximised.
 
-    name : heading in tables and plots; unit : of the values, "" if they have none.
-    of : Result -> value in that unit, of a plain function FunctionResult -> value. Called for runs that ended
-        well only; NaN and inf never win. For a Misfit it returns a dictionary of the measured quantities.
-    statistic : what counts of the values from all random starts: Expectation(), Quantile(0.9), WorstOf(8) or
-        Misfit({"angle": (27.9, 3.0)}).
-    Raises InputError for an empty name, for a statistic that is none, and for a misfit that is maximised.
+    name : heading in tables and plots; unit : of the values, "" if there is none.
+    of : Result -> value in that unit; for a plain function FunctionResult -> value. It is called only for
+        runs that ended well; NaN and inf never win. For a Misfit it returns a dictionary of the measured
+        quantities.
+    statistic : how the values from all random starts are combined: Expectation(), Quantile(0.9), WorstOf(8)
+        or Misfit({"angle": (27.9, 3.0)}).
+    Raises InputError for an empty name, an invalid statistic, and a misfit that is maximised.
     """
 
     name: str
@@ -40,7 +41,7 @@ class Objective:
 
     @property
     def sign(self) -> float:
-        """Cost = sign * value. A cost is minimised; the search knows costs only, people see values only."""
+        """Cost = sign * value. The search minimises costs; users see only values."""
         return -1.0 if self.maximise else 1.0
 
     @property
@@ -51,24 +52,28 @@ class Objective:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of the values that are kept of each run: its own, or those that were measured."""
+        """The names of the values that are stored for each run: its own name, or the measured quantities."""
         return self.statistic.quantities or (self.name,)
 
     @property
     def statistic_of_costs(self) -> Statistic:
-        """What counts of the costs of all starts."""
+        """The statistic that is applied to the costs of all starts."""
         return self.statistic.mirrored if self.maximise else self.statistic
 
     def costs(self, values: ArrayLike) -> np.ndarray:
-        """Return what the statistic takes: the cost of each run, shape (starts,), or the quantities that were
-        measured as they are. values : of the runs, shape (starts, quantities)."""
+        """Return the input of the statistic: the cost of each run, shape (starts,), or the measured
+        quantities unchanged.
+
+        values : of the runs, shape (starts, quantities).
+        """
         columns = np.asarray(values, dtype=float).reshape(-1, len(self.quantities))
         return columns if self.statistic.quantities else self.sign * columns[:, 0]
 
     def cost(self, values: ArrayLike) -> float:
-        """Return the cost of a design by the values of its runs, shape (starts, quantities)."""
+        """Return the cost of a design from the values of its runs, shape (starts, quantities)."""
         return self.statistic_of_costs.value(self.costs(values))
 
     def pseudo_costs(self, values: ArrayLike) -> np.ndarray:
-        """Return a value of each run of which the cost is about the mean (Statistic.pseudo_values)."""
+        """Return a value for each run such that their mean approximates the cost
+        (Statistic.pseudo_values)."""
         return self.statistic_of_costs.pseudo_values(self.costs(values))

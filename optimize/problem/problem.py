@@ -1,4 +1,4 @@
-"""An inverse problem: which scene a design makes, and how good its result is."""
+"""An inverse problem: the scene of a design, and the objectives that its result is judged by."""
 
 from __future__ import annotations
 
@@ -30,30 +30,34 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Problem:
-    """Everything the search needs to know of an inverse problem.
+    """The definition of an inverse problem: genes, scene, objectives and constraints.
 
-    name : short, part of the cache key; title, description : for people.
+    name : short name, part of the cache key; title, description : for reports.
     genome : the genes, their units and ranges.
-    scene : (design in physical units, start seed) -> Scene. Cheap and declarative; an InputError raised
-        here marks the design as infeasible, it does not stop the search. A PlainFunction in its place is
-        called instead of a simulation; see ``of_function``.
-    objective : Result -> fitness, minimised. Called for runs that ended well only; NaN and inf never win.
-        Or any number of Objectives: a search for two or more finds the front of designs that no other
-        design beats in one without losing in another.
-    version : raise it when objective changes its meaning: fitnesses of the old one are then not reused.
-    symbol : heading of the fitness in tables and plots, where objective is a function.
-    meanings : what headings of the report stand for, heading -> words; printed under its tables.
-    derived : extra report columns computed from the fitness, heading -> function; for one objective only.
+    scene : (design in physical units, start seed) -> Scene. It should be cheap and only declare the scene. An
+        InputError raised here marks the design as infeasible; it does not stop the search. A PlainFunction
+        here is called instead of a simulation; see ``of_function``.
+    objective : Result -> fitness, minimised. It is called only for runs that ended well; NaN and inf never
+        win. Alternatively a list of Objectives: with two or more, the search finds the Pareto front, the
+        designs that no other design beats in one objective without losing in another.
+    version : increase it when the meaning of the objective changes; fitnesses of the old version are then not
+        reused.
+    symbol : heading of the fitness in tables and plots, if objective is a function.
+    meanings : explanations of report headings, heading -> words; printed below the tables.
+    derived : extra report columns computed from the fitness, heading -> function; with one objective only.
     picture : (Scene, Result) -> figure of a run, for the report.
-    details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
-    met_at : the fitness at which a design meets all that is asked, and so does any better one; the report
-        then has how far each gene spreads over those that the search has seen. For one objective only.
-    constraints : what a design must keep to beside: any number of ResultConstraints and DesignConstraints.
-    code : a text that tells it from another problem of this name and version, in place of the checksums of
-        scene and objectives, of their files and of all that they are bound to (see fingerprint.py).
-    files : data files that scene or objectives read when they are called; a checksum of their content is part
-        of the key of a value. An objective that reads another file is refused.
-    Raises InputError for an empty name, and for objectives that are none or not told apart by their names.
+    details : (design, Result) -> further quantities of the best design's run, for the report.
+    met_at : a design with this fitness, or a better one, meets all requirements. The report then shows the
+        spread of each gene over all such designs of the search. With one objective only.
+    constraints : any number of ResultConstraints and DesignConstraints.
+    code : a text that distinguishes this problem from others of the same name and version. It replaces the
+        checksums of scene and objectives, of their files and of all values that they are bound to (see
+        fingerprint.py).
+    files : data files that scene or objectives read when they are called. A checksum of their content is part
+        of the key of a value. An objective that reads any other file is refused.
+
+    Raises InputError for an empty name, for an empty list of objectives, and for two objectives of the same
+    name.
     """
 
     name: str
@@ -93,7 +97,7 @@ class Problem:
         headings = [*self.genome.names, *own]
         twice = sorted({name for name in own if headings.count(name) > 1})
         must(not twice or own == names, "names of constraints, and of quantities,",
-             "other than each other's, and than those of genes and objectives", twice)  # fmt: skip
+             "different from each other and from the names of genes and objectives", twice)  # fmt: skip
 
     @classmethod
     def of_function(
@@ -104,12 +108,13 @@ class Problem:
         name: str = "",
         **fields: Any,
     ) -> Problem:
-        """Return the problem of a plain function of a design, in which nothing is simulated.
+        """Return the problem of a plain function of a design, without simulation.
 
-        function : f(design) or f(design, seed) -> a number; for several objectives as many in their order, or
-        a dictionary by their names; see PlainFunction. objectives : a name is one that is minimised and that
-        the function gives; an Objective reads its own of a FunctionResult, ``lambda result: -result.value``.
-        name : the function's where it is left out. fields : other fields of a Problem.
+        function : f(design) or f(design, seed) -> a number; with several objectives a list in their order, or
+            a dictionary by name; see PlainFunction.
+        objectives : a name stands for a value of the function that is minimised; an Objective computes its
+            value from a FunctionResult, ``lambda result: -result.value``.
+        name : by default the name of the function. fields : other fields of a Problem.
         """
         must(not isinstance(objectives, str), "objectives", "a list of names or Objectives", objectives)
         plain, called = PlainFunction(function), function_name(function).replace("/", " ")
@@ -126,51 +131,52 @@ class Problem:
 
     @property
     def function(self) -> PlainFunction | None:
-        """The plain function that is called instead of a simulation, if there is one."""
+        """The plain function that replaces the simulation, or None."""
         return self.scene if isinstance(self.scene, PlainFunction) else None
 
     @property
     def deterministic(self) -> bool:
-        """Whether it is known that all starts of a design give the same: one is enough then."""
+        """Whether all starts of a design are known to give the same value, so that one is enough."""
         return self.function is not None and not self.function.takes_seed
 
     @property
     def design_constraints(self) -> tuple[InequalityConstraint, ...]:
-        """The constraints that are known before anything runs."""
+        """The constraints that can be checked before a run."""
         return tuple(one for one in self.constraints if isinstance(one, DesignConstraint))
 
     @property
     def result_constraints(self) -> tuple[InequalityConstraint, ...]:
-        """The constraints of a quantity of a run."""
+        """The constraints on a quantity of a run."""
         return tuple(one for one in self.constraints if isinstance(one, ResultConstraint))
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """All objectives; a bare function is one, to be minimised."""
+        """All objectives; a bare function is one objective that is minimised."""
         if callable(self.objective):
             return (Objective(self.symbol, self.objective),)
         return tuple(self.objective)
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of the values that are kept of each run: those of all objectives, in their order."""
+        """The names of the values that are stored for each run: the quantities of all objectives, in
+        order."""
         return tuple(name for objective in self.objectives for name in objective.quantities)
 
     @property
     def measured(self) -> Misfit | None:
-        """What was measured, where the only objective is the misfit to it."""
+        """The misfit to measurements, if it is the only objective."""
         statistic = self.objectives[0].statistic
         return statistic if isinstance(statistic, Misfit) and not self.several else None
 
     @property
     def identity(self) -> str:
-        """A checksum of scene, objectives and the functions of genes and constraints, and what they are bound
-        to, as it is now; see ``code``."""
-        # A value has the digest of its scene in its key, whatever made the scene.
+        """A checksum of scene, objectives and the functions of genes and constraints, with all that they are
+        bound to now; see ``code``."""
+        # The key of a value includes the digest of its scene.
         return f"{self.code or '-'.join(self._design_checksums())}-{self.objective_identity}"
 
     def _design_checksums(self) -> list[str]:
-        """Return checksums of the functions that decide what is run of a design."""
+        """Return checksums of the functions that determine the run of a design."""
         functions = {
             f"gene {gene.name}": gene.of for gene in self.genome.genes if isinstance(gene, DependentGene)
         }
@@ -179,14 +185,14 @@ class Problem:
 
     @property
     def objective_identity(self) -> str:
-        """A checksum of objectives, constraints of a run and data files, and of a plain function. Together
-        with a scene they decide a value."""
+        """A checksum of objectives, result constraints, data files and the plain function, if any. It
+        determines a value together with the scene."""
         measured = [name for one in self.objectives for name in one.statistic.quantities]
         files = [sha256(read(file)) for file in self.files]
         return _checksum([self.code or self._run_checksums(), files, *([measured] if measured else [])])
 
     def _run_checksums(self) -> dict[str, str]:
-        """Return checksums of the functions that decide what a run is worth, by name."""
+        """Return checksums of the functions that determine the value of a run, by name."""
         checksums = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
         functions = {f"constraint {one.name}": one.of for one in self.result_constraints}
         if self.function is not None:
@@ -195,29 +201,31 @@ class Problem:
 
     @property
     def several(self) -> bool:
-        """Whether there is more than one objective, and so a front and not one best."""
+        """Whether there are two or more objectives, so that the result is a front instead of one best
+        design."""
         return len(self.objectives) > 1
 
     def costs(self, values: Sequence[float]) -> tuple[float, ...]:
-        """Return the objectives' values with the sign that makes all of them to be minimised, and back
-        again."""
+        """Return the objectives' values with signs such that all are minimised; or the inverse."""
         return tuple(o.sign * value for o, value in zip(self.objectives, values, strict=True))
 
 
 def checksum_of(function: Callable[..., Any], what: str = "") -> str:
-    """Return a checksum of a function, of the files that define it and of all that it is bound to; ``what``
-    as for a fingerprint."""
+    """Return a checksum of a function, of the files that define it and of all that it is bound to.
+
+    what : the name of the function in error messages, as in ``fingerprint``.
+    """
     files = python_file.module_checksums(function)
     return _checksum([fingerprint(function, what), *files.values()])
 
 
 def _checksum(value: Any) -> str:
-    """Return a short checksum of texts, in lists and dictionaries."""
+    """Return a short checksum of texts in lists and dictionaries."""
     return sha256(json.dumps(value, sort_keys=True).encode())[:24]
 
 
 def read(file: str | Path) -> bytes:
-    """Return the content of a data file of a problem; InputError where there is none."""
+    """Return the content of a data file of a problem; InputError if it does not exist."""
     content = regular_file.content(regular_file.target(Path(file)))
     if content is None:
         raise InputError(f"files of a problem must exist; received {str(file)!r}")

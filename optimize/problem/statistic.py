@@ -1,8 +1,7 @@
-"""What an objective takes of the values that a design has had from its random starts: their mean, a quantile,
-the worst of a number of starts, or the misfit of means to what was measured.
+"""Statistics that combine the values of a design from its random starts: mean, quantile, worst of n, misfit.
 
 Each has an estimate, a standard error by the jackknife (B. Efron, The Jackknife, the Bootstrap and Other
-Resampling Plans, SIAM (1982), chapter 3), and a 95 % interval of its own.
+Resampling Plans, SIAM (1982), chapter 3), and a 95 % confidence interval.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True)
 class Others:
-    """What the runs of other designs tell of the values of a design.
+    """Information from the runs of other designs.
 
-    seen : values that have occurred. skewness : of the noise, None where it is not known.
+    seen : values that have occurred. skewness : skewness of the noise, None if it is not known.
     """
 
     seen: Sequence[float] = ()
@@ -36,57 +35,64 @@ class Others:
 
 
 NO_OTHERS = Others()
-"""Nothing is known of other designs."""
+"""No information from other designs."""
 
 
 class Statistic(ABC):
-    """One number of the values of all starts of a design, small ones being better.
+    """A number computed from the values of all starts of a design; small values are better.
 
-    Values have the shape (starts,), or (starts, quantities) where ``quantities`` are named.
+    Values have the shape (starts,), or (starts, quantities) if ``quantities`` are named.
     """
 
     @property
     @abstractmethod
     def label(self) -> str:
-        """What it is, as a part of a table heading."""
+        """The statistic's part of a table heading."""
 
     @property
     def described(self) -> str:
-        """All that decides its value, as text; "" for the mean. Part of the identity of a search."""
+        """A text of all properties that determine its value; "" for the mean. Part of the identity of a
+        search."""
         return repr(self)
 
     @property
     def fewest_starts(self) -> int:
-        """The starts that an estimate needs."""
+        """The smallest number of starts for an estimate."""
         return 2
 
     @property
     def fewest_fresh(self) -> int:
-        """The starts that an interval with two ends needs."""
+        """The smallest number of starts for an interval with two finite ends."""
         return self.fewest_starts
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of the quantities of a run that it needs; () for one without a name."""
+        """The names of the quantities of a run that it needs; () for a single unnamed value."""
         return ()
 
     @property
     def mirrored(self) -> Statistic:
-        """The statistic of the negative values, where large ones are wanted."""
+        """The statistic to apply to the negated values of a maximised objective."""
         return self
 
     @abstractmethod
     def value(self, values: Array) -> float:
-        """Return the estimate of one start or more."""
+        """Return the estimate from one or more starts."""
 
     @abstractmethod
     def interval(self, values: Array, others: Others = NO_OTHERS, confidence: float = CONFIDENCE) -> Ends:
-        """Return the ends of the interval of that confidence, NaN where one is not known; others : for a
-        mean (tisim.numerics.skewed)."""
+        """Return the ends of the confidence interval, NaN for an end that is not known.
+
+        others : used only for the mean (tisim.numerics.skewed).
+        """
 
     def pseudo_values(self, values: Array) -> Array:
-        """Return n theta - (n - 1) theta_without_i of each start i: values of which theta is about the mean
-        (Efron 1982, Eq. 3.10), shape (starts,)."""
+        """Return the jackknife pseudo-value of each start, shape (starts,).
+
+            n theta - (n - 1) theta_without_i
+
+        Their mean approximates theta (Efron 1982, Eq. 3.10).
+        """
         n = len(values)
         if n < 2:
             return np.full(n, self.value(values))
@@ -122,12 +128,15 @@ class Expectation(Statistic):
 
 @dataclass(frozen=True)
 class Quantile(Statistic):
-    """The value that a share of all starts do not exceed.
+    """The quantile: the value that a given share of all starts do not exceed.
 
-    share : between 0 and 1; 0.9 of a loss that is to be small, 0.1 of a yield that is to be large.
-    The estimate is that of F. E. Harrell and C. E. Davis, Biometrika 69 (1982) 635-640, a weighted sum of the
-    sorted values. The interval is that of order statistics (intervals.of_quantile). Each design needs so many
-    starts that one beyond the quantile is to be expected: 10 for 0.9.
+    share : between 0 and 1; for example 0.9 of a loss that is minimised, 0.1 of a yield that is maximised.
+
+    The estimate is a weighted sum of the sorted values. The interval uses order statistics
+    (intervals.of_quantile). Each design gets enough starts that one is expected beyond the quantile: 10 for
+    0.9.
+
+    Source: F. E. Harrell and C. E. Davis, Biometrika 69 (1982) 635-640.
     """
 
     share: float
@@ -164,11 +173,10 @@ class Quantile(Statistic):
 
 @dataclass(frozen=True)
 class WorstOf(Statistic):
-    """The worst that is to be expected of a number of starts: the expectation of the largest of their values
-    where small ones are wanted, and of the smallest where large ones are wanted.
+    """The expected worst value of n starts: the largest of minimised values, the smallest of maximised ones.
 
-    starts : 2 or more. The estimate is the mean of the worst over all subsets of that size. It is
-    unbiased, so that designs with different numbers of starts can be compared.
+    starts : n, 2 or more. The estimate is the mean of the worst value over all subsets of n starts. It is
+        unbiased, so designs with different numbers of starts can be compared.
     """
 
     starts: int
@@ -204,14 +212,17 @@ class WorstOf(Statistic):
 
 @dataclass(frozen=True)
 class Misfit(Statistic):
-    """How far the means over the starts are from what was measured: the mean over the quantities of
-    ((mean - measured) / uncertainty)^2, that is chi^2 over their number.
+    """The misfit of the means over the starts to measurements: chi^2 divided by the number of quantities.
+
+        mean over the quantities of ((mean - measured) / uncertainty)^2
 
     measured : quantity -> (measured value, its standard uncertainty), both in the unit of the quantity. The
-    function of the objective returns a dictionary with these names. The squared distance of a mean of n
-    starts is too large by its variance, which is subtracted: the estimate is unbiased, and may be below 0 for
-    a design that meets the measurements. The designs that such a search has run tell how well each gene is
-    known (optimize.calibration).
+        function of the objective returns a dictionary with these names.
+
+    The squared distance of a mean over n starts is too large by the variance of the mean, which is
+    subtracted. The estimate is therefore unbiased, and may be negative for a design that meets the
+    measurements. The designs of such a search determine confidence intervals of the genes
+    (optimize.calibration).
     """
 
     measured: Mapping[str, tuple[float, float]]
@@ -249,7 +260,7 @@ class Misfit(Statistic):
         return tuple(self.measured)
 
     def off(self, values: Array) -> Array:
-        """Return how far values are from those measured, in uncertainties, shape (..., quantities)."""
+        """Return (values - measured) / uncertainty, shape (..., quantities)."""
         wanted, uncertainty = np.array(list(self.measured.values())).T
         return np.asarray((values - wanted) / uncertainty)
 
@@ -267,4 +278,4 @@ class Misfit(Statistic):
 
 _UNKNOWN = math.nan, math.nan
 MEAN = Expectation()
-"""The statistic of an objective for which none is given."""
+"""The default statistic of an objective."""

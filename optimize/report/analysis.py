@@ -1,4 +1,4 @@
-"""What a search has learnt beside its best design is told: tables for the terminal, CSV files, pictures."""
+"""Reports of calibration and sensitivity: tables for the terminal, CSV files and figures."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Analysis:
-    """An analysis is what there is to tell of a search.
+    """The analyses of a search.
 
-    calibration : None where the objective is not the misfit of what was measured. sensitivity : of each
-    objective; empty where too few designs are known.
+    calibration : None if the objective is not a Misfit.
+    sensitivity : of each objective; empty if too few designs are known.
     """
 
     calibration: Calibration | None
@@ -37,7 +37,7 @@ class Analysis:
 
     @classmethod
     def of(cls, outcome: Outcome) -> Analysis:
-        """Return all that there is to tell of a search that has found a design."""
+        """Return the analyses of a search that has found a design."""
         enough = len(outcome.estimates) >= sensing.least_designs(outcome.problem.genome)
         return cls(
             calibrating.calibration(outcome) if outcome.problem.measured else None,
@@ -50,8 +50,10 @@ class Analysis:
         return [*known, *(sensitivity_table(one) for one in self.sensitivity)]
 
     def write(self, folder: Path) -> list[Path]:
-        """Write calibration and sensitivity, where there is one, as .csv, .png and .pdf; return the paths. A
-        picture that cannot be drawn is left out, which is said on standard error."""
+        """Write the available analyses as .csv, .png and .pdf; return the paths.
+
+        A figure that cannot be drawn is skipped, with a message on standard error.
+        """
         paths: list[Path] = []
         known, sensitive = self.calibration, self.sensitivity
         if known is not None:
@@ -67,7 +69,7 @@ class Analysis:
 
 
 def _late(name: str, of: Calibration | tuple[Sensitivity, ...]) -> Callable[[], Figure]:
-    """Return what draws a figure, for which matplotlib is loaded only then."""
+    """Return a function that draws the figure; matplotlib is imported only when it is called."""
 
     def draw() -> Figure:
         from tisim.optimize.report import analysis_figures
@@ -79,8 +81,8 @@ def _late(name: str, of: Calibration | tuple[Sensitivity, ...]) -> Callable[[], 
 
 
 def calibration_table(found: Calibration) -> RenderableType:
-    """Return how well each gene is known, for the terminal."""
-    title = Text(f"what the measurements tell: {calibrating.summary(found)}", "italic")
+    """Return the estimates and intervals of the genes as a table for the terminal."""
+    title = Text(f"calibration: {calibrating.summary(found)}", "italic")
     parts: list[RenderableType] = ["", title]
     if found.genes:
         table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
@@ -95,14 +97,14 @@ def calibration_table(found: Calibration) -> RenderableType:
                           one.words.partition(":")[0])  # fmt: skip
         parts.append(table)
     if any(one.open_low or one.open_high for one in found.genes):
-        parts.append(Text("[...]: an end of the range that was searched, and not of the interval", "dim"))
+        parts.append(Text("[...]: an end of the searched range; the interval may extend beyond it", "dim"))
     for name, values in found.choices.items():
-        parts.append(Text(f"{name}: {', '.join(map(str, values))} (designs within the 95 % of one gene)"))
+        parts.append(Text(f"{name}: {', '.join(map(str, values))} (designs within the 95 % limit of a gene)"))
     return Group(*parts, *(Text(remark) for remark in found.remarks))
 
 
 def sensitivity_table(found: Sensitivity) -> RenderableType:
-    """Return what each gene does to an objective, for the terminal."""
+    """Return the effects of the genes on an objective as a table for the terminal."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("gene")
     for heading in ("-10 % of range", "+10 % of range", "alone", "in all"):
@@ -112,19 +114,19 @@ def sensitivity_table(found: Sensitivity) -> RenderableType:
         changes = (_signed(gene.changes[move]) for move in (-0.1, 0.1))
         table.add_row(Text(label), *changes, _index(gene.first), _index(gene.total))
     predicts = (
-        f"predicts {found.q2.low:.2f} to {found.q2.high:.2f} of the variance of designs left out, "
-        "their noise taken off"
+        f"predicts {found.q2.low:.2f} to {found.q2.high:.2f} of the variance of left-out designs, "
+        "without their noise"
     )
     words = [
-        f"-10 %, +10 %: change of {found.objective} as the gene alone moves so far from the best design",
-        f"alone, in all: parts of the variance of {found.objective} over all ranges, by the gene alone and "
-        "with the others (Sobol' indices of first order and total)",
-        f"± is half of the 95 % interval. By a Gaussian process through {found.designs} designs, which "
+        f"-10 %, +10 %: change of {found.objective} when only this gene moves by that part of its range",
+        f"alone, in all: parts of the variance of {found.objective} over all ranges due to the gene alone "
+        "and together with others (first-order and total Sobol' indices)",
+        f"±: half of the 95 % interval. From a Gaussian process through {found.designs} designs, which "
         f"{predicts}",
     ]
     if not found.trusted:
-        words[1] = f"alone, in all: not given, as the Gaussian process predicts less than {LEAST_Q2:g}"
-    title = Text(f"what each gene does to {found.label}", "italic")
+        words[1] = f"alone, in all: not given, because the Gaussian process predicts less than {LEAST_Q2:g}"
+    title = Text(f"effect of each gene on {found.label}", "italic")
     return Group("", title, table, *(Text(line, "dim") for line in words))
 
 

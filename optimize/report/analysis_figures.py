@@ -1,4 +1,4 @@
-"""Pictures of how well genes are known and of which of them matter."""
+"""Figures of calibration and sensitivity."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def _correlations(axis: Axes, found: Calibration) -> None:
 
 
 def sensitivity_figure(found: Sequence[Sensitivity]) -> Figure:
-    """Draw for each objective, a row of panels each: the change around the best design as each gene moves,
-    and the first-order and total indices over the whole range; bars are 95 % intervals."""
+    """Draw a row of panels for each objective: its change as each gene moves from the best design, and the
+    first-order and total indices over the whole range; bars are 95 % intervals."""
     genes = len(found[0].genes)
     figure = empty(8.6, (0.42 * genes + 1.7) * len(found))
     panels = figure.subplots(len(found), 2, squeeze=False, sharey=True)
@@ -133,7 +133,7 @@ def _legend_below(axis: Axes, columns: int) -> None:
 
 
 def _bars(what: Sequence[Between], place: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return values, rows and the lengths of the interval at either side."""
+    """Return values, rows and the lengths of the interval on either side."""
     values = np.array([one.value for one in what])
     sides = np.array([[one.value - one.low for one in what], [one.high - one.value for one in what]])
     return values, np.arange(len(what)) + place, np.maximum(sides, 0.0)

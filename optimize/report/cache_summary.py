@@ -1,4 +1,4 @@
-"""The evaluations and searches in a cache file are summarised in a few lines."""
+"""A summary of the evaluations and searches in a cache file."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from tisim.optimize.storage.runs_table import RunsTable
 from tisim.console import plain_table
 
 MAX_REASONS = 5
-"""The largest number of failures whose reasons are spelled out."""
+"""The largest number of failures whose reasons are printed."""
 
 
 def summary(path: str | Path) -> RenderableType:
-    """Return tables of the evaluations in a cache file by problem, of its searches, and of why some failed.
+    """Return tables of the evaluations in a cache file by problem, of its searches, and of reasons for
+    failures.
 
     InputError if there is no such file.
     """

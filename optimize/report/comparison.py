@@ -1,4 +1,4 @@
-"""Search methods are compared on one problem at the same number of runs, with several searches of each."""
+"""Comparison of search methods on one problem with the same number of runs, and several searches for each."""
 
 from __future__ import annotations
 
@@ -30,16 +30,17 @@ from tisim.files import lock, ownership
 COMPARISON_FILE, CSV = "compare.h5", "compare.csv"
 COMPARISON_FILES = (COMPARISON_FILE, f"{COMPARISON_FILE}.journal", f"{COMPARISON_FILE}.lock", CSV, lock.LOCK)
 FRESH = 10**6
-"""The seed of the starts from which the best designs are run again: no search has it."""
+"""The seed of the starts from which the best designs are run again; no search uses it."""
 NOTE = (
-    "median, lowest, highest: of the best designs of the searches, from fresh starts; claimed: what the "
-    "searches held them for, the median; 95 % +-: half of the interval from fresh starts, the median"
+    "median, lowest, highest: best designs of the searches, from held-out (fresh) starts; claimed: median of "
+    "the searches' own estimates; 95 % +-: median of half the interval from the fresh starts"
 )
 
 
 @dataclass(frozen=True)
 class MethodResult:
-    """What one search has found: its best design's estimate, and that of fresh starts (costs)."""
+    """The result of one search: the estimate of its best design from the search, and from held-out starts
+    (costs)."""
 
     method: str
     repeat: int
@@ -50,7 +51,8 @@ class MethodResult:
 
 @contextmanager
 def claim(folder: Path, fresh: bool | None, overwrite: bool) -> Iterator[bool]:
-    """Hold the folder of a comparison, and yield whether one that is there is resumed; else it is removed."""
+    """Hold the folder of a comparison, and yield whether an existing one is resumed; otherwise it is
+    deleted."""
     resume = resume_or_clear(folder, fresh, overwrite, "comparison", COMPARISON_FILE, (CSV,))
     ownership.claim(folder, COMPARISON_FILES, overwrite)
     with lock.acquire(folder, exclusive=False):
@@ -58,21 +60,25 @@ def claim(folder: Path, fresh: bool | None, overwrite: bool) -> Iterator[bool]:
 
 
 def check(folder: Path, cache: Cache, problem: Problem, evaluator: Mapping[str, Any]) -> None:
-    """Raise InputError when the file in the folder is of a comparison on another problem; methods, their
-    settings, ranges of genes and numbers of runs may be others. evaluator : the settings of the evaluator."""
+    """Raise InputError if the file in the folder is from a comparison on another problem.
+
+    Methods, their settings, ranges of genes and numbers of runs may differ. evaluator : the settings of the
+        evaluator.
+    """
     check_problem(folder, "comparison", cache, identity(problem, Settings(), evaluator))
 
 
 def settings_of(
     problem: Problem, base: Mapping[str, Any], method: str, evaluations: int, repeat: int
 ) -> Settings:
-    """Return the settings of one search: the case's with another method, stopped by the number of runs
-    alone."""
+    """Return the settings of one search: the case's with another method, stopped only by the number of
+    runs."""
     search_table = proposed(problem, base, method)
     for rule in ("target", "patience", "wall_clock_s"):
         search_table.pop(rule, None)
     ensemble = {**search_table.get("ensemble", {}), "select": 0, "confirm": 0}
-    # every generation asks for a run or more, unless a method has nothing new to propose: then it ends, too
+    # Every generation requests at least one run, unless the method has no new design; then the search ends,
+    # too.
     stop = {"generations": evaluations, "max_evaluations": evaluations}
     settings = Settings(**{**search_table, "ensemble": ensemble, "seed": repeat, **stop})
     fit(problem, settings)
@@ -83,8 +89,9 @@ def settings_of(
 class Plan:
     """The searches of a comparison: method, repeat and settings of each, in the order in which they run.
 
-    fresh : number of starts from which each best design is run again, the same for all and used by no search:
-    selection flatters, and the more so the fewer starts a method spends on a design.
+    fresh : number of held-out starts from which each best design is run again, the same for all and not used
+        by any search. The estimates of the searches themselves are biased by selection, more so for a method
+        that spends fewer starts on a design.
     """
 
     problem: Problem
@@ -103,7 +110,7 @@ def plan(
     """Return the plan of a comparison; repeat k of every method has the same random starts.
 
     base : settings of a search, as of a case. evaluations : number of runs of each search. InputError for
-    several objectives, unknown methods and numbers that cannot be.
+        several objectives, unknown methods and invalid numbers.
     """
     must(not problem.several, "problem of a comparison", "one with one objective", problem.name)
     must(len(set(methods)) == len(methods) > 0, "methods", "one or more, all different", list(methods))
@@ -121,9 +128,9 @@ def plan(
 def compare(
     plan: Plan, evaluator: Evaluator, cache: Cache, on_progress: Callable[[Progress], None] | None = None
 ) -> Iterator[MethodResult]:
-    """Yield what each search of a plan has found.
+    """Yield the result of each search of a plan.
 
-    All is cached: stopped and begun again, it goes on. KeyboardInterrupt when a search was stopped.
+    Everything is cached, so a stopped comparison can be resumed. KeyboardInterrupt if a search was stopped.
     """
     once = EnsembleSettings(min_starts=plan.fresh, max_starts=plan.fresh, block=plan.fresh)
     fresh_ensemble = Ensemble(plan.problem, evaluator, cache, once, FRESH)
@@ -144,8 +151,9 @@ def _result(method: str, repeat: int, outcome: Outcome, fresh_ensemble: Ensemble
 
 
 def table(problem: Problem, results: Sequence[MethodResult]) -> Table:
-    """Return a table with a line for each method, the best median first: the best of its searches from fresh
-    starts, and what the searches themselves held it for.
+    """Return a table with a line for each method, the best median first.
+
+    It shows the best designs from held-out starts, and the estimates of the searches themselves.
     """
     (objective,) = problem.objectives
     meaning = problem.meanings.get(objective.name, "")

@@ -1,4 +1,4 @@
-"""The convergence of a search is drawn as fitness by generation (Z04 figure 4)."""
+"""The convergence of a search: fitness by generation (Z04 figure 4)."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
 
 
 def convergence_figure(outcome: Outcome) -> Figure:
-    """Draw best and mean fitness against generation, and below it the problem's first derived value of the
-    best.
+    """Draw best and mean fitness by generation, and below it the first derived value of the best design.
 
-    Dotted lines mark the generations after which the search box was moved. Where the best design has
-    been run again from fresh starts, that stands at the end: the curve is better by the luck of a winner.
-    Of several objectives: the best of each, one below the other.
+    Dotted lines mark generations after which the search box was moved. If the best design was run again from
+    held-out starts, that value is drawn at the end; the curve itself is biased by lucky starts. With several
+    objectives, the best value of each is drawn, one below the other.
     """
     problem = outcome.problem
     if problem.several:
@@ -99,6 +98,6 @@ def _finish(axes: NDArray[Any]) -> None:
 
 
 def _plottable(values: list[float]) -> np.ndarray:
-    """Return values to draw, in which generations without a successful design leave a gap."""
+    """Return the values to draw, with a gap for generations without a successful design."""
     array = np.array(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

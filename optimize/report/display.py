@@ -1,4 +1,5 @@
-"""A search as it goes: a bar with the time left, the best design so far, and a line for each generation."""
+"""The progress display of a search: a bar with the remaining time, the best design, and a line for each
+generation."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from tisim.console import progress_bar
 
 
 class Display:
-    """A display shows the progress of a search of a problem; it is a context manager.
+    """Shows the progress of a search; it is a context manager.
 
     Pass ``generation`` and ``step`` to ``tisim.optimize.search.search`` as on_generation and on_progress.
     """
@@ -39,15 +40,15 @@ class Display:
         self.bar.__exit__(kind, error, trace)
 
     def step(self, where: Progress) -> None:
-        """Show that some more evaluations are done: the part of the generations, or of the budget of runs
-        where that will end the search before."""
+        """Update the bar with the finished fraction of the generations, or of the budget of runs if that ends
+        earlier."""
         generations = (where.generation + where.fraction) / (self.settings.generations + 1)
         most = self.settings.max_evaluations
         runs = (where.evaluations + where.hits) / most if most else 0.0
         self.bar.update(self.task, completed=max(generations, runs), generation=where.generation)
 
     def generation(self, where: Progress) -> None:
-        """Show that a generation is done, and its best design where that is new."""
+        """Print a line for a finished generation, and its best design if it is new."""
         self.step(where)
         best = self._best(where)
         self.bar.update(self.task, best=best.split("  ")[0])

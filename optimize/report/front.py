@@ -1,8 +1,8 @@
-"""The front of several objectives is drawn: what is given up of one for more of another.
+"""A figure of the front of several objectives, their trade-off.
 
-Of many designs that were estimated from few starts, the luckiest lie beyond the front, which is known from
-more. So only those that have had as many starts as the front are drawn as what is known; the others are
-marked as few starts. Intervals are drawn of fresh starts only, as those that chose a design flatter it.
+Of many designs estimated from few starts, the luckiest appear to lie beyond the front, whose designs have
+more starts. Designs with fewer starts than the front are therefore drawn differently and labelled. Intervals
+are drawn only for held-out starts, because the starts that chose a design bias its values.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ Estimates = tuple[FitnessEstimate, ...]
 
 
 def front_figure(outcome: Outcome) -> Figure:
-    """Draw a panel for each pair of objectives: the front, with 95 % confidence intervals where it has fresh
-    starts; behind it other designs; and the compromise (Outcome.best).
+    """Draw a panel for each pair of objectives.
+
+    It shows the front, with 95 % confidence intervals if it has held-out starts; other designs behind it; and
+    the compromise (Outcome.best).
     """
     pairs = list(combinations(range(len(outcome.problem.objectives)), 2))
     figure = empty(5.6 * len(pairs), 5.0)
@@ -46,8 +48,8 @@ def front_figure(outcome: Outcome) -> Figure:
 
 
 def others(outcome: Outcome) -> tuple[list[Estimates], list[Estimates]]:
-    """Return the designs outside the front: those estimated from as many starts as the median design of the
-    front, and from fewer."""
+    """Return the designs outside the front: those with at least the median number of starts of the front, and
+    those with fewer."""
     front = {tuple(string) for string in outcome.hall}
     enough = np.median([string.estimates[0].starts for string in outcome.hall] or [1])
     good = [e for genes, e in outcome.estimates.items() if e[0].ok and genes not in front]
@@ -64,7 +66,7 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
     if few:
         axis.plot(
             means[:, x], means[:, y], "o", mfc="none", color=_FEW_STARTS_COLOUR, ms=2.5, mew=0.6, zorder=1,
-            label=f"other designs, only {_starts(few)}: the luckiest lie beyond the front",
+            label=f"other designs, only {_starts(few)}: the luckiest appear beyond the front",
         )  # fmt: skip
     if many:
         means, _ = _values(outcome, many)
@@ -94,8 +96,8 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
 
 
 def _values(outcome: Outcome, estimates: Sequence[Estimates]) -> tuple[np.ndarray, np.ndarray]:
-    """Return means of the objectives, (designs, objectives), and how far their intervals reach below and
-    above, (2, designs, objectives), 0 where unknown."""
+    """Return the means of the objectives, (designs, objectives), and the lower and upper lengths of their
+    intervals, (2, designs, objectives), 0 if unknown."""
     objectives = outcome.problem.objectives
     many = len(objectives)
     means = [outcome.problem.costs([e.mean for e in of_all]) for of_all in estimates]
@@ -109,7 +111,7 @@ def _values(outcome: Outcome, estimates: Sequence[Estimates]) -> tuple[np.ndarra
 
 
 def _starts(estimates: Iterable[Estimates]) -> str:
-    """Return how many starts they had: "1 start" or "4 to 30 starts"."""
+    """Return the number of starts, in words: "1 start" or "4 to 30 starts"."""
     numbers = [of_all[0].starts for of_all in estimates]
     low, high = min(numbers), max(numbers)
     many = f"{low}" if low == high else f"{low} to {high}"

@@ -1,4 +1,4 @@
-"""A finished search is reported as a table like Z04's tables 1 to 3, and its convergence (Z04 figure 4)."""
+"""The report of a finished search: a table like Z04's tables 1 to 3, and its convergence (Z04 figure 4)."""
 
 from __future__ import annotations
 
@@ -24,13 +24,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHARP = 200
-"""The resolution of pictures as they go into papers, dots per inch."""
+"""The resolution of figures for papers, dots per inch."""
 
 
 def best_table(outcome: Outcome) -> RenderableType:
-    """Return the best designs for the terminal: a column per design, genes in their units, fitness from
-    fresh starts with its 95 % interval, derived values. In several tables where they would not fit on
-    TERMINAL_WIDTH columns side by side. Of a front as many as the hall of fame has places, spread along it.
+    """Return the best designs for the terminal: a column for each design, genes in their units, fitness from
+    held-out starts with its 95 % interval, derived values.
+
+    Several tables are used if the columns do not fit into TERMINAL_WIDTH. Of a front, at most
+    ``hall_of_fame`` designs are shown, spread along it.
     """
     columns = best_columns(outcome.problem, outcome.hall)
     places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
@@ -54,30 +56,31 @@ def best_table(outcome: Outcome) -> RenderableType:
 
 
 def notes(outcome: Outcome) -> RenderableType:
-    """Return what the headings of ``best_table`` stand for, a line each; nothing where there is no design."""
+    """Return explanations of the headings of ``best_table``, a line each; empty if there is no design."""
     problem, ensemble = outcome.problem, outcome.settings.ensemble
     if not outcome.hall:
         return Group()
     first = outcome.hall[0]
     words = {
-        "starts": "random starts that the mean is over",
-        ERROR: "standard error of that mean. It does not count that the design was chosen for its luck, too",
+        "starts": "number of random starts in the mean",
+        ERROR: "standard error of that mean; it does not include the bias from choosing the best designs",
     }
     if all(estimate.exact for estimate in first.estimates):
         words = {"starts": "one: all random starts of a design give the same run"}
     if any(string.estimates[0].converged for string in outcome.hall) and ensemble.tolerance:
         words["converged"] = (
-            f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it"
+            f"yes if the last start changed the mean by less than {ensemble.tolerance:g} of it"
         )
     if first.confirmed:
-        words["fresh starts"] = "starts that have had no part in choosing the designs"
+        words["fresh starts"] = "held-out starts, not used to choose the designs"
         words[f"{LOW}, {HIGH}"] = "ends of the 95 % confidence interval of the mean"
     meanings = {**problem.meanings, **words}
     return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in meanings.items()))
 
 
 def met_table(outcome: Outcome) -> RenderableType:
-    """Return how far each gene spreads over the designs that meet what is asked, for the terminal."""
+    """Return the ranges of the genes over all designs with a fitness of ``met_at`` or better, for the
+    terminal."""
     problem = outcome.problem
     strings, (objective,) = met_strings(problem, outcome.estimates), problem.objectives
     bound = "at least" if objective.maximise else "at most"
@@ -102,12 +105,12 @@ def met_table(outcome: Outcome) -> RenderableType:
 
 
 def _spread(number: int, places: int) -> list[int]:
-    """Return at most so many places in a row of that number, the first and the last among them."""
+    """Return at most ``places`` evenly spaced indices out of ``number``, the first and the last included."""
     return sorted({round(k) for k in np.linspace(0, number - 1, min(number, places))})
 
 
 def details_table(details: Mapping[str, float]) -> RenderableType:
-    """Return what the run of the best design shows, for the terminal."""
+    """Return the details of the best design's run, for the terminal."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, show_header=False)
     for name, value in details.items():
         table.add_row(name, text(value))
@@ -115,7 +118,7 @@ def details_table(details: Mapping[str, float]) -> RenderableType:
 
 
 def details_csv(details: Mapping[str, float]) -> bytes:
-    """Return what the run of the best design shows as CSV, all digits."""
+    """Return the details of the best design's run as CSV, all digits."""
     return columns_csv({"quantity": [*details], "value": [*details.values()]})
 
 
@@ -129,7 +132,7 @@ def best_csv(outcome: Outcome) -> bytes:
 
 
 def met_csv(outcome: Outcome) -> bytes:
-    """Return the designs that meet what is asked as CSV, all digits."""
+    """Return the designs with a fitness of ``met_at`` or better as CSV, all digits."""
     return columns_csv(met_columns(outcome.problem, outcome.estimates))
 
 
@@ -143,11 +146,11 @@ def columns_csv(columns: Mapping[str, Sequence[Any]]) -> bytes:
 
 
 def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
-    """Write best.csv, met.csv (where the problem says which designs meet it), convergence and front (of
-    several objectives) as .png and .pdf into a folder (made if missing); name -> path.
+    """Write best.csv, met.csv (if the problem has ``met_at``), and convergence and front (for several
+    objectives) as .png and .pdf into a folder, which is made if missing; return name -> path.
 
-    Each file is, at every instant, the old one or the new one. RunError if the disk is full. A picture that
-    cannot be drawn is left out, which is said on standard error.
+    Each file is, at every instant, the old one or the new one. RunError if the disk is full. A figure that
+    cannot be drawn is skipped, with a message on standard error.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -166,7 +169,7 @@ def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
 
 
 def picture(path: Path, draw: Callable[[], Figure]) -> list[Path]:
-    """Write a picture as .png and .pdf; return their paths, none where it cannot be drawn."""
+    """Write a figure as .png and .pdf; return their paths, none if it cannot be drawn."""
     figure = functools.cache(draw)
     written = pictures.write_beside_data(path.with_suffix(".png"), figure, SHARP)
     return written and written + pictures.write_beside_data(path.with_suffix(".pdf"), figure)
@@ -185,8 +188,7 @@ def _front(outcome: Outcome) -> Figure:
 
 
 def text(value: Any) -> str:
-    """Return a number with four digits, as 1.5e8 and not 1.5e+08, which is two columns more; a text as it
-    is."""
+    """Return a number with four digits, as 1.5e8 instead of the longer 1.5e+08; a text unchanged."""
     if not isinstance(value, float):
         return str(value)
     digits, power, exponent = f"{value:.4g}".partition("e")

@@ -1,12 +1,13 @@
-"""The cache keeps every finished evaluation on the disk at once, shared by processes, never lost to a kill.
+"""The cache stores every finished evaluation on disk at once; processes share it, and a killed process loses
+none.
 
-FILE          HDF5: evaluations as columns, and tables (settings, logbooks, best designs). Whole at every
-              instant, because it is only ever replaced by a complete new one.
-FILE.journal  evaluations and rows of tables since; folded into FILE when it has grown to a share of it.
-FILE.lock     held by whoever reads or writes either; says how far the journal had been written.
+FILE          HDF5: evaluations as columns, and tables (settings, logbooks, best designs). It is complete at
+              every instant, because it is only ever replaced by a complete new file.
+FILE.journal  newer evaluations and rows of tables; merged (folded) into FILE when it exceeds a share of it.
+FILE.lock     locked by every process that reads or writes the others; stores the length of the journal.
 
-So what is stored costs as much as it is long, and not as all that there is. A kill between replacing FILE and
-emptying the journal leaves evaluations in both: they count once, by key.
+Storing an evaluation therefore writes only that evaluation, not the whole file. If a process is killed
+between replacing FILE and emptying the journal, evaluations are in both; they count once, by key.
 """
 
 from __future__ import annotations
@@ -31,21 +32,22 @@ from tisim.files.ownership import ensure_writable
 from tisim.files.regular_file import file_status, is_folder, open_descriptor
 
 FOLD_BYTES = 64 << 10
-"""A journal is folded when it is longer than this, bytes, ..."""
+"""The journal is folded when it is longer than this, in bytes, ..."""
 FOLD_SHARE = 0.25
-"""... and than this share of the HDF5 file: a byte that is stored is written some five times in all, however
-large the file, and the file is never far behind."""
+"""... and longer than this share of the HDF5 file. Each stored byte is then written about five times in
+total, however large the file, and the file is never far behind."""
 TAIL = 4096
-"""At the end of a file, within so many bytes, is its checksum."""
+"""The checksum of a file is within this number of bytes from its end."""
 
 
 class Cache:
-    """A cache holds the evaluations of a file in memory, in step with other processes that use the file.
+    """The evaluations of a file, held in memory and kept up to date with other processes that use the file.
 
     path : the HDF5 file; made on the first fold if there is none. Its folder is made if missing.
-    Raises InputError if path is cut short, damaged, not a cache's file or none that may be opened: nothing is
-    then written. Warns of single evaluations that are damaged or lost; those are run again.
-    Use as a context manager, or close it, so that the journal is folded in.
+
+    Raises InputError if path is truncated, damaged, not a cache file or cannot be opened; nothing is then
+    written. Warns of single damaged or lost evaluations, which are run again. Use it as a context manager, or
+    close it, to fold the journal.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -59,7 +61,7 @@ class Cache:
         self._end = self._frames = 0
         first = None
         if (version := file_version(self.path)) is not None:
-            # A file that is no cache's is refused before a lock file is left beside it.
+            # A file that is not a cache is refused before a lock file is created beside it.
             first = version, hdf5_store.read(self.path)
         if not is_folder(self.path.parent):
             ensure_writable(self.path.parent)
@@ -80,23 +82,24 @@ class Cache:
         return tabulated(self._runs, self._newer.values())
 
     def records(self) -> list[Record]:
-        """Return all evaluations in the file, those of one problem oldest first."""
+        """Return all evaluations in the file, grouped by problem and oldest first."""
         return [*(record for part in self._runs for record in part.records()), *self._newer.values()]
 
     def get(self, key: str) -> Record | None:
-        """Return the evaluation of that key, as of the last refresh, put or fold; None if there is none."""
+        """Return the evaluation with this key, as of the last refresh, put or fold; None if there is none."""
         if key in self._newer:
             return self._newer[key]
         part = next((part for part in self._runs if key in part.rows), None)
         return None if part is None else part.record(part.rows[key])
 
     def refresh(self) -> None:
-        """Take in what other processes have stored since."""
+        """Read the evaluations that other processes have stored since."""
         with locked(self._lock, exclusive=False):
             self._refresh()
 
     def put(self, record: Record) -> Record:
-        """Store an evaluation, which on return is on the disk; return the one that counts, its key's first.
+        """Store an evaluation on disk before returning; return the valid one, which is the first with its
+        key.
 
         RunError if the disk is full; everything stored before is then intact.
         """
@@ -116,11 +119,10 @@ class Cache:
         attrs: Mapping[str, Any] | None = None,
         about: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> None:
-        """Store a table, which on return is on the disk, in place of one of the same name; "a/b" nests. Only
-        rows that are new are written.
+        """Store a table on disk before returning, in place of one with the same name; "a/b" nests.
 
-        about : attributes of columns, such as their unit. InputError if the columns differ in length,
-        RunError if the disk is full; everything stored before is then intact.
+        Only new rows are written. about : attributes of columns, such as their unit. InputError if the
+            columns differ in length, RunError if the disk is full; everything stored before is then intact.
         """
         first = name.split("/")[0]
         must(
@@ -129,7 +131,7 @@ class Cache:
             f"non-empty and not below {hdf5_store.EVALUATIONS!r}",
             name,
         )
-        # The lists are the caller's, who may add to them.
+        # The caller may later add to its lists.
         own = {heading: list(column) for heading, column in columns.items()}
         table = Hdf5Table(own, dict(attrs or {}), dict(about or {}))
         with locked(self._lock, exclusive=True) as lock:
@@ -158,7 +160,7 @@ class Cache:
         return list(self.attributes())
 
     def fold(self) -> None:
-        """Write what is in the journal into the HDF5 file.
+        """Merge the journal into the HDF5 file.
 
         RunError if the disk is full; everything stored before is then intact.
         """
@@ -168,7 +170,7 @@ class Cache:
                 self._fold()
 
     def compact(self) -> None:
-        """Fold, and leave out what is damaged or double."""
+        """Fold, and drop damaged and duplicate records."""
         with locked(self._lock, exclusive=True):
             self._refresh()
             self._tables = {name: table for name, table in self._tables.items() if table.intact}
@@ -176,7 +178,7 @@ class Cache:
             self._fold()
 
     def close(self) -> None:
-        """Fold what is waiting into the HDF5 file."""
+        """Fold the journal into the HDF5 file, and close the cache."""
         self.fold()
 
     def _append(self, lock: int, payload: bytes, evaluations: int) -> None:
@@ -197,7 +199,7 @@ class Cache:
         self._version, self._content = file_version(self.path), file_content(self.path)
 
     def _refresh(self, read: tuple[tuple[int, ...], Content] | None = None) -> None:
-        """Take in what is new; read : the file as it has been read, and its version then."""
+        """Read new data. read : the file as read earlier, with its version at that time."""
         version = file_version(self.path)
         if version != self._version or self._journal.size() < self._end:
             self._newer, self._end, self._frames = {}, 0, 0
@@ -218,7 +220,7 @@ class Cache:
         mark = Mark.read(self._lock) if first else None
         if mark is not None and (loss := mark.loss(self._content, entries)):
             warnings.warn(
-                f"{self.path}: {loss}; what is lost will be run again", RuntimeWarning, stacklevel=3
+                f"{self.path}: {loss}; lost evaluations will be run again", RuntimeWarning, stacklevel=3
             )
 
     def _warn(self, damaged: Sequence[str]) -> None:
@@ -235,14 +237,14 @@ def cache_files(path: str | Path) -> tuple[Path, Path, Path]:
 
 
 def file_version(path: Path) -> tuple[int, ...] | None:
-    """Return numbers that tell one state of the HDF5 file from another; None where there is no file."""
+    """Return numbers that change whenever the HDF5 file is replaced; None if there is no file."""
     status = file_status(path)
     return None if status is None else (status.st_ino, status.st_mtime_ns, status.st_size)
 
 
 def file_content(path: Path) -> tuple[int, ...] | None:
-    """Return numbers that tell the content of the HDF5 file from others, also in a copy: those of its last
-    bytes, in which its checksum is; None where there is no file."""
+    """Return numbers that identify the content of the HDF5 file, equal for a copy: its last bytes, which
+    contain its checksum. None if there is no file."""
     status = file_status(path)
     if status is None:
         return None
@@ -252,7 +254,7 @@ def file_content(path: Path) -> tuple[int, ...] | None:
 
 
 def existing_files(path: str | Path) -> tuple[Path, Path, Path]:
-    """Return the ``cache_files`` of a cache that is there already. InputError if there is no such file."""
+    """Return the ``cache_files`` of an existing cache. InputError if there is no such file."""
     file, journal, lock = cache_files(path)
     status = file_status(file) or file_status(journal)
     must(status is not None, "cache file", "an existing file", str(path))
@@ -260,5 +262,5 @@ def existing_files(path: str | Path) -> tuple[Path, Path, Path]:
 
 
 def existing(path: str | Path) -> Cache:
-    """Return the cache of a file that is there already. InputError if there is no such file."""
+    """Return the cache of an existing file. InputError if there is no such file."""
     return Cache(existing_files(path)[0])

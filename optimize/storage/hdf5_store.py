@@ -1,7 +1,8 @@
 """The HDF5 file of a cache: evaluations as columns, a group for each problem, and any number of named tables.
 
-The file is always built whole, in memory, and then written by ordinary system calls: a full disk is met by
-write(), not inside the HDF5 library. It explains itself to a reader who has h5py and nothing of this package.
+The file is always built completely in memory, and then written by ordinary system calls: a full disk is
+detected by write(), not inside the HDF5 library. It contains its own description for readers who have only
+h5py.
 """
 
 from __future__ import annotations
@@ -78,15 +79,15 @@ _MEANINGS: Mapping[str, Mapping[str, str]] = {
     "crc": {"description": "CRC-32 of the cells of the row"},
 }
 GENES_TABLE, OBJECTIVES_TABLE = "genes", "objectives"
-"""Names of the tables below that of a search that say what its problem's columns are."""
+"""Names of the tables, below a search, that describe the genes and objectives of its problem."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """All that is in the file of a cache.
+    """The content of a cache file.
 
-    runs : whole evaluations. tables : by name, also those that are not intact. damaged : a description of
-    each row whose checksum fails.
+    runs : intact evaluations. tables : by name, damaged ones included. damaged : a description of each row
+        with a wrong checksum.
     """
 
     runs: list[RunsTable] = field(default_factory=list)
@@ -96,10 +97,11 @@ class Content:
 
 @contextlib.contextmanager
 def open_evaluations(path: Path) -> Iterator[h5py.File]:
-    """Yield the file for reading. InputError, naming it, unless it is a whole HDF5 file written by a cache.
+    """Yield the file for reading. InputError, naming it, unless it is a complete HDF5 file written by a
+    cache.
 
-    HDF5 gets what its checksum says is whole, and nothing else: given a damaged structure, or another
-    program's, it may never return.
+    Only data with a valid checksum is passed to HDF5, which may hang on a damaged file or one from another
+    program.
     """
     rule = f"{path} must be a whole HDF5 file written by a cache; received"
     content = regular_file.content(path)
@@ -111,7 +113,7 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
     if image is None:
         raise InputError(
             f"{rule} {len(content)} bytes that are damaged, cut short or another program's "
-            "('tisim cache --compact' keeps what can be read)"
+            "('tisim cache --compact' keeps the readable part)"
         )
     with h5py.File(io.BytesIO(image), "r") as file:
         if not by_cache(file):
@@ -125,20 +127,20 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
 
 
 def by_cache(file: h5py.File) -> bool:
-    """Return whether a cache has written the file, of this version or one before."""
+    """Return whether the file was written by a cache, of this or an earlier version."""
     kind = file.attrs.get("format")
     known = isinstance(kind, str) and kind in (EVALUATIONS_FORMAT, older.FORMAT)
     return known and EVALUATIONS in file
 
 
 def read(path: Path) -> Content:
-    """Return all that is in the file. InputError, naming it, unless it is whole and written by a cache."""
+    """Return the content of the file. InputError, naming it, unless it is complete and written by a cache."""
     with open_evaluations(path) as file:
         return read_content(file)
 
 
 def read_content(file: h5py.File) -> Content:
-    """Return what is in an open file."""
+    """Return the content of an open file."""
     found = read_tables(file)
     if file.attrs["format"] == older.FORMAT:
         records, damaged = older.read_rows(file[EVALUATIONS], found)
@@ -151,7 +153,7 @@ def build_image(runs: Sequence[RunsTable], tables: Mapping[str, Hdf5Table]) -> b
     """Return the bytes of a new file with these evaluations and tables."""
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
         file.attrs["format"], file.attrs["README"] = EVALUATIONS_FORMAT, README
-        # No two files have the same checksum of the structure: by it a journal knows the file it belongs to.
+        # This makes the structure's checksum unique; a journal identifies its file by it.
         file.attrs["written"] = time.time_ns()
         group, about = file.create_group(EVALUATIONS), descriptions(tables)
         names = dataset_names(_numbered([part.problem for part in runs]))
@@ -167,15 +169,17 @@ def build_image(runs: Sequence[RunsTable], tables: Mapping[str, Hdf5Table]) -> b
 
 
 def _numbered(problems: Sequence[str]) -> list[str]:
-    """Return a name for each table of evaluations; a second one of the same problem, with other genes, has a
-    number."""
+    """Return a name for each table of evaluations; further ones of the same problem, with other genes, are
+    numbered."""
     before = [problems[:k].count(problem) for k, problem in enumerate(problems)]
     return [name if not n else f"{name} ({n + 1})" for name, n in zip(problems, before, strict=True)]
 
 
 def descriptions(tables: Mapping[str, Hdf5Table]) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return what searches say of the genes and objectives of their problems: problem, name, attributes. NaN
-    and "" stand for what a gene does not have."""
+    """Return the searches' descriptions of genes and objectives: problem, name, attributes.
+
+    NaN and "" stand for attributes that a gene does not have.
+    """
     about: dict[str, dict[str, dict[str, Any]]] = {}
     for name, search in tables.items():
         for kind in (GENES_TABLE, OBJECTIVES_TABLE):
@@ -206,7 +210,7 @@ def _write_runs(group: h5py.Group, part: RunsTable, about: Mapping[str, Mapping[
 
 
 def read_runs(group: h5py.Group) -> tuple[RunsTable, list[str]]:
-    """Return the whole evaluations of a problem, and a description of each row whose checksum fails."""
+    """Return the intact evaluations of a problem, and a description of each row with a wrong checksum."""
     facts = {name: group[name][...] for name in KINDS}
     parts = {}
     for kind in ("genes", "values"):
@@ -225,5 +229,5 @@ def read_runs(group: h5py.Group) -> tuple[RunsTable, list[str]]:
 
 
 def _extent(dataset: h5py.Dataset) -> tuple[int, int]:
-    """Return offset and size in bytes of a dataset's raw data; those of an empty one are 0."""
+    """Return offset and size in bytes of a dataset's raw data; 0 and 0 for an empty one."""
     return dataset.id.get_offset() or 0, dataset.id.get_storage_size()

@@ -1,8 +1,7 @@
-"""The write-ahead journal is a file of framed, checksummed payloads (see tisim/files/framing.py).
+"""The write-ahead journal: a file of framed, checksummed payloads (see tisim/files/framing.py).
 
-They are evaluations, and rows of tables.
-
-The lock file beside it says how far it had been written: what is missing of that was cut off.
+The payloads are evaluations and rows of tables. The lock file beside it stores the length up to which the
+journal was written; if the journal is shorter, the difference was lost.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ from tisim.files.regular_file import content, file_status, open_descriptor
 
 @dataclass(frozen=True)
 class Mark:
-    """A mark says how far a journal had been written.
+    """The length up to which a journal was written.
 
-    base : numbers of the content of the file that it belongs to; None where there is no such file.
+    base : numbers that identify the content of its HDF5 file; None if there is no such file.
     end : length, bytes. frames : number of evaluations within this length.
     """
 
@@ -38,13 +37,14 @@ class Mark:
     frames: int
 
     def write(self, lock: int) -> None:
-        """Write the mark into the open lock file. No stored record depends on it: a failure is no error."""
+        """Write the mark into the open lock file. A failure is ignored, since no stored record depends on
+        it."""
         with contextlib.suppress(OSError):
             os.pwrite(lock, frame(json.dumps(astuple(self)).encode()), 0)
 
     @classmethod
     def read(cls, lock: Path) -> Mark | None:
-        """Return the mark in a lock file, None where there is no whole one."""
+        """Return the mark in a lock file, None if there is no valid one."""
         try:
             base, end, frames = json.loads(scan(content(lock) or b"").payloads[0])
             return cls(None if base is None else tuple(base), int(end), int(frames))
@@ -52,7 +52,8 @@ class Mark:
             return None
 
     def loss(self, base: tuple[int, ...] | None, found: Entries) -> str | None:
-        """Return a description of what a journal, read from its beginning, has lost; None for a whole one."""
+        """Return a description of the data lost from a journal that was read from its beginning; None if
+        complete."""
         if self.base != base or found.end >= self.end:
             return None
         count = self.frames - len(found.records) - len(found.damaged)
@@ -62,9 +63,11 @@ class Mark:
 
 @dataclass(frozen=True)
 class TableRows:
-    """Rows that were put into a table: behind the first ``kept`` ones; attrs, about : None for those it had.
+    """Rows that were appended to a table after its first ``kept`` rows, or a whole new table.
 
-    So the logbook of a search costs a row a generation, not all rows.
+    attrs, about : attributes of a new table and its columns; None if they did not change.
+
+    The logbook of a search thus costs one row for each generation, not all rows.
     """
 
     table: str
@@ -75,7 +78,7 @@ class TableRows:
 
     @classmethod
     def between(cls, name: str, old: Hdf5Table | None, new: Hdf5Table) -> TableRows | None:
-        """Return what makes the old table (None: there is none) the new one; None where they are the same."""
+        """Return the rows that turn the old table (or None) into the new one; None if they are equal."""
         kept = None if old is None else old.rows_kept_in(new)
         if kept is None:
             return cls(name, 0, {head: list(c) for head, c in new.columns.items()}, new.attrs, new.about)
@@ -84,7 +87,7 @@ class TableRows:
         return cls(name, kept, {head: list(column[kept:]) for head, column in new.columns.items()})
 
     def added_to(self, old: Hdf5Table | None) -> Hdf5Table | None:
-        """Return the new table; the old one where it has too few rows, as a later one of a fold has."""
+        """Return the table with these rows added. If the old table is too short, it is returned unchanged."""
         if self.attrs is not None:
             return Hdf5Table(self.columns, self.attrs, self.about or {})
         if old is None or len(old) < self.kept:
@@ -97,13 +100,13 @@ class TableRows:
 
     @classmethod
     def parse(cls, payload: bytes) -> TableRows:
-        """Return what ``payload`` has written. ValueError if that is none."""
+        """Return the rows in a ``payload``. ValueError if it contains none."""
         _RowsForm.model_validate_json(payload)
         return cls(**json.loads(payload))
 
 
 class _RowsForm(BaseModel):
-    """The form holds rows of a table as their payload has them."""
+    """Validates the payload of TableRows."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
     table: str
@@ -115,8 +118,11 @@ class _RowsForm(BaseModel):
 
 @dataclass(frozen=True)
 class Entries:
-    """What is in a part of a journal. tables : as they are with it. damaged : a description of each thing in
-    it that is neither; end, torn : see Scan."""
+    """The content of a part of a journal.
+
+    records : its evaluations. tables : all tables, with its rows added. damaged : descriptions of invalid
+        frames. end, torn : see Scan.
+    """
 
     records: list[Record] = field(default_factory=list)
     tables: dict[str, Hdf5Table] = field(default_factory=dict)
@@ -126,7 +132,7 @@ class Entries:
 
 
 class Journal:
-    """The journal is the file at path. Callers hold the lock (tisim.files.atomic.locked)."""
+    """The journal file at path. Callers hold the lock (tisim.files.atomic.locked)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -137,9 +143,9 @@ class Journal:
         return 0 if info is None else info.st_size
 
     def read(self, tables: Mapping[str, Hdf5Table], offset: int = 0) -> Entries:
-        """Return what there is from byte offset on, which must be 0 or the end of an earlier reading.
+        """Return the content from byte offset on, which must be 0 or the end of an earlier read.
 
-        tables : as they are without it.
+        tables : the tables before these entries.
         """
         if self.size() <= offset:
             return Entries(tables=dict(tables), end=offset)
@@ -148,9 +154,9 @@ class Journal:
             return entries(scan(file.read(), offset), tables)
 
     def append(self, end: int, payload: bytes) -> int:
-        """Write one frame at the end of the last whole one, cutting off a torn tail; return the new end.
+        """Write one frame after the last complete one, cutting off a torn tail; return the new end.
 
-        On return the frame is on the disk. RunError if the disk is full, the frames before are then whole.
+        The frame is on disk on return. RunError if the disk is full; earlier frames are then intact.
         """
         return append_at(self.path, end, frame(payload))
 
@@ -161,7 +167,7 @@ class Journal:
 
 
 def entries(scanned: Scan, tables: Mapping[str, Hdf5Table]) -> Entries:
-    """Return what the frames hold; tables : as they are without them."""
+    """Return the content of the frames; tables : the tables before them."""
     damaged = [f"journal, byte {offset}: not a whole record" for offset in scanned.damaged]
     found = Entries([], dict(tables), damaged, scanned.end, scanned.torn)
     for number, payload in enumerate(scanned.payloads):

@@ -1,4 +1,4 @@
-"""A cache file, such as that of a search, is checked record by record, or made small again."""
+"""Maintenance of a cache file, such as search.h5: checking every record, and compacting."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from tisim.files.atomic import locked
 
 @dataclass(frozen=True)
 class VerifyReport:
-    """A report says what ``verify`` has found in a cache file.
+    """The result of ``verify`` on a cache file.
 
-    rows, journal : numbers of whole records in the HDF5 file and in the journal.
-    damaged : every row, table or stretch of journal that is not what was written, or has been cut off.
+    rows, journal : numbers of intact records in the HDF5 file and in the journal.
+    damaged : every row, table or part of the journal that was altered or cut off.
     torn : bytes of an unfinished record at the journal's end (a killed writer; harmless).
     duplicates : records stored more than once (a kill during a fold; harmless).
     conflicts : keys stored with different fitnesses: the evaluation is not reproducible.
@@ -40,9 +40,9 @@ class VerifyReport:
 
 
 def verify(path: str | Path) -> VerifyReport:
-    """Check every row, table and journal frame of an existing cache file, and change nothing.
+    """Check every row, table and journal frame of an existing cache file, without changing it.
 
-    InputError if the file does not exist, is cut short or is not a cache's.
+    InputError if the file does not exist, is truncated or is not a cache file.
     """
     path, journal, lock = existing_files(path)
     with locked(lock, exclusive=False):
@@ -74,15 +74,16 @@ def verify(path: str | Path) -> VerifyReport:
 
 
 def _same(one: Record, other: Record) -> bool:
-    """Return whether two evaluations have found the same; a value that there is not is as good as NaN."""
+    """Return whether two evaluations have the same values; a missing value equals NaN."""
     values = [{name: v for name, v in r.values.items() if not math.isnan(v)} for r in (one, other)]
     return one.ok == other.ok and values[0] == values[1]
 
 
 def compact(path: str | Path) -> int:
-    """Fold an existing cache file's journal, drop what is damaged or double; return how many are kept.
+    """Fold the journal of an existing cache file, drop damaged and duplicate records; return the number kept.
 
-    A file that is damaged as a whole is kept as FILE.damaged; FILE then has what could be read of it.
+    A file that is damaged as a whole is renamed to FILE.damaged; FILE then contains the records that could be
+    read from it.
     """
     file, _, lock = existing_files(path)
     salvage.repair(file, lock)

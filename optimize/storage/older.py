@@ -1,7 +1,7 @@
-"""Files of the format before this one are read, and written anew at the next fold.
+"""Reads files of the previous format, which are converted at the next fold.
 
-There a run had the values of its objectives without their names, and its design as JSON. The names are in the
-identities of the searches that are stored in the same file.
+In that format a run had the values of its objectives without their names, and its design as JSON. The names
+are taken from the identities of the searches stored in the same file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _NUMBERS = ("fitness", "ok", "seed", "wall_s", "created", "crc")
 
 
 class _OlderForm(BaseModel):
-    """The form holds an evaluation as that format had it: in a journal, and below the checksum of a row."""
+    """Validates an evaluation of that format, from a journal or from a row with its checksum."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
     key: str
@@ -41,7 +41,7 @@ class _OlderForm(BaseModel):
 
 def parse(payload: bytes, tables: Mapping[str, Hdf5Table]) -> Record:
     """Return the evaluation in a frame of a journal. ValueError if there is none, or no search in these
-    tables says what its objectives are called."""
+    tables names its objectives."""
     form = _OlderForm.model_validate_json(payload)
     values = [math.nan if value is None else value for value in (form.fitness, *form.others)]
     names, genes = _names(form.problem, len(values), tables)
@@ -52,7 +52,7 @@ def parse(payload: bytes, tables: Mapping[str, Hdf5Table]) -> Record:
 
 
 def read_rows(group: h5py.Group, tables: Mapping[str, Hdf5Table]) -> tuple[list[Record], list[str]]:
-    """Return the whole evaluations in order, and a description of each row that is none."""
+    """Return the valid evaluations in order, and a description of each invalid row."""
     columns = {name: group[name][...] for name in (*_TEXT, *_NUMBERS)}
     if "others" in group:
         columns["others"] = group["others"][...]
@@ -68,11 +68,11 @@ def read_rows(group: h5py.Group, tables: Mapping[str, Hdf5Table]) -> tuple[list[
 
 
 class _Unnamed(ValueError):
-    """No search in the file says what the objectives are called."""
+    """No search in the file names the objectives."""
 
 
 def _payload(cells: Mapping[str, Any]) -> bytes:
-    """Return the row as its frame in the journal was; ValueError where its checksum does not fit."""
+    """Return the row in the form of its journal frame; ValueError if its checksum is wrong."""
     text = {name: cells[name].decode() for name in _TEXT}
     fields = {**text, **{name: cells[name] for name in _NUMBERS if name != "crc"}}
     fields |= {name: json.loads(text[name]) for name in ("design", "work")}
@@ -87,11 +87,11 @@ def _payload(cells: Mapping[str, Any]) -> bytes:
 
 
 def _names(problem: str, count: int, tables: Mapping[str, Hdf5Table]) -> tuple[Sequence[str], Sequence[str]]:
-    """Return the names of so many objectives, and of the genes, in order."""
+    """Return the names of this number of objectives, and of the genes, in order."""
     for table in tables.values():
         if table.intact and "identity" in table.attrs:
             identity = json.loads(table.attrs["identity"])
             names = identity.get("objective_order", list(identity.get("objectives", ())))
             if identity.get("problem") == problem and len(names) == count:
                 return names, identity.get("gene_order", ())
-    raise _Unnamed("no search in the file says what its objectives are called")
+    raise _Unnamed("no search in the file names its objectives")

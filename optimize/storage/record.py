@@ -14,9 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from tisim.errors import must
 
 REASON_LENGTH = 500
-"""Largest number of characters of a reason. A column has one length: a stack trace would widen all rows."""
+"""Largest number of characters of a reason. All cells of a column have one length, so a stack trace would
+widen all rows."""
 UNKNOWN_START = -1
-"""The number of a start that is not known, as in files of before it was kept."""
+"""The start number of a run whose start is not known, as in older files."""
 
 Gene = float | int | str | bool
 """The value of a gene in a design."""
@@ -24,23 +25,24 @@ _PLAIN = frozenset((float, int, str, bool))
 
 
 def canonical(value: Any) -> bytes:
-    """Return ASCII JSON with sorted keys: equal values, equal bytes. NumPy scalars become Python numbers."""
+    """Return ASCII JSON with sorted keys: equal values give equal bytes. NumPy scalars become Python
+    numbers."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=lambda scalar: scalar.item())
     return text.encode("ascii")
 
 
 def plain(value: Any) -> Any:
-    """Return a NumPy scalar as a number of Python, and anything else as it is."""
+    """Return a NumPy scalar as a Python number, and anything else unchanged."""
     return value if type(value) in _PLAIN else getattr(value, "item", lambda: value)()
 
 
 def evaluation_key(
     scene_digest: str, settings: Mapping[str, Any], problem: str, version: int, code: str = ""
 ) -> str:
-    """Return the SHA-256 (hex) of all that decides a fitness.
+    """Return the SHA-256 (hex) of everything that determines a fitness.
 
-    That is the scene's digest (physics, parameters, seed), the evaluator's settings (precision, device kind)
-    and the objective (the problem's name, version and code).
+    It covers the scene's digest (physics, parameters, seed), the evaluator's settings (precision, device
+    kind) and the objective (the problem's name, version and code).
     """
     objective = [problem, version, *([code] if code else [])]
     return hashlib.sha256(canonical([scene_digest, dict(settings), *objective])).hexdigest()
@@ -48,15 +50,15 @@ def evaluation_key(
 
 @dataclass(frozen=True)
 class Record:
-    """A record is the evaluation of one design from one random start.
+    """The evaluation of one design from one random start.
 
     key : see evaluation_key; problem : its name.
-    values : what was found, name -> value: each objective, and other quantities of the run where the problem
-    keeps some; in order. NaN, or missing, where the evaluation failed.
-    ok, reason : how it ended.
+    values : name -> value, in order: each objective, and other quantities of the run if the problem stores
+        some. NaN, or missing, if the evaluation failed.
+    ok, reason : whether it succeeded; if not, why.
     seed : of the start; start : its number in the search that made it, from 0.
     design : gene -> value in its unit, in order; work : counts of the run.
-    wall_s : seconds it took; created : seconds since 1970 (UTC).
+    wall_s : duration, s; created : time, s since 1970 (UTC).
     Raises InputError for a gene that no column can hold: an integer beyond 64 bits, a text with a NUL.
     """
 
@@ -85,21 +87,21 @@ class Record:
                 must(-(2**63) <= value < 2**63, "gene", "an integer of 64 bits", f"{name}: {value}")
 
     def payload(self) -> bytes:
-        """Return the record as ASCII JSON, its fields in their order; NaN is written as null, which every
-        JSON reader knows."""
+        """Return the record as ASCII JSON, its fields in order; NaN becomes null, which every JSON reader
+        accepts."""
         fields = {**vars(self), "values": {name: _number(value) for name, value in self.values.items()}}
         return json.dumps(fields, separators=(",", ":"), default=plain).encode("ascii")
 
     @classmethod
     def parse(cls, payload: bytes) -> Record:
-        """Return the record that ``payload`` has written. ValueError if it is none."""
+        """Return the record in a ``payload``. ValueError if it is invalid."""
         fields = dict(vars(_Form.model_validate_json(payload)))
         values = {name: math.nan if v is None else float(v) for name, v in fields.pop("values").items()}
         return cls(**fields, values=values)
 
 
 def _number(value: float) -> float | str | None:
-    """Return a value as JSON can have it."""
+    """Return a value in a form that JSON supports."""
     if math.isfinite(value):
         return value
     return None if math.isnan(value) else str(value)
@@ -109,7 +111,7 @@ Integer64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 
 
 class _Form(BaseModel):
-    """The form holds a record as its payload has it."""
+    """Validates the payload of a record."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
     key: str

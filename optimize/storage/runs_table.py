@@ -1,7 +1,7 @@
-"""Evaluations as columns: those of one problem whose designs have the same genes.
+"""Evaluations as columns: a table for the runs of one problem whose designs have the same genes.
 
-A hundred thousand of them are read, checked and written column by column; a Record is made when it is asked
-for.
+A hundred thousand evaluations are read, checked and written column by column; Records are made only on
+request.
 """
 
 from __future__ import annotations
@@ -23,18 +23,20 @@ KINDS: Mapping[str, Any] = {
     "key": bytes, "start": np.int64, "seed": np.int64, "ok": np.uint8, "reason": bytes, "wall_s": np.float64,
     "created": np.float64, "work": bytes,
 }  # fmt: skip
-"""The columns that all evaluations have, beside genes and values."""
+"""The columns of all evaluations, in addition to genes and values."""
 Layout = tuple[str, frozenset[tuple[str, str]]]
-"""The problem's name, and each gene with the kind of its values (numbers "f", flags "b", text "S"): what
-evaluations of one table share. Whole numbers beside others are kept as these."""
+"""The problem's name, and each gene with the kind of its values (numbers "f", flags "b", text "S"). All
+evaluations of a table share it. Integers are stored as numbers."""
 
 
 @dataclass(frozen=True)
 class RunsTable:
-    """A table has a row for each evaluation of one problem.
+    """A table with a row for each evaluation of one problem.
 
-    facts : the columns of KINDS; genes, values : a column for each gene and each value, by name, in order.
-    Text is bytes (UTF-8) of one length for a column. A value that an evaluation does not have is NaN.
+    facts : the columns of KINDS.
+    genes, values : a column for each gene and each value, by name, in order.
+
+    Text is stored as UTF-8 bytes of one length for a column. A value that an evaluation does not have is NaN.
     """
 
     problem: str
@@ -47,7 +49,7 @@ class RunsTable:
 
     @property
     def layout(self) -> Layout:
-        """Return what tells it from tables that cannot be joined to it."""
+        """Return the layout; only tables of equal layout can be joined."""
         kinds = {name: column.dtype.kind for name, column in self.genes.items()}
         return self.problem, frozenset((name, kind.replace("i", "f")) for name, kind in kinds.items())
 
@@ -58,7 +60,7 @@ class RunsTable:
 
     @cached_property
     def rows(self) -> Mapping[str, int]:
-        """The row of each key, the first that has it."""
+        """The first row of each key."""
         return dict(zip(reversed(self.keys), range(len(self) - 1, -1, -1), strict=True))
 
     def different(self) -> RunsTable:
@@ -66,8 +68,8 @@ class RunsTable:
         return self.chosen(np.isin(np.arange(len(self)), list(self.rows.values())))
 
     def designs(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the row of the first run of each different design, ascending, and for each row of which of
-        these it is."""
+        """Return the row of the first run of each different design, ascending, and the design's index for
+        each row."""
         designs = packed(self.genes.values())
         same_bytes = designs.view(f"V{designs.shape[1]}").ravel()
         _, first, design = np.unique(same_bytes, return_index=True, return_inverse=True)
@@ -77,7 +79,7 @@ class RunsTable:
         return first[order], number[design]
 
     def record(self, row: int) -> Record:
-        """Return the evaluation in a row. ValueError where its text is none."""
+        """Return the evaluation in a row. ValueError if its text is invalid."""
         facts = {name: _plain(column[row]) for name, column in self.facts.items()}
         return Record(
             **{**facts, "ok": bool(facts["ok"]), "work": json.loads(facts["work"])},
@@ -91,8 +93,8 @@ class RunsTable:
         return [self.record(row) for row in range(len(self))]
 
     def checksums(self) -> NDArray[np.uint32]:
-        """Return the CRC-32 of each row: of the bytes of its cells, one after another, behind the names of
-        problem and columns."""
+        """Return the CRC-32 of each row: the bytes of its cells in order, preceded by the names of problem
+        and columns."""
         cells = packed([*self.facts.values(), *self.genes.values(), *self.values.values()])
         start = zlib.crc32(canonical([self.problem, list(self.genes), list(self.values)]))
         return np.array([zlib.crc32(row, start) for row in cells], dtype=np.uint32)
@@ -103,7 +105,7 @@ class RunsTable:
         return RunsTable(self.problem, *parts)
 
     def joined(self, other: RunsTable) -> RunsTable:
-        """Return the table with the rows of another one, of the same layout, behind its own."""
+        """Return the table with the rows of another one, of the same layout, appended."""
 
         def value(part: RunsTable, name: str) -> Column:
             return part.values[name] if name in part.values else np.full(len(part), np.nan)
@@ -118,7 +120,7 @@ class RunsTable:
 
     @classmethod
     def of(cls, records: Sequence[Record]) -> RunsTable:
-        """Return the table of evaluations, one or more, that have one layout."""
+        """Return the table of one or more evaluations that have one layout."""
         facts: dict[str, Column] = {}
         for name, kind in KINDS.items():
             cells = [getattr(record, name) for record in records]
@@ -132,7 +134,7 @@ class RunsTable:
 
 
 def tabulated(tables: Sequence[RunsTable], records: Iterable[Record]) -> list[RunsTable]:
-    """Return tables with the evaluations behind those that are in them already, one for each layout."""
+    """Return the tables with these evaluations appended, one table for each layout."""
     parts: dict[Layout, RunsTable] = {}
     by_layout: dict[Layout, list[Record]] = {}
     for record in records:
@@ -144,13 +146,13 @@ def tabulated(tables: Sequence[RunsTable], records: Iterable[Record]) -> list[Ru
 
 
 def packed(columns: Iterable[Column]) -> NDArray[np.uint8]:
-    """Return the bytes of the cells of each row, one after another, shape (rows, bytes)."""
+    """Return the concatenated bytes of the cells of each row, shape (rows, bytes)."""
     cells = [np.ascontiguousarray(c).view(np.uint8).reshape(len(c), c.dtype.itemsize) for c in columns]
     return np.ascontiguousarray(np.hstack(cells))
 
 
 def _plain(cell: Any) -> Any:
-    """Return a cell as Python has it."""
+    """Return a cell as a plain Python value."""
     value = cell.item()
     return value.decode() if isinstance(value, bytes) else value
 

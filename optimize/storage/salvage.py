@@ -1,7 +1,7 @@
-"""A cache file whose structure is damaged, or that another program has written to, is read in part.
+"""Recovers the readable part of a cache file that is damaged, or that another program has written to.
 
-HDF5 may crash on such a file, or never return: it is read in a process of its own, ended after a while. Rows
-and tables count when their own checksums fit.
+HDF5 may crash or hang on such a file, so a separate process reads it, with a time limit. Rows and tables are
+kept if their own checksums are right.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from tisim.files.checksum import verified
 from tisim.files.regular_file import content, file_status
 
 TIME_LIMIT = 300.0
-"""Longest time of that process, s; reading a million rows takes a tenth of it."""
+"""Time limit of that process, s; reading a million rows takes a tenth of it."""
 
 
 def repair(path: Path, lock: Path) -> None:
-    """Replace a damaged file by what can be read of it, and keep the damaged one as FILE.damaged.
+    """Replace a damaged file by its readable part, and keep the damaged one as FILE.damaged.
 
-    Nothing happens when the file is whole, or nothing can be read. InputError when FILE.damaged is there.
+    Nothing happens if the file is intact, or nothing can be read. InputError if FILE.damaged exists.
     """
     old = content(path)
     if old is None or verified(old) is not None:
@@ -56,7 +56,7 @@ def _salvage(old: bytes) -> bytes | None:
 
 
 def _rebuild(old: bytes) -> bytes:
-    """Return a cache file of what is whole in a damaged one; any error when nothing can be read."""
+    """Return a cache file with the intact part of a damaged one; any error if nothing can be read."""
     with h5py.File(io.BytesIO(old), "r") as file:
         must(hdf5_store.by_cache(file), "file", "written by a cache", Words("another"))
         try:
@@ -67,7 +67,7 @@ def _rebuild(old: bytes) -> bytes:
 
 
 def _runs(file: h5py.File, tables: Mapping[str, Hdf5Table]) -> list[RunsTable]:
-    """Return the evaluations that can be read, of each problem on its own."""
+    """Return the evaluations that can be read, each problem separately."""
     group = file[hdf5_store.EVALUATIONS]
     if file.attrs["format"] == older.FORMAT:
         return tabulated([], older.read_rows(group, tables)[0])

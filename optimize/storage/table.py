@@ -22,8 +22,9 @@ _OWN_ATTRIBUTES = ("columns", "crc32")
 class Hdf5Table:
     """Named columns of equal length (numbers or strings) and attributes (numbers or strings).
 
-    about : attributes of columns, such as their unit, by the column's name. intact : whether it is what was
-    written. Raises InputError if the columns differ in length.
+    about : attributes of columns, such as their unit, by the column's name.
+    intact : whether its checksum is right.
+    Raises InputError if the columns differ in length.
     """
 
     columns: Mapping[str, Sequence[Any]]
@@ -39,7 +40,7 @@ class Hdf5Table:
         return len(next(iter(self.columns.values()), ()))
 
     def rows_kept_in(self, new: Hdf5Table) -> int | None:
-        """Return how many rows the new table begins with that are all of this one; None where it does not."""
+        """Return the number of rows if all of them are the first rows of the new table; otherwise None."""
         same = dict(self.attrs) == dict(new.attrs) and self.about == new.about and self.intact
         if not same or list(self.columns) != list(new.columns):
             return None
@@ -47,19 +48,19 @@ class Hdf5Table:
         return len(self) if begins else None
 
     def continued(self, kept: int, columns: Mapping[str, Sequence[Any]]) -> Hdf5Table:
-        """Return the table with these rows behind the first ``kept`` of its own."""
+        """Return the table with these rows after its first ``kept`` rows."""
         longer = {name: [*self.columns.get(name, ())[:kept], *column] for name, column in columns.items()}
         return Hdf5Table(longer, self.attrs, self.about)
 
 
 def equal(column: Sequence[Any], other: Sequence[Any]) -> bool:
-    """Return whether two columns hold the same, NaN being the same as NaN."""
+    """Return whether two columns are equal; NaN equals NaN."""
     one, two = list(column), list(other)
     return one == two or canonical(one) == canonical(two)
 
 
 def write_table(group: h5py.Group, table: Hdf5Table) -> None:
-    """Write a table into a group, beside those below it. One that is not intact stays so."""
+    """Write a table into a group, next to the tables below it. A damaged table stays marked as damaged."""
     names = dataset_names(table.columns)
     for name, column in table.columns.items():
         text = any(isinstance(value, str) for value in column)
@@ -75,13 +76,13 @@ def write_table(group: h5py.Group, table: Hdf5Table) -> None:
 
 
 def write_column(group: h5py.Group, name: str, data: NDArray[Any]) -> h5py.Dataset:
-    """Write a column; bytes are text in UTF-8 of a fixed length."""
+    """Write a column; bytes are UTF-8 text of a fixed length."""
     kind = h5py.string_dtype("utf-8", data.dtype.itemsize) if data.dtype.kind == "S" else data.dtype
     return group.create_dataset(name, data=data.astype(kind, copy=False))
 
 
 def read_tables(file: h5py.File) -> dict[str, Hdf5Table]:
-    """Return the tables in the file by name, also those that are not intact."""
+    """Return the tables in the file by name, damaged ones included."""
     names: list[str] = []
     file.visititems(lambda name, item: names.append(name) if "crc32" in item.attrs else None)
     return {name: _read_table(file[name]) for name in names}
@@ -115,13 +116,13 @@ def attributes(item: h5py.Group | h5py.Dataset) -> dict[str, Any]:
 
 
 def text_column(cells: Sequence[str]) -> NDArray[Any]:
-    """Return text as a column whose cells have one length: damage to a byte is damage to one row."""
+    """Return text as a column of cells of one length, so that a damaged byte damages only one row."""
     return np.array([cell.encode() for cell in cells], dtype=bytes)
 
 
 def dataset_names(heads: Iterable[str]) -> dict[str, str]:
-    """Return the name of a dataset or group for each heading, all different. HDF5 takes "/" for a path, so a
-    unit like m/s gets U+2215, and "." for the group itself."""
+    """Return a distinct dataset or group name for each heading. HDF5 treats "/" as a path separator and "."
+    as the group itself, so a unit like m/s is written with U+2215."""
     names: dict[str, str] = {}
     for head in heads:
         name = head.replace("/", "\u2215").replace("\0", "\u2400")

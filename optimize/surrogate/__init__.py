@@ -1,1 +1,1 @@
-"""Surrogates: what a search believes of designs that it has not run, from those that it has."""
+"""Surrogates: predictions for designs that have not run, from the designs that have."""

@@ -1,13 +1,15 @@
-"""Which designs are worth a run: those that may improve on what is known, alone and as a batch.
+"""Acquisition: selects the designs to run next, those most likely to improve on the known ones.
 
-One cost: the expected improvement on the least posterior mean of the designs that were run (J. Mockus (1975);
-D. R. Jones, M. Schonlau and W. J. Welch, J. Global Optim. 13 (1998) 455-492, Eq. 15), its logarithm, which
-does not underflow (S. Ament and others, NeurIPS 36 (2023)). Several costs: the hypervolume that the lower
-confidence bound of a design would add to the front (W. Ponweiser and others, PPSN X, LNCS 5199 (2008) 784).
+One cost: the logarithm of the expected improvement on the least posterior mean of the designs that were run.
+The logarithm does not underflow. Several costs: the hypervolume that the lower confidence bound of a design
+would add to the front.
 
-A batch is chosen one by one. A design that is chosen is taken to have the mean that is expected, which leaves
-all means as they are and makes the process surer around it (the kriging believer of D. Ginsbourger, R. Le
-Riche and L. Carraro (2010)).
+A batch is chosen one design at a time. Each chosen design is assumed to have its expected mean. This leaves
+all means unchanged and reduces the uncertainty of the process around the design (kriging believer).
+
+Source: expected improvement: J. Mockus (1975); D. R. Jones, M. Schonlau and W. J. Welch, J. Global Optim. 13
+(1998) 455-492, Eq. 15; its logarithm: S. Ament and others, NeurIPS 36 (2023); hypervolume: W. Ponweiser and
+others, PPSN X, LNCS 5199 (2008) 784; kriging believer: D. Ginsbourger, R. Le Riche and L. Carraro (2010).
 """
 
 from __future__ import annotations
@@ -20,19 +22,19 @@ from tisim.optimize.surrogate.gaussian_process import Array
 from tisim.optimize.surrogate.selection import beaten_by
 
 _CONFIDENCE = 1.0
-"""Standard deviations between the mean and the bound that several costs are judged by."""
+"""Distance of the confidence bound for several costs from the mean, in standard deviations."""
 _MONTE_CARLO = 4000
-"""Points by which a hypervolume of three costs or more is measured."""
+"""Number of sample points for a hypervolume of three costs or more."""
 _MOST_RANKED = 1500
-"""Designs of which a batch is chosen; of more, those that are worth most alone."""
+"""Largest number of candidates for a batch; of more, the best single ones are used."""
 _APART = 1e-6
-"""Designs of a batch differ by this in a gene at least, in widths of its range."""
+"""Designs of a batch differ by at least this in one gene, as a fraction of its range."""
 
 
 class Worth:
-    """What a run of each design would be worth, by a belief.
+    """The acquisition function: the worth of running each design, according to a belief.
 
-    rng : for volumes in three dimensions or more, which are sampled.
+    rng : random generator for volumes in three dimensions or more, which are sampled.
     """
 
     def __init__(self, belief: Belief, rng: np.random.Generator) -> None:
@@ -45,7 +47,8 @@ class Worth:
             self.volume = _Volume(self.front, rng)
 
     def __call__(self, means: Array, deviations: Array) -> Array:
-        """Return the worth of designs by mean and standard deviation of their costs, (m, objectives) both."""
+        """Return the worth of designs from mean and standard deviation of their costs, both (m,
+        objectives)."""
         if means.shape[1] == 1:
             return log_expected_improvement(means[:, 0], deviations[:, 0], self.best[0])
         return self.volume.improvement(means - _CONFIDENCE * deviations)
@@ -55,11 +58,11 @@ class Worth:
         return self(*self.belief.predict(points))
 
     def batch(self, points: Array, count: int, apart: float = _APART) -> Array:
-        """Return the points that are worth most together, (count, genes), of many, (m, genes)."""
+        """Return the points with the greatest joint worth, (count, genes), out of many, (m, genes)."""
         belief = self.belief
         means, deviations = belief.predict(points)
         if len(points) > _MOST_RANKED:
-            # What is worth little alone is worth less beside others.
+            # A design of little worth alone has even less in a batch.
             kept = np.argsort(-self(means, deviations), kind="stable")[:_MOST_RANKED]
             points, means, deviations = points[kept], means[kept], deviations[kept]
         at = belief.features(points)
@@ -90,7 +93,7 @@ class Worth:
 def log_expected_improvement(mean: Array, deviation: Array, best: float) -> Array:
     """Return log E[max(best - f, 0)] of normal f, all of one shape."""
     z = (best - mean) / deviation
-    # Below, phi(z) + z Phi(z) = phi(z) (1 + z Phi(z) / phi(z)), which far below tends to phi(z) / z^2.
+    # For negative z: phi(z) + z Phi(z) = phi(z) (1 + z Phi(z) / phi(z)), which tends to phi(z) / z^2.
     near, below = np.maximum(z, -1.0), np.minimum(z, -1.0)
     ratio = np.exp(log_ndtr(below) - norm.logpdf(below))
     tail = np.where(below < -30.0, below**-2.0, np.maximum(1.0 + below * ratio, 1e-300))
@@ -101,10 +104,11 @@ def log_expected_improvement(mean: Array, deviation: Array, best: float) -> Arra
 
 
 class _Volume:
-    """The hypervolume between a front and a point that is worse than all of it.
+    """The hypervolume between a front and a reference point that is worse than all of it.
 
-    E. Zitzler and L. Thiele, PPSN V, LNCS 1498 (1998) 292-301. Exact for two costs; for more, by points drawn
-    evenly.
+    It is exact for two costs; for more it is sampled at uniform random points.
+
+    Source: E. Zitzler and L. Thiele, PPSN V, LNCS 1498 (1998) 292-301.
     """
 
     def __init__(self, front: Array, rng: np.random.Generator) -> None:
@@ -119,15 +123,17 @@ class _Volume:
             self.free = ~np.any(np.all(front[None] <= self.samples[:, None], axis=2), axis=1)
 
     def add(self, costs: Array) -> None:
-        """Take a design of these costs into the front."""
+        """Add a design with these costs to the front."""
         front = np.vstack([self.front, costs])
         self.front = front[beaten_by(front) == 0]
         if front.shape[1] > 2:
             self.free &= ~np.all(costs <= self.samples, axis=1)
 
     def improvement(self, costs: Array) -> Array:
-        """Return the hypervolume that each of these, (m, objectives), would add; for those that add none a
-        negative number, the nearer to 0 the nearer it is to adding any."""
+        """Return the hypervolume that each of these costs, (m, objectives), would add.
+
+        If a design adds none, the value is negative; it approaches 0 as the design approaches the front.
+        """
         scaled = (costs - self.low) / self.span
         if costs.shape[1] == 2:
             added = self._exact(scaled)
@@ -138,7 +144,7 @@ class _Volume:
                 below &= cost[:, None] <= sample[None, :]
             added = below.sum(axis=1) / _MONTE_CARLO
         front = (self.front - self.low) / self.span
-        # How much better in each cost it had to be, to be no worse than a design of the front in one.
+        # The improvement in all costs needed to match some design of the front in one cost.
         behind = np.max(np.min(scaled[:, None, :] - front[None], axis=2), axis=1)
         return np.where(added > 0, added, -np.maximum(behind, 0.0) - 1e-12)
 

@@ -1,4 +1,4 @@
-"""What a search believes of designs that it has not run: a Gaussian process for each cost."""
+"""Predictions for designs that have not run: a Gaussian process for each cost."""
 
 from __future__ import annotations
 
@@ -12,23 +12,25 @@ from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess, Pa
 from tisim.optimize.surrogate.selection import representative, thinned
 
 MOST_LEARNED = 500
-"""Designs from which a process is made, at most."""
+"""Largest number of designs that a process is fitted to."""
 _PRIOR_STARTS = 8
-"""Starts that the noise of all designs together counts for beside the starts of the design itself."""
+"""Weight, in starts, of the pooled noise of all designs relative to the starts of a single design."""
 _SKEWED, _SKEWED_NOISE = 0.5, 2.0
-"""Skewness of costs above which they are transformed, without and with noise: a few large ones would hide all
-differences between small ones. But the mean of noisy costs is not that of transformed ones."""
+"""Costs with a larger skewness than this, without and with noise, are transformed: otherwise a few large
+costs would hide all differences between small ones. With noise the limit is higher, because the mean of noisy
+costs is not the mean of transformed ones."""
 
 
 class Belief:
-    """A belief holds a Gaussian process for each cost, in units that ``transformed`` gives.
+    """A Gaussian process for each cost, in units given by ``_transformed``.
 
-    features : of points of the unit cube, (n, genes) -> (n, features).
-    The noise of the mean of n starts is the variance of those starts over n. The variance of a single design,
-    known from two starts or so, is drawn towards that of all designs; that of a value that came with its
-    standard error is known. Where no design has more than one start, noise is what the nugget of the process
-    makes of the values. A failed design has the worst cost. exact : whether it is known that there is no
-    noise.
+    features : function of points of the unit cube, (n, genes) -> (n, features).
+    exact : whether the costs are known to have no noise.
+
+    The noise of a mean over n starts is the variance between starts divided by n. The variance of a single
+    design, known from about two starts, is shrunk towards the pooled variance of all designs. A value given
+    with its standard error keeps it. If no design has more than one start, the nugget of the process
+    represents the noise. A failed design has the worst cost.
     """
 
     def __init__(self, features: Callable[[Array], Array] = np.asarray) -> None:
@@ -38,10 +40,10 @@ class Belief:
         self.starts = 1
 
     def learn(self, strings: Sequence[Individual], iterations: int = 30, apart: float = 0.0) -> None:
-        """Learn from strings of known fitness, of which one or more has not failed.
+        """Fit the processes to individuals of known fitness, at least one of which did not fail.
 
-        apart : of designs that are closer together in all genes the process is made of the best alone, where
-        there is one cost and no noise. Many equal ones at a place make it think that nothing changes.
+        apart : with one cost and no noise, only the best of designs that are closer than this in all genes is
+            used; a cluster of almost equal designs would make the function appear constant.
         """
         self.strings = list(strings)
         self.points = np.array([list(string) for string in strings])
@@ -70,8 +72,10 @@ class Belief:
 
     @property
     def means(self) -> Array:
-        """The posterior mean of each cost of the designs it is made of, (chosen, objectives); without noise,
-        the costs themselves: what the process smooths away is there, though it cannot tell where."""
+        """The posterior mean of each cost of the fitted designs, (chosen, objectives).
+
+        Without noise these are the costs themselves, because variations that the process smooths are real.
+        """
         if self.exact:
             return self.costs[self.chosen]
         return self.predict(self.points[self.chosen])[0]
@@ -84,12 +88,12 @@ class Belief:
 
 
 def all_exact(strings: Sequence[Individual]) -> bool:
-    """Return whether all costs of the strings that have not failed are known to have no noise."""
+    """Return whether all costs of the individuals that did not fail are known to have no noise."""
     return all(one.exact for string in strings if not string.failed for one in string.estimates)
 
 
 def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
-    """Return the costs of strings and the variances of these means, both (strings, objectives)."""
+    """Return the costs of individuals and the variances of these means, both (strings, objectives)."""
     costs = np.array([string.fitness.values for string in strings], dtype=float)
     good = np.all(np.isfinite(costs), axis=1)
     for column in costs.T:
@@ -109,8 +113,10 @@ def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
 
 
 def _pooled(strings: Sequence[Individual], objective: int) -> float:
-    """Return the variance of a cost from start to start, of all designs together: where no design has two
-    starts, the mean of those that came with their standard errors; 0 where it is not known."""
+    """Return the variance of a cost between starts, pooled over all designs.
+
+    If no design has two starts, it is the mean of the given squared standard errors; 0 if there are none.
+    """
     known = [string.estimates[objective] for string in strings]
     known = [estimate for estimate in known if estimate.ok and math.isfinite(estimate.std)]
     squares, freedom = 0.0, 0
@@ -124,9 +130,11 @@ def _pooled(strings: Sequence[Individual], objective: int) -> float:
 
 
 def _transformed(costs: Array, skewed: float) -> tuple[Array, Array]:
-    """Return costs in units in which they are less skewed to large values than that, and the unit's slope.
+    """Return costs in units with a smaller skewness than ``skewed``, and the slope of the unit.
 
-    I.-K. Yeo and R. A. Johnson, Biometrika 87 (2000) 954-959. Other columns are returned as they are.
+    Columns with a smaller skewness are returned unchanged.
+
+    Source: I.-K. Yeo and R. A. Johnson, Biometrika 87 (2000) 954-959.
     """
     new, slopes = costs.copy(), np.ones_like(costs)
     for k, column in enumerate(costs.T):

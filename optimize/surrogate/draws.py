@@ -1,9 +1,11 @@
-"""Functions drawn from what a Gaussian process believes: through its values, as near as their noise allows.
+"""Functions drawn from the posterior of a Gaussian process.
 
-A function of the process before any data is a sum of cosines of random frequencies (A. Rahimi and B. Recht,
-NIPS 20 (2007)); those of the Matern 5/2 covariance have Student's distribution of five degrees of freedom
-(GPML Eq. 4.15). The data bend it by what the process makes of the difference (J. T. Wilson and others, ICML
-(2020), Eq. 13, the rule of Matheron).
+A function of the prior is a sum of cosines with random frequencies; for the Matern 5/2 covariance the
+frequencies have Student's distribution with five degrees of freedom. It is conditioned on the data by adding
+the process's prediction of the difference (rule of Matheron).
+
+Source: cosines: A. Rahimi and B. Recht, NIPS 20 (2007); frequencies: GPML Eq. 4.15; conditioning: J. T.
+Wilson and others, ICML (2020), Eq. 13.
 """
 
 from __future__ import annotations
@@ -14,17 +16,17 @@ import numpy as np
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess
 
 _COSINES = 512
-"""Cosines of which a function is a sum."""
+"""Number of cosines in the sum."""
 _DEGREES = 5
 """Degrees of freedom of the frequencies: twice the order of the covariance."""
 _AT_ONCE = 4096
-"""Points whose values are taken together, for the sake of memory."""
+"""Number of points evaluated at a time, to limit memory."""
 
 
 class Draws:
     """Functions drawn from a process, all defined everywhere.
 
-    count : how many. rng : decides them.
+    count : number of functions. rng : random generator for the draws.
     """
 
     def __init__(self, model: GaussianProcess, count: int, rng: np.random.Generator) -> None:

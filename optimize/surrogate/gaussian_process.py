@@ -1,7 +1,8 @@
-"""A Gaussian process: a smooth function through values of known noise, and how unsure it is between them.
+"""A Gaussian process: a smooth function through values of known noise, and its uncertainty between them.
 
-C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press (2006), here GPML:
-prediction Eq. 2.25 and 2.26, marginal likelihood Eq. 2.30, its gradient Eq. 5.9, Matern covariance Eq. 4.17.
+Source: C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press (2006), here
+GPML: prediction Eq. 2.25 and 2.26, marginal likelihood Eq. 2.30, its gradient Eq. 5.9, Matern covariance Eq.
+4.17.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from tisim.optimize.surrogate.selection import representative
 Array = NDArray[np.float64]
 
 MOST_FITTED = 300
-"""Points from which the length scales are fitted, which costs their cube; of more, this number is chosen."""
+"""Largest number of points used to fit the length scales; the cost is cubic in it. Of more points, this
+number is chosen."""
 _JITTER = 1e-8
-"""Least noise variance, in units of the variance of the values: rounding of nearly equal points."""
+"""Least noise variance, as a fraction of the variance of the values: rounding of nearly equal points."""
 NUGGET, EXACT_NUGGET = 1e-3, 1e-6
-"""Medians of the priors of the nugget: of values with noise, and of those without."""
+"""Medians of the prior of the nugget, for values with and without noise."""
 _SPREAD = {"length": 1.0, "signal": 1.5, "nugget": 3.0}
 """Standard deviations of the logarithms of the parameters in their priors."""
 
@@ -31,8 +33,9 @@ _SPREAD = {"length": 1.0, "signal": 1.5, "nugget": 3.0}
 class Parameters:
     """Parameters of the covariance, in units of the standardised values.
 
-    lengths : shape (features,), in units of the feature. signal : variance of the function. nugget : variance
-    that is added to the noise which is known.
+    lengths : length scales, shape (features,), in units of the feature.
+    signal : variance of the function.
+    nugget : variance that is added to the known noise.
     """
 
     lengths: Array
@@ -43,8 +46,10 @@ class Parameters:
     def prior(cls, features: int, nugget: float = NUGGET) -> Parameters:
         """Return the medians of the priors.
 
-        Length scales grow with the root of the dimension, as distances do: C. Hvarfner, E. O. Hellsten and
-        L. Nardi, Vanilla Bayesian optimization performs great in high dimensions, ICML (2024).
+        Length scales grow with the square root of the dimension, as distances do.
+
+        Source: C. Hvarfner, E. O. Hellsten and L. Nardi, Vanilla Bayesian optimization performs great in high
+        dimensions, ICML (2024).
         """
         return cls(np.full(features, 0.35 * math.sqrt(features)), 1.0, nugget)
 
@@ -61,13 +66,13 @@ class Parameters:
 class GaussianProcess:
     """A Gaussian process with the Matern 5/2 covariance and a length scale for each feature.
 
-    Its mean before any data is that of the values. A search has most of them where they are good, so that it
-    takes what it does not know for nearly as good, and looks there. The parameters are fitted about the
-    constant that is the likeliest.
-
     points : shape (n, features). values : shape (n,). variance : of the noise in each value, shape (n,).
-    parameters : given, or fitted from those given in ``start`` by the largest posterior density. exact :
-    whether the values are known to have no noise.
+    parameters : given; or fitted by maximum posterior density, starting from ``start``.
+    exact : whether the values are known to have no noise.
+
+    The prior mean is the mean of the values. Since most values of a search come from good regions, the
+    process expects unknown regions to be nearly as good, which favours exploration. The parameters are fitted
+    with the most likely constant as the mean.
     """
 
     def __init__(
@@ -102,36 +107,39 @@ class GaussianProcess:
         return self.centre + self.scale * mean, self.scale * np.sqrt(np.maximum(left, 1e-12))
 
     def half_solved(self, points: Array) -> Array:
-        """Return L^-1 k for each point, shape (n, m), of which products are what the data explain of the
-        covariance: k(a, b) - half_solved(a).T @ half_solved(b) is the covariance that is left."""
+        """Return L^-1 k for each point, shape (n, m).
+
+        The posterior covariance is k(a, b) - half_solved(a).T @ half_solved(b).
+        """
         across = _matern(self.points, np.atleast_2d(points), self.parameters)
         return solve_triangular(self._factor[0], across, lower=True, check_finite=False)
 
     def left_out(self) -> Array:
-        """Return for each value how far it is from what the others predict of it, shape (n,), with the
-        parameters of all (GPML Eq. 5.12)."""
+        """Return the leave-one-out residual of each value, shape (n,), with the parameters of all (GPML Eq.
+        5.12)."""
         inverse = cho_solve(self._factor, np.eye(len(self.points)), check_finite=False)
         return self.scale * (inverse @ self.values) / np.diag(inverse)
 
     def conditioned(self, across: Array, values: Array) -> Array:
-        """Return the means that a process with other values at its points would have, shape (m, draws).
+        """Return the means of a process with other values at its points, shape (m, draws).
 
-        across : covariance with its points, shape (m, n). values : shape (n, draws), standardised units, as
-        the result.
+        across : covariance with its points, shape (m, n). values : shape (n, draws), in standardised units,
+            as the result.
         """
         return np.asarray(across @ cho_solve(self._factor, values, check_finite=False))
 
     def covariance(self, points: Array, others: Array) -> Array:
-        """Return the covariance of the function before any data, shape (m, k), in standardised units."""
+        """Return the prior covariance of the function, shape (m, k), in standardised units."""
         return _matern(points, others, self.parameters)
 
     @property
     def nugget(self) -> float:
-        """The variance that a value has beside its known noise, in standardised units."""
+        """The variance of a value in addition to its known noise, in standardised units."""
         return self.parameters.nugget + _JITTER
 
     def _fitted(self, start: Parameters | None, iterations: int, exact: bool) -> Parameters:
-        """Return the parameters of largest posterior density, from those of the prior or from ``start``."""
+        """Return the parameters of largest posterior density, searched from the prior's medians or from
+        ``start``."""
         prior = Parameters.prior(self.points.shape[1], EXACT_NUGGET if exact else NUGGET)
         chosen = representative(self.values[:, None], MOST_FITTED, exact)
         likelihood = _Likelihood(self.points[chosen], self.values[chosen], self.noise[chosen], prior)
@@ -193,7 +201,8 @@ def _matern(one: Array, other: Array, parameters: Parameters) -> Array:
 
 
 def _factor(covariance: Array) -> tuple[Array, bool]:
-    """Return the lower Cholesky factor; where rounding has left none, of the covariance and a little more."""
+    """Return the lower Cholesky factor; if rounding prevents it, the factor of the covariance plus a small
+    diagonal."""
     more = 0.0
     while True:
         try:

@@ -1,4 +1,4 @@
-"""What the runs of a search tell of the shape of their noise, though each design has had two or so."""
+"""Skewness of the noise of runs, estimated from all designs, although each has only about two starts."""
 
 from __future__ import annotations
 
@@ -15,18 +15,21 @@ from tisim.optimize.surrogate.selection import representative
 from tisim.numerics.skewed import Moments
 
 LEAST_DESIGNS = 10
-"""Designs with several starts below which nothing is told."""
+"""Smallest number of designs with several starts for an estimate."""
 
 
 def moments(genome: Genome, strings: Sequence[Individual]) -> tuple[Moments, ...] | None:
-    """Return the moments of the noise of each cost; None where too few designs have several starts.
+    """Return the moments of the noise of each cost; None if too few designs have several starts.
 
-    Two values of a design do not tell in which direction noise is skewed: (0, 20) may be 20 too much once, or
-    20 too little. Other designs tell whether their mean is too high. Of a mean of n values and their variance
-    s^2 the covariance is k_3 / n, k_3 being the third central moment (M. G. Kendall and A. Stuart, The
-    Advanced Theory of Statistics, vol. 1, 4th ed. (1977), section 12.3): so k_3 is the mean over designs of
-    n s^2 times how far the mean is from what a Gaussian process predicts of it from all others. It counts for
-    fewer values, the more the process misses beside noise. The starts of a design must be its own.
+    The two values of one design do not show the direction of skewness: in (0, 20) either value may be the
+    outlier. Other designs show whether the mean is too high. The mean of n values and their variance s^2 have
+    the covariance k_3 / n, with k_3 the third central moment. Hence k_3 is estimated as the mean over designs
+    of n s^2 times the deviation of the mean from the prediction of a Gaussian process of all other designs.
+    The estimate is given a smaller weight if the prediction errors exceed the noise. The starts of a design
+    must be its own.
+
+    Source: M. G. Kendall and A. Stuart, The Advanced Theory of Statistics, vol. 1, 4th ed. (1977), section
+    12.3.
     """
     several = [one for one in strings if not one.failed and one.estimates[0].starts > 1]
     several = [one for one in several if all(math.isfinite(estimate.std) for estimate in one.estimates)]
@@ -49,7 +52,7 @@ def moments(genome: Genome, strings: Sequence[Individual]) -> tuple[Moments, ...
 
 
 def _missed(features: Array, costs: Array, noise: Array) -> Array:
-    """Return how far each cost is from what the others predict of it, less the mean of this."""
+    """Return the leave-one-out residual of each cost, minus the mean of these residuals."""
     if not np.any(noise):
         return np.zeros(len(costs))
     missed = GaussianProcess(features, costs, noise).left_out()

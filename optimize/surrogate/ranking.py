@@ -1,7 +1,7 @@
-"""Which of the designs that were run are the best, where a mean of few starts is good by luck, too.
+"""Ranking of the designs that were run, when the means of few starts are noisy.
 
-The best of many noisy means is flattered. A Gaussian process through all of them draws each towards its
-neighbours, the more so the fewer starts it has: that is ranked.
+The best of many noisy means is biased by luck. A Gaussian process through all means draws each towards its
+neighbours, more strongly if it has fewer starts; the ranking uses these posterior means.
 """
 
 from __future__ import annotations
@@ -16,13 +16,17 @@ from tisim.optimize.surrogate.belief import Belief, all_exact
 from tisim.optimize.surrogate.selection import beaten_by
 
 _UNSEEN = 1e-4
-"""A nugget below this part of the variance of all costs is taken for no noise, where noise is not known."""
+"""If the noise is not known and the nugget is below this fraction of the variance of all costs, there is no
+noise."""
 
 
 def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np.float64]:
-    """Return the posterior mean of each cost of designs, (strings, objectives), in units that may be others
-    than those of the costs, in the same order; the costs where there is no noise, or the process sees none.
-    None of the strings has failed."""
+    """Return the posterior mean of each cost of designs, (strings, objectives).
+
+    Its units may differ from the units of the costs, but the order of values is the same. The costs
+    themselves are returned if there is no noise, or the process finds none. None of the individuals may have
+    failed.
+    """
     costs = np.array([string.fitness.values for string in strings])
     if len(strings) < 3 or all_exact(strings):
         return costs
@@ -33,8 +37,11 @@ def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np
 
 
 def best(genome: Genome, strings: Sequence[Individual], count: int) -> list[Individual]:
-    """Return the best designs by posterior mean, best first; of several objectives the front, along the
-    first, of which ``count`` are kept where it is larger: the ends, and those farthest from others."""
+    """Return the best designs by posterior mean, best first.
+
+    For several objectives it is the front, sorted by the first objective. If it has more than ``count``
+    designs, the ends and the designs farthest from others are kept.
+    """
     ran = [string for string in strings if not string.failed]
     good = [string for string in ran if not string.violation] or ran
     if not good:
@@ -48,8 +55,11 @@ def best(genome: Genome, strings: Sequence[Individual], count: int) -> list[Indi
 
 
 def spread(costs: NDArray[np.float64], count: int) -> NDArray[np.intp]:
-    """Return the indices of designs that are spread over a front, ascending: the best of each objective, then
-    again and again the one that is farthest from those taken, the ranges of the front being 1."""
+    """Return the indices of designs that are spread over a front, ascending.
+
+    The best of each objective is taken first, then repeatedly the design farthest from those taken. The
+    ranges of the front are scaled to 1.
+    """
     if len(costs) <= count:
         return np.arange(len(costs))
     span = np.ptp(costs, axis=0)

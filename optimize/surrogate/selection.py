@@ -1,4 +1,5 @@
-"""The designs of an archive from which a Gaussian process is made, and how many others dominate each."""
+"""Selection of the designs that a Gaussian process is fitted to, and the number of designs that dominate
+each."""
 
 from __future__ import annotations
 
@@ -9,11 +10,12 @@ Array = NDArray[np.float64]
 
 
 def representative(costs: Array, most: int, exact: bool) -> NDArray[np.intp]:
-    """Return the indices of at most ``most`` designs, in their order, from their costs, (n, objectives).
+    """Return the indices of at most ``most`` designs, in order, from their costs, (n, objectives).
 
-    exact : whether the costs have no noise. Then half of those returned are the best, where the search is,
-    and the rest is drawn evenly. With noise all are drawn evenly: those of the lowest means were lucky, and a
-    process of lucky designs alone takes the whole region around them for as good.
+    exact : whether the costs have no noise. If so, half of the returned designs are the best ones, and the
+        rest are taken at even intervals from the others, ordered by rank. With noise all are taken at even
+        intervals from the whole list: the lowest means are partly luck, and a process fitted to lucky designs
+        would predict too low costs in their region.
     """
     if len(costs) <= most:
         return np.arange(len(costs))
@@ -26,8 +28,8 @@ def representative(costs: Array, most: int, exact: bool) -> NDArray[np.intp]:
 
 
 def thinned(points: Array, costs: Array, apart: float) -> NDArray[np.intp]:
-    """Return the indices of designs that are farther apart than this in one gene or more, ascending; of those
-    that are closer together the best."""
+    """Return the indices, ascending, of the best of each group of designs closer than ``apart`` in all
+    genes."""
     kept: list[int] = []
     for i in np.argsort(costs, kind="stable"):
         if not kept or np.abs(points[kept] - points[i]).max(axis=1).min() > apart:
@@ -36,7 +38,7 @@ def thinned(points: Array, costs: Array, apart: float) -> NDArray[np.intp]:
 
 
 def beaten_by(costs: Array) -> NDArray[np.int64]:
-    """Return by how many of the others each design is dominated: no better in any cost, and worse in one."""
+    """Return the number of others that dominate each design: no worse in any cost, and better in one."""
     if costs.shape[1] == 1:
         return np.searchsorted(np.sort(costs[:, 0]), costs[:, 0])
     no_better = np.all(costs[:, None, :] >= costs[None, :, :], axis=2)

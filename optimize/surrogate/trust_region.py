@@ -1,7 +1,9 @@
-"""A region around the best design with a Gaussian process of its own.
+"""A trust region around the best design, with its own Gaussian process.
 
-It converges where the process of the whole range, which must be true everywhere, does not. Then it begins
-anew elsewhere (D. Eriksson and others, NeurIPS 32 (2019)).
+This local process converges, while the process of the whole range, which must fit everywhere, does not. After
+convergence the region restarts elsewhere.
+
+Source: D. Eriksson and others, NeurIPS 32 (2019).
 """
 
 from __future__ import annotations
@@ -17,19 +19,22 @@ from tisim.optimize.surrogate.belief import Belief
 from tisim.optimize.surrogate.gaussian_process import Array
 
 _FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-3
-"""Half-widths of the region in the unit cube: at first, the largest, and that at which it has converged."""
+"""Half-widths of the region in the unit cube: initial, largest, and at convergence."""
 SAME_PLACE = 0.02
-"""The process of the whole range learns from one design alone of those within this distance in all genes."""
+"""Of designs within this distance in all genes, the process of the whole range learns only from one."""
 _APART = 0.1
-"""The process of the whole range proposes designs farther from the centre than this in one gene or more."""
+"""The process of the whole range proposes only designs farther from the centre than this in at least one
+gene."""
 _ROUNDS, _DRAWN, _BEST = 6, 200, 12
 
 
 class TrustRegion:
     """A trust region for one cost without noise.
 
-    centre : the best design; once a region has converged, the best of those of the next, which begins with
-    random designs. half_width : of the region around it. own : the designs of a region that has begun anew.
+    centre : the best design; after a restart, the best design of the current region, which begins with random
+        designs.
+    half_width : half-width of the region around it.
+    own : the designs of a restarted region; None before the first restart.
     """
 
     def __init__(self, genome: Genome) -> None:
@@ -41,19 +46,19 @@ class TrustRegion:
         self.belief = Belief(self._within)
 
     def propose(self, belief: Belief, count: int, rng: np.random.Generator) -> Array:
-        """Return the designs in the region that are worth a run, (count, genes), by all that is known."""
+        """Return the most worthwhile designs in the region, (count, genes)."""
         strings = belief.strings if self.own is None else self.own
         best = min((s for s in strings if not s.failed), key=lambda s: s.fitness.values, default=None)
         if best is None:
             self.cost = np.inf
             return rng.random((count, self.genes))
         self.centre, self.cost = np.array(best), float(best.fitness.values[0])
-        # As many as a quadratic function has coefficients, and some more.
+        # The number of coefficients of a quadratic function, and some more.
         enough = max(40, min(200, (self.genes + 1) * (self.genes + 2)))
         nearest = np.argsort(((belief.points - self.centre) ** 2).sum(axis=1), kind="stable")[:enough]
         self.belief.learn([belief.strings[i] for i in nearest])
         worth = Worth(self.belief, rng)
-        worth.best = self.belief.costs[0]  # of the centre, which others may have bettered elsewhere
+        worth.best = self.belief.costs[0]  # the centre; designs elsewhere may be better
         low = np.maximum(self.centre - self.half_width, 0.0)
         high = np.minimum(self.centre + self.half_width, 1.0)
         drawn = [low + rng.random((_DRAWN, self.genes)) * (high - low), self.centre[None]]
@@ -68,12 +73,15 @@ class TrustRegion:
         return worth.batch(np.vstack(drawn), count, apart=1e-3 * self.half_width)
 
     def outside(self, points: Array) -> NDArray[np.bool_]:
-        """Return which points are away from the centre. Around it the region searches; what is worth a run by
-        the process of the whole range would else be there too, where little is left to be found."""
+        """Return which points are away from the centre.
+
+        The region itself searches around the centre. Without this rule, the process of the whole range would
+        often propose designs there too, with little left to find.
+        """
         return np.abs(points - self.centre).max(axis=1) > _APART
 
     def learn(self, proposed: Sequence[Individual]) -> None:
-        """Move the size of the region by what the designs that it proposed are worth."""
+        """Update the size of the region from the costs of the designs that it proposed."""
         good = [string for string in proposed if string.fitness.valid and not string.failed]
         if self.own is not None:
             self.own += good

@@ -221,7 +221,7 @@ def test_what_cannot_be_is_refused(tmp_path):
         (first, 1.0, -0.1, "value std. error must be 0 or more, or empty; received -0.1"),
         (first, "good", None, "values of a design must be of value; received 'good'"),
         (first, {"worth": 1.0}, None, "values of a design must be of value; received"),
-        (first, None, 0.1, "standard_errors must be left out where the designs have them; received 0.1"),
+        (first, None, 0.1, "standard_errors must be left out if the designs contain them; received 0.1"),
         ([3], [1.0], None, "design must be a dictionary by the names of genes; received 3"),
         ({**first, "z": 1.0}, 1.0, None, "column z must be a gene"),
         ([], [], None, "told design must be one design or more"),

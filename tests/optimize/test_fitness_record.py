@@ -108,7 +108,7 @@ def test_what_is_no_record_of_this_problem_is_refused(record, tmp_path):
         path.write_text(text)
         with pytest.raises(InputError, match="fitness record must be"):
             FitnessRecord.load(path)
-    with pytest.raises(InputError, match="problem must be that of the record, 'fall'; received 'rise'"):
+    with pytest.raises(InputError, match="problem must be the one recorded, 'fall'; received 'rise'"):
         record.again(replace(problem(), name="rise"))
     with pytest.raises(InputError, match=r"designs must be at least one; received \{\}"):
         FitnessRecord.measure(problem(), {})

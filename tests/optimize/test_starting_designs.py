@@ -297,7 +297,7 @@ def test_rows_of_experiments(tmp_path):
         (
             "x0,x1,gain,price,load",
             "0,0,x,1,1",
-            "gain must be a number, or empty where there is none; received 'x'",
+            "gain must be a number, or empty if there is none; received 'x'",
         ),
         (
             "x0,x1,gain,price,load,price std. error",

@@ -1,4 +1,5 @@
-"""Where the runs of a search are made: in this process, in others on this machine, or on a Dask cluster."""
+"""Executors run a search's scenes in this process, in other processes of this machine, or on a Dask
+cluster."""
 
 from __future__ import annotations
 
@@ -11,15 +12,17 @@ from tisim.backend import runtime
 from tisim.errors import must
 
 RULE = "batch, processes:N or dask://HOST:PORT"
-"""What the name of an executor must be, as error messages say it."""
+"""The valid names of executors, for error messages."""
 
 
 def evaluator_for(
     problem: Problem, name: str, device: str = "cpu", precision: str = "f64", threads: int = 0,
     arithmetic: str = "strict",
 ) -> Evaluator:  # fmt: skip
-    """Return the evaluator of that name for what the problem makes of designs, scenes or calls of a plain
-    function; the others as for ``evaluator_named``."""
+    """Return the named evaluator for the problem's scenes, or calls of a plain function.
+
+    The other arguments are the same as in ``evaluator_named``.
+    """
     if problem.function is None:
         return evaluator_named(name, device, precision, threads, arithmetic)
     if name == "batch":
@@ -32,11 +35,11 @@ def evaluator_for(
 def evaluator_named(
     name: str, device: str = "cpu", precision: str = "f64", threads: int = 0, arithmetic: str = "strict"
 ) -> Evaluator:
-    """Return the evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
+    """Return the named evaluator. InputError for an unknown name, or if it cannot be reached.
 
-    "batch": this process, many worlds side by side. "processes:4": as many processes that this one starts.
-    "dask://host:port": the workers of the Dask scheduler there (needs the extra ``dask``), or
-    "dask://tls://host:port" where it speaks another protocol than TCP.
+    "batch": this process, many worlds side by side. "processes:4": four worker processes, which this one
+    starts. "dask://host:port": the workers of that Dask scheduler (needs the extra ``dask``), or
+    "dask://tls://host:port" for a protocol other than TCP.
     threads : CPU threads of this process, or of each worker; 0 for all cores, or a worker's share of them.
     """
     kind, _, rest = name.partition(":")
@@ -45,7 +48,7 @@ def evaluator_named(
         must(name == "batch", "executor", RULE, name)
         runtime.init(device, precision, threads, arithmetic)
         return BatchEvaluator()
-    # Imported late: nobody needs the one for the other, and Dask may not be there at all.
+    # Imported late: the executors do not need each other, and Dask may not be installed.
     from tisim.optimize.evaluation.executors.remote import Remote
     from tisim.optimize.evaluation.executors.worker import WorkerSettings
 

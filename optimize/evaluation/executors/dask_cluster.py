@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster, on whatever machines they are."""
+"""Workers of a Dask cluster, on any machines."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ if TYPE_CHECKING:
     from distributed import Client
 
 CONNECT_S = 10.0
-"""A scheduler has so long to answer, s."""
+"""Time limit for the scheduler's answer, s."""
 SILENCE_S = 60.0
-"""A search gives up after so long without any worker, s: a cluster may start others."""
+"""A search gives up after this time without any worker, s, since a cluster may start new ones."""
 ENCRYPTED = ("tls", "wss")
 SCHEMES = ("tcp", "ws", *ENCRYPTED)
-"""The schemes of addresses in which a scheduler may be spoken to."""
+"""The address schemes supported for a scheduler."""
 WORKER_CHECK_S = 1.0
-"""It is checked at most once in so long whether there are workers, s."""
+"""Shortest interval between checks for workers, s."""
 
 
 class DaskCluster:
     """The workers of the scheduler at address: host:port, or scheme://host:port with one of SCHEMES.
 
-    Every worker must have this package, the same compiler and Python. Taichi gets as many threads as the
-    worker was given (``dask worker --nthreads``). A unit of work whose worker is lost is given to another one
-    by the scheduler, a few times at most. Certificates, for what is encrypted, are those of Dask's own
-    configuration, ``distributed.comm.tls``. InputError when they are missing, when there is no scheduler, and
-    when it has no workers or one of another program.
+    Every worker must have this package, and the same compiler and Python. Taichi gets the number of threads
+    of the worker (``dask worker --nthreads``). If a worker is lost, the scheduler gives its unit of work to
+    another one, a few times at most. Certificates for encrypted connections are taken from Dask's own
+    configuration, ``distributed.comm.tls``. InputError if they are missing, if there is no scheduler, and if
+    it has no workers or one with another version of the program.
     """
 
     def __init__(self, address: str) -> None:
         self._client = _client(address)
-        # A scheduler that is lost is reported below; Dask would report it too, with all of its stacks.
+        # A lost scheduler is reported below; Dask would report it too, with many stack traces.
         for logger in ("distributed", "distributed.client"):
             logging.getLogger(logger).setLevel(logging.CRITICAL)
         try:
@@ -50,7 +50,7 @@ class DaskCluster:
                 who = f"worker {where} of the Dask cluster"
                 if isinstance(theirs, dict):
                     handshake.agree(handshake.program(), theirs, who)
-                elif not isinstance(theirs, OSError):  # or it has just gone
+                elif not isinstance(theirs, OSError):  # or it has just disconnected
                     raise handshake.stranger(theirs, who)
         except InputError:
             self._client.close()
@@ -61,7 +61,7 @@ class DaskCluster:
 
     @property
     def workers(self) -> int:
-        """How many there are; 0 also when the scheduler does not answer."""
+        """The number of workers; also 0 if the scheduler does not answer."""
         try:
             return len(self._client.sync(self._client.scheduler.ncores, callback_timeout=CONNECT_S))
         except (OSError, TimeoutError):
@@ -83,11 +83,11 @@ class DaskCluster:
             raise RunError(f"workers of the Dask cluster were lost again and again ({answer})") from answer
         if isinstance(answer, Answer):
             return answer
-        # It could not read what it was sent, or is of a version that does not know of answers.
+        # The worker could not read its input, or its version of the program is too old for this format.
         raise handshake.stranger(answer, "worker of the Dask cluster")
 
     def check_workers(self) -> None:
-        """Say so when there is no worker; RunError without one for SILENCE_S, or without a scheduler."""
+        """Warn if there is no worker; RunError after SILENCE_S without one, or without a scheduler."""
         self._check()
         now = time.monotonic()
         if now - self._checked < WORKER_CHECK_S:
@@ -97,7 +97,7 @@ class DaskCluster:
             self._answered, self._warned = now, False
         elif now - self._answered > SILENCE_S:
             raise RunError(
-                f"no worker of the Dask cluster has answered for {SILENCE_S:g} s; what had finished is kept"
+                f"no worker of the Dask cluster has answered for {SILENCE_S:g} s; finished runs are kept"
             )
         elif not self._warned:
             self._warned = True
@@ -109,14 +109,14 @@ class DaskCluster:
             raise _scheduler_lost()
 
     def stop(self) -> None:
-        """Cancel what is waiting; what a worker is at, it finishes for nothing."""
+        """Cancel waiting work; a worker finishes its current unit, but the result is discarded."""
         self._executor.shutdown(wait=False)
         self._client.close()
 
 
 def _client(address: str) -> Client:
-    """Return the client of the scheduler at the address. Where the address is none, nothing is begun that
-    Dask could not end."""
+    """Return the client of the scheduler at the address. An invalid address is refused before Dask starts
+    anything that it could not stop."""
     try:
         from distributed import Client, Security
         from distributed.comm import parse_host_port
@@ -141,7 +141,7 @@ def _client(address: str) -> Client:
 
 
 def _scheduler_lost() -> RunError:
-    return RunError("Dask scheduler was lost; what had finished is kept")
+    return RunError("Dask scheduler was lost; finished runs are kept")
 
 
 def _run(scenes: bytes, worker_settings: WorkerSettings) -> Answer:

@@ -1,4 +1,4 @@
-"""That searching process and workers are one program: what of each decides the bits of a result."""
+"""A check that workers run the same program, so that their results agree bit by bit."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ from tisim.scene.scene import PHYSICS_VERSION
 
 
 def program() -> dict[str, str]:
-    """Return what decides the bits of a result beside the scene, the precision, the device and the
-    arithmetic.
+    """Return all properties of the program and machine that affect the bits of a result.
 
-    Starts are drawn by NumPy and SciPy; ``sum`` of Python 3.12 rounds in another way than that of 3.11; other
-    processors have other mathematical functions.
+    Scene, precision, device and arithmetic are not included. NumPy and SciPy draw the starts; ``sum`` of
+    Python 3.12 rounds differently from Python 3.11; mathematical functions differ between processors.
     """
     return {
         "tisim": __version__,
@@ -39,7 +38,8 @@ def program() -> dict[str, str]:
 
 @cache
 def source() -> str:
-    """Return the first 12 digits of a SHA-256 of all source files: a version may have been edited."""
+    """Return the first 12 digits of a SHA-256 of all source files, because files of a version may have been
+    edited."""
     files = {
         f"{package.replace('.', '/')}/{path.relative_to(folder).as_posix()}": path
         for package, folder in zip(OWN_PACKAGES, own_folders(), strict=True)
@@ -58,9 +58,9 @@ def agree(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> None:
 
 
 def stranger(answer: object, who: str) -> InputError:
-    """Return the error for a worker that cannot even say what it is: it has sent something else."""
+    """Return the error for a worker that sent no valid description of its program."""
     ours = program()
-    rule = f"one that knows what the search is made of ({_versions_of(ours, ours)})"
+    rule = f"one with the program of the search ({_versions_of(ours, ours)})"
     return InputError(f"{who} must be {rule}; received {shorten(repr(answer), 200)}")
 
 

@@ -18,15 +18,15 @@ from tisim import RunError, Scene
 from tisim.backend import runtime
 
 LEAVE_S = 10.0
-"""A worker without work has so long to end by itself, s."""
+"""Time limit for an idle worker to exit by itself, s."""
 
 
 class Processes:
-    """So many processes, started (spawned: a fork would not survive Taichi) as there is work for them.
+    """A fixed number of worker processes, spawned on demand (Taichi would not survive a fork).
 
-    Each has a connection of its own, and a thread here that waits for its answer: one that dies is noticed at
-    once, and takes with it the unit of work that it was at and nothing else. (Those of concurrent.futures
-    share queues and their locks, and one that is killed may leave them locked, or a message cut short.)
+    Each worker has its own connection, and a thread in this process that waits for its answer. If a worker
+    dies, this is noticed at once, and only its current unit of work is lost. (Processes of concurrent.futures
+    share queues and locks; one that is killed may leave them locked, or a message incomplete.)
     """
 
     def __init__(self, workers: int) -> None:
@@ -44,10 +44,10 @@ class Processes:
         return future.result()
 
     def check_workers(self) -> None:
-        """A worker that has ended is noticed by the thread that waits for it."""
+        """Do nothing: the thread that waits for a worker notices its end."""
 
     def stop(self) -> None:
-        """Let the idle ones end in order, and kill those at work."""
+        """Let idle workers exit normally, and kill the busy ones."""
         with self._changing:
             self._stopped = True
             for busy in self._crew.difference(self._idle):
@@ -89,10 +89,11 @@ class _Worker:
                 self.process.start()
             except OSError as failure:
                 raise RunError(f"worker process could not be started: {failure}") from failure
-        end.close()  # or it would not be closed when the process ends
+        end.close()  # otherwise it would stay open after the process has ended
 
     def answer(self, scenes: bytes, worker_settings: WorkerSettings) -> Answer:
-        """EOFError or OSError when the process ends before it has answered."""
+        """Return the answer of the process. EOFError or OSError if the process ends before it has
+        answered."""
         self.connection.send((scenes, worker_settings))
         answer: Answer = self.connection.recv()
         return answer
@@ -100,11 +101,12 @@ class _Worker:
 
 @contextlib.contextmanager
 def _children_deaf_to_ctrl_c() -> Iterator[None]:
-    """A Ctrl-C reaches all processes of the terminal; this one decides what becomes of its workers.
+    """Make child processes ignore Ctrl-C, which the terminal sends to all; this process decides when they
+    stop.
 
-    Signals that a thread blocks, the processes that it starts block from their first instruction on.
+    A process inherits the blocked signals of the thread that starts it, from its first instruction on.
     """
-    resource_tracker.ensure_running()  # begun by the first start otherwise, which unblocks the signal again
+    resource_tracker.ensure_running()  # otherwise the first start begins it, which unblocks the signal again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -1,4 +1,4 @@
-"""Scenes to results in other processes: cut into units of work, sent, waited for, sent again if lost."""
+"""Runs scenes in other processes: divides them into units of work, sends them, and resends lost ones."""
 
 from __future__ import annotations
 
@@ -12,49 +12,51 @@ from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
 from tisim import Result, RunError, Scene
 
 UNITS = 2
-"""Each worker gets so many units of work in a call. More even out runs of different length; fewer are larger,
-and a batch of worlds is the faster per world the larger it is."""
+"""Units of work of each worker in a call. More units balance runs of different length; fewer are larger, and
+a larger batch of worlds is faster per world."""
 POLL_S = 0.1
-"""Progress is reported and workers are checked after so long while nothing comes, s."""
+"""Interval between progress reports and checks of the workers while waiting for results, s."""
 MAX_LOST_WORKERS = 3
-"""The search gives up once a unit of work has cost so many workers."""
+"""The search gives up after a unit of work has lost this number of workers."""
 
 
 class Lost(Exception):
-    """The worker is gone: this unit of work will not come back."""
+    """The worker has died; its unit of work must be sent again."""
 
 
 class Pool(Protocol):
-    """Workers. workers : how many there are now."""
+    """A pool of workers.
+
+    workers : current number of workers.
+    """
 
     @property
     def workers(self) -> int: ...
 
     def submit(self, scenes: Sequence[Scene], worker_settings: WorkerSettings) -> cf.Future[Answer]:
-        """Have a worker run optimize.evaluation.executors.worker.run on them."""
+        """Let a worker run optimize.evaluation.executors.worker.run on these scenes."""
         ...
 
     def outcome(self, future: cf.Future[Answer]) -> Answer:
-        """Return the answer of a finished future. Lost when its worker is gone and it must be sent again,
-        RunError when that would be no use.
-        """
+        """Return the answer of a finished future. Lost if its worker has died and it must be sent again,
+        RunError if sending it again would not help."""
         ...
 
     def check_workers(self) -> None:
-        """Called every POLL_S while an answer is waited for; RunError when none is to be hoped for."""
+        """Called every POLL_S while waiting for an answer; RunError if none can be expected."""
         ...
 
     def stop(self) -> None:
-        """Let the workers go, whatever they are doing."""
+        """Stop the workers, whether idle or busy."""
         ...
 
 
 class Remote:
-    """An evaluator (optimize.evaluation.runs.Evaluator) on a pool of workers; bit for bit
-    the in-process one's results.
+    """An evaluator (optimize.evaluation.runs.Evaluator) on a pool of workers; its results are bitwise equal
+    to the in-process ones.
 
-    What has been yielded stands, whatever happens to a worker; what has not is run again by another one. The
-    cache is written by this process only, so nothing can be counted twice.
+    Yielded results are final, even if a worker dies later; the rest is run again by another worker. Only this
+    process writes the cache, so nothing is counted twice.
     """
 
     def __init__(self, pool: Pool, worker_settings: WorkerSettings) -> None:
@@ -66,7 +68,7 @@ class Remote:
     ) -> Iterator[tuple[int, Result]]:
         """Yield (index into scenes, Result) as units of work end.
 
-        RunError when workers are lost again and again, InputError when one is of another program.
+        RunError if workers are lost repeatedly, InputError if one runs another program.
         """
         waiting: dict[cf.Future[Answer], tuple[list[int], int]] = {}
 
@@ -86,7 +88,7 @@ class Remote:
                     if losses + 1 == MAX_LOST_WORKERS:
                         raise RunError(
                             f"{error}; it was the worker number {MAX_LOST_WORKERS} to be lost with the same "
-                            "work. What had finished is kept"
+                            "work. Finished runs are kept"
                         ) from error
                     send(unit, losses + 1)
                     continue
@@ -97,7 +99,8 @@ class Remote:
                 progress(finished_scenes / len(scenes))
 
     def _results(self, answer: Answer) -> list[Result]:
-        """Return what a worker has found. Its error if it failed, InputError if it is of another program."""
+        """Return the results in a worker's answer. Raises its error if it failed, InputError if it runs
+        another program."""
         ours = handshake.program() if answer.error else self.worker_settings.made_by
         handshake.agree(ours, answer.made_by, answer.worker)
         if answer.error:
@@ -105,13 +108,13 @@ class Remote:
         return answer.results
 
     def close(self) -> None:
-        """Let the workers go; what they are still at is given up."""
+        """Stop the workers; unfinished work is discarded."""
         self.pool.stop()
 
 
 def units(scenes: Sequence[Scene], workers: int) -> list[list[int]]:
-    """Return the indices of the scenes of each unit of work: scenes of one structure, which run side by
-    side."""
+    """Return the indices of the scenes of each unit of work; its scenes have one structure, so they run side
+    by side."""
     groups: dict[Any, list[int]] = {}
     for index, scene in enumerate(scenes):
         groups.setdefault(scene.structure(), []).append(index)

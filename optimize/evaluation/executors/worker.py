@@ -1,4 +1,4 @@
-"""What a worker does: it starts Taichi once, and then runs the scenes that it is sent."""
+"""A worker: it starts Taichi once, and then runs the scenes that it receives."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from tisim.files.python_file import PythonFile
 
 @dataclass(frozen=True)
 class WorkerSettings:
-    """How a worker is to run: see tisim.backend.runtime; threads 0 for its share of the cores.
+    """The settings of a worker's runs, see tisim.backend.runtime; threads 0 for its share of the cores.
 
-    files : Python files of the user's that define what scenes are made of; those loaded here by default.
+    files : the user's Python files that define parts of scenes; by default the ones loaded in this process.
     """
 
     device: str = "cpu"
@@ -41,19 +41,18 @@ class WorkerSettings:
 
     @property
     def runtime(self) -> runtime.Runtime:
-        """The runtime as asked for; InputError where there is no such setting."""
+        """The requested runtime; InputError if a setting is invalid."""
         return runtime.Runtime(self.device, self.precision, self.threads, self.arithmetic)
 
     @property
     def settings(self) -> dict[str, str]:
-        """As of the in-process evaluator: what a cached result depends on."""
+        """Settings that a cached result depends on, the same as in the in-process evaluator."""
         return {**self.runtime.settings, "backend": runtime.backend()}
 
     @property
     def made_by(self) -> dict[str, str]:
-        """What an answer must say of itself, or its last bits may be others, and the cache would take them
-        for the same.
-        """
+        """The description that an answer must carry. With another one, its last bits could differ, and the
+        cache would mix both."""
         return {**handshake.program(), **self.runtime.settings}
 
 
@@ -63,7 +62,8 @@ def _name() -> str:
 
 @dataclass(frozen=True)
 class Answer:
-    """The results of the scenes, in order, or the error instead; what they were made by, and where."""
+    """The results of the scenes, in order, or an error; the description of the program; and the worker's
+    name."""
 
     made_by: dict[str, str]
     results: list[Any]
@@ -72,12 +72,12 @@ class Answer:
 
 
 _work = cf.ThreadPoolExecutor(1)
-"""The thread in which units of work are run, one at a time, while others listen."""
+"""The thread that runs units of work, one at a time, while other threads receive."""
 _evaluator: list[BatchEvaluator] = []
 
 
 def pack_scenes(scenes: Sequence[Scene]) -> bytes:
-    """Return scenes as they are sent: a worker imports the files that define their parts before it reads
+    """Return scenes in pickled form; a worker first imports the files that define their parts, then reads
     them."""
     try:
         return pickle.dumps(scenes)
@@ -88,15 +88,16 @@ def pack_scenes(scenes: Sequence[Scene]) -> bytes:
 
 
 def run(scenes: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
-    """Return the answer of a worker whose share of the cores that is."""
+    """Return the answer of a worker; share : its number of cores."""
     return _answered(_work.submit(_run, scenes, worker_settings, share))
 
 
 def serve(connection: Connection, share: int) -> None:
-    """Answer pickled (packed scenes, settings) until the other end is closed: the whole life of the process.
+    """Answer pickled (packed scenes, settings) until the other end is closed; this is the process's whole
+    life.
 
-    This thread does nothing but listen. When the searching process is gone, however it went, the system
-    closes its end, and what is being run for it ends here and now.
+    This thread only receives. If the searching process ends for any reason, the system closes its end of the
+    connection, and this process exits at once, even during a run.
     """
     answer_sent: cf.Future[None] | None = None
     while True:
@@ -131,7 +132,7 @@ def _run(pickled: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
 
 
 def _unpack_scenes(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[Any]:
-    """InputError, in a line, when what they are made of cannot be imported here."""
+    """Return the scenes. InputError, in one line, if their parts cannot be imported here."""
     try:
         for file in worker_settings.files:
             python_file.install(file)
@@ -139,7 +140,7 @@ def _unpack_scenes(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[
     except InputError as error:
         raise InputError(f"{_name()}: {error}") from None
     except (ImportError, AttributeError) as error:
-        rule = "able to import what the scenes are made of (give your own files with --plugin)"
+        rule = "able to import the parts of the scenes (give your own files with --plugin)"
         raise InputError(f"{_name()} must be {rule}; received {error}") from None
     return scenes
 
@@ -154,14 +155,14 @@ def _send(connection: Connection, future: cf.Future[Answer]) -> None:
 
 
 def _end_unless_sent(answer_sent: cf.Future[None]) -> None:
-    """Who waits for the answer would wait for ever; that a process has ended is noticed."""
+    """End the process if an answer could not be sent; the receiver notices this, and would otherwise wait for
+    ever."""
     if answer_sent.exception():
         os._exit(1)
 
 
 def _portable(error: BaseException) -> BaseException:
-    """Return the error as it can be sent; one that is not for people with where in the worker it was
-    raised."""
+    """Return the error in a form that can be sent. An internal error includes its traceback in the worker."""
     if isinstance(error, (InputError, RunError)):
         return error
     trace = "".join(traceback.format_exception(error))

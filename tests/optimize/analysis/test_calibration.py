@@ -92,7 +92,7 @@ def test_what_is_not_told_is_said():
     friction, rolling, restitution = found.genes
     assert [one.told for one in (friction, rolling, restitution)] == [True, False, True]
     assert (rolling.low, rolling.high) == pytest.approx((0.0, 0.4))
-    assert any("Nothing is told of rolling_friction" in remark for remark in found.remarks)
+    assert any("The measurements do not determine rolling_friction" in remark for remark in found.remarks)
     # With four quantities these two are known from the same ones.
     assert [friction.part, restitution.part] == pytest.approx(right_widths(truth, 4)[[0, 2]], rel=0.06)
     assert np.isnan(found.correlation[1]).all()
@@ -107,8 +107,8 @@ def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
     found = optimize.calibration(outcome)
     assert [one.told for one in found.genes] == [False, False, True]
     (remark,) = found.remarks
-    assert remark.startswith("a and b cannot be told apart")
-    assert "where more a goes with less b" in remark
+    assert remark.startswith("a and b cannot be distinguished")
+    assert "for more a with less b" in remark
     assert found.correlation[0, 1] < -0.85
 
 
@@ -117,7 +117,7 @@ def test_measurements_that_are_not_met_together_are_told():
     outcome = outcome_of(
         lambda d: {"one": d["a"], "other": d["a"]}, genes, {"one": (0.2, 0.02), "other": (0.6, 0.02)}
     )
-    assert any("not met together" in remark for remark in optimize.calibration(outcome).remarks)
+    assert any("does not meet all measurements" in remark for remark in optimize.calibration(outcome).remarks)
 
 
 def test_too_few_designs_ask_for_more_and_say_which():
@@ -147,7 +147,7 @@ def test_a_choice_is_kept_at_the_best_and_others_as_good_are_listed():
 def test_a_problem_that_is_no_misfit_is_refused():
     problem = Problem.of_function(lambda d: d["a"], [Gene("a", "", 0, 1)], code="made")
     outcome = optimize.run(problem, max_evaluations=20)
-    with pytest.raises(InputError, match="must be the Misfit of what was measured in a problem that is cal"):
+    with pytest.raises(InputError, match="must be a Misfit in a problem that is calibrated"):
         optimize.calibration(outcome)
 
 

@@ -535,9 +535,7 @@ def test_dask_worker_of_another_version_is_refused_before_anything_runs(cluster,
 def test_dask_worker_that_does_not_know_its_version_is_refused(cluster, join, tmp_path):
     without(tmp_path, "handshake.py")
     join()
-    message = (
-        rf"must be one that knows what the search is made of \(tisim {__version__}, .*; received .*handshake"
-    )
+    message = rf"must be one with the program of the search \(tisim {__version__}, .*; received .*handshake"
     with pytest.raises(InputError, match=message):
         connected(cluster)
 
@@ -555,7 +553,7 @@ def test_dask_worker_of_another_version_that_comes_later_is_refused(cluster, joi
 def test_dask_futures_that_hold_no_answer_are_messages():
     distributed = pytest.importorskip("distributed")
     for answer, error, message in (
-        ([], InputError, r"one that knows what the search is made of \(tisim .*\); received \[\]"),
+        ([], InputError, r"one with the program of the search \(tisim .*\); received \[\]"),
         (AttributeError("WorkerSettings"), InputError, r"received AttributeError\('WorkerSettings'\)"),
         (
             distributed.KilledWorker("run", SimpleNamespace(address="tcp://a"), 4),

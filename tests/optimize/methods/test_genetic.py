@@ -256,7 +256,7 @@ def test_a_search_knows_what_its_operators_are():
             {"mutate": lambda string: (list(np.random.default_rng().random(len(string))),)}, 1,
             "operators must be random by the modules random and numpy.random alone",
         ),
-        ({"surrogate": False, "inner": 3}, 1, "inner must be left out where surrogate is false"),
+        ({"surrogate": False, "inner": 3}, 1, "inner must be left out if surrogate is false"),
         ({"parents": 3}, 1, "search.options.parents must be a known key"),
     ],
 )  # fmt: skip

@@ -258,7 +258,7 @@ def test_starts_that_happen_to_be_equal_are_not_taken_for_one():
     assert outcome.designs[0].intervals["value"] is None
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(report.notes(outcome))
-    assert "starts: random starts that the mean is over" in console.export_text()
+    assert "starts: number of random starts in the mean" in console.export_text()
 
 
 @pytest.mark.parametrize(("budget", "part"), [(None, 0.25), (40, 0.5), (1000, 0.25)])

@@ -130,7 +130,7 @@ def test_a_file_that_is_damaged_as_a_whole_is_salvaged(path):
 @pytest.mark.parametrize("identity", [None, {**IDENTITY, "objective_order": ["one"]}])
 def test_runs_whose_objectives_nothing_names_are_reported_and_run_again(path, identity):
     old_file(path, ROWS, identity)
-    told = "no search in the file says what its objectives are called"
+    told = "no search in the file names its objectives"
     assert verify(path).damaged == [f"row {k}: {told}" for k in range(6)]
     with pytest.warns(RuntimeWarning, match=r"6 damaged evaluation\(s\) are ignored and will be run again"):
         assert len(Cache(path)) == 0
