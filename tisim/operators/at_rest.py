@@ -26,9 +26,9 @@ class AtRest(AtIntervals):
     The first ratio is the kinetic energy over the energy of a fall by one radius. The second is the
     unbalanced force, summed over the grains as the magnitude of the resultant on each, over the weight. (YADE
     and PFC divide by the mean contact force, which in a deep bed is larger than the weight; here a grain at
-    the top counts as much as one below.) Each criterion alone can be met by grains that move: the first by
-    grains that have just been released, the second by grains that fall at a steady speed. A rigid clump has
-    the kinetic energy of the body and the resultant on the body.
+    the top has the same weight in the sum as one below.) Each criterion alone can be met by grains that move:
+    the first by grains that have just been released, the second by grains that fall at a steady speed. A
+    rigid clump has the kinetic energy of the body and the resultant on the body.
 
     The grains are checked ten times in ``time`` and must be at rest each time. Grains that are fixed, or that
     move as prescribed, do not count; without other grains nothing is at rest. Nothing is at rest either until

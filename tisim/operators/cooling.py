@@ -25,8 +25,8 @@ class Cooling(Operator):
         m C dT/dt = -h_c a_s (T - T_gas) - sigma eps a_s (T^4 - T_s^4),    a_s = 4 pi b^2
 
     b is the radius, C the specific heat capacity and sigma the Stefan-Boltzmann constant. The paper steps
-    this equation explicitly (6.21). The temperature of a small hot grain then turns negative if a step, of
-    1e-6 s, is longer than the grain takes to cool. Here the step is implicit (backward Euler, of the same
+    this equation explicitly (6.21). The temperature of a small hot grain then turns negative if a step of
+    1e-6 s is longer than the grain takes to cool. Here the step is implicit (backward Euler, of the same
     accuracy). The equation for the new temperature is increasing and convex, so Newton's iteration converges
     to its only root, which lies between the old temperature and equilibrium.
 
@@ -50,7 +50,7 @@ class Cooling(Operator):
         per_kelvin = dt * 4.0 * ti.math.pi * s.radius[w, i] ** 2 / capacity
         a, c = STEFAN_BOLTZMANN * self.emissivity(w) * per_kelvin, self.convection(w) * per_kelvin
         before = s.temperature[w, i]
-        # t + c t + a t^4 = before + c T_gas + a T_s^4, solved from above, where Newton's iteration cannot
+        # t + c t + a t^4 = before + c T_gas + a T_s^4, solved from above, so that Newton's iteration cannot
         # overshoot: t only falls, so the loop ends.
         right_side = before + c * self.gas(w) + a * self.surroundings(w) ** 4
         t = ti.max(before, ti.max(self.surroundings(w), self.gas(w)))

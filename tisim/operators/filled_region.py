@@ -30,7 +30,12 @@ class FilledRegion(Effect):
         must(min(side) > 0, f"{self.label}.high", "above low in every component", self.high)
         alike = {"box": side[:1], "cylinder": side[:2], "ball": side}[self.shape]
         equal = max(alike) - min(alike) <= 1e-9 * max(alike)
-        must(equal, f"{self.label}.high", f"as far from low along each axis as a {self.shape} is", self.high)
+        must(
+            equal,
+            f"{self.label}.high",
+            f"equally far from low along the axes in which a {self.shape} is round",
+            self.high,
+        )
         return self
 
     def check_room(self, radius: float) -> None:

@@ -76,7 +76,7 @@ class Fragmentation(ImpactLaw, Operator):
 
     def _grain(self, masses: np.ndarray) -> float:
         known = self.grain_mass is not None or len(masses) > 0
-        must(known, f"{self.label}.grain_mass", "given where a scene starts without particles", None)
+        must(known, f"{self.label}.grain_mass", "given if a scene starts without particles", None)
         return float(masses.min()) if self.grain_mass is None else self.grain_mass
 
     def connect(self, peers: Peers) -> dict[str, Any]:

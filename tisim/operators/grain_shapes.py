@@ -98,7 +98,7 @@ class GrainShapes(Effect):
 
     @ti.func
     def join(self, s, w, c, lead, first, place, q, velocity, mass, radius):
-        """Make a clump of the last inserted spheres, those of a grain of class c, from slot ``lead`` and id
+        """Make a clump of the last inserted spheres, which form a grain of class c, from slot ``lead`` and id
         ``first`` on."""
         size = self.end_sphere(c) - self.first_sphere(c)
         if self.bodies[c, 2] > 0.0:

@@ -61,9 +61,9 @@ class InsertionByFraction(FilledPart, Insertion):
 
     At ``begin`` and after each ``interval``, grains are inserted until the grains whose centres are in the
     region have the ``fraction`` of its volume, or until the trials of one grain have all failed. At random
-    places, equal spheres reach a fraction of about 0.3 with some thousand trials; 0.38 is the limit for any
-    number of trials. LIGGGHTS has this as ``fix insert/pack``. ``at_rest`` regards the insertion as complete
-    after the first filling, because later room for grains cannot be foreseen.
+    places, equal spheres reach a fraction of about 0.3 with some thousand trials, and do not reach 0.38 with
+    any number of trials. LIGGGHTS has this as ``fix insert/pack``. ``at_rest`` regards the insertion as
+    complete after the first filling, because later room for grains cannot be foreseen.
     """
 
     interval: float = parameter("s", "time between two fillings", gt=0, examples=[1.0])

@@ -21,11 +21,11 @@ class JoinGroup(BehindPlanes, AtIntervals):
     """At a given time, free grains behind a plane join a group that moves as prescribed.
 
     This freezes or drives part of a structure that has formed: the bottom grains of a bed become its rough
-    floor, or the end grains of chains become clamps that pull the chains apart. A grain joins if its centre
-    is on the side of one of the ``planes`` opposite to the normal and no constraint holds it yet. It joins
-    the ``group`` of a ``prescribed_motion`` at the end of the first step that reaches ``time``, and moves on
-    from its place at the velocity of the motion. ``work["joined"]`` is the number of such grains. In LAMMPS
-    this is ``group`` and ``fix move`` between two ``run`` commands.
+    floor, or the end grains of chains pull the chains apart. A grain joins if its centre is on the side of
+    one of the ``planes`` opposite to the normal and no constraint holds it yet. It joins the ``group`` of a
+    ``prescribed_motion`` at the end of the first step that reaches ``time``, and moves on from its place at
+    the velocity of the motion. ``work["joined"]`` is the number of such grains. In LAMMPS this is ``group``
+    and ``fix move`` between two ``run`` commands.
     """
 
     fields: ClassVar = ("group",)
@@ -43,7 +43,7 @@ class JoinGroup(BehindPlanes, AtIntervals):
     def connect(self, peers: Peers) -> dict[str, Any]:
         groups = peers.of(PrescribedMotion)
         joins = [one for one in groups if one.data.group == self.group]
-        rule = f"that of a prescribed motion ({', '.join(str(one.data.group) for one in groups)})"
+        rule = f"the group of a prescribed motion ({', '.join(str(one.data.group) for one in groups)})"
         must(len(joins) == 1, f"effects.{self.label}.group", rule, self.group)
         return {**super().connect(peers), "motion_of_group": joins[0]}
 

@@ -78,7 +78,7 @@ class Stepper(StepperHints, Component):
             must(not self.control.watches_pairs, "stepper.control", rule, self.control.kind())
             for effect in effects:
                 name = f"effects.{effect.label}"
-                must(not isinstance(effect, PairEvent), name, f"a force, and not sudden, {where}", name)
+                must(not isinstance(effect, PairEvent), name, f"a force, not a pair event, {where}", name)
                 rule = f"one that acts on all layers alike (homogeneous), as gravity does, {where}"
                 must(effect.homogeneous, name, rule, effect.kind())
 

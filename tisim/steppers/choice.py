@@ -71,9 +71,9 @@ def choose(
     InputError if no stepper can be chosen.
     """
     for effect in effects:
-        rule = f"given, as the length of a step is part of the law of effects.{effect.label}"
+        rule = f"given, because the step length is part of the law of effects.{effect.label}"
         must(not effect.step_dependent, "scene.stepper", rule, Words("none"))
-        rule = f"given, as effects.{effect.label} puts in particles later, whose sizes are not known here"
+        rule = f"given, because effects.{effect.label} inserts particles later, of sizes unknown here"
         must(not len(effect.largest_newcomers()["radius"]), "scene.stepper", rule, Words("none"))
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
@@ -142,7 +142,7 @@ def _meetings(
 ) -> StepperChoice:
     _check_told(steps, "collisions")
     for effect in effects:
-        rule = f"given, as none steps collisions and effects.{effect.label} together"
+        rule = f"given, because no choice steps both collisions and effects.{effect.label}"
         suits = ApproachTime.kind() not in effect.incompatible_controls and not effect.gyrates(effects)
         must(suits, "scene.stepper", rule, Words("none"))
     control, events = ApproachTime(), any(isinstance(effect, PairEvent) for effect in effects)
@@ -172,7 +172,7 @@ def _leapfrog(
 ) -> StepperChoice:
     _check_told(steps, f"effects.{why}")
     touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
-    rule = f"given, as no critical time step is known for {why}"
+    rule = f"given, because no critical time step is known for {why}"
     must(bool(critical) or not touching, "scene.stepper", rule, Words("none"))
     longest, label = leapfrog_step(effects, critical, accuracy)
     # The duration is divided if no motion has a critical step, and also if an effect acts once per step or
@@ -182,7 +182,7 @@ def _leapfrog(
     gyrates = any(effect.gyrates(effects) for effect in effects)
     others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
     if gyrates and others:
-        rule = f"given, as none steps a magnetic force and effects.{others[0]} to second order"
+        rule = f"given, because no choice is of second order for a magnetic force and effects.{others[0]}"
         must(False, "scene.stepper", rule, Words("none"))
     stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
     reason = (
@@ -248,7 +248,7 @@ def _check_told(steps: Mapping[str, float | None], what: str) -> None:
     """Raise InputError if an effect does not report its critical step; ``what`` names the effect that needs
     it."""
     for label, step in steps.items():
-        rule = f"given, as no critical time step is known for effects.{label}, which {what} would need"
+        rule = f"given, because no critical time step is known for effects.{label}, which {what} would need"
         must(step is not None, "scene.stepper", rule, Words("none"))
 
 

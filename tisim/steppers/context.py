@@ -22,8 +22,8 @@ class StepContext:
     """The bound parts of a scene from which a step is made; a tuple of items is empty if there is nothing to
     do.
 
-    s : device memory of the worlds. effects : all effects; ``effects.of(Source)`` are those of a kind.
-    stepper,
+    s : device memory of the worlds. effects : all effects; ``effects.of(Source)`` returns the effects of a
+    kind. stepper,
     control, domain : as seen by kernels. neighbour_lists : None if no part of the scene needs pairs.
     independent : whether the stepper may advance each particle by itself.
 
@@ -81,8 +81,8 @@ class StepContext:
 
 @dataclass(frozen=True)
 class Buffer:
-    """Device memory beside the state. memory : object whose ``bytes()`` is its size. what, why : its content
-    and its purpose."""
+    """Device memory beside the state. memory : object whose ``bytes()`` is its size. ``what``, ``why`` : its
+    content and its purpose."""
 
     memory: Any
     what: str

@@ -126,8 +126,8 @@ class EndIntervals(Phase):
 
     @ti.func
     def stop(self, w, i, fault):
-        """Stop the world where a particle has been stopped by this fault; intervals that all have passed are
-        good."""
+        """Stop the world at the time at which this fault stopped a particle; intervals that all particles
+        have completed are counted."""
         s = self.s
         s.steps[w] += ti.cast(s.own_interval[w, i] - s.intervals[w], ti.i64)
         s.time[w], s.cut[w] = own_time(s, self.control, w, i), s.own_elapsed[w, i]

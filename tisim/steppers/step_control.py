@@ -59,7 +59,7 @@ class StepControl(Component):
 
     @ti.func
     def note(self, s, w, i, soonest):
-        """Note for a particle the least time (s, f64) that its pairs allow."""
+        """Record for a particle the least time (s, f64) that its pairs allow."""
 
     def fewest(self, duration: float) -> float:
         """Return the smallest number of steps of a run of this duration (s)."""
@@ -110,11 +110,11 @@ class FixedStep(Controller):
 
 
 class ApproachTime(Controller):
-    """A step lasts until the next two surfaces meet, at gap over approach speed, within limits.
+    """The step length is the least time until two surfaces meet, gap over approach speed, within limits.
 
     Z04 uses only the nearest neighbour of each particle. Here every approaching pair is examined, because the
-    nearest neighbour is not always met first. The default limits are those of Z04 section 8. A scene of hard
-    particles that would pass through each other in the shortest step is refused.
+    nearest neighbour is not always met first. The default limits are taken from Z04 section 8. A scene of
+    hard particles that would pass through each other in the shortest step is refused.
 
     Source: Z04 Eq. (6.14).
     """

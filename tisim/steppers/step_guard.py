@@ -8,10 +8,10 @@ forces that decrease with distance, such as gravity. Such a force may throw a pa
 single step. The displacement is then due to the force that has vanished, so that (omega dt)^2 comes out just
 below 1.
 
-Laws that check their own critical step at each contact, such as those of grains, are not checked again. Their
-forces are in the sum, however, and vanish within a step when a contact ends, for example when a wall is drawn
-away. In a scene with such laws, a step therefore counts as too long only if the limit is exceeded twice in a
-row: a growing motion exceeds it in every step.
+Laws that check their own critical step at each contact, such as contact laws of grains, are not checked
+again. Their forces are in the sum, however, and vanish within a step when a contact ends, for example when a
+wall is drawn away. In a scene with such laws, a step therefore counts as too long only if the limit is
+exceeded twice in a row: a growing motion exceeds it in every step.
 
 Source: M. P. Allen, D. J. Tildesley, Computer Simulation of Liquids (2017), section 3.2.
 """

@@ -52,8 +52,8 @@ class OfStages(PerParticle):
 
 
 class PredictStages(OfStages):
-    """This phase predicts the rates at all stages but the first, where they are known, from the polynomial of
-    the last step."""
+    """This phase predicts the rates at all stages from the polynomial of the last step; at the first they are
+    known."""
 
     @ti.func
     def run(self, w, i):
@@ -254,8 +254,8 @@ class JudgeStages(Phase):
 
     @ti.func
     def foreseen(self, w):
-        """Return what a sweep is foreseen to multiply the error by: it grows as dt^2 and, to be safe, falls
-        as dt only."""
+        """Return the expected contraction: it increases as dt^2 with longer steps and, to be safe, decreases
+        only as dt with shorter ones."""
         s = self.s
         factor = ti.cast(GUESS, ti.f64)
         if s.measured_dt[w] > 0.0:
