@@ -142,7 +142,7 @@ def _meetings(
 ) -> StepperChoice:
     _check_told(steps, "collisions")
     for effect in effects:
-        rule = f"given, because no choice steps both collisions and effects.{effect.label}"
+        rule = f"given, because no choice steps collisions and effects.{effect.label} together"
         suits = ApproachTime.kind() not in effect.incompatible_controls and not effect.gyrates(effects)
         must(suits, "scene.stepper", rule, Words("none"))
     control, events = ApproachTime(), any(isinstance(effect, PairEvent) for effect in effects)
@@ -182,7 +182,7 @@ def _leapfrog(
     gyrates = any(effect.gyrates(effects) for effect in effects)
     others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
     if gyrates and others:
-        rule = f"given, because no choice is of second order for a magnetic force and effects.{others[0]}"
+        rule = f"given, because no choice steps a magnetic force and effects.{others[0]} to second order"
         must(False, "scene.stepper", rule, Words("none"))
     stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
     reason = (
