@@ -72,8 +72,8 @@ class Particles(Start):
         "kg/m^3", "density of all particles, instead of masses", None, gt=0, examples=[2000.0]
     )
     material: Any = option(
-        "material of each particle, by name or by its number in the scene, from 0; one for all particles,"
-        " the first unless given",
+        "material of each particle, by name or by its number in the scene, from 0; one for all particles, "
+        "the first unless given",
         None,
     )
     quantities: Mapping[Text, Any] = option(
@@ -102,13 +102,11 @@ class Particles(Start):
 
         clumps : template of each clump, or of all. position : centres of mass, m, shape (n, 3). velocity :
         velocities of the centres of mass, m/s. orientation : quaternions w, x, y, z that rotate the
-        templates, shape (n, 4).
-        angular_velocity : rad/s, in space. For these three, one row may be given for all. spheres : particles
-        outside clumps, which follow the members. box : box of the scene, whose periodic faces clumps may
-        cross.
-        quantities : further fields of all members, one value for all or one for each clump. material :
-        material of the clumps, one for all or one for each, unless all have the first material; then
-        ``spheres`` must have materials too.
+        templates, shape (n, 4). angular_velocity : rad/s, in space. For these three, one row may be given for
+        all. spheres : particles outside clumps, which follow the members. box : box of the scene, whose
+        periodic faces clumps may cross. quantities : further fields of all members, one value for all or one
+        for each clump. material : material of the clumps, one for all or one for each, unless all have the
+        first material; then ``spheres`` must have materials too.
         """
         columns, sizes = clump_columns(clumps, position, velocity, orientation, angular_velocity)
         for name, value in (quantities or {}).items():

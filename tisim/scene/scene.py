@@ -67,8 +67,8 @@ class Scene(Component):
     duration: float = parameter("s", "simulated time", gt=0)
     skin: float | None = parameter(
         "m",
-        "skin distance of the neighbour lists, which are rebuilt when particles have moved by half of it;"
-        " chosen automatically by cost unless given; does not affect results",
+        "skin distance of the neighbour lists, which are rebuilt when particles have moved by half of it; "
+        "chosen automatically by cost unless given; does not affect results",
         None,
         gt=0,
     )

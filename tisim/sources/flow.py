@@ -31,8 +31,9 @@ class UniformFlow(Source):
 def kozeny_carman(porosity, size, constant):
     """Return the permeability k = (1 - phi)^3 nu^2 / (C phi^2) of a packing (m^2).
 
-    porosity : 1 - phi. size : nu (m), volume over surface of the packed bodies. constant : C. Source: B16 Eq.
-    (7.4), after Kozeny (1927) and Carman (1937).
+    porosity : 1 - phi. size : nu (m), volume over surface of the packed bodies. constant : C.
+
+    Source: B16 Eq. (7.4), after Kozeny (1927) and Carman (1937).
     """
     return porosity**3 * size**2 / (constant * (1.0 - porosity) ** 2)
 

@@ -57,9 +57,9 @@ def sample(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the sum of all sources of a quantity among effects, shape (n, 3), and its gradient, (n, 3, 3).
 
-    quantity : its standard name, such as "magnetic_flux_density" (T). points : m, shape (n, 3). time : s. [k,
-    a, b] of the gradient is the derivative of component a along axis b, per metre. InputError is raised if
-    the quantity has no source, or for points of another shape.
+    quantity : its standard name, such as "magnetic_flux_density" (T). points : m, shape (n, 3). time : s.
+    [k, a, b] of the gradient is the derivative of component a along axis b, per metre.
+    InputError is raised if the quantity has no source, or for points of another shape.
     """
     real = runtime.current().real
     places = np.ascontiguousarray(points, np.float64 if real == ti.f64 else np.float32)

@@ -43,10 +43,9 @@ class Stepper(StepperHints, Component):
     counters, world_quantities, flags : names of its state variables of a world, ``s.NAME[w]``: counters of
     events (i64), which a Result contains, quantities (f64) and integers (i32), all 0 at the start. random :
     whether it draws random numbers, so that only statistics converge. all_pairs : whether it sums over all
-    pairs itself.
-    follows_shear : whether it places moved particles with ``domain.put``, at the time of the new place, and
-    reports displacements relative to ``drift``, so that it can step a sheared box. follows_constraints :
-    whether it leaves particles held by constraints to the constraints.
+    pairs itself. follows_shear : whether it places moved particles with ``domain.put``, at the time of the
+    new place, and reports displacements relative to ``drift``, so that it can step a sheared box.
+    follows_constraints : whether it leaves particles held by constraints to the constraints.
     """
 
     contract: ClassVar[bool] = True

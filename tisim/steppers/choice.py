@@ -245,7 +245,7 @@ def _stride(effects: Sequence[Effect], start: Mapping[str, np.ndarray]) -> float
 
 
 def _check_told(steps: Mapping[str, float | None], what: str) -> None:
-    """Raise InputError if an effect does not report its critical step; ``what`` names the effect that needs
+    """Raise InputError if an effect does not report its critical step; ``what`` : effect or event that needs
     it."""
     for label, step in steps.items():
         rule = f"given, because no critical time step is known for effects.{label}, which {what} would need"

@@ -23,9 +23,8 @@ class StepContext:
     do.
 
     s : device memory of the worlds. effects : all effects; ``effects.of(Source)`` returns the effects of a
-    kind. stepper,
-    control, domain : as seen by kernels. neighbour_lists : None if no part of the scene needs pairs.
-    independent : whether the stepper may advance each particle by itself.
+    kind. stepper, control, domain : as seen by kernels. neighbour_lists : None if no part of the scene needs
+    pairs. independent : whether the stepper may advance each particle by itself.
 
     update_lists : items that update the neighbour lists to the positions. advance_memory : items that update
     the contact histories over ``dt``, once per step. sum_forces : items that set derived quantities and sum

@@ -19,8 +19,9 @@ def demagnetising_factor(radius: float, length: float) -> float:
 
     1 - N is the inductance per length of a current sheet of this shape, over the inductance per length of a
     long one: with k^2 = 4 R^2 / (4 R^2 + l^2), 4 / (3 pi k') ((k'/k)^2 (K - E) + E - k) (L. Lorenz, Ann.
-    Phys. 243 (1879) 161; H. Nagaoka, J. Coll. Sci. Imp. Univ. Tokyo 27 (1909) 1). InputError is raised unless
-    both (m) are above 0.
+    Phys. 243 (1879) 161; H. Nagaoka, J. Coll. Sci. Imp. Univ. Tokyo 27 (1909) 1).
+
+    InputError is raised unless both (m) are above 0.
     """
     must(radius > 0, "radius of a cylinder", "greater than 0", radius)
     must(length > 0, "length of a cylinder", "greater than 0", length)
@@ -43,9 +44,11 @@ def magnetisation(
 
     It is the minimum over all psi, so there is no hysteresis. Of two equal minima the one nearer to the
     direction of ``axis`` is taken. Without a field, M of a long cylinder therefore points along ``axis``, and
-    M of a flat one in an arbitrary direction across it. Source: E. C. Stoner, E. P. Wohlfarth, Phil. Trans.
-    R. Soc. A 240 (1948) 599; B16 section 6.3. InputError is raised for an axis of length 0, or a cylinder or
-    saturation that is not above 0.
+    M of a flat one in an arbitrary direction across it.
+
+    Source: E. C. Stoner, E. P. Wohlfarth, Phil. Trans. R. Soc. A 240 (1948) 599; B16 section 6.3.
+
+    InputError is raised for an axis of length 0, or a cylinder or saturation that is not above 0.
     """
     size = float(np.linalg.norm(axis))
     must(0 < size < np.inf, "axis of a cylinder", "a direction", axis)

@@ -41,8 +41,7 @@ class RotnePrager:
     @ti.func
     def of(self, one, other, r, inverse):
         """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m); inverse : 1/r."""
-        # In units of r. The radii are divided by each other here, so that this division need not wait for the
-        # distance.
+        # In units of r. The division by the radii is separate, so that it need not wait for the distance.
         x, y, per_product = one * inverse, other * inverse, 1.0 / (one * other)
         squares, gap = 0.25 * (x * x + y * y), (x - y) * (x - y)
         around, within, apart = gap + 3.0, gap - 1.0, x + y < 1.0
