@@ -38,7 +38,7 @@ WRONG = {
     "sudden": (
         {},
         {"effects": (Impact(hardness=1.0),)},
-        r"effects.impact must be a force, and not sudden",
+        r"effects.impact must be a force, not a pair event",
     ),
     "walls": (
         {},

@@ -132,7 +132,7 @@ REFUSED = {
         Cooling(name="cold", **{n: 1.0 for n, i in Cooling.model_fields.items() if i.is_required()})
     ),
     "a.b.name must be text of the form ^[A-Za-z][A-Za-z0-9_]*$; received 'a.b'": lambda: Gravity(name="a.b"),
-    "effects.core.name must be left out, as it is that of the table; received 'x'": lambda: Scene.from_dict(
+    "effects.core.name must be left out: it is the table's name; received 'x'": lambda: Scene.from_dict(
         {**one().to_dict(), "effects": {"core": {"kind": "mie", "name": "x", "epsilon": 1.0}}}
     ),
     "effects.core.kind must be one of": lambda: Scene.from_dict(

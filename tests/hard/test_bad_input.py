@@ -86,7 +86,7 @@ BAD = {
     "two components": (lambda: Cloud(**CLOUD, deviation=(1, 2)), "cloud.deviation"),
     "none at all": (
         lambda: Scene(particles=particles(position=[], velocity=[]), duration=1.0),
-        "particles must be at least one, or put in by an effect such as insertion_by_flux; received none",
+        "particles must be at least one, or inserted by an effect such as insertion_by_flux; received none",
     ),
     "empty array": (
         lambda: Scene(particles=particles(position=np.zeros((0, 3)), velocity=np.zeros((0, 3))), duration=1),

@@ -326,7 +326,7 @@ class TestTheChoice:
         assert errors[0] > errors[-1]
 
     def test_what_depends_on_its_step_is_refused(self):
-        with pytest.raises(tisim.InputError, match=r"scene.stepper must be given, as the length of a step"):
+        with pytest.raises(tisim.InputError, match=r"scene.stepper must be given, because the step length"):
             tisim.Scene(
                 particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, mass=1e-6),
                 effects=(
@@ -391,7 +391,7 @@ class TestTheChoice:
             grains=[tisim.GrainClass(sizes=tisim.packing.EqualSizes(radius=1e-3), density=2000.0)],
         )  # fmt: skip
         with pytest.raises(
-            tisim.InputError, match=r"scene.stepper must be given, as .* puts in particles later"
+            tisim.InputError, match=r"scene.stepper must be given, because .* inserts particles later"
         ):
             tisim.Scene(
                 particles=tisim.Particles.none(),

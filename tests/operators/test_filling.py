@@ -407,7 +407,7 @@ WRONG = {
         lambda: InsertionByFlux(
             flux=1.0, number=1, grains=ONE, low=(0, 0, 0), high=(1, 2, 1), shape="cylinder"
         ),
-        "insertion_by_flux.high must be as far from low along each axis as a cylinder is",
+        "insertion_by_flux.high must be equally far from low along the axes in which a cylinder is round",
     ),
     "nothing": (
         lambda: InsertionByFlux(flux=1.0, number=1, grains=(), low=(0, 0, 0), high=(1, 1, 1)),
@@ -419,7 +419,7 @@ WRONG = {
     ),
     "nothing ever": (
         lambda: Scene(particles=Particles.none(), effects=(Gravity(),), duration=1.0),
-        "particles must be at least one, or put in by an effect such as insertion_by_flux; received none",
+        "particles must be at least one, or inserted by an effect such as insertion_by_flux; received none",
     ),
     "rest without weight": (
         lambda: Scene(

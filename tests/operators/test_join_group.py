@@ -161,5 +161,5 @@ def test_laws_no_longer_act_between_two_that_have_joined():
 
 
 def test_a_group_of_no_motion_is_refused():
-    with pytest.raises(InputError, match=r"effects\.below\.group must be that of a prescribed motion"):
+    with pytest.raises(InputError, match=r"effects\.below\.group must be the group of a prescribed motion"):
         Simulation(falling(group=3))

@@ -85,7 +85,7 @@ def test_clumps_and_spheres_beside_them_are_of_the_materials_they_are_given():
     spheres = Particles(**alone, material="steel")
     both = Particles.of_clumps(clump, places, material=["glass", "steel"], spheres=spheres)
     assert both.material == ("glass", "glass", "steel", "steel", "steel")
-    with pytest.raises(InputError, match=r"^material must be given of clumps and of the spheres"):
+    with pytest.raises(InputError, match=r"^material must be given for both clumps and the spheres"):
         Particles.of_clumps(clump, places, spheres=spheres)
     with pytest.raises(InputError, match=r"^clumps\.charge must be one value or 2 of them; received 3"):
         Particles.of_clumps(clump, places, quantities={"charge": [1.0, 2.0, 3.0]})

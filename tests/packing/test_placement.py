@@ -226,7 +226,7 @@ WRONG = {
     "open domain": (lambda: arrays(Cloud(number=9, radius=1, density=1)), "domain must be bounded to hold"),
     "charge twice": (
         lambda: Cloud(**VIBRATION, specific_charge=1.0, quantities={"charge": 1.0}),
-        "cloud.quantities.charge must be given beside quantities, and once",
+        "cloud.quantities.charge must be given outside quantities, and only once",
     ),
     "energy": (lambda: Blast(energy=0.0), "blast.energy must be greater than 0"),
 }

@@ -1,7 +1,7 @@
 """Changes of state between steps, one file each.
 
-``tisim effects operators`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
-source, parameters and units.
+In a shell, ``tisim effects operators`` lists them, a line each, and ``tisim effects NAME`` describes one:
+law, source, parameters and units.
 """
 
 import lazy_loader

@@ -11,8 +11,8 @@ from tisim.operators.base import Operator
 class AtIntervals(Operator):
     """An operator of this kind acts on a world after the first step of each interval of time.
 
-    Its ``world`` calls ``count_interval``. The number of intervals that have been counted is kept, as the one
-    before a step, found anew from the times, may be rounded into another.
+    Its ``world`` calls ``count_interval``. The number of intervals already counted is stored, because a
+    number computed again from the time before the step could be rounded into another interval.
     """
 
     contract: ClassVar[bool] = True
@@ -22,19 +22,20 @@ class AtIntervals(Operator):
         return *super().keeps(what), *own
 
     def remembers(self, s: Any) -> dict[str, Any]:
-        """Return the field of the intervals that have been counted."""
+        """Return the field with the number of counted intervals."""
         return {**super().remembers(s), "counted": getattr(s, f"{self.label}_intervals")}
 
     @ti.func
     def elapsed(self, s, w):
-        """Return how many intervals have gone by, as a real number, f64; by default of ``interval`` each, a
-        parameter, since the start: it first acts when one is over."""
+        """Return the number of intervals that have passed, as a real number (f64). By default each lasts
+        ``interval``, a parameter, and the first begins at the start of the run, so that the operator first
+        acts when it is over."""
         return s.time[w] / ti.cast(self.interval(w), ti.f64)
 
     @ti.func
     def intervals(self, s, w):
-        """Return how many whole intervals have gone by, f64: of short ones they are more than an integer
-        holds."""
+        """Return the number of whole intervals that have passed (f64: the number of short intervals may
+        exceed the range of an integer)."""
         return ti.max(0.0, ti.floor(self.elapsed(s, w)))
 
     @ti.func
@@ -43,5 +44,5 @@ class AtIntervals(Operator):
 
     @ti.func
     def count_interval(self, s, w):
-        """Note that it has acted in this interval."""
+        """Count the present interval as one in which the operator has acted."""
         self.counted[w] = self.intervals(s, w)

@@ -1,4 +1,4 @@
-"""At rest: a run ends when its grains have come to rest, rather than after a time."""
+"""At rest: a run ends when its grains have come to rest, instead of at a fixed time."""
 
 from __future__ import annotations
 
@@ -14,24 +14,27 @@ from tisim.operators.insertion import Insertion
 from tisim.state.bound import Peers
 
 LOOKS = 10
-"""Grains are looked at so many times while they have to be at rest."""
+"""Number of checks of the grains within the time for which they must be at rest."""
 
 
 class AtRest(AtIntervals):
-    """A world ends when its grains have been at rest under gravity for a while.
+    """A world ends when its grains have been at rest under gravity for a given time.
 
         sum_i (m_i v_i^2 + 2/5 m_i R_i^2 w_i^2) / 2  <=  energy * g sum_i m_i R_i
         sum_i |F_i|                                  <=  unbalanced * g sum_i m_i
 
-    The ``duration`` of the scene is the latest. The first is the kinetic energy, over that of a fall by a
-    radius. The second is the unbalanced force, the resultant of all on a grain, over the weight. (YADE and
-    PFC have the mean contact force in place of the weight, which is larger in a deep bed; here a grain on top
-    counts as one below.) Either alone can be deceived: by grains that are let go, and by those that fall at a
-    steady speed. Rigid clumps have the kinetic energy of bodies, and the resultant on the body. Grains are
-    looked at ten times in ``time``, and must be at rest each time. Grains that are fixed, or move as
-    prescribed, do not count, and without others nothing is at rest; nor is it while
-    insertions are not done (by fraction: not begun). The ratios at the last look are ``measures``:
-    ``kinetic_ratio`` and ``unbalanced_ratio``.
+    The first ratio is the kinetic energy over the energy of a fall by one radius. The second is the
+    unbalanced force, summed over the grains as the magnitude of the resultant on each, over the weight. (YADE
+    and PFC divide by the mean contact force, which in a deep bed is larger than the weight; here a grain at
+    the top has the same weight in the sum as one below.) Each criterion alone can be met by grains that move:
+    the first by grains that have just been released, the second by grains that fall at a steady speed. A
+    rigid clump has the kinetic energy of the body and the resultant on the body.
+
+    The grains are checked ten times in ``time`` and must be at rest each time. Grains that are fixed, or that
+    move as prescribed, do not count; without other grains nothing is at rest. Nothing is at rest either until
+    insertions are complete (insertions by fraction: until they have begun). The ratios at the last check are
+    ``measures``: ``kinetic_ratio`` and ``unbalanced_ratio``. The run ends at the ``duration`` of the scene at
+    the latest.
 
     Source: C. O'Sullivan, Particulate Discrete Element Modelling (2011), section 2.6.
     """
@@ -43,7 +46,9 @@ class AtRest(AtIntervals):
     requires: ClassVar = (Gravity,)
     ends: ClassVar = "grains are at rest"
 
-    energy: float = parameter("", "kinetic energy at rest, over that of a fall by a radius", 1e-5, gt=0)
+    energy: float = parameter(
+        "", "kinetic energy at rest, over the energy of a fall by one radius", 1e-5, gt=0
+    )
     unbalanced: float = parameter("", "unbalanced force at rest, over the weight", 1e-2, gt=0)
     time: float = parameter("s", "time for which grains must be at rest", gt=0, examples=[0.05])
 
@@ -89,8 +94,8 @@ class AtRest(AtIntervals):
 
     @ti.func
     def balance(self, s, w, i):
-        """Return kinetic energy (J) and magnitude of the force (N) of a grain, or of the body that it stands
-        for; of others of a body none."""
+        """Return the kinetic energy (J) and the magnitude of the force (N) of a grain. For a body they are
+        returned with the particle that represents it, and are zero for its other particles."""
         m, radius = s.mass[w, i], s.radius[w, i]
         energy, force = 0.5 * m * s.velocity[w, i].norm_sqr(), s.force[w, i].norm()
         if ti.static(hasattr(s, "spin")):

@@ -1,4 +1,4 @@
-"""The contract of operators that act on grains which get behind planes."""
+"""The contract of operators that act on grains behind planes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tisim.state.bound import Peers
 
 
 class BehindPlanes(Operator):
-    """Grains are behind a plane when their centres are on the side that its normal points away from; a rigid
-    clump as a whole, when its centre of mass is."""
+    """A grain is behind a plane when its centre is on the side opposite to the normal; a rigid clump, when
+    its centre of mass is."""
 
     contract: ClassVar[bool] = True
     any_order: ClassVar[bool] = True
 
-    planes: tuple[Plane, ...] = option("planes behind which grains get", min_length=1)
+    planes: tuple[Plane, ...] = option("planes behind which the operator acts on grains", min_length=1)
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {"constraints": peers.of(Constraint)}

@@ -1,4 +1,4 @@
-"""Capture: a particle that touches a cylinder or sphere of the scene stays where it is (B16 section 6.3)."""
+"""Capture: a particle that touches a magnet of the scene is fixed there (B16 section 6.3)."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from tisim.state.fields import Field
 
 
 class Capture(Operator):
-    """A particle that touches a magnet of the scene stays where it touches, at rest.
+    """A particle that touches a magnet of the scene is fixed at the point of contact.
 
-    A particle whose surface meets that of a magnet is put on it and fixed: no force moves it. It still acts
-    on others. Three fields of the particle say so: ``fixed`` is 1 (a start may fix particles too, which are
-    not counted); ``captured_by`` is the magnet, counted from 0 through the lists of the scene in order, -1
-    for none; ``captured_at`` is the end of the step in which it touched (s), -1 for a free one.
-    ``work["captures"]`` counts them. A particle that a step brings into a magnet goes to the nearest point
-    outside, so steps must be short beside the magnet. Impacts, which would move it again, are refused.
+    A particle whose surface meets the surface of a magnet is placed on it and fixed: no force moves it any
+    more, but it still acts on others. Three fields describe this: ``fixed`` is 1 (the initial state may fix
+    particles too, which are not counted); ``captured_by`` is the number of the magnet, counted from 0 through
+    the lists of the scene in order, or -1; ``captured_at`` is the end of the step in which the particle
+    touched (s), or -1. ``work["captures"]`` is the number of captured particles. A particle whose step ends
+    inside a magnet is moved to the nearest point outside, so steps near a magnet must be short. Impacts are
+    refused, because they would move a captured particle.
 
     Source: B16 section 6.3.
     """

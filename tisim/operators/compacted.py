@@ -1,4 +1,4 @@
-"""Compacted: a run ends when its grains fill a region to a given part, rather than after a time."""
+"""Compacted: a run ends when its grains fill a given part of a region, instead of at a fixed time."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from tisim.operators.filled_part import FilledPart
 
 
 class Compacted(FilledPart):
-    """A world ends when its grains fill a region to a given part of its volume, such as under a servo wall.
+    """A world ends when its grains fill a region to a given part of its volume, for example under a servo
+    wall.
 
         4/3 pi sum_i R_i^3  >=  fraction * V
 
     The sum is over the grains whose centres are in the region, after the first step of every ``interval``;
-    the ``duration`` of the scene is the latest. Keep the region a few grains away from walls, next to which
-    there is less room for centres. ``measures`` have the part that was filled at the last look as
-    ``filled_fraction``.
+    the run ends at the ``duration`` of the scene at the latest. Keep the region a few grains away from walls,
+    because near a wall there is less room for centres. The filled fraction at the last check is in
+    ``measures`` as ``filled_fraction``.
     """
 
     world_quantities = ("filled_fraction",)
@@ -26,7 +27,7 @@ class Compacted(FilledPart):
     fields = ("radius",)
     ends: ClassVar = "grains fill the region"
 
-    interval: float = parameter("s", "time from one look at the region to the next", gt=0, examples=[1e-3])
+    interval: float = parameter("s", "time between two checks of the region", gt=0, examples=[1e-3])
 
     def measured(self) -> dict[str, str]:
         return {"filled_fraction": ""}

@@ -1,4 +1,4 @@
-"""How much of a region grains fill, as kernels see it."""
+"""The filled part of a region, as seen by kernels."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tisim.state.bound import Peers
 
 
 class FilledPart(FilledRegion, AtIntervals):
-    """The part of a region's volume that grains fill is looked at: each whose centre is in it with all of its
-    volume, a rigid clump with the union of its spheres."""
+    """The part of a region's volume that grains fill is measured. A grain whose centre is in the region
+    counts with its whole volume, a rigid clump with the volume of the union of its spheres."""
 
     contract: ClassVar[bool] = True
     terms: ClassVar = 1
@@ -25,13 +25,13 @@ class FilledPart(FilledRegion, AtIntervals):
 
     @ti.func
     def enough(self, s, w):
-        """Return the sum of the cubes of the radii (m^3) of balls that fill the region to the fraction."""
+        """Return the sum of the cubes of the radii (m^3) of spheres that fill the region to the fraction."""
         return self.fraction(w) * self.volume(w) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
 
     @ti.func
     def each(self, s, w, i):
-        """Return the cube of the radius (m^3) of a ball of the volume of the grain that particle i stands
-        for, where its centre is in the region; else 0."""
+        """Return the cube of the radius (m^3) of a sphere of the same volume as the grain that particle i
+        represents, if the centre of the grain is in the region; else 0."""
         place, cube = s.position[w, i], s.radius[w, i] ** 3
         for constraint in ti.static(self.constraints):
             if constraint.holds(s, w, i):

@@ -1,6 +1,6 @@
 """Fragmentation of agglomerates that absorb too much kinetic energy (Z04 section 5).
 
-The fractures of a step: grains that have broken write their pieces into slots, all at once.
+All broken grains of a step write their pieces into memory slots in parallel.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class Fragmentation(ImpactLaw, Operator):
         n = b_0^3 / b^3                               number of pieces
         dZ = gamma (n 4 pi b^2 - 4 pi b_0^2)          energy of the new surface                   (6.8)
 
-    dK is the kinetic energy absorbed and b_0 the radius. The grain breaks when b / b_0 is below the
-    threshold. n is rounded down, and no piece is lighter than an original grain. The pieces move on together
-    as a touching cluster about the same centre of mass. Mass, momentum and kinetic energy are conserved; dZ
-    is taken from the grain's heat. A grain that breaks does not bond in that impact. Z04 remark 5.1 uses a
-    threshold of 1/2.
+    dK is the absorbed kinetic energy and b_0 the radius of the grain. The grain breaks when b / b_0 is below
+    the threshold. n is rounded down, and no piece is lighter than an original grain. The pieces form a
+    cluster of touching spheres with the same centre of mass and velocity. Mass, momentum and kinetic energy
+    are conserved; dZ is taken from the grain's heat. A grain that breaks does not bond in that impact. Z04
+    remark 5.1 uses a threshold of 1/2.
 
     Source: Z04 Eqs (5.1)-(5.3).
     """
@@ -55,24 +55,28 @@ class Fragmentation(ImpactLaw, Operator):
     surface_energy: float = parameter("J/m^2", "surface energy gamma", examples=[10.0], gt=0)
     grain_mass: float | None = parameter(
         "kg",
-        "mass of an original grain, the smallest piece; unless given, the lightest of the start",
+        "mass of an original grain, the smallest piece; default: mass of the lightest initial particle",
         None,
         gt=0,
     )
     threshold: float = parameter(
-        "", "ratio b / b_0 below which a grain breaks; two pieces by default", 2.0 ** (-1.0 / 3.0), gt=0, lt=1
+        "",
+        "ratio b / b_0 below which a grain breaks; the default gives at least two pieces",
+        2.0 ** (-1.0 / 3.0),
+        gt=0,
+        lt=1,
     )
 
     def at_start(self, masses: np.ndarray) -> Self:
         return self.model_copy(update={"grain_mass": self._grain(masses)})
 
     def capacity(self, masses: np.ndarray) -> int:
-        # What is lighter than a grain stays one piece.
+        # A particle lighter than an original grain stays one piece.
         return int(np.maximum(masses / self._grain(masses), 1.0).sum() * (1 + 1e-9))
 
     def _grain(self, masses: np.ndarray) -> float:
         known = self.grain_mass is not None or len(masses) > 0
-        must(known, f"{self.label}.grain_mass", "given where a scene starts without particles", None)
+        must(known, f"{self.label}.grain_mass", "given if a scene starts without particles", None)
         return float(masses.min()) if self.grain_mass is None else self.grain_mass
 
     def connect(self, peers: Peers) -> dict[str, Any]:
@@ -83,10 +87,10 @@ class Fragmentation(ImpactLaw, Operator):
         radius = s.radius[w, i]
         surface = 4.0 * ti.math.pi * self.surface_energy(w) * radius * radius
         shrink = absorbed / surface + 1.0
-        # Rounding must not cost a grain of the sum its last piece.
+        # The tolerance keeps rounding from losing the last piece of a grain.
         most = ti.cast(s.mass[w, i] / self.grain_mass(w) * (1.0 + 1e-6), ti.i32)
         pieces = ti.cast(ti.min(shrink**3 * (1.0 + 1e-12), ti.cast(most, s.real)), ti.i32)
-        # A grain that an earlier impact of this step has broken does not break again, and bonds no more.
+        # A grain that an earlier impact of this step has broken neither breaks again nor bonds.
         broke = ti.cast(s.pieces[w, i] >= 2, ti.i32)
         if shrink * self.threshold(w) > 1.0 and pieces >= 2 and broke == 0:
             energy = surface * (elementary.pow(ti.cast(pieces, s.real), 1.0 / 3.0) - 1.0)
@@ -108,8 +112,8 @@ class Fragmentation(ImpactLaw, Operator):
 
     @ti.func
     def split(self, s, w, i, n, before):
-        """Put n equal pieces at the first n sites of a cubic block of touching spheres, about the old
-        centre; so many new pieces of other grains go before its own."""
+        """Put n equal pieces at the first n sites of a cubic block of touching spheres about the old centre;
+        before : number of new pieces of other grains that precede these in memory."""
         edge = 1
         while edge * edge * edge < n:
             edge += 1
@@ -134,11 +138,11 @@ class Fragmentation(ImpactLaw, Operator):
 
 @ti.data_oriented
 class Fractures(WorldAction):
-    """The new pieces of the grains of a world that have broken take the slots after the last one in use, in
-    the order of the grains.
+    """The new pieces of a world's broken grains take the slots after the last one in use, in the order of the
+    grains.
 
-    new : of each grain how many more pieces than one it breaks into, then how many there are of all grains up
-    to it.
+    new : number of additional pieces of each grain (one less than its number of pieces), then the cumulative
+    sum of it up to and including the grain.
     """
 
     def __init__(self, fragmentation: Bound[Fragmentation], s: State) -> None:
@@ -157,7 +161,7 @@ class Fractures(WorldAction):
 
 
 class SplitGrains(Repeat):
-    """This item splits all grains of a world that have broken."""
+    """This item splits all broken grains of a world."""
 
     usual = 0
 
@@ -184,8 +188,8 @@ class CountPieces(PerParticle):
 
 
 class SplitGrain(PerParticle):
-    """This phase splits each grain that has broken; none, where there is not room for all pieces, and the
-    first grain that has none stops the world."""
+    """This phase splits each broken grain. If there is not enough memory for all pieces, none is split, and
+    the first grain whose pieces do not fit stops the world."""
 
     def __init__(self, fractures: Fractures) -> None:
         super().__init__(fractures.s)

@@ -1,4 +1,4 @@
-"""The shapes of grains that an insertion puts in: spheres, and rigid clumps of them, as kernels see them."""
+"""The shapes of inserted grains, spheres and rigid clumps of spheres, as seen by kernels."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from tisim.packing.grains import GrainClass
 
 
 class GrainShapes(Effect):
-    """Grains of some classes are spheres, those of others rigid clumps."""
+    """Each class of grains consists of spheres or of rigid clumps of spheres."""
 
     contract: ClassVar[bool] = True
 
-    grains: tuple[GrainClass, ...] = option("classes of the grains that are put in", min_length=1)
+    grains: tuple[GrainClass, ...] = option("classes of the inserted grains", min_length=1)
 
     @property
     def has_clumps(self) -> bool:
-        """Return whether grains of a class are rigid clumps."""
+        """Return whether the grains of any class are rigid clumps."""
         return any(one.clump is not None for one in self.grains)
 
     def required_effects(self) -> tuple[type[Component], ...]:
         return (*self.requires, RigidClumps) if self.has_clumps else self.requires
 
     def most_spheres(self) -> int:
-        """Return the number of spheres of the grain that has most of them."""
+        """Return the largest number of spheres of a grain."""
         return max(len(one.spheres()) for one in self.grains)
 
     def largest_spheres(self) -> list[float]:
@@ -46,7 +46,7 @@ class GrainShapes(Effect):
         ]
 
     def farthest(self) -> float:
-        """Return how far (m) the largest grain reaches from its centre."""
+        """Return the largest distance (m) of a surface point of a grain from the centre of the grain."""
         return max(float(one.sizes.nodes()[0][-1]) * one.outer_radius() for one in self.grains)
 
     def lookups(self) -> dict[str, np.ndarray]:
@@ -60,17 +60,19 @@ class GrainShapes(Effect):
 
     @ti.func
     def first_sphere(self, c):
-        """Return the number of the first sphere of a grain of class c, among those of all classes."""
+        """Return the index of the first sphere of a grain of class c in the list of the spheres of all
+        classes."""
         return ti.cast(self.bodies[c, 0], ti.i32)
 
     @ti.func
     def end_sphere(self, c):
-        """Return the number after that of its last sphere."""
+        """Return the index after the last sphere of a grain of class c."""
         return ti.cast(self.bodies[c, 1], ti.i32)
 
     @ti.func
     def outer(self, c, radius):
-        """Return how far (m) a grain of class c and this radius (m) reaches from its centre."""
+        """Return the distance (m) of the outermost point of a grain of class c and this radius (m) from its
+        centre."""
         return radius * ti.cast(self.bodies[c, 3], float)
 
     @ti.func
@@ -80,28 +82,29 @@ class GrainShapes(Effect):
 
     @ti.func
     def sphere_mass(self, m, mass):
-        """Return the part of sphere m of the mass (kg) of a grain."""
+        """Return the mass (kg) of sphere m of a grain of this mass (kg)."""
         return mass * ti.cast(self.spheres[m, 4], float)
 
     @ti.func
     def offset(self, m, radius):
-        """Return the place (m) of sphere m from the centre of a grain, along the axes of this."""
+        """Return the position (m) of sphere m relative to the centre of a grain, along the axes of the
+        grain."""
         return radius * ti.Vector([self.spheres[m, 0], self.spheres[m, 1], self.spheres[m, 2]])
 
     @ti.func
     def arm(self, m, q, radius):
-        """Return the same in space, where the grain is turned by q."""
+        """Return the position (m) of sphere m relative to the centre in space, for a grain turned by q."""
         return rotated(q, self.offset(m, radius))
 
     @ti.func
     def join(self, s, w, c, lead, first, place, q, velocity, mass, radius):
-        """Make a clump of the spheres of a grain of class c, the last that have been put in: from slot
-        ``lead`` and id ``first`` on."""
+        """Make a clump of the last inserted spheres, which form a grain of class c, from slot ``lead`` and id
+        ``first`` on."""
         size = self.end_sphere(c) - self.first_sphere(c)
         if self.bodies[c, 2] > 0.0:
             for k in range(size):
                 i = lead + k
-                # Numbers of members are ids, which no member of the start has.
+                # Members are numbered by ids, which do not collide with those of initial members.
                 s.clump_index[w, first + k] = i
                 s.clump[w, i], s.clump_first[w, i], s.clump_member[w, i] = first, first, first + k
                 s.clump_size[w, i], s.body_mass[w, i] = size, mass

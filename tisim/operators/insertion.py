@@ -1,4 +1,4 @@
-"""The contract of insertions, which put grains into a region in the course of a run."""
+"""The contract of insertions, which add grains to a region in the course of a run."""
 
 from __future__ import annotations
 
@@ -25,20 +25,22 @@ from tisim.state.bound import Bound
 from tisim.state.state import State
 
 MOST_TRIES = 20_000
-"""A draw of Philox has room for so many tries of a grain in a step."""
+"""Largest number of insertion trials for a grain in a step, limited by the counter of the Philox
+generator."""
 
 
 class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
-    """An insertion puts grains at random places of a region, where they overlap none that are there.
+    """An insertion adds grains at random places of a region, without overlap with the grains already there.
 
-    Grains come one after another, each drawn from the classes, with v = velocity + deviation * lambda, lambda
-    uniform in -1..1 along each axis; clumps are turned evenly at random. One that finds no place within
-    ``tries`` is tried again in the next step, and those after it wait, so that sizes come as they are drawn
-    however full it is. They depend on the seed of the scene alone; where they lie also on what is there. They
-    do not spin, and have what their class gives them besides.
+    Grains come one after another. The class of each is drawn at random, and its velocity is v = velocity +
+    deviation * lambda, with lambda uniform in -1..1 along each axis. The orientations of clumps are uniformly
+    random. If all ``tries`` insertion trials of a grain fail, it is tried again in the next step and the
+    later grains wait, so that the size distribution is kept however full the region is. The grains depend on
+    the seed of the scene alone; their places also depend on the particles already there. They do not spin,
+    and have the further quantities that their class defines.
 
-    ``measures`` have the number and the mass (kg) that have been put in so far, under its name: NAME_number
-    and NAME_mass.
+    ``measures`` have the number and the mass (kg) of the grains inserted so far, under the name of the
+    insertion: NAME_number and NAME_mass.
     """
 
     contract: ClassVar[bool] = True
@@ -46,13 +48,13 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
     fields = ("radius",)
     any_order: ClassVar[bool] = True
 
-    number: int = option("grains that are put in, at most", gt=0, le=10**8, examples=[1000])
+    number: int = option("largest number of inserted grains", gt=0, le=10**8, examples=[1000])
     velocity: Vector = parameter("m/s", "mean velocity of the grains", (0.0, 0.0, 0.0))
     deviation: Vector = parameter(
         "m/s", "largest deviation from the mean velocity, along each axis", (0.0, 0.0, 0.0)
     )
-    begin: float = parameter("s", "time from which on grains are put in", 0.0, ge=0)
-    tries: int = option("places that are tried for a grain in a step", 20, gt=0, le=MOST_TRIES)
+    begin: float = parameter("s", "time from which on grains are inserted", 0.0, ge=0)
+    tries: int = option("insertion trials for a grain in a step", 20, gt=0, le=MOST_TRIES)
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -61,7 +63,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         return self
 
     def structure(self) -> tuple[Any, ...]:
-        """Return what is compiled in: sizes, materials and further quantities too."""
+        """Return the compiled-in options, including sizes, materials and further quantities."""
         classes = ((one.sizes, one.material, *sorted(one.quantities.items())) for one in self.grains)
         shapes = (table.tobytes() for table in GrainShapes.lookups(self).values())
         return (*super().structure(), *classes, *shapes)
@@ -77,8 +79,8 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         class_materials(self.grains, materials)
 
     def given_quantities(self) -> list[dict[str, Any]]:
-        """Return what each class gives its grains besides, by name; the index of its material too, where one
-        has a material of its own."""
+        """Return the further quantities of the grains of each class, by name; with the material index, if any
+        class has its own material."""
         given: list[dict[str, Any]] = [dict(sorted(one.quantities.items())) for one in self.grains]
         indices = class_materials(self.grains, self._materials)
         if indices is None:
@@ -109,7 +111,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
             **super().lookups(),
             "nodes": np.concatenate(tables),
             "spans": np.column_stack([ends - lengths, ends - 1, by_number]).astype(float),
-            # A column more, as there may be nothing given.
+            # One more column, because there may be no given quantities.
             "given": np.array([np.hstack([*one.values(), 0.0]) for one in self.given_quantities()]),
         }
 
@@ -117,7 +119,8 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         return TriedPlace(own, s)
 
     def remembers(self, s: Any) -> dict[str, Any]:
-        """Return the fields of its own quantities, and of what classes give: each with its first column."""
+        """Return the state variables of the insertion, and the fields of the quantities given by the classes,
+        each with its first column in the table."""
         number, mass = (getattr(s, name) for name in self.keeps("world_quantities"))
         given, first = [], 0
         for name, value in self.given_quantities()[0].items():
@@ -129,23 +132,23 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def pending(self, s, w):
-        """Return whether more is to come, for which what waits for rest waits too."""
+        """Return whether more grains are to come, so that ``at_rest`` has to wait."""
         return 0
 
     @ti.func
     def is_wanted(self, s, w):
-        """Return whether another grain is to be put in, now."""
+        """Return whether another grain is to be inserted now."""
         return False
 
     @ti.func
     def seek(self, s, w):
-        """Have the next grain seek a place, where one is wanted."""
+        """Start the insertion trials of the next grain, if one is wanted."""
         tried = self.action
         tried.seeking[w], tried.attempt[w] = ti.cast(self.is_wanted(s, w), ti.i32), 0
 
     @ti.func
     def choose_place(self, s, w):
-        """Choose the place that is tried next; before the first, draw the grain."""
+        """Choose the place of the next trial; before the first trial, draw the grain."""
         tried, k = self.action, ti.cast(self.inserted[w], ti.i32)
         tried.taken[w] = 0
         if tried.attempt[w] == 0:
@@ -157,22 +160,23 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def draw_grain(self, s, w, k):
-        """Draw grain k; where there is no room for it in memory, it has had all its tries."""
+        """Draw grain k; if there is no room for it in memory, all its trials count as used."""
         tried, of_grain = self.action, self.uniforms(s, w, k, 0)
         c = self.draw_class(w, of_grain[0])
         tried.drawn[w], tried.radius[w] = c, ti.cast(self.draw_radius(c, of_grain[1]), s.real)
         lambda_ = 2.0 * ti.Vector([of_grain[2], of_grain[3], of_grain[4]]) - 1.0
         tried.velocity[w] = self.velocity(w) + self.deviation(w) * lambda_
         size = self.end_sphere(c) - self.first_sphere(c)
-        # Members of clumps are found by their ids, in memory of as many entries as there is room.
+        # Members of clumps are found through a table by id, with one entry for each particle that fits into
+        # memory.
         numbered = s.next_id[w] + size <= s.most[w]
         if s.room(w) < size or not (numbered or ti.static(not self.has_clumps)):
             tried.taken[w], tried.attempt[w] = 1, self.tries
 
     @ti.func
     def end_try(self, s, w):
-        """Put the grain in, where its place is free, and have the next one seek; one that has found none
-        within its tries is the last of the step."""
+        """Insert the grain if its place is free, and start the trials of the next one. A grain whose trials
+        have all failed is the last of the step."""
         tried = self.action
         if tried.taken[w] == 0:
             radius = tried.radius[w]
@@ -185,8 +189,8 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def uniforms(self, s, w, k, attempt):
-        """Return six numbers in 0..1: what grain k is like, or where it is tried in this step, from the first
-        attempt on."""
+        """Return six random numbers in 0..1: the properties of grain k (attempt 0), or its place and
+        orientation in a trial of this step (attempt 1 and later)."""
         step = ti.select(attempt > 0, s.steps[w], ti.cast(0, ti.i64))
         numbers = ti.Vector.zero(s.real, 6)
         for m in range(3):
@@ -197,7 +201,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def put(self, s, w, c, place, q, velocity, radius):
-        """Put a grain of class c at a place (m), turned by q."""
+        """Insert a grain of class c at a place (m), turned by q."""
         mass = self.grains.density(w, c) * ti.cast(4.0 / 3.0 * ti.math.pi, s.real) * radius**3
         lead, first = s.count[w], s.next_id[w]
         for m in range(self.first_sphere(c), self.end_sphere(c)):
@@ -211,7 +215,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def give(self, s, w, c, i):
-        """Give a particle what its class gives it besides."""
+        """Set the further quantities that the class of a particle defines."""
         for given in ti.static(self.given_fields):
             if ti.static(given[2] == 3):
                 given[0][w, i] = ti.Vector([self.given[c, given[1] + m] for m in range(3)])
@@ -220,7 +224,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def draw_class(self, w, u):
-        """Return the class of a grain, by a number in 0..1."""
+        """Return the class of a grain, drawn by a number in 0..1."""
         total = 0.0 * self.grains.number(w, 0)
         for k in range(self.grains.size(w)):
             total += self.grains.number(w, k)
@@ -232,8 +236,8 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def draw_radius(self, c, u):
-        """Return the radius (m) of a grain of a class, by a number in 0..1, as ``SizeDistribution.radii``
-        does."""
+        """Return the radius (m) of a grain of a class, drawn by a number in 0..1, as
+        ``SizeDistribution.radii`` does."""
         low, high = ti.cast(self.spans[c, 0], ti.i32), ti.cast(self.spans[c, 1], ti.i32)
         while high - low > 1:
             middle = (low + high) // 2

@@ -1,4 +1,4 @@
-"""The insertions: by a flux, and by the part of a region that grains fill."""
+"""The insertions: by a flux, and by the filled fraction of a region."""
 
 from __future__ import annotations
 
@@ -11,20 +11,23 @@ from tisim.operators.insertion import MOST_TRIES, Insertion
 
 
 class InsertionByFlux(Insertion):
-    """Grains come into a region at a given flux, until there are as many as asked for.
+    """Grains are inserted into a region at a given flux, up to a given number.
 
         a grain is due at t when those before it are less than flux * (t - begin)
 
-    by mass, or by number. Where the region is full they wait, and come as soon as there is room: put it where
-    grains fall out of it, or give them a velocity. It is what LAMMPS has as ``fix pour``, and LIGGGHTS as
-    ``fix insert/rate/region``.
+    The amount is a mass or a number. Grains that are due wait while the region is full, and come as soon as
+    there is room. Place the region so that grains fall out of it, or give them a velocity. LAMMPS has this as
+    ``fix pour``, and LIGGGHTS as ``fix insert/rate/region``.
     """
 
     flux: float = parameter(
-        "kg/s", "mass that comes in each second; in 1/s where it is by number", gt=0, examples=[0.1]
+        "kg/s",
+        "inserted mass per second, in kg/s; number per second, in 1/s, if by is number",
+        gt=0,
+        examples=[0.1],
     )
     by: Literal["mass", "number"] = option(
-        "what the flux is of: the mass of the grains, or their number", "mass"
+        "quantity that the flux measures: mass or number of the grains", "mass"
     )
 
     def unit_as_set(self, name: str) -> str:
@@ -54,17 +57,17 @@ class InsertionByFlux(Insertion):
 
 
 class InsertionByFraction(FilledPart, Insertion):
-    """Grains are put into a region until they fill a given part of its volume, now and again.
+    """Grains are inserted at intervals until they fill a given fraction of a region's volume.
 
-    At ``begin``, and whenever an ``interval`` has passed, grains are put in until those whose centres are in
-    the region have the ``fraction`` of its volume, or until one finds no place. At random places the fraction
-    of equal spheres comes to 0.3 with some thousand tries, and to 0.38 with no number of them. It is what
-    LIGGGHTS has as ``fix insert/pack``. For ``at_rest`` it is done after the first filling: whether there
-    will be room for more, nobody knows.
+    At ``begin`` and after each ``interval``, grains are inserted until the grains whose centres are in the
+    region have the ``fraction`` of its volume, or until the trials of one grain have all failed. At random
+    places, equal spheres reach a fraction of about 0.3 with some thousand trials, and do not reach 0.38 with
+    any number of trials. LIGGGHTS has this as ``fix insert/pack``. ``at_rest`` regards the insertion as
+    complete after the first filling, because later room for grains cannot be foreseen.
     """
 
-    interval: float = parameter("s", "time from one filling to the next", gt=0, examples=[1.0])
-    tries: int = option("places that are tried for a grain", 1000, gt=0, le=MOST_TRIES)
+    interval: float = parameter("s", "time between two fillings", gt=0, examples=[1.0])
+    tries: int = option("insertion trials for a grain", 1000, gt=0, le=MOST_TRIES)
 
     @ti.func
     def elapsed(self, s, w):

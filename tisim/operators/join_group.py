@@ -1,4 +1,4 @@
-"""Joining a group: free grains of a layer begin, at a time, to move as prescribed."""
+"""Joining a group: at a given time, free grains of a layer begin to move as prescribed."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from tisim.operators.behind_planes import BehindPlanes
 from tisim.state.bound import Peers
 
 NEARLY = 1e-6
-"""A step that ends before a time by this part of its length has reached it: rounding leaves that."""
+"""A step has reached a time if it ends before it by at most this part of the step's length (rounding)."""
 
 
 class JoinGroup(BehindPlanes, AtIntervals):
-    """Free grains that are behind a plane at a time join a group that moves as prescribed.
+    """At a given time, free grains behind a plane join a group that moves as prescribed.
 
-    It freezes part of what has come about by then, or drives it: the grains that are at the bottom of a bed
-    become its rough floor, the ends of chains those that are drawn apart. Those whose centres are on the side
-    that the normal of one of the ``planes`` points away from, and that nothing holds yet, join the ``group``
-    of a ``prescribed_motion``, at the end of the first step that reaches ``time``; they go on from where they
-    are, at the velocity of the motion. ``work["joined"]`` counts them. It is ``group`` and ``fix move`` of
-    LAMMPS, between two of its ``run``.
+    This freezes or drives part of a structure that has formed: the bottom grains of a bed become its rough
+    floor, or the end grains of chains pull the chains apart. A grain joins if its centre is on the side of
+    one of the ``planes`` opposite to the normal and no constraint holds it yet. It joins the ``group`` of a
+    ``prescribed_motion`` at the end of the first step that reaches ``time``, and moves on from its place at
+    the velocity of the motion. ``work["joined"]`` is the number of such grains. In LAMMPS this is ``group``
+    and ``fix move`` between two ``run`` commands.
     """
 
     fields: ClassVar = ("group",)
@@ -43,13 +43,13 @@ class JoinGroup(BehindPlanes, AtIntervals):
     def connect(self, peers: Peers) -> dict[str, Any]:
         groups = peers.of(PrescribedMotion)
         joins = [one for one in groups if one.data.group == self.group]
-        rule = f"that of a prescribed motion ({', '.join(str(one.data.group) for one in groups)})"
+        rule = f"the group of a prescribed motion ({', '.join(str(one.data.group) for one in groups)})"
         must(len(joins) == 1, f"effects.{self.label}.group", rule, self.group)
         return {**super().connect(peers), "motion_of_group": joins[0]}
 
     @ti.func
     def elapsed(self, s, w):
-        # Once: who comes later stays free. Rounding must not cost a step.
+        # Only once: later grains stay free. The tolerance keeps rounding from delaying the action by a step.
         reached = s.time[w] + NEARLY * s.dt[w]
         return ti.min(reached / ti.cast(self.time(w), ti.f64), 1.0)
 
@@ -65,7 +65,7 @@ class JoinGroup(BehindPlanes, AtIntervals):
     def world(self, s, w):
         self.count_interval(s, w)
         s.joined[w] += ti.cast(self.sums.total(w)[0], ti.i64)
-        # Laws that act within a short range no longer act between two that have joined.
+        # Short-range laws no longer act between two grains that have both joined.
         s.invalidate_lists(w)
 
     @ti.func

@@ -1,4 +1,4 @@
-"""Outflow: grains that leave through a plane are taken out and weighed."""
+"""Outflow: grains that leave through a plane are removed and weighed."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from tisim.operators.behind_planes import BehindPlanes
 
 
 class Outflow(BehindPlanes):
-    """Grains whose centres are behind a plane, the side that its normal points away from, are taken out.
+    """Grains whose centres are behind a plane, on the side opposite to the normal, are removed.
 
-    A rigid clump is taken out as a whole, when its centre of mass is behind it.
-    ``work["outflow"]`` counts them, a clump as one, and ``measures["outflow_mass"]`` is their mass (kg). How
-    either grows is the discharge rate: record it with ``MeasureSeries``, and see
+    A rigid clump is removed as a whole, when its centre of mass is behind the plane. ``work["outflow"]`` is
+    the number of removed grains, with a clump as one, and ``measures["outflow_mass"]`` their mass (kg). The
+    discharge rate is the growth of either: record it with ``MeasureSeries``, and see
     ``tisim.analysis.discharge_rate``.
     """
 
@@ -52,7 +52,7 @@ class Outflow(BehindPlanes):
 
     @ti.func
     def counts(self, s, w, i):
-        """Return 1 for a particle that stands for a grain, 0 for another of its clump."""
+        """Return 1 for a particle that represents a grain, 0 for the other particles of its clump."""
         one = 1
         for constraint in ti.static(self.constraints):
             if constraint.holds(s, w, i) and not constraint.leads(s, w, i):

@@ -1,4 +1,4 @@
-"""Passage: grains that go through a plane are weighed, and the rate at which they do is kept."""
+"""Passage: grains that pass a plane are weighed, and the mean rate of passage is recorded."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from tisim.state.fields import Field
 
 
 class Passage(BehindPlanes):
-    """Grains whose centres get behind a plane, the side that its normal points away from, are weighed once;
-    nothing is changed. A rigid clump passes as a whole, when its centre of mass does.
+    """Grains whose centres get behind a plane, on the side opposite to the normal, are weighed once; the
+    motion is not changed. A rigid clump passes as a whole, when its centre of mass does.
 
         passage_rate = (m_2 - m_1) / (t_2 - t_1)
 
-    ``measures["passed_mass"]`` is the mass (kg) that has passed, and ``passage_rate`` (kg/s) the mean rate
-    while it grew from m_1, the first at or above ``begin``, to m_2, the last at or below ``end``: that of a
-    hopper in steady flow, without how it begins and runs empty. It is 0 before. ``passed`` is 1 for a grain
-    that has passed. Grains may be taken out afterwards, by an ``outflow`` that comes later in the scene.
+    ``measures["passed_mass"]`` is the mass (kg) that has passed. ``passage_rate`` (kg/s) is the mean rate
+    while that mass grew from m_1, its first value at or above ``begin``, to m_2, its last value at or below
+    ``end``; it is 0 before. For a hopper this is the rate in steady flow, without the onset and the emptying.
+    The field ``passed`` is 1 for a grain that has passed. An ``outflow`` that comes later in the scene may
+    remove such grains afterwards.
     """
 
     fields: ClassVar = (Field("passed", "", 1, "keep", integer=True, default=0),)
     world_quantities: ClassVar = ("passed_mass", "passage_rate", "passage_begin_time", "passage_begin_mass")
     flags: ClassVar = ("passage_due",)
     terms: ClassVar = 1
-    # What has been taken out weighs nothing.
+    # Removed grains have no mass left to weigh.
     precedes: ClassVar = (Outflow,)
 
-    begin: float = parameter("kg", "mass that has passed from which on the rate is taken", 0.0, ge=0)
-    end: float = parameter("kg", "mass that has passed up to which the rate is taken", 1e30, gt=0)
+    begin: float = parameter("kg", "passed mass from which on the rate is measured", 0.0, ge=0)
+    end: float = parameter("kg", "passed mass up to which the rate is measured", 1e30, gt=0)
 
     def measured(self) -> dict[str, str]:
         return dict(zip(self.world_quantities, ("kg", "kg/s", "s", "kg"), strict=True))

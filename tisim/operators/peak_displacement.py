@@ -1,4 +1,4 @@
-"""The farthest that a cloud's centre of gravity has been from where it began: an observer."""
+"""The largest displacement of a cloud's centre of gravity from its start: an observer."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ START_POSITION = Field("origin", "m", 3, "mean", default="position")
 
 
 class PeakDisplacement(Operator):
-    """The largest displacement of the centre of gravity is observed; nothing is changed.
+    """The largest displacement of the centre of gravity is recorded; the motion is not changed.
 
         max over steps of |sum_i m_i (r_i - r_i(0))| / sum_i m_i
 
     It is ``measures["peak_displacement"]`` (m). r(0) is the field ``origin`` (m), the position at the start.
-    Particles that do not feel each other then take common steps. In a box with joined faces distances are
-    those of open space.
+    Particles that do not interact then take common steps. In a periodic box, distances are computed as in
+    open space.
     """
 
     fields: ClassVar = (START_POSITION,)
@@ -40,7 +40,7 @@ class PeakDisplacement(Operator):
         total, farthest = self.sums.total(w), ti.cast(0.0, ti.f64)
         if total[3] > 0.0:
             farthest = ti.Vector([total[0], total[1], total[2]]).norm() / total[3]
-        # The maximum would drop NaN.
+        # A maximum with NaN would ignore the NaN.
         if not finite(farthest):
             s.fail_world_by_effect(w, self.index)
         s.peak_displacement[w] = ti.max(s.peak_displacement[w], farthest)

@@ -1,4 +1,4 @@
-"""How high each particle has risen: an observer, such as of a grain that rebounds."""
+"""The largest height that each particle has reached: an observer, for example for a grain that rebounds."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tisim.state.fields import Field
 
 
 class PeakHeight(Directed, Operator):
-    """The greatest height that each particle has had above where it began is observed; nothing is changed.
+    """The largest height of each particle above its start is recorded; the motion is not changed.
 
         h_i = max over steps of (r_i - r_i(0)) . n
 
-    It is the field ``peak_height`` (m), 0 of a particle that has only gone down; n is the unit vector of the
-    direction. r(0) is the field ``origin`` (m), the position at the start. A particle that begins at a plate
-    with the speed of a fall has the height of its rebound, until a later bounce is higher. In a box with
-    joined faces a particle that goes through one jumps, and its height with it.
+    It is the field ``peak_height`` (m), 0 for a particle that has only gone down. n is the unit vector of the
+    direction. r(0) is the field ``origin`` (m), the position at the start. For a particle that starts at a
+    plate with the speed of a fall, it is the height of the rebound, unless a later bounce is higher. In a
+    periodic box a particle that crosses a face jumps, and so does its height.
     """
 
     fields: ClassVar = (START_POSITION, Field("peak_height", "m", 1, "keep"))
 
-    direction: Vector = parameter("", "direction that is up", (0.0, 0.0, 1.0))
+    direction: Vector = parameter("", "upward direction", (0.0, 0.0, 1.0))
 
     @ti.func
     def particle(self, s, w, i, t, dt):

@@ -1,4 +1,4 @@
-"""The place that an insertion tries for its next grain: looked at by all particles at once."""
+"""The insertion trials for the next grain: all particles are checked for overlap in parallel."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ if TYPE_CHECKING:
     from tisim.operators.insertion import Insertion
 
 COMPARED_TOGETHER = {"cpu": 1024}
-"""A block has so many particles, on other devices 64: the spheres of a grain are turned once for each."""
+"""Number of particles in a block, 64 on other devices; the spheres of the grain are rotated once per
+block."""
 
 
 @ti.data_oriented
 class TriedPlace(WorldAction):
-    """A tried place is where the next grain of each world may come to lie: place after place is tried, and
-    grain after grain, until no more are wanted or one has found no place.
+    """Insertion trials choose places for the next grain of each world, grain after grain, until no more
+    grains are wanted or all trials of a grain have failed.
 
-    seeking : whether there is a grain that seeks a place. attempt : so many places have been tried for it.
-    taken : whether something lies at its place. drawn : the class of the grain; radius (m), velocity (m/s),
-    place (m), and orientation are its own. filled : the sum of the cubes of the radii of grains (m^3), for
-    those who count them.
+    seeking : whether a grain is being placed. attempt : number of failed trials for it. taken : whether its
+    place overlaps a particle. drawn : its class. radius (m), velocity (m/s), place (m) and orientation :
+    properties of the grain. filled : sum of the cubes of the radii of grains (m^3), for insertions by
+    fraction.
     """
 
     def __init__(self, insertion: Bound[Insertion], s: State) -> None:
@@ -51,7 +52,7 @@ class TriedPlace(WorldAction):
 
 
 class TryPlaces(Repeat):
-    """This repeat tries a place in each turn."""
+    """This repeat performs one insertion trial in each turn."""
 
     usual = 0
 
@@ -65,7 +66,7 @@ class TryPlaces(Repeat):
 
 
 class ChoosePlace(Phase):
-    """This phase chooses the place that is tried."""
+    """This phase chooses the place of a trial."""
 
     def __init__(self, tried: TriedPlace) -> None:
         self.tried, self.insertion, self.s = tried, tried.insertion, tried.s
@@ -76,8 +77,7 @@ class ChoosePlace(Phase):
 
 
 class LookForOverlap(Phase):
-    """This phase looks in each block of particles for one that overlaps the grain at its place, until one
-    has been found."""
+    """This phase searches each block of particles for one that overlaps the grain, until one is found."""
 
     light = False
 
@@ -98,7 +98,7 @@ class LookForOverlap(Phase):
 
     @ti.func
     def overlaps(self, w, begin, end):
-        """Return whether a sphere of the grain overlaps one of a range of particles."""
+        """Return whether a sphere of the grain overlaps any of a range of particles."""
         s, tried = self.s, self.tried
         c, q, radius = tried.drawn[w], tried.orientation[w], tried.radius[w]
         m, found = self.insertion.first_sphere(c), False
@@ -116,7 +116,7 @@ class LookForOverlap(Phase):
 
 
 class EndTry(Phase):
-    """This phase puts the grain in where there was nothing, and otherwise goes on to the next try."""
+    """This phase inserts the grain if its place is free, and otherwise goes on to the next trial."""
 
     def __init__(self, tried: TriedPlace) -> None:
         self.insertion, self.s = tried.insertion, tried.s

@@ -1,4 +1,4 @@
-"""A start of spheres at random places, equal or of classes with sizes of their own."""
+"""An initial state of spheres at random places, equal or of classes with their own sizes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tisim.scene.initial_state import Arrays, Start, worst
 from tisim.scene.initial_velocity import Pulse
 
 SPHERES_ASKED = 4096
-"""A stepper is chosen by this many of the spheres of a larger cloud of equal ones."""
+"""Number of spheres of a larger cloud of equal spheres from which a stepper is chosen."""
 
 
 class Cloud(Start):
@@ -35,15 +35,16 @@ class Cloud(Start):
 
         v = mean_velocity + deviation * lambda + pulse
 
-    lambda is uniform in -1..1 for each particle and component. The same seed gives the same lambdas whatever
-    the other parameters. The spheres are equal, of a radius and a density, or drawn from the grains of a
-    mixture: each is of a class by the class's part of the number of grains, with a size of its own.
+    lambda is uniform in -1..1 for each particle and component. The same seed gives the same lambdas for any
+    values of the other parameters. The spheres are equal, with a radius and a density, or are drawn from the
+    grains of a mixture: the class of each is drawn by the number fractions of the classes, and its size from
+    the class.
 
     Source: Z04 section 7.
     """
 
     number: int | None = option(
-        "number of spheres; left out where the placement fixes it, as a lattice does",
+        "number of spheres; left out if the placement determines it, as a lattice does",
         None,
         gt=0,
         le=PARTICLES,
@@ -51,20 +52,20 @@ class Cloud(Start):
     )
     radius: float | None = parameter("m", "radius of equal spheres", None, examples=[1e-3], gt=0)
     density: float | None = parameter("kg/m^3", "density of equal spheres", None, examples=[2000.0], gt=0)
-    grains: tuple[GrainClass, ...] = option("classes of unlike spheres, instead of radius and density", ())
-    placement: Placement = option("where the centres lie", RandomInDomain())
+    grains: tuple[GrainClass, ...] = option("classes of unequal spheres, instead of radius and density", ())
+    placement: Placement = option("placement of the centres", RandomInDomain())
     mean_velocity: Vector = parameter("m/s", "mean velocity", (0.0, 0.0, 0.0))
     deviation: Vector = parameter(
         "m/s", "largest deviation from the mean velocity, along each axis", (0.0, 0.0, 0.0)
     )
-    pulse: Pulse | None = option("velocities that are added at the start, such as a blast's", None)
+    pulse: Pulse | None = option("additional initial velocities, such as those of a blast", None)
     temperature: float = parameter("K", "temperature", 300.0, gt=0)
     material: Text | None = option("material of the spheres; the first of the scene unless given", None)
     specific_charge: float | None = parameter(
-        "C/kg", "charge over mass of each sphere; unless given, there is none", None
+        "C/kg", "charge over mass of each sphere; uncharged unless given", None
     )
     quantities: Mapping[Text, float | Vector] = option(
-        "further fields by name, in SI; one number or three components, for all", default_factory=dict
+        "further fields by name, in SI; one number or three components, for all spheres", default_factory=dict
     )
 
     @model_validator(mode="after")
@@ -82,7 +83,9 @@ class Cloud(Start):
         own = {"position", "velocity", "radius", "mass", "temperature", "id", "material"}
         own |= {"charge"} if self.specific_charge is not None else set()
         for name, value in self.quantities.items():
-            must(name not in own, f"cloud.quantities.{name}", "given beside quantities, and once", value)
+            must(
+                name not in own, f"cloud.quantities.{name}", "given outside quantities, and only once", value
+            )
         check_quantities(self.grains, {*own, *self.quantities} - {"temperature"})
         mass, rule = self._equal_mass(), f"from {LEAST:g} to {MOST:g} kg"
         must(mass is None or LEAST <= mass <= MOST, "mass of a particle of the cloud", rule, mass)
@@ -93,7 +96,7 @@ class Cloud(Start):
         return self.placement.sites() or self.number or 0
 
     def _equal_mass(self) -> float | None:
-        """Return the mass of each sphere, kg; None of unlike ones."""
+        """Return the mass of each sphere, kg; None for unequal spheres."""
         if self.radius is None or self.density is None:
             return None
         return self.density * 4 / 3 * np.pi * self.radius**3
@@ -109,7 +112,7 @@ class Cloud(Start):
         mass = self._equal_mass()
         if mass is None:
             return masses(self.grains, *draw(self.grains, self.count(), seed))
-        # All in one place of memory, as the number may be large and a scene is checked before it is run.
+        # All in one memory location, because the number may be large and a scene is checked before it is run.
         return np.broadcast_to(mass, self.count())
 
     @np.errstate(over="ignore", invalid="ignore")
@@ -123,17 +126,17 @@ class Cloud(Start):
         return arrays
 
     def unplaced(self, seed: int) -> Arrays:
-        # Of equal spheres, which differ in velocity alone, some stand for all.
+        # A few equal spheres, which differ in velocity only, represent all.
         known = self._unplaced(self.count() if self.grains else min(self.count(), SPHERES_ASKED), seed)
         if self.pulse is not None and len(known["mass"]):
-            # In whatever direction: two of them may be thrown apart.
+            # In any direction: two of them may be thrown apart.
             added = self.pulse.top_speed(self.masses(seed))
             known["velocity"][0, 0] += added
             known["velocity"][-1, 0] -= added
         return known
 
     def _unplaced(self, n: int, seed: int) -> Arrays:
-        """Return the quantities of the first n spheres, but for their places."""
+        """Return the quantities of the first n spheres, without their places."""
         check_memory(f"a cloud of {n} particles", n)
         draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (n, 3))
         spheres = self._spheres(n, seed)
@@ -148,7 +151,7 @@ class Cloud(Start):
         return arrays
 
     def _spheres(self, n: int, seed: int) -> Arrays:
-        """Return radius and mass of each sphere, and what its class says of it."""
+        """Return the radius and mass of each sphere, and the further quantities that its class defines."""
         mass = self._equal_mass()
         if mass is not None:
             return {"radius": np.full(n, self.radius), "mass": np.full(n, mass)}

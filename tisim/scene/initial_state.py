@@ -1,4 +1,4 @@
-"""What a scene starts with: the contract, and particles given one by one."""
+"""The initial state of a scene: the contract, and particles given one by one."""
 
 from __future__ import annotations
 
@@ -19,47 +19,48 @@ from tisim.packing.clump import Clump, clump_columns, sphere_columns
 from tisim.packing.tried_places import Packing
 
 Arrays = dict[str, np.ndarray]
-"""These are particle quantities by field name: shape (n,) or (n, 3), SI."""
+"""Particle quantities by field name: shape (n,) or (n, 3), SI."""
 
 
 FLAGS = ("fixed",)
-"""Quantities that are true or false may be given as such."""
+"""Quantities that may be given as true or false."""
 
 
 class Start(Component):
-    """This is the contract of a starting configuration."""
+    """The contract of an initial state."""
 
     contract: ClassVar[bool] = True
 
     def masses(self, seed: int) -> np.ndarray:
-        """Return the mass of each particle, kg, shape (n,), which is known without placing them."""
+        """Return the mass of each particle, kg, shape (n,), without placing the particles."""
         raise NotImplementedError(f"{type(self).__name__} must define masses")
 
     def unplaced(self, seed: int) -> Arrays:
-        """Return what is known of the particles, or of enough of them, without placing them: velocity (m/s),
-        mass (kg), radius (m) and further quantities; by default they are placed in open space."""
+        """Return the quantities that are known without placing the particles, for all particles or a
+        sufficient number: velocity (m/s), mass (kg), radius (m) and further quantities; by default the
+        particles are placed in open space."""
         return self.arrays(Open(), seed)
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:
-        """Return position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
+        """Return position (m), velocity (m/s), mass (kg), radius (m) and further quantities, n of each."""
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
 
     def packing(self, domain: Domain, seed: int) -> Packing | None:
-        """Return the random sequential addition that ``arrays`` asks for; None where there is none."""
+        """Return the random sequential addition that ``arrays`` needs; None if it needs none."""
         return None
 
     def material_indices(self, materials: Materials, seed: int) -> np.ndarray | None:
-        """Return the index of the material of each particle, shape (n,), given those of the scene; None where
-        all are of the first."""
+        """Return the material index of each particle, shape (n,), given the materials of the scene; None if
+        all have the first material."""
         return None
 
 
 class Particles(Start):
     """Particles are given one by one, as lists or arrays.
 
-    Positions and velocities are of shape (n, 3). Of any other quantity one number stands for all particles,
-    or n of them are given. Give mass or density, not both. Arrays are copied, and kept as arrays that are not
-    writeable. There may be none, ``Particles.none()``, where an effect puts some in later.
+    Positions and velocities have shape (n, 3). Any other quantity is given as one number for all particles or
+    as n numbers. Give mass or density, not both. Arrays are copied and stored as read-only arrays. If an
+    effect inserts particles later, the initial state may be empty, ``Particles.none()``.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
@@ -71,8 +72,8 @@ class Particles(Start):
         "kg/m^3", "density of all particles, instead of masses", None, gt=0, examples=[2000.0]
     )
     material: Any = option(
-        "material of each particle, by its name or its number, from 0, in the scene; one for all, the "
-        "first unless given",
+        "material of each particle, by name or by its number in the scene, from 0; one for all particles, "
+        "the first unless given",
         None,
     )
     quantities: Mapping[Text, Any] = option(
@@ -81,7 +82,7 @@ class Particles(Start):
 
     @classmethod
     def none(cls) -> Self:
-        """Return no particles, for a scene in which all are put in later."""
+        """Return an empty initial state, for a scene in which all particles are inserted later."""
         return cls(position=(), velocity=(), radius=(), mass=())
 
     @classmethod
@@ -97,14 +98,15 @@ class Particles(Start):
         quantities: Mapping[str, Any] | None = None,
         material: Any = None,
     ) -> Self:
-        """Return the particles that rigid clumps are, for a scene with the effect RigidClumps.
+        """Return the member particles of rigid clumps, for a scene with the effect RigidClumps.
 
-        clumps : the template of each, or of all. position : centres of mass, m, shape (n, 3). velocity : of
-        these, m/s. orientation : quaternions w, x, y, z by which templates are turned, shape (n, 4).
-        angular_velocity : rad/s, in space. Of these three one row may stand for all. spheres : particles of
-        no clump, which follow. box : that of the scene, through whose joined faces clumps may reach.
-        quantities : further fields of all members, one value for all or one of each clump. material : of the
-        clumps, one for all or one of each, where not all are of the first; then ``spheres`` have theirs.
+        clumps : template of each clump, or of all. position : centres of mass, m, shape (n, 3). velocity :
+        velocities of the centres of mass, m/s. orientation : quaternions w, x, y, z that rotate the
+        templates, shape (n, 4). angular_velocity : rad/s, in space. For these three, one row may be given for
+        all. spheres : particles outside clumps, which follow the members. box : box of the scene, whose
+        periodic faces clumps may cross. quantities : further fields of all members, one value for all or one
+        for each clump. material : material of the clumps, one for all or one for each, unless all have the
+        first material; then ``spheres`` must have materials too.
         """
         columns, sizes = clump_columns(clumps, position, velocity, orientation, angular_velocity)
         for name, value in (quantities or {}).items():
@@ -115,20 +117,25 @@ class Particles(Start):
             materials = [*np.repeat(_of_each("clumps.material", material, len(sizes)), sizes)]
         if spheres is not None:
             both = (material is None) == (spheres.material is None)
-            must(both, "material", "given of clumps and of the spheres beside them, or of neither", material)
+            must(
+                both,
+                "material",
+                "given for both clumps and the spheres beside them, or for neither",
+                material,
+            )
             columns = _beside(columns, spheres.masses(0), spheres.arrays(Open(), 0))
             if materials is not None:
                 materials += [*_of_each("particles.material", spheres.material, len(spheres.masses(0)))]
         if box is not None:
             low, side, joined = np.array(box.low), np.diff([box.low, box.high], axis=0), box.joined()
             inside = low + (columns["position"] - low) % side
-            # A remainder may round up to the whole side.
+            # The remainder may be rounded up to the whole side.
             inside = np.where(inside < np.array(box.high), inside, low)
             columns["position"] = np.where(joined, inside, columns["position"])
         core = {name: columns.pop(name) for name in ("position", "velocity", "radius", "mass")}
         return cls(**core, quantities=columns, material=materials)
 
-    # Not that of pydantic, which takes the comparison of two arrays for a truth.
+    # The comparison of pydantic would use the comparison of two arrays as a truth value.
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
@@ -137,7 +144,7 @@ class Particles(Start):
     __hash__ = None  # type: ignore[assignment]
 
     def __setstate__(self, state: dict[Any, Any]) -> None:
-        """Set the state that comes from another process: its arrays are not writeable either."""
+        """Set the state received from another process; its arrays are made read-only again."""
         super().__setstate__(state)
         for value in (*self.__dict__.values(), *self.quantities.values()):
             if isinstance(value, np.ndarray):
@@ -153,7 +160,7 @@ class Particles(Start):
             column = np.asarray(value if isinstance(value, np.ndarray) else plain(where, value))
         except (ValueError, RecursionError):
             raise InputError(f"particles.{name} must be numbers; received {abbreviated(value)}") from None
-        # Neither text nor whole numbers of more than 64 bits.
+        # Text, and integers of more than 64 bits, are not numbers here.
         must(column.dtype.kind in "iuf", where, "numbers", value)
         column = column.astype(float)
         if column.ndim == 0 or column.shape == (1,):
@@ -232,7 +239,7 @@ class Particles(Start):
             must(
                 name not in (*arrays, "id", "material"),
                 f"particles.quantities.{name}",
-                "given beside quantities",
+                "given outside quantities",
                 value,
             )
             arrays[name] = self._column(name, value, n)
@@ -243,8 +250,8 @@ class Particles(Start):
 
 
 def _beside(clumps: Arrays, mass: np.ndarray, spheres: Arrays) -> Arrays:
-    """Return the quantities of the members of clumps, and after them of spheres, which are of no clump and
-    may be of a group."""
+    """Return the quantities of the members of clumps, followed by the quantities of spheres outside clumps,
+    which may belong to a group."""
     given = {**sphere_columns(mass), **spheres}
     clumps = {**clumps, **({"group": np.zeros(len(clumps["mass"]))} if "group" in given else {})}
     must(given.keys() == clumps.keys(), "spheres beside clumps", f"given {sorted(clumps)}", sorted(given))
@@ -252,7 +259,8 @@ def _beside(clumps: Arrays, mass: np.ndarray, spheres: Arrays) -> Arrays:
 
 
 def _lists(value: Any, depth: int = DEEPEST) -> Any:
-    """Return a list with what is of NumPy in it as lists and numbers of Python; all else as it is."""
+    """Return a list with its NumPy arrays and numbers converted to Python lists and numbers; other values
+    unchanged."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if type(value) not in (list, tuple) or depth == 0:
@@ -261,7 +269,7 @@ def _lists(value: Any, depth: int = DEEPEST) -> Any:
 
 
 def _of_each(name: str, value: Any, n: int) -> np.ndarray:
-    """Return n rows: those given, or the one that is given for all."""
+    """Return n rows: the given ones, or the given row repeated."""
     rows = np.asarray(value)
     rows = rows[None] if rows.ndim == 0 else rows
     must(len(rows) in (1, n), name, f"one value or {n} of them", len(rows))
@@ -269,12 +277,12 @@ def _of_each(name: str, value: Any, n: int) -> np.ndarray:
 
 
 def worst(column: np.ndarray) -> float:
-    """Return the first number that is not finite; 0 where there is none."""
+    """Return the first number that is not finite; 0 if all are finite."""
     return float(column[~np.isfinite(column)].flat[0]) if not np.isfinite(column).all() else 0.0
 
 
 def check_sizes(name: str, unit: str, column: np.ndarray) -> None:
-    """Raise InputError unless all are above 0 and within the limits of their unit."""
+    """Raise InputError unless all values are above 0 and within the limits of their unit."""
     least, most = limits(unit)
     must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min(initial=np.inf)))
     outside = column[(column < least) | (column > most)]

@@ -1,4 +1,4 @@
-"""Velocities that a start is given at once, on top of those that it has."""
+"""Velocities added to the velocities of an initial state."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from tisim.errors import Words, must
 
 
 class Pulse(Component):
-    """This is the contract of a change of all velocities at the start."""
+    """The contract of a change of all velocities at the start."""
 
     contract: ClassVar[bool] = True
 
     def velocity(self, position: np.ndarray, mass: np.ndarray) -> np.ndarray:
-        """Return what is added to velocities, m/s, (n, 3), given positions, m, and masses, kg, (n,)."""
+        """Return the added velocities, m/s, (n, 3), given positions, m, and masses, kg, (n,)."""
         raise NotImplementedError(f"{type(self).__name__} must define velocity")
 
     def top_speed(self, mass: np.ndarray) -> float:
-        """Return the largest speed (m/s) that it adds to particles of some masses (kg), wherever they are; 0
-        where it is not known."""
+        """Return the largest speed (m/s) added to particles of given masses (kg) at any places; 0 if
+        unknown."""
         return 0.0
 
 
@@ -30,15 +30,15 @@ class Blast(Pulse):
 
         |dv| = sqrt(2 W/M)
 
-    M is the mass of the particles. Total momentum is that of the unit vectors, which do not quite cancel in a
-    random start. A particle in the centre of mass, which has no direction to go, stays as it is, and M is the
-    mass of the others.
+    M is the mass of the particles. The total momentum is not exactly 0 in a random initial state, because the
+    unit vectors do not quite cancel. A particle at the centre of mass has no direction to move in: its
+    velocity is not changed, and M is the mass of the others.
 
     Source: Z16 Eqs (3.1)-(3.4).
     """
 
     energy: float = parameter(
-        "J", "energy W: the kinetic energy of particles that were at rest", examples=[1.0], gt=0
+        "J", "energy W: kinetic energy of particles initially at rest", examples=[1.0], gt=0
     )
 
     def top_speed(self, mass: np.ndarray) -> float:
@@ -47,7 +47,7 @@ class Blast(Pulse):
     def velocity(self, position: np.ndarray, mass: np.ndarray) -> np.ndarray:
         arm = position - np.average(position, axis=0, weights=mass)
         distance = np.linalg.norm(arm, axis=1)
-        # Nearer than the rounding of the coordinates, a direction would be one of rounding errors.
+        # Within the rounding error of the coordinates, the direction would be one of rounding errors.
         moved = distance > 1e-12 * np.abs(position).max(initial=0.0)
         must(
             bool(moved.any()),

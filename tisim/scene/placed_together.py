@@ -1,4 +1,4 @@
-"""The spheres of many scenes are placed side by side, on all threads, before their starts are made."""
+"""The spheres of many scenes are placed in parallel, on all threads, before their initial states are made."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from tisim.scene.scene import Scene
 
 @contextmanager
 def placed_together(scenes: Sequence[Scene]) -> Iterator[None]:
-    """Within, ``start`` of each of these scenes finds its spheres placed, where it would place them alone.
+    """Within this context, ``start`` of each scene finds its spheres already placed, at the same places as if
+    it placed them alone.
 
-    A scene whose packing cannot be asked for raises nothing here: its start does, when it is made.
+    An invalid packing raises no error here, but when the initial state of its scene is made.
     """
     several = scenes if len(scenes) > 1 else ()
     with placed_side_by_side([packing for scene in several if (packing := _packing(scene))]):

@@ -1,4 +1,5 @@
-"""A scene as plain data, nested tables as in a TOML file: to and from it, and with keys changed."""
+"""Scenes as plain data, nested tables as in a TOML file: conversion in both directions, and changes by
+key."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def scene_table(scene: Scene, particles: dict[str, Any]) -> dict[str, Any]:
-    """Return the plain data of a scene, given those of its particles."""
+    """Return the plain data of a scene, given the plain data of its particles."""
     stepper: dict[str, Any] = {"accuracy": scene.accuracy}
     if "stepper" in scene.model_fields_set:
         stepper = {"stepper": serialization.to_dict(scene.stepper)}
@@ -40,8 +41,8 @@ def scene_table(scene: Scene, particles: dict[str, Any]) -> dict[str, Any]:
 
 
 def scene_fields(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return what a scene is made of, given its plain data, and the folder from which names of files in it
-    lead; InputError names the key that is wrong."""
+    """Return the fields of a scene, given its plain data and the folder to which file names in the data are
+    relative; InputError names the key that is wrong."""
     rest = serialization.table(data, "scene")
     must("particles" in rest, "scene.particles", "given", Words("nothing"))
     plugins.load_parts()
@@ -62,43 +63,44 @@ def scene_fields(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def change(data: dict[str, Any], key: str, value: Any) -> None:
-    """Set what a dotted key leads to in the plain data of a scene."""
+    """Set the value at a dotted key in the plain data of a scene."""
     *path, last = key.split(".")
     place: Any = data
     for depth, step in enumerate(path):
         place = place[_step(place, step, key, ".".join(path[:depth]))]
-    # A key that is not there may be one that is left at its default.
+    # A missing key may be one that was left at its default.
     place[last if isinstance(place, dict) else _step(place, last, key, ".".join(path))] = value
 
 
 def _tables(key: str, parts: Mapping[str, Component]) -> dict[str, Any]:
-    """Return a key with a table of each part by name; nothing where there is none."""
+    """Return a key with a table of each part by name; an empty dictionary if there are no parts."""
     tables = {name: serialization.to_dict(part, named=False) for name, part in parts.items()}
     return {key: tables} if tables else {}
 
 
 def _effect_table(effect: Effect) -> dict[str, Any]:
-    """Return the parameters of an effect, with its kind where that is not the name of its table."""
+    """Return the parameters of an effect, with its kind if that is not the name of its table."""
     values = serialization.to_dict(effect, named=effect.label != effect.kind())
     return {key: value for key, value in values.items() if key != "name"}
 
 
 def _effect(name: str, values: Any, folder: Path) -> Effect:
-    """Return the effect of a table; the name of the table is its own, and its kind unless it has one."""
+    """Return the effect of a table. The name of the table is the name of the effect, and its kind unless the
+    table has one."""
     where = f"effects.{name}"
     table = serialization.table(values, where)
     own = table.pop("name", None)
-    must(own in (None, name), f"{where}.name", "left out, as it is that of the table", own)
+    must(own in (None, name), f"{where}.name", "left out: it is the table's name", own)
     name_entry = {"name": name} if table.get("kind", name) != name else {}
     return serialization.from_dict(Effect, {"kind": name, **table, **name_entry}, where, folder)
 
 
 def _step(place: Any, step: str, key: str, path: str) -> Any:
-    """Return the key or number by which a place in plain data is entered; InputError with the whole ``key``.
+    """Return the key or index of the next place in plain data; InputError with the whole ``key``.
 
     path : dotted name of the place; empty for the scene itself.
     """
-    # Of few digits: Python does not read numbers of some thousand.
+    # With few digits, because Python refuses to read numbers of some thousand digits.
     in_list = isinstance(place, list) and step.isdecimal() and len(step) < 10 and int(step) < len(place)
     if not in_list and not (isinstance(place, dict) and step in place):
         names = list(place) if isinstance(place, dict) else []

@@ -1,8 +1,8 @@
-"""Parts of scenes that are not tisim's own: of a Python file, or of a package that is installed.
+"""Plugins: parts of scenes defined outside tisim, in a Python file or an installed package.
 
 A package names its modules under the entry point group ``tisim.effects``; they are imported when a scene is
-read from plain data. What a plugin defines is found by its kind, as what tisim itself has; the digest of a
-scene that uses it has a checksum of its file.
+read from plain data. The components of a plugin are found by their kind, like tisim's own. The digest of a
+scene that uses a plugin includes a checksum of its file.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ GROUP = "tisim.effects"
 
 
 def load(path: str | Path) -> ModuleType:
-    """Import a Python file of the user's, so that the parts in it can be found by name.
+    """Import a Python file of the user, so that the parts in it can be found by name.
 
-    InputError is raised when it cannot be imported, or defines a kind whose name is taken; nothing of it is
-    then known.
+    InputError is raised if it cannot be imported, or if it defines a kind whose name is taken; none of its
+    parts are then known.
     """
     _load_own()
     module = python_file.load(path)
@@ -40,20 +40,19 @@ def load(path: str | Path) -> ModuleType:
 
 
 def load_parts() -> None:
-    """Import all parts of scenes that are installed, so that they can be found."""
+    """Import all installed parts of scenes, so that they can be found."""
     _load_own()
     _load_installed()
 
 
 def versions() -> dict[str, str]:
-    """Return a checksum of the file of each plugin, by its name: of those loaded, and of packages
-    installed."""
+    """Return a checksum of the file of each plugin by name, for loaded files and installed packages."""
     own = {f"plugin {file.name}": file.checksum[:12] for file in python_file.loaded_files()}
     return own | installed()
 
 
 def installed() -> dict[str, str]:
-    """Return the plugins of installed packages alone; they are not imported."""
+    """Return the plugins of installed packages only, without importing them."""
     return {f"plugin {entry.module}": _checksum(entry) for entry in entry_points(group=GROUP)}
 
 
@@ -84,7 +83,7 @@ def _checksum(entry: EntryPoint) -> str:
 
 
 def _check(module: ModuleType) -> None:
-    """Raise InputError for a kind of a module that another one of the same family has."""
+    """Raise InputError if a module defines a kind that exists already in the same family."""
     for kind in list(vars(module).values()):
         if not (isinstance(kind, type) and issubclass(kind, Component)) or kind.__dict__.get("contract"):
             continue

@@ -1,4 +1,4 @@
-"""A scene: what the user asks for, as plain validated data. TOML in and out; no Taichi."""
+"""A scene: the description of a simulation as plain validated data. TOML in and out; no Taichi."""
 
 from __future__ import annotations
 
@@ -27,37 +27,39 @@ from tisim.steppers.base import Stepper
 from tisim.steppers.choice import ACCURACY, StepperChoice, choose, critical_steps
 
 PHYSICS_VERSION = 12
-"""This number is raised whenever a change of code changes the result of a scene; it is part of its digest."""
+"""Version of the physics, part of a scene's digest; raised whenever a change of code changes the result of a
+scene."""
 
 __all__ = ["Box", "Open", "Scene", "ShearedBox"]
 
 
 class Scene(Component):
-    """A scene says what is simulated: particles, the effects that act on them, and for how long.
+    """A scene describes a simulation: particles, the effects that act on them, and the duration.
 
-    It pays only for what it calls for. It is made in Python or read from a TOML file; InputError ("X must be
-    Y; received Z") is raised when it is made from anything that cannot be run.
+    Only the effects in a scene are compiled and allocated. A scene is made in Python or read from a TOML
+    file; InputError ("X must be Y; received Z") is raised if it cannot be run.
     """
 
-    name: Text = option("name of the scene, for people", "scene")
-    particles: Start = option("what it starts with, Particles or Cloud")
+    name: Text = option("descriptive name of the scene", "scene")
+    particles: Start = option("initial state, such as Particles or Cloud")
     materials: Mapping[Text, Material] = option(
-        "materials by name, which laws of contact go by", default_factory=dict
+        "materials by name, used by contact laws", default_factory=dict
     )
     material_pairs: Mapping[Text, MaterialPair] = option(
-        "what two materials have where no rule gives it, by both names, such as steel-rubber",
+        "parameters of pairs of materials that no rule derives from the single materials, by both names, "
+        "such as steel-rubber",
         default_factory=dict,
     )
     effects: tuple[Effect, ...] = option("effects, sources and operators, which act in this order", ())
-    domain: Domain = option("space that it lives in, such as Open or Box", Open())
+    domain: Domain = option("space in which the particles move, such as Open or Box", Open())
     stepper: Stepper = option(
-        "how time advances, with tolerances and limits; chosen for the accuracy unless given",
+        "time integration, with tolerances and limits; chosen for the accuracy unless given",
         None,
     )
     accuracy: float = parameter(
         "",
-        "relative accuracy for which a stepper is chosen: of places at the end, over the size of the motion; "
-        "with contacts, of the energy and the rebound of each",
+        "relative accuracy for which a stepper is chosen: error of final positions over the size of the "
+        "motion; with contacts, error of the energy and the rebound of each",
         ACCURACY,
         gt=0,
         lt=1,
@@ -65,12 +67,12 @@ class Scene(Component):
     duration: float = parameter("s", "simulated time", gt=0)
     skin: float | None = parameter(
         "m",
-        "how much farther than laws reach lists of pairs look, which are made anew when particles have moved "
-        "by half of it; chosen by what steps cost unless given; no result depends on it",
+        "skin distance of the neighbour lists, which are rebuilt when particles have moved by half of it; "
+        "chosen automatically by cost unless given; does not affect results",
         None,
         gt=0,
     )
-    seed: int = option("seed of all that is random in it", 0, ge=0, lt=2**63)
+    seed: int = option("seed of all random numbers of the scene", 0, ge=0, lt=2**63)
 
     @field_validator("effects", mode="before")
     @classmethod
@@ -85,19 +87,20 @@ class Scene(Component):
         for effect in self.effects:
             effect.suits(self.domain)
             effect.suits_others(self.effects)
-        rule = "at least one, or put in by an effect such as insertion_by_flux"
+        rule = "at least one, or inserted by an effect such as insertion_by_flux"
         must(self.capacity() > 0, "particles", rule, Words("none"))
         if "stepper" in self.model_fields_set:
-            rule = "left out where a stepper is given, which has settings of its own"
+            rule = "left out if a stepper is given, which has its own settings"
             must(self.accuracy == ACCURACY, "scene.accuracy", rule, self.accuracy)
         else:
-            # Not a field that is set: ``replace`` chooses anew.
+            # Not set as a field, so that ``replace`` chooses again.
             self.__dict__["stepper"] = self.choice().stepper
         self._check_stepper()
         return self
 
     def _check_effects(self) -> None:
-        """Raise InputError unless all effects have what they need of each other."""
+        """Raise InputError unless the effects fit together: no duplicates, all required effects present, no
+        excluded ones, and in the required order."""
         present = [type(effect) for effect in self.effects]
         labels = [effect.label for effect in self.effects]
         for effect, kind, label in zip(self.effects, present, labels, strict=True):
@@ -130,7 +133,7 @@ class Scene(Component):
             must(
                 self.stepper.control.kind() not in effect.incompatible_controls,
                 "stepper.control",
-                f"one that suits {effect.label}, such as fixed_step or that of an implicit stepper",
+                f"one that suits {effect.label}, such as fixed_step or the control of an implicit stepper",
                 self.stepper.control.kind(),
             )
         self.stepper.suits(self.effects, self.domain)
@@ -138,7 +141,8 @@ class Scene(Component):
         self.stepper.fewest(self.effects, self.duration)
 
     def _check_materials(self) -> None:
-        """Raise InputError unless the materials have what effects need of them, and all names are known."""
+        """Raise InputError unless the materials have the properties that effects need, and all names are
+        known."""
         materials = Materials(self.materials, self.material_pairs)
         self.particles.material_indices(materials, self.seed)
         for part in (part for effect in self.effects for part in effect.parts()):
@@ -154,17 +158,17 @@ class Scene(Component):
         return repr(self)
 
     def choice(self) -> StepperChoice:
-        """Return the stepper that is chosen for the effects, the start and the accuracy, with the reason;
-        InputError where none can be chosen."""
+        """Return the stepper chosen for the effects, the initial state and the accuracy, with the reason;
+        raise InputError if none can be chosen."""
         return choose(*self._unplaced(), self.duration, self.accuracy)
 
     def critical_steps(self) -> dict[str, float]:
         """Return the critical time steps (s), 2/omega of the stiffest motion that an effect causes, by the
-        label of the effect, the shortest first; of those effects that have and know one."""
+        label of the effect, the shortest first; only for effects that have a known one."""
         return critical_steps(*self._unplaced(), self.duration)
 
     def _unplaced(self) -> tuple[list[Effect], Domain, Arrays]:
-        """Return the effects, which know the materials, the domain, and the start without its places."""
+        """Return the effects bound to their materials, the domain, and the initial state without places."""
         materials = Materials(self.materials, self.material_pairs)
         start = self.particles.unplaced(self.seed)
         indices = self.particles.material_indices(materials, self.seed)
@@ -173,17 +177,17 @@ class Scene(Component):
         return [_of(effect, materials) for effect in self.effects], self.domain, start
 
     def structure(self) -> tuple[Any, ...]:
-        """Return what is compiled in; scenes that agree in it can run as one batch."""
+        """Return the compiled-in part of the scene; scenes in which it is equal can run as one batch."""
         parts = (*self.effects, self.domain, self.stepper)
         return *(part.structure() for part in parts), tuple(self.materials)
 
     def acting(self) -> tuple[Effect, ...]:
-        """Return the effects, with what they take from the start and from the materials filled in."""
+        """Return the effects, completed by data of the initial state and the materials."""
         masses, materials = self.particles.masses(self.seed), Materials(self.materials, self.material_pairs)
         return tuple(_of(effect, materials).at_start(masses) for effect in self.effects)
 
     def start(self, seed: int | None = None) -> Arrays:
-        """Return the quantities of particles at the start, by name; of another seed where one is given."""
+        """Return the initial quantities of the particles by name, for another seed if given."""
         seed = self.seed if seed is None else seed
         arrays = self.particles.arrays(self.domain, seed)
         for effect in self.effects:
@@ -192,14 +196,14 @@ class Scene(Component):
         return arrays if indices is None else {**arrays, "material": indices}
 
     def capacity(self) -> int:
-        """Return how many particles may ever live at once."""
+        """Return the largest number of particles that may exist at once."""
         masses = self.particles.masses(self.seed)
         n = len(masses)
         return n + sum(effect.capacity(masses) - n for effect in self.effects)
 
     def digest(self) -> str:
-        """Return a hash, in hex, of everything that decides the result: physics version, every parameter, the
-        seed, and the files that define parts of the scene that are not tisim's own."""
+        """Return a hash, in hex, of everything that determines the result: physics version, all parameters
+        that affect it, the seed, and the files that define parts of the scene outside tisim."""
         order = [effect.label for effect in self.effects]
         files = python_file.module_checksums(*dict.fromkeys(map(type, self.parts())))
         digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
@@ -218,20 +222,20 @@ class Scene(Component):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], folder: str | Path = "") -> Scene:
-        """Make a scene of plain data; InputError names the key that is wrong.
+        """Make a scene from plain data; InputError names the key that is wrong.
 
-        folder : that from which names of files in the data lead; the working directory unless given.
+        folder : folder to which file names in the data are relative; the working directory unless given.
         """
         return cls(**plain_data.scene_fields(data, Path(folder)))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Scene:
-        """Read a scene from a TOML file, and what it names in other files, whose names lead from its folder;
-        InputError when it is not one."""
+        """Read a scene from a TOML file, and further files named in it relative to its folder; raise
+        InputError if it is not a scene."""
         file, label = Path(path), "scene file"
         text = None
         try:
-            # Neither a folder nor a pipe, which may never end.
+            # A folder cannot be read, and a pipe may never end.
             if file.is_file() or not file.exists():
                 text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
@@ -240,26 +244,26 @@ class Scene(Component):
             received = f"{abbreviated(str(path))} ({error.strerror})"
             raise InputError(f"{label} must be readable; received {received}") from None
         except ValueError as fault:
-            # Bytes that are no text, or a name with a NUL.
+            # Bytes that are not text, or a name with a NUL.
             raise InputError(f"{label} must be TOML; received {abbreviated(str(path))} ({fault})") from None
         if text is None:
             raise InputError(f"{label} must be a file; received {abbreviated(str(path))}")
         return cls.from_dict(serialization.read_toml(text, label, str(path)), file.parent)
 
     def to_toml(self) -> str:
-        """Return the scene as TOML text; ``from_toml`` gives it back."""
+        """Return the scene as TOML text, which ``from_toml`` reads."""
         return serialization.toml(self.to_dict())
 
     def replace(self, settings: Mapping[str, Any]) -> Scene:
         """Return a copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a
-        list by number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
+        list are numbered from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
         data = self.to_dict()
         for key, value in settings.items():
             plain_data.change(data, key, value)
         return type(self).from_dict(data)
 
     def without(self, *names: str) -> Scene:
-        """Return a copy without some effects; InputError when one is not there, or is needed by others."""
+        """Return a copy without some effects; raise InputError if one is absent, or needed by others."""
         data = self.to_dict()
         for name in names:
             present = ", ".join(data["effects"]) or "none, as this scene has none"
@@ -269,14 +273,14 @@ class Scene(Component):
 
 
 def _of(effect: Effect, materials: Materials) -> Effect:
-    """Return an effect that knows the materials, if it is one that goes by them."""
+    """Return an effect bound to the materials, if it uses them."""
     return effect.with_materials(materials) if isinstance(effect, UsesMaterials) else effect
 
 
 def _names(kind: type[Component]) -> list[str]:
-    """Return the name of an effect in files, or the names of those that are made after a contract."""
+    """Return the name of an effect in files, or for a contract the names of the effects that implement it."""
     if not kind.__dict__.get("contract"):
         return [f"effects.{kind.kind()}"]
-    # Those that are imported when they are first asked for.
+    # Includes those that are imported on first use.
     plugins.load_parts()
     return [f"effects.{name}" for name in sorted(kind.known())] or [kind.kind()]

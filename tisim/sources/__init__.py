@@ -1,6 +1,6 @@
 """External fields of place and time, one file each.
 
-``tisim effects sources`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
+In a shell, ``tisim effects sources`` lists them, a line each, and ``tisim effects NAME`` describes one: law,
 source, parameters and units.
 """
 

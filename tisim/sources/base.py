@@ -1,7 +1,7 @@
-"""The contract of a source: an external field of place and time, which effects feel.
+"""The contract of a source: an external field of place and time that acts on particles through other effects.
 
-A source is an effect (see tisim/effects/base) that writes nothing. Whoever feels it finds it with
-``sources`` among the bound effects of a scene, and adds up what they give.
+A source is an effect (see tisim/effects/base) that writes nothing. Effects that depend on a field find its
+sources with ``sources`` among the bound effects of a scene, and add up their values.
 """
 
 from typing import ClassVar
@@ -14,9 +14,10 @@ __all__ = ["Source", "option", "parameter", "sources"]
 
 
 class Source(Effect):
-    """A source is an external field of place and time, such as that of a magnet or a flow.
+    """A source is an external field of place and time, such as the field of a magnet or a flow.
 
-    quantity : its standard name, "magnetic_flux_density" (T), "electric_field" (V/m), "flow_velocity" (m/s).
+    quantity : standard name of the field, "magnetic_flux_density" (T), "electric_field" (V/m),
+    "flow_velocity" (m/s).
     """
 
     contract: ClassVar[bool] = True
@@ -25,7 +26,7 @@ class Source(Effect):
     quantity: ClassVar[str]
 
     def strongest(self) -> float | None:
-        """Return a bound of the magnitude of the field anywhere, in its unit; None where none is known."""
+        """Return an upper bound on the magnitude of the field, in its unit; None if none is known."""
         return None
 
     @ti.func
@@ -40,14 +41,14 @@ class Source(Effect):
 
     @ti.func
     def value_and_gradient(self, w, r, t):
-        """Return the field and its gradient; a source that makes both of the same numbers does so here."""
+        """Return the field and its gradient; sources override this to compute both from shared terms."""
         return self.value(w, r, t), self.gradient(w, r, t)
 
     @ti.func
     def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore[valid-type]
-        """Add the field and its gradient at a tile of points: r and ``value`` are three vectors and
-        ``gradient`` nine, of a component for each point, or none where it is not asked for. A source that
-        takes them at once does so here."""
+        """Add the field and its gradient at a tile of points. r and ``value`` are three vectors and
+        ``gradient`` nine, with one component for each point; ``gradient`` may be empty if it is not needed.
+        Sources that process a tile at once override this."""
         for lane in range(ti.static(r[0].n)):
             place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
             one, slope = self.value_and_gradient(w, place, t)

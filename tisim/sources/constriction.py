@@ -1,4 +1,4 @@
-"""The velocity of a fluid that is driven through a constriction of a round duct (L21 section 3.4.4)."""
+"""The velocity of a fluid driven through a constriction of a round duct (L21 section 3.4.4)."""
 
 from __future__ import annotations
 
@@ -14,27 +14,30 @@ from tisim.sources.base import Source, parameter
 
 
 class ConstrictionFlow(Directed, Source):
-    """A fluid is driven along a round duct and through its constriction, where it is faster; drag laws feel
-    it.
+    """A fluid is driven along a round duct and, faster, through its constriction; drag laws use its velocity.
 
         v = V p(rho) f(z, rho) n
 
         p = 1                                rho <= R_c          within the radius of the constriction
             (R - rho) / (R - R_c)            R_c < rho <= R      down to 0 at the wall of the duct
             0                                R < rho
+
         f = 1 + ((R / R_c)^2 - 1) g(z)       rho <= R_c          faster by the ratio of the areas
             1                                R_c < rho
+
         g = 1                                |z| <= L / 2        in the constriction
             1 - (|z| - L / 2) / b            up to L / 2 + b     in the transitions before and after it
             0                                beyond
 
-    n is the unit vector along the axis, rho the distance from it, z the place along it, from the middle of
-    the constriction, of length L. L21 has no transitions, b = 0: there the velocity jumps at both ends. With
-    them it is continuous along the axis; across rho = R_c it jumps where the constriction has its wall, and
-    in the transitions. This is a profile to drag particles with, and no solution for a fluid: it goes along
+    n is the unit vector along the axis, rho the distance from it, and z the coordinate along it from the
+    middle of the constriction, of length L. L21 has no transitions, b = 0; the velocity then jumps at both
+    ends. With transitions it is continuous along the axis. At rho = R_c it jumps in the constriction and in
+    the transitions.
+
+    The profile is meant to drag particles and does not solve the equations of a fluid. The velocity is along
     the axis everywhere, so its divergence, V (1 - (R / R_c)^2) / b sign(z), does not vanish in the
-    transitions, and 3 R^2 / (R^2 + R R_c + R_c^2) times as much flows through the constriction as before and
-    after it. Nothing changes it: neither particles nor walls.
+    transitions, and the flow rate through the constriction is 3 R^2 / (R^2 + R R_c + R_c^2) times the flow
+    rate before and after it. Neither particles nor walls change it.
 
     Source: L21 section 3.4.4.
     """
@@ -79,8 +82,8 @@ class ConstrictionFlow(Directed, Source):
 
     @ti.func
     def place(self, w, r):
-        """Return the unit vector along the axis, the place along it (m), the distance from it (m), and the
-        unit vector away from it, 0 on it."""
+        """Return the unit vector along the axis, the coordinate along it (m), the distance from it (m), and
+        the unit vector away from it, 0 on the axis."""
         n, out = self.downstream(w), r - self.centre(w)
         z = out.dot(n)
         across = out - z * n

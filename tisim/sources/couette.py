@@ -15,14 +15,15 @@ from tisim.sources.base import Source, parameter
 
 
 class CouetteFlow(Directed, Source):
-    """A fluid is sheared between two parallel walls that slide past each other, which drag laws feel.
+    """A fluid is sheared between two parallel walls that slide past each other; drag laws use its velocity.
 
         v = v_1 + (x - x_1) / (x_2 - x_1) (v_2 - v_1),    x = r.n
 
-    n is the unit normal of the walls, x_1 and x_2 are their places along it. Beyond a wall the fluid moves
-    with it. The flow is free of divergence where v_1 and v_2 lie along the walls, as those of walls that
-    slide do. It is still before ``begin`` and steady from then on: that shear spreads across the gap, in a
-    time of (x_2 - x_1)^2 rho / mu, is left out. Neither particles nor walls of the scene change it.
+    n is the unit normal of the walls, x_1 and x_2 are their positions along it. Beyond a wall the fluid moves
+    with the wall. The flow is free of divergence if v_1 and v_2 are parallel to the walls, as for sliding
+    walls. The fluid is at rest before ``begin`` and in steady flow afterwards; the diffusion of shear across
+    the gap, in a time of (x_2 - x_1)^2 rho / mu, is neglected. Neither particles nor walls of the scene
+    change the flow.
 
     Source: L21 section 2.2.2, figure 2.4.
     """
@@ -32,8 +33,8 @@ class CouetteFlow(Directed, Source):
     unit: ClassVar[str] = "across"
 
     normal: Vector = parameter("", "normal n of both walls", (0.0, 0.0, 1.0))
-    first: float = parameter("m", "place x_1 of the first wall along the normal", examples=[0.0])
-    second: float = parameter("m", "place x_2 of the second wall along the normal", examples=[1e-3])
+    first: float = parameter("m", "position x_1 of the first wall along the normal", examples=[0.0])
+    second: float = parameter("m", "position x_2 of the second wall along the normal", examples=[1e-3])
     first_velocity: Vector = parameter("m/s", "velocity v_1 of the first wall", examples=[(-0.1, 0.0, 0.0)])
     second_velocity: Vector = parameter("m/s", "velocity v_2 of the second wall", examples=[(0.1, 0.0, 0.0)])
 
@@ -65,10 +66,10 @@ class CouetteFlow(Directed, Source):
 
     @ti.func
     def moving(self, w, t):
-        """Return 1 from the time on at which the walls begin to move, 0 before."""
+        """Return 1 from the time at which the walls begin to move, 0 before."""
         return ti.select(t >= self.begin(w), 1.0, 0.0)
 
     @ti.func
     def part(self, w, r):
-        """Return how far r (m) is on the way from the first wall, at 0, to the second, at 1."""
+        """Return the relative position of r (m) between the walls, 0 at the first and 1 at the second."""
         return (r.dot(self.across(w)) - self.first(w)) / (self.second(w) - self.first(w))

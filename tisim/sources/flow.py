@@ -1,4 +1,4 @@
-"""The velocity of a fluid that particles are in: uniform, or as a pressure drives it through a packing."""
+"""The velocity of a fluid around particles: uniform, or driven through a packing by a pressure gradient."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tisim.sources.base import Source, option, parameter
 
 
 class UniformFlow(Source):
-    """A fluid moves everywhere at the same velocity, which drag laws feel.
+    """A fluid moves everywhere at the same velocity; drag laws use it.
 
     Source: B16 section 7.2.
     """
@@ -31,7 +31,8 @@ class UniformFlow(Source):
 def kozeny_carman(porosity, size, constant):
     """Return the permeability k = (1 - phi)^3 nu^2 / (C phi^2) of a packing (m^2).
 
-    porosity : 1 - phi. size : nu (m), volume over surface of what it is packed of. constant : C.
+    porosity : 1 - phi. size : nu (m), volume over surface of the packed bodies. constant : C.
+
     Source: B16 Eq. (7.4), after Kozeny (1927) and Carman (1937).
     """
     return porosity**3 * size**2 / (constant * (1.0 - porosity) ** 2)
@@ -41,14 +42,14 @@ _kozeny_carman = ti.func(kozeny_carman)
 
 
 class DarcyFlow(Source):
-    """A fluid flows slowly through a packing, as a pressure gradient drives it; this is the mean over the
-    packing.
+    """A pressure gradient drives a fluid slowly through a packing; the velocity is the mean over the packing.
 
         U = -k/eta grad p,    k = (1 - phi)^3 nu^2 / (C phi^2)
 
-    k is the permeability of Kozeny and Carman. nu is volume over surface of what is packed, D/4 of long
-    fibres and D/6 of spheres of diameter D. The mean is over the whole packing (Darcy's velocity) or over the
-    pores alone, where it is faster by one over the porosity. B16 (7.3) gives the mass that flows, rho_0 A U.
+    k is the Kozeny-Carman permeability. nu is the volume over the surface of the packed bodies: D/4 for long
+    fibres and D/6 for spheres of diameter D. The mean is over the whole packing (Darcy's velocity) or over
+    the pores alone, in which the fluid is faster by one over the porosity. B16 (7.3) gives the mass flow
+    rate, rho_0 A U.
 
     Source: B16 Eqs (7.3), (7.4).
     """
@@ -56,16 +57,16 @@ class DarcyFlow(Source):
     quantity = "flow_velocity"
 
     pressure_gradient: Vector = parameter(
-        "Pa/m", "pressure gradient grad p; the fluid goes against it", examples=[(-100.0, 0.0, 0.0)]
+        "Pa/m",
+        "pressure gradient grad p; the fluid flows in the opposite direction",
+        examples=[(-100.0, 0.0, 0.0)],
     )
     viscosity: float = parameter("Pa s", "dynamic viscosity eta of the fluid", examples=[1e-3], gt=0)
     porosity: float = parameter("", "porosity 1 - phi of the packing", examples=[0.9], gt=0, lt=1)
-    diameter: float = parameter(
-        "m", "diameter D of the fibres or spheres that are packed", examples=[6e-4], gt=0
-    )
+    diameter: float = parameter("m", "diameter D of the packed fibres or spheres", examples=[6e-4], gt=0)
     constant: float = parameter("", "constant C of Kozeny and Carman; about 5 in random packings", 5.0, gt=0)
-    packed: Literal["fibres", "spheres"] = option("what is packed", "fibres")
-    mean: Literal["packing", "pores"] = option("what the velocity is the mean over", "packing")
+    packed: Literal["fibres", "spheres"] = option("shape of the packed bodies", "fibres")
+    mean: Literal["packing", "pores"] = option("volume over which the velocity is averaged", "packing")
 
     def strongest(self) -> float:
         size = self.diameter / (4 if self.packed == "fibres" else 6)

@@ -1,4 +1,4 @@
-"""The field of sources at any points, as particles of a scene would feel it."""
+"""The field of sources at given points, as it acts on particles of a scene."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,17 +17,17 @@ from tisim.state.bound import Peers, connected
 from tisim.state.parameter_table import ParameterTable
 
 TILE_POINTS = 16
-"""So many points are taken at once on a CPU."""
+"""Number of points evaluated together on a CPU."""
 
 
 def tile_size() -> int:
-    """Return how many points are taken at once."""
+    """Return the number of points evaluated together."""
     return TILE_POINTS if runtime.current().device == "cpu" else 1
 
 
 @ti.data_oriented
 class _Sum:
-    """This is the sum of bound sources."""
+    """The sum of bound sources."""
 
     def __init__(self, fields: Peers) -> None:
         self.fields = fields
@@ -59,7 +59,7 @@ def sample(
 
     quantity : its standard name, such as "magnetic_flux_density" (T). points : m, shape (n, 3). time : s.
     [k, a, b] of the gradient is the derivative of component a along axis b, per metre.
-    InputError is raised where there is no source of it, or for points of another shape.
+    InputError is raised if the quantity has no source, or for points of another shape.
     """
     real = runtime.current().real
     places = np.ascontiguousarray(points, np.float64 if real == ti.f64 else np.float32)

@@ -1,4 +1,4 @@
-"""Electric and magnetic fields that are the same everywhere and oscillate in time (Z13 section 2)."""
+"""Uniform electric and magnetic fields that may oscillate in time (Z13 section 2)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class Uniform(Source):
-    """This is the contract of a field constant + amplitude sin(omega t + phase), each component by itself,
-    from a time on."""
+    """The contract of a field constant + amplitude sin(omega t + phase), each component by itself, from a
+    given time on."""
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = True
@@ -36,7 +36,7 @@ class Uniform(Source):
         return self.begin > 0
 
     def structure(self) -> tuple[Any, ...]:
-        # Steppers may be compiled otherwise for forces with kinks.
+        # Steppers may be compiled differently for forces with kinks.
         return (*super().structure(), self.kinked)
 
     def critical_step(
@@ -52,9 +52,9 @@ class Uniform(Source):
     @ti.func
     def value(self, w, r, t):
         value = self.constant(w)
-        # A field that does not oscillate need not pay for sines.
+        # A field that does not oscillate is not slowed down by sines.
         if self.amplitude(w).norm_sqr() > 0.0:
-            # In f64, whatever the precision: omega t grows without bound.
+            # In f64 for any precision, because omega t grows without bound.
             amplitude, angle = self.amplitude(w), self.omega(w) * t + self.phase(w)
             for k in ti.static(range(3)):
                 value[k] += amplitude[k] * ti.cast(elementary.sin(angle[k]), float)
@@ -66,7 +66,7 @@ class ElectricField(Uniform):
 
         E = E_0 + E_1 sin(omega t + phase),    each component by itself
 
-    There is none before ``begin``, whatever its phase then.
+    It is zero before ``begin``; the phase still refers to t = 0.
 
     Source: Z13 Eqs (3)-(5), (16).
     """
@@ -76,7 +76,7 @@ class ElectricField(Uniform):
     amplitude: Vector = parameter("V/m", "amplitude E_1 of the oscillating part", STILL)
     omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
     phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)
-    begin: float = parameter("s", "time from which on the field is there", 0.0, ge=0)
+    begin: float = parameter("s", "time from which on the field acts", 0.0, ge=0)
 
 
 class MagneticField(Uniform):
@@ -84,8 +84,8 @@ class MagneticField(Uniform):
 
         B = B_0 + B_1 sin(omega t + phase),    each component by itself
 
-    There is none before ``begin``, whatever its phase then. The electric field that goes with a changing B
-    (Faraday's law) is left out, as in the paper, where B is constant.
+    It is zero before ``begin``; the phase still refers to t = 0. The electric field induced by a changing B
+    (Faraday's law) is neglected, as in the paper, in which B is constant.
 
     Source: Z13 Eqs (3)-(5).
     """
@@ -95,4 +95,4 @@ class MagneticField(Uniform):
     amplitude: Vector = parameter("T", "amplitude B_1 of the oscillating part", STILL)
     omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
     phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)
-    begin: float = parameter("s", "time from which on the field is there", 0.0, ge=0)
+    begin: float = parameter("s", "time from which on the field acts", 0.0, ge=0)

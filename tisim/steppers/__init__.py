@@ -1,6 +1,6 @@
-"""How time advances: the order of a step, and how long it is.
+"""Time integration: the order of the phases in a step, and the step length.
 
-``tisim effects steppers`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
+In a shell, ``tisim effects steppers`` lists them, a line each, and ``tisim effects NAME`` describes one: law,
 source, parameters and units.
 """
 

@@ -1,4 +1,4 @@
-"""The contract of a stepper: the order of a step."""
+"""The contract of a stepper: the order of the phases in a step."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tisim.steppers.step_control import MOST_STEPS, StepControl
 
 
 def single(effect: Effect) -> bool:
-    """Return whether an effect acts on each particle by itself, and remembers nothing of it."""
+    """Return whether an effect acts on each particle by itself and has no history."""
     if isinstance(effect, Force):
         return not (effect.offers("load") or isinstance(effect, LongRange))
     mutual = isinstance(effect, SelfConsistentQuantity | LongRange)
@@ -36,16 +36,16 @@ def single(effect: Effect) -> bool:
 
 
 class Stepper(StepperHints, Component):
-    """A stepper says how time advances, and its control how long the next step is: the contract of both.
+    """A stepper advances time, and its control chooses the length of each step: the contract of both.
 
-    Before the first step ``force`` and ``torque`` are those of the start.
+    Before the first step, ``force`` and ``torque`` have the values of the initial state.
 
-    counters, world_quantities, flags : names of what it keeps of a world, ``s.NAME[w]``: counters of events
-    (i64), which a Result gives back, quantities (f64) and integers (i32), 0 at the start. random : whether it
-    draws random numbers, so that only statistics converge. all_pairs : whether it sums over all pairs itself.
-    follows_shear : whether it puts particles where they have moved to by ``domain.put``, at the time of that,
-    and reports displacements relative to ``drift``, so that it can step a sheared box. follows_constraints :
-    whether it leaves the particles that constraints hold to these.
+    counters, world_quantities, flags : names of its state variables of a world, ``s.NAME[w]``: counters of
+    events (i64), which a Result contains, quantities (f64) and integers (i32), all 0 at the start. random :
+    whether it draws random numbers, so that only statistics converge. all_pairs : whether it sums over all
+    pairs itself. follows_shear : whether it places moved particles with ``domain.put``, at the time of the
+    new place, and reports displacements relative to ``drift``, so that it can step a sheared box.
+    follows_constraints : whether it leaves particles held by constraints to the constraints.
     """
 
     contract: ClassVar[bool] = True
@@ -64,7 +64,7 @@ class Stepper(StepperHints, Component):
         return 2
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
-        """Raise InputError when the stepper cannot step a scene of these effects in this domain."""
+        """Raise InputError if the stepper cannot step a scene of these effects in this domain."""
         for effect in effects:
             if isinstance(effect, Constraint):
                 rule = f"one that follows constraints, such as verlet, with effects.{effect.label}"
@@ -77,30 +77,30 @@ class Stepper(StepperHints, Component):
             must(not self.control.watches_pairs, "stepper.control", rule, self.control.kind())
             for effect in effects:
                 name = f"effects.{effect.label}"
-                must(not isinstance(effect, PairEvent), name, f"a force, and not sudden, {where}", name)
+                must(not isinstance(effect, PairEvent), name, f"a force, not a pair event, {where}", name)
                 rule = f"one that acts on all layers alike (homogeneous), as gravity does, {where}"
                 must(effect.homogeneous, name, rule, effect.kind())
 
     def resolves(self, effects: Sequence[Effect], start: Callable[[], Mapping[str, np.ndarray]]) -> None:
-        """Raise InputError when steps are known beforehand to be too long for a motion that an effect causes;
-        by default that is found in the run. start : gives the quantities of the particles at the start, SI,
-        without their places."""
+        """Raise InputError if steps are known beforehand to be too long for a motion that an effect causes;
+        by default this is detected in the run. start : function that returns the initial quantities of the
+        particles, SI, without their places."""
 
     def countable(self, effects: Sequence[Effect]) -> float:
         """Return the number of steps that the stepper can count in a scene of these effects."""
         return MOST_STEPS
 
     def fewest(self, effects: Sequence[Effect], duration: float) -> float:
-        """Return the number of steps that a run of this duration (s) takes at least; InputError where it is
-        more than can be counted."""
+        """Return the smallest number of steps of a run of this duration (s); raise InputError if it exceeds
+        the number that can be counted."""
         steps, most = min(self.control.fewest(duration), sys.float_info.max), self.countable(effects)
         rule = f"reached in at most {most:.3g} steps, but takes at least {steps:.3g} of {self.control.kind()}"
         must(steps <= most, "scene.duration", rule, duration)
         return max(1.0, steps)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
-        """Return whether the stepper may take each particle by itself: by default, when particles feel
-        nothing of each other and only forces change them."""
+        """Return whether the stepper may advance each particle by itself: by default, if particles do not
+        interact and only forces change them."""
         return all(single(effect) for effect in effects)
 
     def structure(self) -> tuple[Any, ...]:
@@ -112,20 +112,21 @@ class Stepper(StepperHints, Component):
         return ()
 
     def step(self, context: StepContext) -> Step:
-        """Return the items of a step, up to pair events and what operators do to the world as a whole.
+        """Return the items of a step, up to pair events and the action of operators on the world as a whole.
 
-        They set ``dt`` and move ``time`` on, to ``end`` at most; count ``steps`` and ``particle_steps``; set
-        ``events`` to 0; once the control has been asked, set ``approach_time`` to infinity and ``fastest`` to
-        0, for its notes on the next step; call ``particle`` of each operator; put back into the domain what
-        has left it; and say how far particles have moved: ``displacement`` relative to the frame, then
-        ``neighbour_lists.moved(w)``, or simply ``neighbour_lists.invalidate(w)``. Verlet is a pattern. In
-        kernels a parameter of the stepper is read of ``context.stepper``.
+        They must: set ``dt``; advance ``time``, to ``end`` at most; count ``steps`` and ``particle_steps``;
+        set ``events`` to 0; after the control has chosen the step, set ``approach_time`` to infinity and
+        ``fastest`` to 0, for the data of the next step; call ``particle`` of each operator; put particles
+        that have left the domain back into it; and report how far particles have moved: ``displacement``
+        relative to the frame, then ``neighbour_lists.moved(w)``, or simply ``neighbour_lists.invalidate(w)``.
+        Verlet is an example. Kernels read parameters of the stepper from ``context.stepper``.
 
-        Forces are summed at ``time``. A stepper that sums them within a step puts ``time`` there, as Boris
-        does, and keeps where the step began in ``time_before``, which it names in ``world_quantities``:
-        ``apply_operators`` and ``AdvanceClock`` (steppers/common.py) go on from it. One that moves particles
-        twice reports both displacements with ``report_displacement``, which sets them to 0 after each.
-        ``s.axes(s.frame, w)`` is the velocity of the frame (m/s). Forces and derived quantities that the step
-        leaves may be those of its middle; the next one must not rely on others.
+        Forces are summed at ``time``. A stepper that sums them within a step sets ``time`` to that instant,
+        as Boris does, and stores the beginning of the step in ``time_before``, which it names in
+        ``world_quantities``; ``apply_operators`` and ``AdvanceClock`` (steppers/common.py) continue from it.
+        A stepper that moves particles twice reports both displacements with ``report_displacement``, which
+        sets them to 0 after each. ``s.axes(s.frame, w)`` is the velocity of the frame (m/s). Forces and
+        derived quantities after a step may belong to the middle of the step; the next step must not rely on
+        anything else.
         """
         raise NotImplementedError(f"{type(self).__name__} must define step")

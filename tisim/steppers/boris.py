@@ -1,4 +1,4 @@
-"""Boris' stepper, the standard of charged particles in magnetic fields."""
+"""Boris' stepper, the standard for charged particles in magnetic fields."""
 
 from collections.abc import Sequence
 from typing import ClassVar, Self
@@ -28,14 +28,14 @@ from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_f
 
 
 class Boris(Stepper):
-    """Boris' stepper, the standard of charged particles in magnetic fields, is explicit and of second order.
+    """Boris' stepper, the standard for charged particles in magnetic fields, is explicit and of second order.
 
         r += dt/2 v,    v- = v + dt/2m F_0,    (1 - dt/2m J) v+ = (1 + dt/2m J) v-,    v = v+ + dt/2m F_0,
         r += dt/2 v
 
-    Forces are those at the middle of the step, F = F_0 + J v, J that of ``velocity_jacobian``. For the
-    Lorentz force the middle equation is Boris' rotation: it keeps the speed to rounding whatever the step.
-    There is one force evaluation a step; torques turn particles by one kick, at the middle.
+    Forces are evaluated at the middle of the step, F = F_0 + J v, with J from ``velocity_jacobian``. For the
+    Lorentz force the middle equation is Boris' rotation: it conserves the speed up to rounding for any step
+    length. There is one force evaluation per step; torques change the spin in one kick, at the middle.
 
     Source: J. P. Boris, Proc. 4th Conf. Numerical Simulation of Plasmas (1970) 3-67; C. K. Birdsall, A. B.
     Langdon, Plasma Physics via Computer Simulation (1985), section 4-3.
@@ -63,7 +63,7 @@ class Boris(Stepper):
 
 
 class Middle(Phase):
-    """This phase moves the time of the trial state to the middle of the step, as forces are those there."""
+    """This phase sets the time to the middle of the step, at which forces are evaluated."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s
@@ -76,7 +76,7 @@ class Middle(Phase):
 
 
 class BorisDrift(PerParticle):
-    """This phase moves particles by half a drift, r += dt/2 v, up to a part of the step."""
+    """This phase moves particles by half a drift, r += dt/2 v, which ends at a given part of the step."""
 
     def __init__(self, context: StepContext, part: float) -> None:
         super().__init__(context.s)
@@ -93,7 +93,7 @@ class BorisDrift(PerParticle):
 
 
 class BorisRotation(PerParticle):
-    """This phase takes v- to v+ to v', with the forces at the middle of the step."""
+    """This phase takes v- to v+ and then to the new v, with the forces at the middle of the step."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -122,7 +122,8 @@ class BorisRotation(PerParticle):
 
     @ti.func
     def guard(self, w, i, free):
-        """Compare what does not go with velocity, which is stepped exactly, with that of the last step."""
+        """Compare the velocity-independent part of the force with its value in the last step. (The part
+        linear in velocity is stepped exactly.)"""
         s = self.s
         if ti.static(self.guarded):
             torque = 0.0 * free

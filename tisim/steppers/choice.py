@@ -1,15 +1,15 @@
-"""The stepper of a scene that names none: chosen by its effects, for an accuracy that is asked for.
+"""The stepper of a scene that names none, chosen from its effects for a requested accuracy.
 
 The rule, in this order:
 
 1. Particles that only drift, and hard particles that collide, step from one meeting of surfaces to the next
    (``approach_time``).
-2. Effects that remember, turn with their particles or move them, and solid contacts, are stepped by a
-   leapfrog (``verlet``, or ``boris`` with a Lorentz force) in steps of one length: a part of the critical
-   time step, 2/omega of the stiffest motion that an effect of the scene tells (``Effect.critical_step``).
-3. All other forces are stepped by collocation, with the error that is asked for.
+2. Effects with a history, effects that turn with their particles or move them, and solid contacts are stepped
+   by a leapfrog (``verlet``, or ``boris`` with a Lorentz force) with a fixed step: a part of the critical
+   time step, 2/omega of the stiffest motion that an effect of the scene reports (``Effect.critical_step``).
+3. All other forces are stepped by collocation, with the requested error.
 
-What cannot be chosen so is refused, with the effect at fault.
+Other scenes are refused, with the name of the effect that prevents the choice.
 """
 
 from __future__ import annotations
@@ -33,24 +33,25 @@ from tisim.steppers.step_control import SHORTEST_STEP, ApproachTime, FixedStep
 from tisim.steppers.verlet import Verlet
 
 ACCURACY = 1e-2
-"""This accuracy is aimed at unless another is asked for: results are good to a hundredth."""
+"""Accuracy of the results unless another is requested: one percent."""
 ALONE, TOGETHER, KINKED, MEETING = 20.0, 75.0, 3.0, 15.0
-"""The error that collocation is asked for is the accuracy over these: where forces are smooth, of particles
-that move alone, and of such as act on each other, which multiplies errors on the way, in eccentric orbits by
-40; where forces have kinks, of particles alone, and of such as meet (tests/hard/test_default_stepper.py,
-tests/steppers/test_kinked_forces.py)."""
+"""The error requested from collocation is the accuracy over one of these numbers. For smooth forces: ALONE if
+particles do not interact; TOGETHER if they do, because interaction amplifies errors during the run, in
+eccentric orbits by 40. For forces with kinks: KINKED without pair forces, MEETING with them
+(tests/hard/test_default_stepper.py, tests/steppers/test_kinked_forces.py)."""
 FINE = 1e-3
-"""From this accuracy on five stages of collocation are cheapest."""
+"""At this accuracy and finer ones, five stages of collocation are cheapest."""
 LONGEST_MEETING = 1e3
-"""Steps between collisions are at most this many times the shortest, as in Z04."""
+"""Longest step between collisions, over the shortest, as in Z04."""
 RESOLUTION = 1e-6
-"""Motions below this part of a radius need not be accurate; rounding would be taken for an error of them."""
+"""Motions below this part of a radius need not be accurate; otherwise rounding would count as an error of
+them."""
 
 
 @dataclass(frozen=True)
 class StepperChoice:
-    """A choice is a stepper, and the reason for it. critical : critical time steps (s) by the label of the
-    effect, the shortest first; only effects that have one."""
+    """The chosen stepper and the reason for the choice. critical : critical time steps (s) by the label of
+    the effect, the shortest first; only effects that have one."""
 
     stepper: Stepper
     reason: str
@@ -64,15 +65,15 @@ def choose(
     duration: float,
     accuracy: float = ACCURACY,
 ) -> StepperChoice:
-    """Return a stepper for effects, which know the materials, in a domain, for an accuracy (relative).
+    """Return a stepper for effects (bound to their materials) in a domain, for a relative accuracy.
 
-    start : quantities of the particles by field name, SI, without their places. duration : s. Raises
-    InputError where no stepper can be chosen.
+    start : initial quantities of the particles by field name, SI, without their places. duration : s. Raises
+    InputError if no stepper can be chosen.
     """
     for effect in effects:
-        rule = f"given, as the length of a step is part of the law of effects.{effect.label}"
+        rule = f"given, because the step length is part of the law of effects.{effect.label}"
         must(not effect.step_dependent, "scene.stepper", rule, Words("none"))
-        rule = f"given, as effects.{effect.label} puts in particles later, whose sizes are not known here"
+        rule = f"given, because effects.{effect.label} inserts particles later, of sizes unknown here"
         must(not len(effect.largest_newcomers()["radius"]), "scene.stepper", rule, Words("none"))
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
@@ -98,7 +99,7 @@ def critical_steps(
 
 
 def finite_steps(steps: Mapping[str, float | None]) -> dict[str, float]:
-    """Return those steps (s) that are known and finite, the shortest first."""
+    """Return the known, finite steps (s) among these, the shortest first."""
     known = {label: step for label, step in steps.items() if step is not None and math.isfinite(step)}
     return dict(sorted(known.items(), key=lambda item: item[1]))
 
@@ -111,7 +112,7 @@ def meeting_speed(
     extent = math.inf if low is None or high is None else float(np.linalg.norm(high - low))
     if not len(velocity):
         return sum(effect.reached_speed(duration, extent) for effect in effects)
-    # Past each other, and past what stands still or is held.
+    # Relative to each other, and relative to particles and walls at rest.
     own = float(np.linalg.norm(velocity - velocity.mean(axis=0), axis=1).max())
     speed = max(2 * own, float(np.linalg.norm(velocity, axis=1).max()))
     return speed + sum(effect.reached_speed(duration, extent) for effect in effects)
@@ -120,8 +121,8 @@ def meeting_speed(
 def leapfrog_step(
     effects: Sequence[Effect], critical: Mapping[str, float], accuracy: float
 ) -> tuple[float, str]:
-    """Return the longest step (s) of a leapfrog that is as accurate with all effects, and the label of that
-    which sets it; infinity where none has a critical step."""
+    """Return the longest step (s) of a leapfrog at which every effect is accurate enough, and the label of
+    the effect that limits it; infinity if no effect has a critical step."""
     steps = {
         effect.label: effect.part_of_critical_step(accuracy) * critical[effect.label]
         for effect in effects
@@ -141,18 +142,18 @@ def _meetings(
 ) -> StepperChoice:
     _check_told(steps, "collisions")
     for effect in effects:
-        rule = f"given, as none steps collisions and effects.{effect.label} together"
+        rule = f"given, because no choice steps collisions and effects.{effect.label} together"
         suits = ApproachTime.kind() not in effect.incompatible_controls and not effect.gyrates(effects)
         must(suits, "scene.stepper", rule, Words("none"))
     control, events = ApproachTime(), any(isinstance(effect, PairEvent) for effect in effects)
     smallest = float(start["radius"].min(initial=math.inf))
     shortest, longest = control.shortest, control.longest
     if events and speed > 0 and math.isfinite(smallest):
-        # Those that meet within the shortest step are moved into each other by this part of a radius.
+        # Particles that meet within the shortest step are moved into each other by this part of a radius.
         shortest = accuracy * smallest / speed
         longest = LONGEST_MEETING * shortest
     if any(isinstance(effect, Operator) for effect in effects):
-        # What cools or reacts between collisions does so step by step.
+        # Operators that act between collisions, such as cooling or reactions, act once per step.
         longest = min(longest, ApproachTime().longest)
     longest = min(longest, leapfrog_step(effects, critical, accuracy)[0])
     control = ApproachTime(shortest=_length(min(shortest, longest)), longest=_length(longest))
@@ -171,17 +172,17 @@ def _leapfrog(
 ) -> StepperChoice:
     _check_told(steps, f"effects.{why}")
     touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
-    rule = f"given, as no critical time step is known for {why}"
+    rule = f"given, because no critical time step is known for {why}"
     must(bool(critical) or not touching, "scene.stepper", rule, Words("none"))
     longest, label = leapfrog_step(effects, critical, accuracy)
-    # Without a motion that has a critical step the whole is divided, and where something acts once a step or
-    # begins on the way.
+    # The duration is divided if no motion has a critical step, and also if an effect acts once per step or
+    # may set in during the run.
     divided = not critical or any(isinstance(effect, Operator | Source) for effect in effects)
     dt = _length(min(longest, (accuracy if divided else 0.1) * duration))
     gyrates = any(effect.gyrates(effects) for effect in effects)
     others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
     if gyrates and others:
-        rule = f"given, as none steps a magnetic force and effects.{others[0]} to second order"
+        rule = f"given, because no choice steps a magnetic force and effects.{others[0]} to second order"
         must(False, "scene.stepper", rule, Words("none"))
     stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
     reason = (
@@ -202,7 +203,7 @@ def _error_controlled(
     accuracy: float,
 ) -> StepperChoice:
     pairwise, kinked = any(isinstance(effect, PairForce) for effect in effects), kinks(effects, domain)
-    # Operators act, and look, once a step.
+    # Operators act, and observers sample, once per step.
     sampled = any(isinstance(effect, Operator) for effect in effects)
     limits = {
         "first": _length(min(1e-6, 1e-4 * duration)),
@@ -222,10 +223,11 @@ def _error_controlled(
 
 
 def _stages(effects: Sequence[Effect], accuracy: float) -> int:
-    """Return the number of stages that reach an accuracy with the fewest sums of smooth forces.
+    """Return the number of stages that reach an accuracy with the fewest force evaluations, for smooth
+    forces.
 
-    Where velocities gyrate, steps take more sweeps, each of which gains one order of dt and not two; fewer
-    steps of a higher order are cheaper then.
+    If velocities gyrate, a step takes more sweeps, because each gains one order of dt instead of two; fewer
+    steps of a higher order are then cheaper.
     """
     if accuracy <= FINE:
         return 5
@@ -233,7 +235,8 @@ def _stages(effects: Sequence[Effect], accuracy: float) -> int:
 
 
 def _stride(effects: Sequence[Effect], start: Mapping[str, np.ndarray]) -> float:
-    """Return how far (m) a particle may go in a step without missing what it passes; 0 for any distance."""
+    """Return the longest path (m) of a particle in a step that cannot skip a force or a field; 0 for no
+    limit."""
     lengths = [effect.shortest_length() for effect in effects if isinstance(effect, Source)]
     if any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects):
         lengths.append(float(start["radius"].min(initial=math.inf)))
@@ -242,12 +245,13 @@ def _stride(effects: Sequence[Effect], start: Mapping[str, np.ndarray]) -> float
 
 
 def _check_told(steps: Mapping[str, float | None], what: str) -> None:
-    """Raise InputError where an effect does not tell its critical step, which one with ``what`` goes by."""
+    """Raise InputError if an effect does not report its critical step; ``what`` : effect or event that needs
+    it."""
     for label, step in steps.items():
-        rule = f"given, as no critical time step is known for effects.{label}, which {what} would need"
+        rule = f"given, because no critical time step is known for effects.{label}, which {what} would need"
         must(step is not None, "scene.stepper", rule, Words("none"))
 
 
 def _length(step: float) -> float:
-    """Return a step (s) of three digits that is not below the shortest."""
+    """Return a step (s) rounded to three digits and not below the shortest."""
     return max(SHORTEST_STEP, three_digits(step))

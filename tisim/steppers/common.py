@@ -9,22 +9,23 @@ from tisim.state.status import WorldStatus
 from tisim.steppers.context import StepContext
 
 POSITION_ROUNDING = Field("position_rounding", "m", 3, "keep", scratch=True)
-"""This field is what rounding has taken from a particle's displacements so far; in single precision only."""
+"""Accumulated rounding error of a particle's displacements; in single precision only."""
 
 
 def rounding_fields() -> tuple[Field, ...]:
-    """Return the field of what rounding takes from displacements, in the precision that needs it."""
+    """Return the field of the rounding errors of displacements, in single precision only."""
     return (POSITION_ROUNDING,) if runtime.precision() == "f32" else ()
 
 
 @ti.func
 def displaced(s, w, i, r, path):
-    """Return the place (m) to which a path (m) leads from r. In single precision the sum is compensated (W.
-    Kahan 1965): slow particles would otherwise lose a part of each step, always the same way."""
+    """Return the place (m) reached from r by a displacement ``path`` (m). In single precision the sum is
+    compensated (W. Kahan 1965): otherwise slow particles would lose a part of each step, always in the same
+    direction."""
     place = r + path
     if ti.static(POSITION_ROUNDING in s.fields):
         whole = path + s.position_rounding[w, i]
-        # What is left is far below 1 m.
+        # The remainder is far below 1 m.
         place = rounded_vector(r + whole, s.position_rounding[w, i][0])
         s.position_rounding[w, i] = whole - rounded_vector(place - r, s.position_rounding[w, i][0])
     return place
@@ -32,7 +33,7 @@ def displaced(s, w, i, r, path):
 
 @ti.func
 def note_displacement(s, w, moved):
-    """Note for the pair lists that a particle has moved by ``moved`` (m, f64) relative to the world's
+    """Record for the pair lists that a particle has moved by ``moved`` (m, f64) relative to the world's
     frame."""
     for k in ti.static(range(3)):
         far = ti.abs(moved[k])
@@ -42,9 +43,9 @@ def note_displacement(s, w, moved):
 
 @ti.func
 def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown, t):  # type: ignore[valid-type]
-    """Put a particle at r (m), wherever that is in the domain at time t (s). It has moved by ``moved`` (m,
-    f64) relative to the frame, and by ``grown`` (m, f64) in radius: for pair lists a surface that grows is
-    one that moves."""
+    """Put a particle at r (m), wrapped into the domain at time t (s). It has moved by ``moved`` (m, f64)
+    relative to the frame, and its radius has grown by ``grown`` (m, f64); for pair lists a growing surface is
+    a moving one."""
     change = ti.abs(moved) + ti.abs(grown)
     if not finite(change.sum()):
         s.fail(w, WorldStatus.NOT_FINITE, i)
@@ -57,12 +58,12 @@ def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown, t):  # t
 
 @ti.func
 def drift(s, domain: ti.template(), w, r):  # type: ignore[valid-type]
-    """Return the velocity (m/s, f64) of the frame at r, that of the flow of a sheared domain included."""
+    """Return the velocity (m/s, f64) of the frame at r, including the flow of a sheared domain."""
     return s.axes(s.frame, w) + ti.cast(domain.streaming(w, r), ti.f64)
 
 
 class BeginStep(Phase):
-    """This phase chooses the step; the last one ends exactly on time."""
+    """This phase chooses the step; the last step ends exactly at the end of the run."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.control = context.s, context.control
@@ -76,7 +77,7 @@ class BeginStep(Phase):
             horizon = self.lists.sure(w)
         dt = self.control.next(s, w, horizon)
         remaining = s.end[w] - s.time[w]
-        # A remainder as small as rounding leaves is not worth a step of its own.
+        # A remainder at the level of rounding errors gets no step of its own.
         if dt * (1.0 + 1e-6) >= remaining:
             dt = remaining
         s.dt[w] = dt
@@ -90,7 +91,7 @@ class BeginStep(Phase):
 
 
 class FirstStep(Phase):
-    """This phase says how long the first step is, where all are of one length."""
+    """This phase sets the length of the first step, if all steps have the same length."""
 
     def __init__(self, s, control) -> None:
         self.s, self.control = s, control
@@ -103,7 +104,7 @@ class FirstStep(Phase):
 
 @ti.func
 def advance_clock(s, w):
-    """Move time on by dt."""
+    """Advance the time by dt."""
     last = s.dt[w] == s.end[w] - s.time[w]
     s.time[w], s.time_carry[w] = compensated_sum(s.time[w], s.dt[w], s.time_carry[w], s.count[w])
     if last:
@@ -111,7 +112,7 @@ def advance_clock(s, w):
 
 
 class ReportDisplacement(Phase):
-    """This phase tells the neighbour lists how far particles have moved."""
+    """This phase reports the displacements of particles to the neighbour lists."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.lists = context.s, context.neighbour_lists
@@ -143,7 +144,8 @@ class ApplyOperators(PerParticle):
 
 
 class AdvanceClock(Phase):
-    """This phase ends the step: time, which was that of a trial state, moves on from where the step began."""
+    """This phase ends the step: time, which was the time of a trial state, advances from the beginning of the
+    step."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s
@@ -155,7 +157,8 @@ class AdvanceClock(Phase):
 
 
 class EndStep(Phase):
-    """This phase lets effects set what they keep of the world, given the forces at the end of the step."""
+    """This phase lets effects update their state variables of the world, given the forces at the end of the
+    step."""
 
     def __init__(self, s, effects) -> None:
         self.s, self.effects = s, effects
@@ -167,7 +170,7 @@ class EndStep(Phase):
 
 
 class FinishStep(Phase):
-    """This phase stops a world that has reached its end."""
+    """This phase stops a world that has reached the end of the run."""
 
     def __init__(self, s) -> None:
         self.s = s
@@ -179,11 +182,10 @@ class FinishStep(Phase):
 
 
 def report_displacement(context: StepContext) -> tuple[Phase, ...]:
-    """Return the phase that tells the neighbour lists how far particles have moved, where there are such
-    lists."""
+    """Return the phase that reports displacements to the neighbour lists, if there are any."""
     return (ReportDisplacement(context),) if context.neighbour_lists else ()
 
 
 def apply_operators(context: StepContext) -> tuple[Phase, ...]:
-    """Return the phases that let operators act on single particles, where there are operators."""
+    """Return the phases that let operators act on single particles, if there are operators."""
     return (ApplyOperators(context), *report_displacement(context)) if context.operators else ()

@@ -1,4 +1,5 @@
-"""The phases in which constraints move what they hold, and what a stepper asks of them for a particle."""
+"""The phases in which constraints move the particles that they hold, and the functions that steppers call for
+such a particle."""
 
 from typing import Any
 
@@ -14,8 +15,8 @@ Constraints = tuple[Bound[Constraint], ...]
 
 @ti.func
 def put_held(s, domain: ti.template(), constraints: ti.template(), w, i, t, dt):  # type: ignore[valid-type]
-    """Put a particle that a constraint holds where that says, at the end t (s) of a step of dt (s), with the
-    velocity midway in it; return whether one does."""
+    """Place a particle that a constraint holds at the end t (s) of a step of dt (s), with its velocity at the
+    middle of the step; return whether a constraint holds it."""
     held = 0
     for constraint in ti.static(constraints):
         if constraint.holds(s, w, i):
@@ -27,7 +28,8 @@ def put_held(s, domain: ti.template(), constraints: ti.template(), w, i, t, dt):
 
 @ti.func
 def steer_held(s, constraints: ti.template(), w, i, t):  # type: ignore[valid-type]
-    """Have a particle that a constraint holds move as that says, at time t (s); return whether one does."""
+    """Set the velocity of a particle that a constraint holds, at time t (s); return whether a constraint
+    holds it."""
     held = 0
     for constraint in ti.static(constraints):
         if constraint.holds(s, w, i):
@@ -37,7 +39,7 @@ def steer_held(s, constraints: ti.template(), w, i, t):  # type: ignore[valid-ty
 
 
 class OfConstraints(PerParticle):
-    """This phase asks constraints about each particle."""
+    """This phase calls the constraints of each particle."""
 
     def __init__(self, s: State, constraints: Constraints) -> None:
         super().__init__(s)
@@ -45,7 +47,7 @@ class OfConstraints(PerParticle):
 
 
 class LocateHeld(OfConstraints):
-    """This phase lets constraints know where in memory the particles are that they hold."""
+    """This phase tells constraints the memory slots of the particles that they hold."""
 
     @ti.func
     def run(self, w, i):
@@ -55,8 +57,8 @@ class LocateHeld(OfConstraints):
 
 
 class BeginConstraints(OfConstraints):
-    """This phase lets constraints set what they keep of each particle; one that none holds is its own
-    body."""
+    """This phase lets constraints initialise their state variables of each particle; a particle that no
+    constraint holds is its own body."""
 
     @ti.func
     def run(self, w, i):
@@ -70,7 +72,7 @@ class BeginConstraints(OfConstraints):
 
 
 class PutHeld(OfConstraints):
-    """This phase has particles be and move where constraints say."""
+    """This phase places and moves particles as constraints prescribe."""
 
     @ti.func
     def run(self, w, i):
@@ -79,7 +81,7 @@ class PutHeld(OfConstraints):
 
 
 class AdvanceBodies(OfConstraints):
-    """This phase moves the bodies of constraints on by a step."""
+    """This phase advances the bodies of constraints by a step."""
 
     @ti.func
     def run(self, w, i):
@@ -99,12 +101,12 @@ class KickBodies(OfConstraints):
 
 
 def offering(constraints: Constraints, hook: str) -> Constraints:
-    """Return those constraints that define a hook which their contract leaves empty."""
+    """Return the constraints that define a hook which is empty in their contract."""
     return tuple(constraint for constraint in constraints if constraint.data.offers(hook))
 
 
 def _asking(kind: Any, s: State, constraints: Constraints, hook: str) -> tuple[PerParticle, ...]:
-    """Return a phase that asks constraints, where one has something to say."""
+    """Return a phase that calls the constraints that define the hook; none if no constraint does."""
     asked = offering(constraints, hook)
     return (kind(s, asked),) if asked else ()
 
@@ -118,12 +120,12 @@ def begin_constraints(s: State, constraints: Constraints) -> tuple[PerParticle, 
 
 
 def advance_bodies(context: StepContext) -> tuple[PerParticle, ...]:
-    """Return the phases of constraints that come before particles move."""
+    """Return the phases of constraints that precede the motion of particles."""
     s, constraints = context.s, context.constraints
     locate = _asking(LocateHeld, s, constraints, "locate")
     return *locate, *_asking(AdvanceBodies, s, constraints, "advance")
 
 
 def kick_bodies(context: StepContext) -> tuple[PerParticle, ...]:
-    """Return the phases of constraints that come when forces have been summed."""
+    """Return the phases of constraints that follow the sum of forces."""
     return _asking(KickBodies, context.s, context.constraints, "kick")

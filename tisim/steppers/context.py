@@ -1,4 +1,4 @@
-"""What a stepper is given to make a step of, and what it makes of it."""
+"""The parts that a stepper is given, and the step that it makes from them."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StepContext:
-    """A context holds the bound parts of a scene that a step is made of; a tuple of items is empty where
-    nothing is to do.
+    """The bound parts of a scene from which a step is made; a tuple of items is empty if there is nothing to
+    do.
 
-    s : device memory of the worlds. effects : all of them, ``effects.of(Source)`` those of a kind. stepper :
-    the stepper itself, as kernels see it; control, domain : likewise. neighbour_lists : None where nothing
-    asks for pairs. independent : whether the stepper may take each particle by itself.
+    s : device memory of the worlds. effects : all effects; ``effects.of(Source)`` returns the effects of a
+    kind. stepper, control, domain : as seen by kernels. neighbour_lists : None if no part of the scene needs
+    pairs. independent : whether the stepper may advance each particle by itself.
 
-    update_lists : items that bring the neighbour lists up to date with the positions. advance_memory : bring
-    up to date what touching pairs remember, over ``dt``; once a step. sum_forces : set derived quantities,
-    and sum force and torque of the trial state. sum_trial_forces : the same for a state that may be far from
-    any solution, where a force that is not finite is the stepper's to deal with. Lists and forces may stand
-    in an iteration, a ``Repeat``; positions must lie in the domain. force_sum : the sum by itself, for
-    particles taken one by one, and to find out which force is at fault.
+    update_lists : items that update the neighbour lists to the positions. advance_memory : items that update
+    the contact histories over ``dt``, once per step. sum_forces : items that set derived quantities and sum
+    the force and torque of the trial state. sum_trial_forces : the same for a state that may be far from any
+    solution; the stepper must then handle forces that are not finite. Lists and forces may stand in an
+    iteration, a ``Repeat``; positions must lie in the domain. force_sum : the sum by itself, for particles
+    that advance one by one, and for the search for a force that fails.
     """
 
     s: State
@@ -54,7 +54,7 @@ class StepContext:
 
     @property
     def single_forces(self) -> tuple[Bound[Force], ...]:
-        """Return the forces on particles by themselves, in scene order."""
+        """Return the forces on single particles, in scene order."""
         return self.effects.of(Force)
 
     @property
@@ -74,14 +74,14 @@ class StepContext:
 
     @property
     def smooth(self) -> bool:
-        """Return whether forces have no kinks or jumps on the way."""
+        """Return whether forces have no kinks or jumps."""
         return not kinks([effect.data for effect in self.effects.of(Effect)], self.domain.data)
 
 
 @dataclass(frozen=True)
 class Buffer:
-    """A buffer is device memory beside the state: ``memory`` tells its ``bytes()``; the rest says what it is,
-    and for what."""
+    """Device memory beside the state. memory : object whose ``bytes()`` is its size. ``what``, ``why`` : its
+    content and its purpose."""
 
     memory: Any
     what: str
@@ -90,7 +90,7 @@ class Buffer:
 
 @dataclass(frozen=True)
 class Step:
-    """A step is its items, in order, and the device memory that was allocated for them."""
+    """The items of a step, in order, and the device memory allocated for them."""
 
     items: tuple[Item, ...]
     buffers: tuple[Buffer, ...] = ()

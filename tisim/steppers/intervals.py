@@ -1,8 +1,8 @@
-"""Synchronisation intervals: where particles that do not feel each other meet.
+"""Synchronisation intervals, at the ends of which particles that do not interact meet.
 
-Each takes its own steps, and all meet at every multiple of the longest step. From one such time to the next
-is an interval, which counts as one step of the world. A launch takes particles through some of them, and may
-end anywhere: where each particle is on its way is in its own clock.
+Each particle takes its own steps, and all meet at every multiple of the longest step. The time between two
+meetings is an interval, which counts as one step of the world. A launch takes particles through some
+intervals and may end anywhere: the progress of each particle is in its own clock.
 """
 
 from tisim.backend.taichi import ti
@@ -12,31 +12,30 @@ from tisim.state.status import WorldStatus
 from tisim.steppers.context import StepContext
 
 LAUNCH_ATTEMPTS = 2**20
-"""A launch has at most so many intervals, and so many attempts at a step, of all particles together: about a
+"""Largest number of intervals in a launch, and of attempts at a step, of all particles together: about one
 second."""
 LEAST_INTERVALS = 64
-"""A launch may take every particle through so many intervals or attempts, however many particles there
+"""Number of intervals or attempts that a launch always allows each particle, however many particles there
 are."""
 LITTLE = 1e-6
-"""A remainder of an interval or a step of this part of its length is worth no step of its own: rounding
-leaves it."""
+"""A remainder of an interval or a step below this part of its length is due to rounding, and gets no step of
+its own."""
 OWN_CLOCK = tuple(
     Field(name, unit, 1, "keep", scratch=True, double=True)
     for name, unit in (("own_interval", ""), ("own_elapsed", "s"), ("own_carry", "s"))
 )
-"""These fields say where a particle is on its way: the number of its interval, how far it is in it, and the
-rounding error of that."""
+"""The progress of a particle: the number of its interval, the time elapsed in it, and the rounding error of
+that time."""
 INTERVAL_QUANTITIES = ("intervals", "launch_intervals")
-"""These are the intervals of a world that are over, and those that this launch is to take it through."""
+"""Completed intervals of a world, and intervals of the present launch."""
 INTERVAL_FLAGS = ("halted", "attempt_limit")
-"""These say whether a particle of a world cannot go on, and how many attempts each may make in this
-launch."""
+"""Whether a particle of a world cannot go on, and the number of attempts allowed to each in this launch."""
 
 
 class BeginIntervals(Phase):
-    """This phase sets the intervals of a launch: up to the end, to the next time at which somebody looks, or
-    to as many as are asked for; and the attempts that a particle may make. What an earlier launch has left is
-    done first.
+    """This phase sets the number of intervals of a launch, up to the end of the run, the next pause, or the
+    step limit; and the number of attempts allowed to a particle. Intervals left over from an earlier launch
+    are completed first.
 
     The world's time is counted in intervals, so that it does not drift.
     """
@@ -62,7 +61,8 @@ class BeginIntervals(Phase):
 
 @ti.func
 def beginning(s, control: ti.template(), w, interval):  # type: ignore[valid-type]
-    """Return the time (s, f64) at which an interval begins: none after the end, and the first of all at 0."""
+    """Return the time (s, f64) at which an interval begins; the first begins at 0, and none after the end of
+    the run."""
     length = ti.cast(control.longest(w), ti.f64)
     over = interval > 0.0 and (interval + LITTLE) * length >= s.end[w]
     return ti.select(over, s.end[w], interval * length)
@@ -70,20 +70,21 @@ def beginning(s, control: ti.template(), w, interval):  # type: ignore[valid-typ
 
 @ti.func
 def duration(s, control: ti.template(), w, interval, begin):  # type: ignore[valid-type]
-    """Return the length (s, f64) of an interval that begins at ``begin`` (s); one that is cut ends there."""
+    """Return the length (s, f64) of an interval that begins at ``begin`` (s), or its length up to the cut
+    after a failure."""
     length = beginning(s, control, w, interval + 1.0) - begin
     return ti.select(s.cut[w] > 0.0, ti.min(length, s.cut[w]), length)
 
 
 @ti.func
 def own_time(s, control: ti.template(), w, i):  # type: ignore[valid-type]
-    """Return the time (s, f64) that a particle has come to."""
+    """Return the time (s, f64) that a particle has reached."""
     return beginning(s, control, w, s.own_interval[w, i]) + s.own_elapsed[w, i]
 
 
 class EndIntervals(Phase):
-    """This phase ends the intervals, or a part of them, or one that is cut; or it finds the first particle to
-    be stuck."""
+    """This phase ends the intervals of a launch, a part of them, or an interval cut after a failure; or it
+    finds the first particle that is stuck."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.control = context.s, context.control
@@ -94,7 +95,7 @@ class EndIntervals(Phase):
         s.events[w] = 0
         if s.underway[w] > 0:
             s.reached[w] = own_time(s, self.control, w, self.slowest(w))
-            # Whoever asks for more may look first.
+            # The caller may inspect the world before it asks for more.
             s.step_limit[w] = s.steps[w]
         elif s.halted[w] > 0:
             self.report_failure(w)
@@ -109,7 +110,7 @@ class EndIntervals(Phase):
 
     @ti.func
     def slowest(self, w):
-        """Return the particle that has come least far."""
+        """Return the particle whose time is least."""
         s = self.s
         least = 0
         for i in range(s.count[w]):
@@ -125,8 +126,8 @@ class EndIntervals(Phase):
 
     @ti.func
     def stop(self, w, i, fault):
-        """Stop the world where a particle has been stopped by this fault; intervals that all have passed are
-        good."""
+        """Stop the world at the time at which this fault stopped a particle; intervals that all particles
+        have completed are counted."""
         s = self.s
         s.steps[w] += ti.cast(s.own_interval[w, i] - s.intervals[w], ti.i64)
         s.time[w], s.cut[w] = own_time(s, self.control, w, i), s.own_elapsed[w, i]

@@ -10,8 +10,7 @@ Part = TypeVar("Part")
 
 
 class Local:
-    """Local stands for a particle field where a single particle is looked at: its value, whatever the
-    index."""
+    """A single particle's value in place of a particle field, for any index."""
 
     value: Any = None
 
@@ -24,11 +23,11 @@ class Local:
 
 @ti.data_oriented
 class Registers:
-    """Registers hold a state that is read and written as any other, but the named fields of one particle are
-    local variables.
+    """A state that is read and written like any other, except that the named fields of one particle are local
+    variables.
 
-    loaded : fields of three components or one that are taken from memory, and put back. own : vectors that
-    exist here only.
+    loaded : fields of three components or one that are loaded from memory and stored back. own : vectors that
+    exist only here.
     """
 
     def __init__(self, s: State, loaded: tuple[str, ...], own: tuple[str, ...]) -> None:
@@ -46,7 +45,7 @@ class Registers:
 
     @ti.func
     def load(self, w, i):
-        """Take a particle out of memory, into variables of the block that calls this."""
+        """Load a particle from memory into variables of the calling block."""
         for field, local in ti.static(self.loaded):
             value = field[w, i]
             ti.static(local.assign(value))
@@ -55,12 +54,12 @@ class Registers:
             ti.static(local.assign(value))
 
     def assign(self, *values: Any) -> None:
-        """Take these values for what ``load`` would take from memory."""
+        """Use these values instead of those that ``load`` would read from memory."""
         for (_, local), value in zip(self.loaded, values, strict=True):
             local.assign(value)
 
     @ti.func
     def store(self, w, i):
-        """Put the particle back into memory."""
+        """Store the particle back into memory."""
         for field, local in ti.static(self.loaded):
             field[w, i] = local[w, i]

@@ -1,4 +1,4 @@
-"""How long the next step may be: fixed, or from the time until surfaces meet."""
+"""The length of the next step: fixed, or from the time until surfaces meet."""
 
 from __future__ import annotations
 
@@ -13,19 +13,22 @@ from tisim.components.component import Component, parameter
 from tisim.errors import must
 
 HALF_DIGIT = 2.0**-24
-"""Numbers are rounded by at most this part of them in single precision."""
+"""Largest relative rounding error in single precision."""
 TOUCH = 1.0 + 1e-6
-"""Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
+"""Steps end later than the meeting of surfaces by this factor, so that rounding does not decide whether they
+have met."""
 SHORTEST_STEP = 1e-30
-"""This is the shortest step that may be asked for, s: light goes 3e-22 m in it, and single precision holds
+"""Shortest step that may be requested, s: light travels 3e-22 m in it, and single precision can represent
 it."""
 MOST_STEPS = 2.0**53
-"""A run may take so many steps: with more, one is shorter than what the time at the end is rounded to."""
+"""Largest number of steps of a run: with more, a step would be shorter than the rounding error of the time at
+the end."""
 
 
 @ti.func
 def note_speed(s, w, i):
-    """Note the speed (m/s, f64) of a particle relative to the world's frame, of which the largest counts."""
+    """Record the speed (m/s, f64) of a particle relative to the world's frame, if it is the largest so
+    far."""
     speed = (ti.cast(s.velocity[w, i], ti.f64) - s.axes(s.frame, w)).norm()
     if speed > s.fastest[w]:
         ti.atomic_max(s.fastest[w], speed)
@@ -33,16 +36,16 @@ def note_speed(s, w, i):
 
 @ti.func
 def shortest_representable(s, w, shortest):
-    """Return the shortest step (s, f64), where ``shortest`` is asked for, that the time at the end still
-    tells."""
+    """Return the shortest step (s, f64) that changes the time at the end of the run; at least
+    ``shortest``."""
     return ti.max(ti.cast(shortest, ti.f64), s.end[w] / MOST_STEPS)
 
 
 class StepControl(Component):
-    """Step control chooses the length of steps; ``pair`` sees every near pair, ``note`` every particle.
+    """Step control chooses the length of steps; ``pair`` is called for every near pair, ``note`` for every
+    particle.
 
-    watches_pairs : whether it needs to see pairs at all. world_quantities : names of the quantities that it
-    keeps of a world.
+    watches_pairs : whether it needs pairs at all. world_quantities : names of its state variables of a world.
     """
 
     contract: ClassVar[bool] = True
@@ -56,35 +59,35 @@ class StepControl(Component):
 
     @ti.func
     def note(self, s, w, i, soonest):
-        """Note for a particle the least time (s, f64) that its pairs allow."""
+        """Record for a particle the least time (s, f64) that its pairs allow."""
 
     def fewest(self, duration: float) -> float:
-        """Return the number of steps that a run of this duration (s) takes at least."""
+        """Return the smallest number of steps of a run of this duration (s)."""
         return 1.0
 
     def asked(self) -> dict[str, float]:
-        """Return the relative errors that steps are asked for, by the names of its settings; by default
-        none."""
+        """Return the relative errors requested of steps, by the names of the settings; by default none."""
         return {}
 
     def suits_start(self, radius: np.ndarray, velocity: np.ndarray) -> None:
-        """Raise InputError when its steps do not suit a start of hard particles that collide: their radii
-        (m, shape (n,)) and velocities (m/s, shape (n, 3)); by default they do."""
+        """Raise InputError if the steps do not suit an initial state of hard particles that collide: their
+        radii (m, shape (n,)) and velocities (m/s, shape (n, 3)). By default they do."""
 
 
 class Controller(StepControl):
-    """Control of explicit steppers decides how long a step is before it is made."""
+    """Control of explicit steppers chooses the length of a step before the step is taken."""
 
     contract: ClassVar[bool] = True
 
     @ti.func
     def next(self, s, w, horizon):
-        """Return the length (s, f64) of the next step; pairs within a gap of ``horizon`` (m) were seen."""
+        """Return the length (s, f64) of the next step; pairs with a gap below ``horizon`` (m) have been
+        examined."""
         return ti.cast(0.0, ti.f64)
 
 
 class FixedStep(Controller):
-    """All steps are of one length; the last one is cut to end on time."""
+    """All steps have the same length; the last one is shortened to end at the end of the run."""
 
     dt: float = parameter("s", "length dt of a step", examples=[1e-6], ge=SHORTEST_STEP)
 
@@ -97,7 +100,8 @@ class FixedStep(Controller):
     def next(self, s, w, horizon):
         dt = ti.cast(self.dt(w), ti.f64)
         if ti.static(s.real == ti.f32):
-            # It is known to half a last digit: where that is the difference, whole steps lead to the end.
+            # dt is known to half a unit in the last place: if the deviation is within that, whole steps lead
+            # to the end.
             remaining = s.end[w] - s.time[w]
             steps = ti.round(remaining / dt)
             if steps >= 1.0 and ti.abs(remaining - steps * dt) <= HALF_DIGIT * remaining:
@@ -106,11 +110,11 @@ class FixedStep(Controller):
 
 
 class ApproachTime(Controller):
-    """A step is as long as the least time until two surfaces meet, gap over approach speed, within limits.
+    """The step length is the least time until two surfaces meet, gap over approach speed, within limits.
 
-    Z04 asks each particle's nearest neighbour only; here every approaching pair is asked, as the nearest
-    is not always the first to be met. The limits are those of Z04 section 8 unless given. A scene of hard
-    particles that would pass through each other in the shortest step is refused.
+    Z04 uses only the nearest neighbour of each particle. Here every approaching pair is examined, because the
+    nearest neighbour is not always met first. The default limits are taken from Z04 section 8. A scene of
+    hard particles that would pass through each other in the shortest step is refused.
 
     Source: Z04 Eq. (6.14).
     """
@@ -134,9 +138,10 @@ class ApproachTime(Controller):
         return duration / self.longest
 
     def suits_start(self, radius: np.ndarray, velocity: np.ndarray) -> None:
-        # In one step of a radius each, two that meet head on are past each other: no impact is seen.
+        # Two particles that meet head on, and move by a radius each in one step, have passed each other: no
+        # impact is detected.
         with np.errstate(over="ignore", invalid="ignore"):
-            # Speeds whose squares are more than numbers hold are infinite here, and refused.
+            # Speeds whose squares overflow are infinite here, and refused.
             fastest = float(np.linalg.norm(velocity - velocity.mean(axis=0), axis=1).max(initial=0.0))
         smallest = float(radius.min(initial=np.inf))
         rule = f"so short that no particle moves by more than the smallest radius, {smallest:.3g} m, in it"
@@ -164,7 +169,8 @@ class ApproachTime(Controller):
     def next(self, s, w, horizon):
         dt = s.approach_time[w]
         if horizon > 0.0:
-            # Pairs not seen are farther apart than this, and close no faster than twice the fastest.
+            # Pairs that were not examined have a larger gap than this, and approach no faster than twice the
+            # fastest speed.
             dt = ti.min(dt, ti.cast(horizon, ti.f64) / (2.0 * s.fastest[w] + 1e-300))
         return ti.max(
             shortest_representable(s, w, self.shortest(w)), ti.min(dt, ti.cast(self.longest(w), ti.f64))

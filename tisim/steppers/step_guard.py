@@ -1,16 +1,17 @@
-"""The guard of explicit steppers: a step of more than 0.45 of the critical step of a force stops its world.
+"""The guard of explicit steppers: a step above 0.45 of the critical step of a force stops its world.
 
-A leapfrog follows a motion of angular frequency omega in steps below the critical one, 2/omega; in longer
-ones it alternates and grows. From one step to the next such a motion changes the acceleration of a particle
-by omega^2 times its displacement, whatever the law. So the guard needs no knowledge of laws: it compares the
-two. The limit is below half of the critical step, 1/omega, because of forces that fall off with distance,
-such as gravity. Such a force may throw a particle out of its reach in a single step. The displacement is then
-that which the lost force made, so (omega dt)^2 comes out just below 1.
+A leapfrog follows a motion of angular frequency omega if its steps are below the critical step, 2/omega. With
+longer steps the motion alternates and grows. From one step to the next, such a motion changes the
+acceleration of a particle by omega^2 times its displacement, for any force law. The guard therefore needs no
+knowledge of the laws: it compares the two. The limit is below half of the critical step, 1/omega, because of
+forces that decrease with distance, such as gravity. Such a force may throw a particle out of its range in a
+single step. The displacement is then due to the force that has vanished, so that (omega dt)^2 comes out just
+below 1.
 
-Laws that ask for their own critical step at each contact, such as those of grains, are not asked again. Their
-forces are in the sum, though, and end from one step to the next where a contact does, as when a wall is drawn
-away. So beside such laws a step counts as too long only where that is found twice in a row: a motion that
-grows shows it in every step.
+Laws that check their own critical step at each contact, such as contact laws of grains, are not checked
+again. Their forces are in the sum, however, and vanish within a step when a contact ends, for example when a
+wall is drawn away. In a scene with such laws, a step therefore counts as too long only if the limit is
+exceeded twice in a row: a growing motion exceeds it in every step.
 
 Source: M. P. Allen, D. J. Tildesley, Computer Simulation of Liquids (2017), section 3.2.
 """
@@ -25,14 +26,14 @@ from tisim.state.status import WorldStatus
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
 
 STEP_LIMIT = 0.8
-"""(omega dt)^2 must be below this; a leapfrog is stable where it is below 4."""
+"""Limit of (omega dt)^2; a leapfrog is stable below 4."""
 HARDLY = 1e-2
-"""A change of the force that moves a particle by less than this part of its radius in a step, or turns it by
-less than this angle (rad), is let pass: where a particle hardly moves, others change the force on it."""
+"""A change of the force is ignored if it moves a particle by less than this part of its radius in a step, or
+turns it by less than this angle (rad): the force on a particle that hardly moves is changed by the others."""
 STRAINED = Field("strained", "", 1, "keep", scratch=True)
-"""Whether the last step of a particle was beyond the limit, beside laws that guard themselves."""
+"""Whether the last step of a particle was beyond the limit, in a scene with laws that guard themselves."""
 STEP_EXCESS = "step_excess"
-"""This quantity of a world is the largest (omega dt)^2 that has been found where it is above the limit."""
+"""This quantity of a world is the largest (omega dt)^2 above the limit."""
 
 
 def guards(effects: Sequence[Effect]) -> bool:
@@ -44,7 +45,7 @@ def guard_fields(effects: Sequence[Effect]) -> tuple[Field, ...]:
     """Return the fields that the guard reads in a scene of these effects."""
     if not guards(effects):
         return ()
-    # Contacts and bonds; gravity guards its own steps too, as there is nothing to guard.
+    # Contacts and bonds. Gravity counts as guarding its own steps, because it needs no guard.
     laws = [e for e in effects if isinstance(e, Force | PairForce)]
     beside = any(e.guards_steps and e.leapfrog for e in laws)
     torques = (TORQUE_BEFORE,) if turning(effects) else ()
@@ -53,12 +54,13 @@ def guard_fields(effects: Sequence[Effect]) -> tuple[Field, ...]:
 
 @ti.func
 def check_step(s, w, i, force, torque, turns: ti.template(), patient: ti.template()):  # type: ignore[valid-type]
-    """Stop the world where dt is beyond 0.45 of the critical step of particle i, which has moved by dt v and,
-    where it ``turns``, by dt spin since the last forces; ``force`` (N) and ``torque`` (N m) are the new
-    ones.
+    """Stop the world if dt is beyond 0.45 of the critical step of particle i. The particle has moved by dt v
+    and, if it ``turns``, rotated by dt spin since the last forces; ``force`` (N) and ``torque`` (N m) are the
+    new ones.
 
-    What the new force does in a step is let pass, too: a field that is switched on, or grows in time, changes
-    the force on a particle at rest. patient : whether a single step beyond the limit is let pass.
+    The displacement by the new force itself in a step is allowed too, because a field that is switched on, or
+    grows in time, changes the force on a particle at rest. patient : whether a single step beyond the limit
+    is allowed.
     """
     dt, radius = ti.cast(s.dt[w], s.real), s.radius[w, i]
     per_force = dt * dt / s.mass[w, i]
@@ -66,7 +68,7 @@ def check_step(s, w, i, force, torque, turns: ti.template(), patient: ti.templat
     bent = per_force * (force - s.force_before[w, i]).norm()
     fails, excess = bent > STEP_LIMIT * moved + per_force * force.norm(), bent / moved
     if ti.static(turns):
-        # Of grains of nanometres m R^2 is below f32.
+        # For grains of nanometres, m R^2 underflows in f32.
         per_torque = per_force / 0.4 / radius
         turned = dt * s.spin[w, i].norm() + HARDLY
         twisted = per_torque * ((torque - s.torque_before[w, i]).norm() / radius)

@@ -1,7 +1,8 @@
-"""Velocity Verlet, then operators, then pair events: the order of a step.
+"""Velocity Verlet, followed by operators and pair events: the order of a step.
 
-Forces are kicked half before and half after the drift (L. Verlet 1967; W. C. Swope et al. 1982). A scene
-without forces drifts in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c), and has no kick at all.
+Forces act in half a kick before and half a kick after the drift (L. Verlet 1967; W. C. Swope et al. 1982). In
+a scene without forces, particles drift in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c), without
+kicks.
 """
 
 from collections.abc import Sequence
@@ -35,9 +36,9 @@ class Verlet(Stepper):
 
         v += dt/2 F/m,    r += dt v,    v += dt/2 F'/m
 
-    It is of second order in dt for forces that depend on position only. A scene without forces drifts in
-    straight lines, and has no kick at all. Operators and pair events follow the drift. A step of more than
-    0.45 of the critical one, 2/omega of the stiffest motion, stops the world.
+    It is of second order in dt for forces that depend on position only. In a scene without forces, particles
+    drift in straight lines, without kicks. Operators and pair events follow the drift. A step above 0.45 of
+    the critical step, 2/omega of the stiffest motion, stops the world.
 
     Source: L. Verlet, Phys. Rev. 159 (1967) 98; W. C. Swope et al., J. Chem. Phys. 76 (1982) 637.
     """
@@ -50,7 +51,8 @@ class Verlet(Stepper):
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
-        # Its kicks take velocities of other times than the forces': of first order where they matter.
+        # Kicks use velocities at other times than the forces, which is of first order for velocity-dependent
+        # forces.
         if any(effect.offers("velocity_jacobian") for effect in effects if isinstance(effect, Force)):
             return ()
         events = any(isinstance(effect, PairEvent) for effect in effects)
@@ -73,19 +75,19 @@ class Verlet(Stepper):
 
 @ti.func
 def half_kick(s, w, i, turning: ti.template()):  # type: ignore[valid-type]
-    """Kick velocity and spin by half a step: v += dt/2 F/m; spin += dt/2 M/I with I = 2/5 m R^2, a solid
-    sphere's (Z16 7.8)."""
+    """Kick velocity and spin by half a step: v += dt/2 F/m; spin += dt/2 M/I with I = 2/5 m R^2 for a solid
+    sphere (Z16 7.8)."""
     half = 0.5 * ti.cast(s.dt[w], s.real)
     s.velocity[w, i] = s.velocity[w, i] + half / s.mass[w, i] * s.force[w, i]
     if ti.static(turning):
-        # Of grains of nanometres m R^2 is below f32.
+        # For grains of nanometres, m R^2 underflows in f32.
         turn = half / (0.4 * s.mass[w, i] * s.radius[w, i]) * (s.torque[w, i] / s.radius[w, i])
         s.spin[w, i] = s.spin[w, i] + turn
 
 
 class Move(PerParticle):
-    """This phase kicks, drifts and wraps particles, or has them go where constraints say, and lets operators
-    change single particles."""
+    """This phase kicks, drifts and wraps particles, or places them as constraints prescribe, and lets
+    operators change single particles."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -112,17 +114,17 @@ class Move(PerParticle):
         after, grown = s.position[w, i], ti.cast(s.radius[w, i] - size, ti.f64)
         path = after - before
         if ti.static(len(self.constraints) > 0):
-            # What is held may have been put through a face already.
+            # A held particle may have been put through a periodic face already.
             path = ti.select(held > 0, self.domain.nearest(w, before, after, end), path)
             if ti.static(not self.forced):
-                # No kick follows, after which they would.
+                # No kick follows, which would otherwise set their velocities.
                 steer_held(s, self.constraints, w, i, end)
         moved = ti.cast(path, ti.f64) - drift(s, self.domain, w, before) * s.dt[w]
         apply_displacement(s, self.domain, w, i, after, moved, grown, end)
 
 
 class Kick(PerParticle):
-    """This phase is the second half of the kick."""
+    """This phase is the second half of the kick, after the drift."""
 
     local = True
 
@@ -143,7 +145,7 @@ class Kick(PerParticle):
 
 
 class Advance(Phase):
-    """This phase moves time on, and tells pair lists how far particles have moved."""
+    """This phase advances time, and reports displacements to the pair lists."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.lists = context.s, context.neighbour_lists

@@ -19,8 +19,8 @@ WRONG = {
     "received 'contact_dissipation'": lambda: scene(
         [[0, 0, 0]], [[0, 0, 0]], (ContactDissipation(damping=1),)
     ),
-    "stepper.control must be one that suits contact, such as fixed_step or that of an implicit stepper; "
-    "received 'approach_time'": lambda: scene(
+    "stepper.control must be one that suits contact, such as fixed_step or the control of an implicit "
+    "stepper; received 'approach_time'": lambda: scene(
         [[0, 0, 0]], [[0, 0, 0]], (Contact(stiffness=1),), stepper=Verlet()
     ),
     "effects.contact_softening must be used together with effects.contact; "

@@ -1,4 +1,4 @@
-"""The magnetic field of uniformly magnetised cylinders, any number of them, anywhere (B16 chapter 5)."""
+"""The magnetic field of any number of uniformly magnetised cylinders at any place (B16 chapter 5)."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from tisim.state.bound import Peers
 
 
 class Cylinder(Body):
-    """A cylinder, magnetised uniformly and in any direction, or not at all."""
+    """A cylinder, magnetised uniformly in any direction, or not at all."""
 
-    axis: Vector = parameter("", "direction of the axis, of any length but 0", (0.0, 0.0, 1.0))
+    axis: Vector = parameter("", "direction of the axis, of any nonzero length", (0.0, 0.0, 1.0))
     radius: float = parameter("m", "radius R", examples=[3e-4], gt=0)
     length: float = parameter("m", "length from end to end", examples=[1e-2], gt=0)
 
@@ -44,7 +44,8 @@ class Cylinder(Body):
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
-        """Yield what the cylinder is given, and what kernels read in place of axis and magnetisation."""
+        """Yield the columns of the given parameters, and those that kernels read instead of axis and
+        magnetisation."""
         yield from super().columns()
         yield from (("lead", 3), ("rest", 3), ("across", 3), ("along", 1))
 
@@ -55,8 +56,9 @@ class Cylinder(Body):
 
     @ti.func
     def place(self, w, k, r):
-        """Return where r (m) lies: distance from the axis of cylinder k, unit vector from it, place along it
-        from the centre, and distance beyond the nearer end, negative before it."""
+        """Return the position of r (m) relative to cylinder k: distance from the axis, unit vector away from
+        the axis, coordinate along the axis from the centre, and distance beyond the nearer end, negative
+        before it."""
         rho, outward, foot, z = place(r, self.centre(w, k), self.lead(w, k), self.rest(w, k))
         side = ti.select(foot + z < 0.0, -1.0, 1.0)
         return rho, outward, foot + z, (side * foot - 0.5 * self.length(w, k)) + side * z
@@ -97,7 +99,7 @@ class Cylinder(Body):
 
     @ti.func
     def flux_of(self, w, k, six, rho, outward, end):
-        """Return B (T) and its gradient (T/m) by the six functions."""
+        """Return B (T) and its gradient (T/m), computed from the six functions."""
         slope = cylinder_field.gradient(
             six, rho, outward, self.unit(w, k), self.across(w, k), self.along(w, k)
         )
@@ -118,22 +120,27 @@ class MagneticCylinders(Magnets):
 
         B = mu_0 (H + M) inside,    mu_0 H outside
 
-    Field and gradient are closed forms in complete elliptic integrals, with series about the axis and far
-    away. In f64, for lengths of 1/10 to 2000 radii in any direction, their errors are below 1e-12, and 1e-15
-    R/d more at a distance d from the rim, as places are known to rounding only: that of B relative to |B|,
-    that of its gradient to |grad B| + |B|/l, l the distance to the rim with R added across, as it passes
-    through 0 in the middle. That is of the numbers as they are given: what their own rounding puts across the
-    axis of a long cylinder that is magnetised along it is of the order of 1e-16 (length/R)^2 of the field
-    beside it. Where the field has no value - on the surface, where it jumps, and at the rims, where it grows
-    as a logarithm - it is finite. With ``table_digits`` they are read from a table, made when a scene is
-    compiled, where its error is measured; cylinders must then be at least as long as their radius.
+    Field and gradient are closed forms in complete elliptic integrals, with series near the axis and far
+    away.
+
+    In f64, for lengths of 1/10 to 2000 radii and any direction, their errors are below 1e-12, plus 1e-15 R/d
+    at a distance d from the rim, because positions are known only up to rounding. The error of B is relative
+    to |B|. The error of the gradient is relative to |grad B| + |B|/l, because the gradient passes through 0
+    in the middle; l is the distance to the rim, with R added to its component across the axis. These errors
+    hold for the numbers as given. Rounding of the given axis and magnetisation of a long cylinder that is
+    magnetised along its axis adds a magnetisation across it; this changes the field beside the cylinder by
+    the order of 1e-16 (length/R)^2, relative.
+
+    The field jumps at the surface, and grows as a logarithm at the rims; the values returned there are
+    finite. With ``table_digits``, field and gradient are read from a table, which is made and whose error is
+    measured when a scene is compiled; cylinders must then be at least as long as their radius.
 
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
 
     cylinders: tuple[Cylinder, ...] = option("the cylinders; their number may differ per world")
     table_digits: int | None = option(
-        "digits to which field and gradient are read from a table; unless given, closed forms",
+        "digits of accuracy of field and gradient from a table; closed forms unless given",
         None,
         ge=2,
         le=6,

@@ -1,14 +1,16 @@
-"""One end of a uniformly magnetised cylinder: what its field and gradient are made of.
+"""One end of a uniformly magnetised cylinder: the functions from which its field and gradient are computed.
 
 Let W(r) = 1/(4 pi) integral dV' / |r - r'| over the cylinder. Then H_i = sum_j d_i d_j W M_j, so field and
 gradient are the second and third derivatives of W, and each of them is a difference between the two ends.
-An end enters as that of a half-infinite cylinder of radius R that reaches away from the point, which is
-u >= 0 before it along its axis; V is its W. Six numbers in this order, rho the distance from the axis,
-subscripts derivatives:
+Each end is replaced by the end of a half-infinite cylinder of radius R that extends away from the point. The
+point is at a distance u >= 0 in front of the end, measured along the axis; V is the W of the half-infinite
+cylinder. With rho the distance from the axis, and subscripts for derivatives, six numbers describe it, in
+this order:
 
     V_uu,  V_rho / rho,  rho (V_rho / rho)_rho / rho,  V_rho u / rho,  V_uuu,  V_rho uu / rho
 
-All others follow from the equation of Laplace. They go smoothly to 0 far away and have no digits to cancel.
+All other derivatives follow from Laplace's equation. The six numbers go smoothly to 0 far away and are free
+of cancellation.
 """
 
 from tisim.backend import runtime
@@ -16,28 +18,29 @@ from tisim.backend.taichi import ti
 from tisim.numerics.elliptic import elliptic, limits
 
 SLIM = 1.0 / 36.0
-"""Below this (rho / distance to the rim)^2, seen from the axis, the series about the axis is used."""
+"""The series about the axis is used if (rho / distance to the rim)^2 is below this, with the distance from
+the axis."""
 SERIES_BELOW = {ti.f64: 1e-18, ti.f32: 1e-9}
-"""Powers in a series that are below this are left out."""
+"""Powers below this are omitted from a series."""
 
 
 def small() -> float:
-    """Return ``SERIES_BELOW`` of the precision that runs."""
+    """Return ``SERIES_BELOW`` for the precision in use."""
     return SERIES_BELOW[runtime.current().real]
 
 
 @ti.func
 def two_ends(rho, u, radius):
-    """Return the six numbers of two ends, (6, 2); rho >= 0, both u >= 0, radius > 0 in one unit of length.
+    """Return the six numbers of two ends, (6, 2); rho >= 0, both u >= 0 and radius > 0 in one unit of length.
 
-    They are made side by side, as each waits for its own divisions and roots.
+    Both are computed side by side, because each alone would wait for its own divisions and roots.
     """
     far = u * u + radius * radius
     slim = rho * rho < SLIM * far
     both = ti.Matrix([[0.0 * rho, 0.0 * rho] for _ in range(6)])
     if not (slim[0] and slim[1]):
         both = off_axis(rho, u, radius, False)[0]
-    # One question for most points, which are far from the axis of both.
+    # One test for most points, which are far from the axis for both ends.
     for k in range(ti.select(slim[0] or slim[1], 2, 0)):
         first = k == 0
         if ti.select(first, slim[0], slim[1]):
@@ -56,10 +59,10 @@ def end(rho, u, radius):
 
 
 class ClosedEnds:
-    """These ends are as accurate as the precision allows.
+    """Ends from closed forms, accurate to the working precision.
 
-    far : (distance from the centre / that of the rim)^2 from where the cylinder is taken as a whole.
-    small : powers in that series which are below this are left out.
+    far : the series of the whole cylinder is used if (distance from the centre / distance of the rim from the
+    centre)^2 is above this. small : powers below this are omitted from that series.
     """
 
     far = 36.0
@@ -73,8 +76,8 @@ class ClosedEnds:
 
     @ti.func
     def mostly(self, rho, u, radius):
-        """Return the six numbers of two ends without a loop or a branch, and whether they are right: as they
-        are at most points."""
+        """Return the six numbers of two ends without a loop or a branch, and whether they are valid; they are
+        at most points."""
         both, met = off_axis(rho, u, radius, True)
         slim = rho * rho < SLIM * (u * u + radius * radius)
         return both, met and not (slim[0] or slim[1])
@@ -83,10 +86,10 @@ class ClosedEnds:
 @ti.func
 def near_axis(rho, u, radius, far):
     """Return the six numbers of an end by the power series in rho of an axisymmetric harmonic function, whose
-    values on the axis are closed.
+    values on the axis have a closed form.
 
-    V_uuu(0, u) = R^2 / (2 d^3), d^2 = far = u^2 + R^2, and its k-th derivative is that times
-    (-1)^k k! C_k(u/d) / d^k, with Gegenbauer's C_k of order 3/2.
+    V_uuu(0, u) = R^2 / (2 d^3), d^2 = far = u^2 + R^2, and its k-th derivative is V_uuu(0, u) times (-1)^k k!
+    C_k(u/d) / d^k, with Gegenbauer's C_k of order 3/2.
     """
     d = ti.sqrt(far)
     c, t = u / d, -rho * rho / far
@@ -130,16 +133,16 @@ def near_axis(rho, u, radius, far):
 
 @ti.func
 def off_axis(rho, u, radius, mostly: ti.template()):  # type: ignore[valid-type]
-    """Return the six numbers of two ends, (6, 2), by closed forms in complete elliptic integrals, put into
-    the sums of ``elliptic``, and whether these have met their limit; mostly : as there.
+    """Return the six numbers of two ends, (6, 2), by closed forms in complete elliptic integrals, evaluated
+    by the sums of ``elliptic``, and whether these have converged; mostly : as in ``elliptic``.
 
-    The second derivatives are B16 Eqs (5.3)-(5.6), (5.20)-(5.22), the third those of a current loop (W. R.
-    Smythe, Static and Dynamic Electricity, 1950, section 7.10).
+    The second derivatives are B16 Eqs (5.3)-(5.6), (5.20)-(5.22). The third derivatives are the field of a
+    current loop (W. R. Smythe, Static and Dynamic Electricity, 1950, section 7.10).
     """
     least = ti.static(limits()[1])
     total, gap, product = rho + radius, rho - radius, rho * radius
     inside = gap < 0.0
-    # Each division once.
+    # Each division is done only once.
     over_rho, over_total, over_product = 1.0 / rho, 1.0 / total, 0.25 / product
     wide = total * total
     reach = u * u + wide
@@ -152,7 +155,7 @@ def off_axis(rho, u, radius, mostly: ti.template()):  # type: ignore[valid-type]
     kc = ti.max(ti.sqrt(u * u + gap * gap) * over_s, least)
     rest = n * (size * size + beta * beta)
     k, sigma, third, other, met = elliptic(kc, reach * over_product, size, ti.abs(over_gamma), rest, mostly)
-    # The same difference twice: each loses digits where the other does not.
+    # The same difference in two forms: each loses digits if the other does not.
     lift = ti.select(
         gamma < 0.5,
         1.0 - 0.5 * (1.0 + gamma) * (third * over_gamma),

@@ -1,4 +1,4 @@
-"""A uniformly magnetised cylinder from far away: its multipoles, of which the first is the dipole."""
+"""The field of a uniformly magnetised cylinder far away: its multipoles, of which the first is the dipole."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from tisim.backend.taichi import ti
 
 @ti.func
 def far_field(rho, z, radius, half, small):
-    """Return what ``cylinder_field.shape`` gives, at distances r > a = sqrt(R^2 + L^2).
+    """Return the six functions of ``cylinder_field.shape`` at distances r > a = sqrt(R^2 + L^2).
 
-    small : powers of (a/r)^2 below this are left out.
+    small : powers of (a/r)^2 below this are omitted.
 
     W = sum over even n of w_n P_n(z/r) / r^(n+1), w_n = R^2 a^(n+1) P'_(n+2)(L/a) / ((n+1) (n+2) (n+3)): on
     the axis W_zz is closed and 1 / sqrt((z + L)^2 + R^2) generates Legendre polynomials. Each derivative
@@ -18,7 +18,8 @@ def far_field(rho, z, radius, half, small):
     square = radius * radius + half * half
     distance = ti.sqrt(rho * rho + z * z)
     c, x = z / distance, half / ti.sqrt(square)
-    # Legendre polynomials and derivatives of orders k - 1 and k, here of k = 1; x enters with the first only.
+    # Legendre polynomials and derivatives of orders k - 1 and k, here for k = 1; x enters only through the
+    # first derivatives.
     p, q = 1.0 + 0.0 * c, c
     dp, dq = 0.0 * c, 1.0 + 0.0 * c
     ddp, ddq = 0.0 * c, 0.0 * c
@@ -30,7 +31,7 @@ def far_field(rho, z, radius, half, small):
         inverse = 1.0 / ((n + 1.0) * (n + 2.0) * (n + 3.0))
         second, third = (n + 1.0) * (n + 3.0) * inverse, (n + 1.0) * (n + 2.0) * inverse
         a, b, lead = 2.0 * n + 3.0, 2.0 * n + 5.0, dq
-        # To order n + 2, and for the point on to order n + 3.
+        # Up to order n + 2, and for the point then to order n + 3.
         xp, xq = xq, (a * x * xq - (n + 1.0) * xp) * second
         dxp, dxq = dxq, dxp + a * xp
         ddp, ddq = ddq, ddp + a * dq

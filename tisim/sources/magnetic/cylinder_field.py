@@ -1,8 +1,9 @@
-"""The field of a uniformly magnetised cylinder and its gradient, about its own axis and for its own units.
+"""The field of a uniformly magnetised cylinder and its gradient, relative to its own axis and in its own
+units.
 
-The cylinder has radius R and reaches from z = -L to L along its axis (as in B16 chapter 5). M points any way:
-B16 Eqs (5.3) and (5.21) are the columns of one tensor, W_ij of ``cylinder_end``, whose symmetry leaves three
-functions of rho and z for the field and three more for its gradient:
+The cylinder has radius R and extends from z = -L to L along its axis (as in B16 chapter 5). M has any
+direction: B16 Eqs (5.3) and (5.21) are the columns of one tensor, W_ij of ``cylinder_end``. By symmetry,
+three functions of rho and z are enough for the field, and three more for its gradient:
 
     W_zz,  W_rho / rho,  rho (W_rho / rho)_rho / rho,  W_rho z / rho,  W_zzz,  W_rho zz / rho
 """
@@ -13,8 +14,8 @@ from tisim.sources.magnetic.cylinder_far import far_field
 
 @ti.func
 def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
-    """Return the six functions, as a vector. Lengths are in one unit. end : |z| - half, which the caller
-    knows without cancellation. ends : closed or tabulated."""
+    """Return the six functions, as a vector. Lengths are in one unit. end : |z| - half, computed by the
+    caller without cancellation. ends : closed or tabulated."""
     six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
     if rho * rho + z * z > ends.far * (radius * radius + half * half):
         six = far_field(rho, z, radius, half, ends.small)
@@ -26,8 +27,8 @@ def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid
 
 @ti.func
 def mostly(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
-    """Return the six functions without a loop or a branch, and whether they are right: as they are at most
-    points, neither far away nor about the axis."""
+    """Return the six functions without a loop or a branch, and whether they are valid; they are at most
+    points, except far away and near the axis."""
     pair, right = ends.mostly(rho, ti.Vector([ti.abs(z) + half, ti.abs(end)]), radius)
     far = rho * rho + z * z > ends.far * (radius * radius + half * half)
     return close_by(rho, z, end, radius, pair), right and not far
@@ -35,7 +36,8 @@ def mostly(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[vali
 
 @ti.func
 def close_by(rho, z, end, radius, pair):
-    """Return the difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
+    """Return the difference between the ends; between the ends, an infinite cylinder is added (B16 Eq.
+    5.24)."""
     side, between = ti.select(z < 0.0, -1.0, 1.0), end < 0.0
     odd = ti.select(between, 1.0, -1.0)
     six = ti.Vector(
@@ -48,7 +50,7 @@ def close_by(rho, z, end, radius, pair):
             pair[5, 0] + odd * pair[5, 1],
         ]
     )
-    # Without a branch, as no CPU can foresee where points lie.
+    # Without a branch, because the positions of points are unpredictable for a CPU.
     beside = ti.max(rho, radius)
     share = (radius / beside) ** 2
     six[1] = ti.select(between, six[1] - 0.5 * share, six[1])
@@ -58,9 +60,10 @@ def close_by(rho, z, end, radius, pair):
 
 @ti.func
 def field(six, rho, outward, m_across, m_along):
-    """Return H across and along the axis, of M across and along it: sum_j W_ij M_j, in the unit of M.
+    """Return H across and along the axis for M across and along it: sum_j W_ij M_j, in the unit of M.
 
-    outward : unit vector from the axis to the point. All but the last are vectors across the axis.
+    outward : unit vector from the axis to the point. Quantities across the axis are vectors, those along it
+    numbers.
     """
     m_out = outward.dot(m_across)
     across = six[1] * m_across + rho * (six[2] * m_out + six[3] * m_along) * outward
@@ -69,14 +72,15 @@ def field(six, rho, outward, m_across, m_along):
 
 @ti.func
 def gradient(six, rho, outward, axis, m_across, m_along):
-    """Return [i, k] dH_i / dr_k = sum_j W_ijk M_j, per unit of length: it is symmetric and without trace."""
+    """Return [i, k] dH_i / dr_k = sum_j W_ijk M_j, per unit of length; the matrix is symmetric and
+    traceless."""
     turn, cross, bend = six[2], six[3], rho * six[5]
     both, steep = six[4] + 2.0 * cross, bend + 4.0 * turn
     m_out = outward.dot(m_across)
     tilt = cross * m_across + (bend * m_along - both * m_out) * outward
     spread = turn * m_out + cross * m_along
     mixed = turn * m_across - 0.5 * (steep * m_out + both * m_along) * outward
-    # x y^T + y x^T for the pairs that are not alike, and what stands alone on the diagonal.
+    # x y^T + y x^T for the mixed pairs, and the separate terms on the diagonal.
     half = outward.outer_product(mixed) + axis.outer_product(
         tilt + 0.5 * (bend * m_out + six[4] * m_along - spread) * axis
     )

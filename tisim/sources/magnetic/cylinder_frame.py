@@ -1,8 +1,9 @@
-"""The directions of a cylinder, found in 50 digits, and places about it without cancellation.
+"""The directions of a cylinder, computed with 50 digits, and positions relative to it without cancellation.
 
-Beside the middle of a long cylinder that is magnetised along its axis the field is only of the order of
-(R/L)^2 M, and a magnetisation across the axis would make one of the order of M: what rounding puts across it
-decides the field. Far along the axis, a point's distance from it is a small difference of large numbers.
+Beside the middle of a long cylinder that is magnetised along its axis, the field is only of the order of
+(R/L)^2 M. A magnetisation across the axis would cause a field of the order of M, so even the part across the
+axis that rounding adds determines the field. Far along the axis, the distance of a point from the axis is a
+small difference of large numbers.
 """
 
 from __future__ import annotations
@@ -15,15 +16,14 @@ from tisim.components.component import Vector
 from tisim.numerics.ieee import rounded_vector
 
 DIGITS, BITS = 50, 24
-"""These are the digits of what is found here, and the bits of a unit vector's leading part, whose product
-with as many is exact."""
+"""Decimal digits used here, and bits of the leading part of a unit vector; the product of two such parts is
+exact."""
 LARGEST_PLACE = 1e37
-"""This is the largest place (m) along an axis that is split, within the range of f32."""
+"""Largest coordinate (m) along an axis that is split, within the range of f32."""
 
 
 def split_direction(axis: Vector) -> tuple[Vector, Vector]:
-    """Return the unit vector along an axis as the sum of one of ``BITS`` bits and what is left, which is
-    rounded."""
+    """Return the unit vector along an axis as the sum of a vector of ``BITS`` bits and the rounded rest."""
     with localcontext(prec=DIGITS):
         a = [Decimal(c) for c in axis]
         size = _dot(a, a).sqrt()
@@ -58,11 +58,11 @@ def _vector(components: list[float]) -> Vector:
 
 @ti.func
 def place(r, centre, lead, rest):
-    """Return where r lies: its distance from the axis, the unit vector from there, and its place along the
-    axis as a sum of two, of which the first has the bits of f32.
+    """Return the position of r relative to an axis: its distance from the axis, the unit vector away from the
+    axis, and its coordinate along the axis as a sum of two numbers, of which the first has the bits of f32.
 
-    It is exact to rounding of the distance from the axis, however far from the centre. r, centre : m. lead,
-    rest : the direction, as of ``split_direction``.
+    The error is at the level of rounding of the distance from the axis, at any distance from the centre. r,
+    centre : m. lead, rest : the direction, from ``split_direction``.
     """
     # r - centre = d + lost, exactly (D. E. Knuth, The Art of Computer Programming, volume 2, 4.2.2).
     d = rounded_vector(r - centre, lead[0])

@@ -1,8 +1,10 @@
-"""The six numbers of a cylinder's end from a table, in units of its radius: one for cylinders of any shape.
+"""The six numbers of a cylinder's end from a table, in units of its radius; one table serves cylinders of any
+shape.
 
-A point is placed by its distance d from the rim and its direction from there, as that is where the numbers
-vary: cells of equal widths in d^2 between powers of two, and in u / (|x| + u), x = rho - 1. That takes bits,
-no logarithm and no angle. In each cell the numbers are polynomials through Chebyshev points.
+A point is located by its distance d from the rim and its direction from the rim, because the numbers vary
+most near the rim. Cells have equal widths in d^2 between powers of two, and in u / (|x| + u), x = rho - 1.
+They are found from bits, without a logarithm or an angle. In each cell the numbers are polynomials through
+Chebyshev points.
 """
 
 from functools import cache
@@ -18,19 +20,20 @@ from tisim.errors import InputError
 from tisim.sources.magnetic.cylinder_end import end
 
 FIRST_OCTAVE, OCTAVES_END = -40, 16
-"""The table is between these powers of two of (d / R)^2."""
+"""The table covers (d / R)^2 between these powers of two."""
 GRIDS = ((3, 1, 2), (3, 2, 4), (3, 4, 8), (3, 8, 16), (5, 4, 8), (5, 8, 16))
-"""These are the degree, and the cells of d^2 in an octave and of direction in a quadrant; the smallest
+"""Polynomial degree, cells of d^2 per octave, and cells of direction per quadrant; the smallest table
 first."""
 SAFE = 3.0
-"""Field and gradient are differences between ends, in which errors weigh more, by less than this factor."""
+"""Upper bound on the factor by which errors grow in field and gradient, which are differences between
+ends."""
 
 
 @in_taichi_thread
 @ti.kernel
 def _ends(places: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[valid-type]
     for i in range(places.shape[0]):
-        # Beyond the axis all but the third, which is odd, are what they are before it.
+        # On the other side of the axis all numbers are the same except the third, which is odd.
         six = end(ti.abs(places[i, 0]), places[i, 1], 1.0)
         six[2] *= ti.select(places[i, 0] < 0.0, -1.0, 1.0)
         for k in ti.static(range(6)):
@@ -38,8 +41,8 @@ def _ends(places: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[
 
 
 def _numbers(octave: np.ndarray, part: np.ndarray, side: np.ndarray, slant: np.ndarray) -> tuple[Any, Any]:
-    """Return rho / R and the six numbers of points with (d/R)^2 = part 2^octave, 1 <= part < 2; of one
-    shape."""
+    """Return rho / R and the six numbers for points with (d/R)^2 = part 2^octave, 1 <= part < 2; arrays of
+    one shape."""
     d = np.sqrt(np.ldexp(part, octave)) / np.hypot(1 - slant, slant)
     places = np.stack([1 + side * d * (1 - slant), d * slant], axis=-1)
     out = np.zeros((*places.shape[:-1], 6))
@@ -63,8 +66,8 @@ def _coefficients(degree: int, parts: int, slants: int) -> np.ndarray:
 
 
 def _error(coefficients: np.ndarray, points: int = 200_000) -> float:
-    """Return the largest error at random points, of what makes the field and of what makes the gradient, each
-    of its own size."""
+    """Return the largest error at random points, for the numbers of the field and for those of the gradient,
+    each relative to their own magnitude."""
     draw = np.random.Generator(np.random.Philox(16))
     _, parts, slants, _, n, _, _ = coefficients.shape
     octave, side = draw.integers(FIRST_OCTAVE, OCTAVES_END, points), draw.integers(0, 2, points)
@@ -83,8 +86,7 @@ def _error(coefficients: np.ndarray, points: int = 200_000) -> float:
 
 @cache
 def _table(digits: int, settings: runtime.Runtime) -> tuple[np.ndarray, tuple[int, int, int]]:
-    """Return the smallest table that is accurate to so many digits, (cells, numbers in each), and its
-    grid."""
+    """Return the smallest table accurate to this number of digits, (cells, numbers in each), and its grid."""
     for grid in GRIDS:
         coefficients = _coefficients(*grid)
         if SAFE * _error(coefficients) < 10.0**-digits:
@@ -93,13 +95,13 @@ def _table(digits: int, settings: runtime.Runtime) -> tuple[np.ndarray, tuple[in
 
 
 def table(digits: int) -> tuple[np.ndarray, tuple[int, int, int]]:
-    """Return the table of so many digits, made once for the running settings; InputError where none is so
-    accurate."""
+    """Return the table for a number of digits, made once for the running settings; raise InputError if no
+    table is accurate enough."""
     return _table(digits, runtime.current())
 
 
 class TabulatedEnds:
-    """These ends are read from a table, where there is one. cells : the bound array of ``table``."""
+    """Ends read from a table, within its range. cells : the bound array of ``table``."""
 
     far = 9.0
 
@@ -112,7 +114,7 @@ class TabulatedEnds:
     @ti.func
     def both(self, rho, u, radius):
         both = ti.Matrix([[0.0 * rho, 0.0 * rho] for _ in range(6)])
-        # A loop, so that what is long is compiled once.
+        # A loop, so that the long code is compiled once.
         for k in range(2):
             first = k == 0
             one = self.at(rho, ti.select(first, u[0], u[1]), radius)
@@ -122,7 +124,7 @@ class TabulatedEnds:
 
     @ti.func
     def mostly(self, rho, u, radius):
-        # A table is read with branches.
+        # Reading a table needs branches.
         return ti.Matrix([[0.0 * rho, 0.0 * rho] for _ in range(6)]), False
 
     @ti.func
@@ -138,7 +140,8 @@ class TabulatedEnds:
 
     @ti.func
     def read(self, x, y, square, radius):
-        # Of a number in f32 the bits from 23 on are its octave, and the next ones where it is in there.
+        # In an f32 number, the bits from 23 on are its octave, and the next lower bits its part of the
+        # octave.
         bits = ti.bit_cast(ti.cast(square, ti.f32), ti.i32)
         octave, part = bits >> 23, (bits >> self.shift) & (self.parts - 1)
         inverse = ti.cast(ti.bit_cast((254 - octave) << 23, ti.f32), float)

@@ -1,4 +1,4 @@
-"""What uniformly magnetised bodies have in common, whatever their shape."""
+"""Common parts of uniformly magnetised bodies of any shape."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from tisim.state.bound import Peers
 
 
 class Body(Component):
-    """This is the contract of a solid body that may be magnetised; k is its row in the list of the source."""
+    """The contract of a solid body that may be magnetised; k is its row in the list of the source."""
 
     contract: ClassVar[bool] = True
 
@@ -23,7 +23,7 @@ class Body(Component):
     @ti.func
     def nearest(self, w, k, r):
         """Return the distance of r (m) from the surface of body k, negative inside, and the unit vector along
-        which it grows."""
+        which it increases."""
         return 0.0 * r[0], 0.0 * r
 
     @ti.func
@@ -33,31 +33,31 @@ class Body(Component):
 
     @ti.func
     def flux(self, w, k, r):
-        """Return B (T) and its gradient dB_i/dr_j (T/m), which is right where r is not on the surface."""
+        """Return B (T) and its gradient dB_i/dr_j (T/m), which is valid for r off the surface."""
         return 0.0 * r, 0.0 * r.outer_product(r)
 
     @ti.func
     def flux_mostly(self, w, k, r):
-        """Return B and its gradient without a loop or a branch, so that compilers take many points at once,
-        and whether they are right. Where they are not, and for a body that has no such way, ``flux`` is."""
+        """Return B and its gradient without a loop or a branch, so that compilers vectorise over points, and
+        whether they are valid. If they are not, or if a body has no such method, ``flux`` must be used."""
         return 0.0 * r, 0.0 * r.outer_product(r), False
 
 
 class Magnets(Source):
-    """This is the contract of the sum of the fields of a list of bodies, each magnetised as it says, not by
-    the others."""
+    """The contract of a source that sums the fields of a list of bodies, each with its given magnetisation;
+    bodies do not magnetise each other."""
 
     contract: ClassVar[bool] = True
     quantity: ClassVar[str] = "magnetic_flux_density"
     each: ClassVar[Any]
-    """The bodies, where this is bound."""
+    """The bodies, in the bound source."""
 
     def bodies(self) -> Sequence[Any]:
-        """Return the bodies, those of all its lists."""
+        """Return the bodies of all lists."""
         return [body for name, _ in self.lists() for body in getattr(self, name)]
 
     def strongest(self) -> float:
-        # Of a body alone it is at most mu_0 M, wherever it is.
+        # The field of a single body is at most mu_0 M everywhere.
         return mu_0 * sum(math.hypot(*body.magnetisation) for body in self.bodies())
 
     def shortest_length(self) -> float:
@@ -85,7 +85,8 @@ class Magnets(Source):
 
     @ti.func
     def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        # What vectors are right for, then the other points one by one; a tile of one point has no vectors.
+        # First the points for which the vectorised form is valid, then the others one by one; a tile of one
+        # point has no vectors.
         size = ti.static(r[0].n)
         for k in range(self.each.size(w)):
             left, wrong = ti.Vector([1] * size, ti.i32), size

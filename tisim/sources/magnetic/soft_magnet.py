@@ -1,6 +1,6 @@
-"""How far a uniform field magnetises a soft cylinder: as far as saturation lets it shield itself.
+"""The magnetisation of a soft cylinder in a uniform field, limited by self-shielding and saturation.
 
-Plain NumPy on what a scene is made of: ``Cylinder(..., magnetisation=magnetisation(...))``.
+Plain NumPy to compute input for a scene: ``Cylinder(..., magnetisation=magnetisation(...))``.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from tisim.sources.magnetic.stoner_wohlfarth import demagnetising_factor
 def magnetisation(
     axis: Vector, radius: float, length: float, saturation: float, flux_density: Vector
 ) -> Vector:
-    """Return M (A/m) of a body without hysteresis and of a permeability without end, in a uniform field B_0
-    (T).
+    """Return M (A/m) of a body without hysteresis and with infinite permeability, in a uniform field B_0 (T).
 
-    It minimises shape and Zeeman energy, mu_0/2 M.N M - M.B_0 per volume, among all M of size ``saturation``
-    at most. So its own field cancels the applied one inside, N M = B_0/mu_0 along each axis, until it is
-    saturated; from there on M turns towards the field, as of a body that always is (stoner_wohlfarth.py).
-    N is the mean over the volume. Long bodies saturate in weaker fields along their axis than across, where
-    N is near 1/2.
+    It minimises shape and Zeeman energy, mu_0/2 M.N M - M.B_0 per volume, among all M with a magnitude of at
+    most ``saturation``. The field of the body then cancels the applied one inside, N M = B_0/mu_0 along each
+    axis, until the body is saturated. Beyond saturation M turns towards the field, as in a body that is
+    always saturated (stoner_wohlfarth.py). N is the mean over the volume. Long bodies saturate in weaker
+    fields along their axis than across it, because N across is near 1/2.
+
     Source: R. M. Bozorth, D. M. Chapin, J. Appl. Phys. 13 (1942) 320.
+
     InputError is raised for an axis of length 0, or a cylinder or saturation that is not above 0.
     """
     size = float(np.linalg.norm(axis))

@@ -1,4 +1,4 @@
-"""The magnetic field of uniformly magnetised spheres, any number of them, anywhere."""
+"""The magnetic field of any number of uniformly magnetised spheres at any place."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class MagneticSpheres(Magnets):
     """Uniformly magnetised spheres make a magnetic field, the sum over all of them; they do not magnetise
     each other.
 
-        B = 2/3 mu_0 M inside;    outside that of a dipole of moment M V, V the volume
+        B = 2/3 mu_0 M inside;    outside a dipole of moment M V, V the volume
 
     Source: J. D. Jackson, Classical Electrodynamics (1999), Eqs (5.56), (5.105).
     """

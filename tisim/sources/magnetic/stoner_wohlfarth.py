@@ -1,6 +1,6 @@
-"""Which way a uniform field magnetises a saturated cylinder: the model of Stoner and Wohlfarth (B16 6.3).
+"""The magnetisation of a saturated cylinder in a uniform field: the model of Stoner and Wohlfarth (B16 6.3).
 
-Plain NumPy on what a scene is made of: ``Cylinder(..., magnetisation=magnetisation(...))``.
+Plain NumPy to compute input for a scene: ``Cylinder(..., magnetisation=magnetisation(...))``.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ def demagnetising_factor(radius: float, length: float) -> float:
     """Return N of a uniformly magnetised cylinder along its axis, the mean over its volume; (1 - N) / 2
     across it.
 
-    1 - N is what a current sheet of its shape has of the inductance of a long one, per length: with
-    k^2 = 4 R^2 / (4 R^2 + l^2), 4 / (3 pi k') ((k'/k)^2 (K - E) + E - k) (L. Lorenz, Ann. Phys. 243 (1879)
-    161; H. Nagaoka, J. Coll. Sci. Imp. Univ. Tokyo 27 (1909) 1).
+    1 - N is the inductance per length of a current sheet of this shape, over the inductance per length of a
+    long one: with k^2 = 4 R^2 / (4 R^2 + l^2), 4 / (3 pi k') ((k'/k)^2 (K - E) + E - k) (L. Lorenz, Ann.
+    Phys. 243 (1879) 161; H. Nagaoka, J. Coll. Sci. Imp. Univ. Tokyo 27 (1909) 1).
+
     InputError is raised unless both (m) are above 0.
     """
     must(radius > 0, "radius of a cylinder", "greater than 0", radius)
@@ -41,9 +42,12 @@ def magnetisation(
 
         mu_0 M^2 / 4 (1 - 3 N) sin^2(psi) - M B_0 cos(psi - alpha)
 
-    It is the minimum over all psi, so without hysteresis. Of two alike the one along ``axis`` is taken;
-    without a field that is where M of a long cylinder points, and a flat one then has it somewhere across.
+    It is the minimum over all psi, so there is no hysteresis. Of two equal minima the one nearer to the
+    direction of ``axis`` is taken. Without a field, M of a long cylinder therefore points along ``axis``, and
+    M of a flat one in an arbitrary direction across it.
+
     Source: E. C. Stoner, E. P. Wohlfarth, Phil. Trans. R. Soc. A 240 (1948) 599; B16 section 6.3.
+
     InputError is raised for an axis of length 0, or a cylinder or saturation that is not above 0.
     """
     size = float(np.linalg.norm(axis))
@@ -64,11 +68,11 @@ def magnetisation(
 def _angle(anisotropy: float, along: float, across: float) -> float:
     """Return psi that minimises a/2 sin^2(psi) - b_1 cos(psi) - b_2 sin(psi), all in T; b_2 >= 0.
 
-    Where it is stationary x = tan(psi/2) satisfies b_2 x^4 + 2 (b_1 - a) x^3 + 2 (b_1 + a) x - b_2 = 0.
+    At stationary points x = tan(psi/2) satisfies b_2 x^4 + 2 (b_1 - a) x^3 + 2 (b_1 + a) x - b_2 = 0.
     """
     roots = np.roots([across, 2 * (along - anisotropy), 0.0, 2 * (along + anisotropy), -across])
-    # Not all of these angles are stationary: a minimum among them is one all the same. Sorted by what they
-    # are to the axis, so that rounding does not choose between two that are alike.
+    # Not all of these angles are stationary, but the least energy among them is the minimum. They are sorted
+    # by their angle from the axis, so that rounding does not choose between two equal minima.
     angles = np.unique([0.0, np.pi / 2, np.pi, *(2 * np.arctan(roots.real))])
     angles = angles[np.argsort(-np.cos(angles), kind="stable")]
     energy = 0.5 * anisotropy * np.sin(angles) ** 2 - along * np.cos(angles) - across * np.sin(angles)

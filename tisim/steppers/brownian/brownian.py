@@ -33,7 +33,7 @@ from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.intervals import INTERVAL_FLAGS, INTERVAL_QUANTITIES, BeginIntervals
 
 LONGEST_RELAXATION = 0.2
-"""Steps are at most this part of the time in which a spring draws a particle back."""
+"""Steps are at most this fraction of the relaxation time of a spring."""
 
 
 class Brownian(Stepper):
@@ -42,26 +42,26 @@ class Brownian(Stepper):
         dr_i = u(r_i) dt + dt/(kT) sum_j D_ij F_j + R_i,    <R_i> = 0,    <R_i R_j> = 2 D_ij dt
 
     u is the sum of all sources of a flow velocity, F the sum of forces, D the diffusion tensor at the start
-    of the step and R normal noise. ``velocity`` is that of drift in the last step, u + sum_j D_ij F_j / kT.
-    Its mean is exact to first order in dt, and so is every statistic (weak order 1). The fluid has no inertia
-    either; it is infinite, and at rest but for u.
+    of the step and R normal noise. ``velocity`` is the drift velocity of the last step, u + sum_j D_ij F_j /
+    kT. Its mean, and every statistic, is exact to first order in dt (weak order 1). The fluid has no inertia
+    either; it is infinite, and at rest except for u.
 
-    In a trap of stiffness k the variance of the place is kT/k / (1 - a/2), with a = dt k / (6 pi eta R); it
-    grows without bound from a = 2 on. Steps with a above 0.2, where it is a ninth too large, are refused for
-    forces on single particles that tell their stiffness (``critical_step``), as ``tether`` does.
+    In a trap of stiffness k the variance of the position is kT/k / (1 - a/2), with a = dt k / (6 pi eta R);
+    for a >= 2 it grows without bound. At a = 0.2 it is one ninth too large. Steps with larger a are refused
+    for forces on single particles that report their stiffness (``critical_step``), such as ``tether``.
 
-    Noise is made by Cholesky's decomposition ("exact"), or by the truncated expansion, in N^2 operations
-    ("fast"). A world in which the diffusion tensor is not positive definite fails, with time and particle:
-    that happens with Oseen's tensor at distances below some 3/2 R. "fast" sees only pairs for which it is
-    not.
+    Noise is made by a Cholesky decomposition ("exact"), or by the truncated expansion, in N^2 operations
+    ("fast"). A world in which the diffusion tensor is not positive definite fails, with time and particle;
+    this happens with Oseen's tensor at distances below about 3/2 R. "fast" detects only pairs whose tensor is
+    not positive definite.
 
-    Particles whose field ``fixed`` is not 0 stay where they are, and take no part in D. Spheres do not
-    rotate: refused are torques, and also what asks for velocities, which particles here do not have: drag,
-    loss in contact, and what happens in an impact. Interaction is refused in a periodic box, as the tensors
-    are of an infinite fluid.
+    Particles whose field ``fixed`` is not 0 stay in place and take no part in D. Spheres do not rotate, so
+    torques are refused. Effects that depend on velocities are refused too, because particles have none here:
+    drag, losses in contacts, and impacts. Hydrodynamic interaction is refused in a periodic box, because the
+    tensors are those for an infinite fluid.
 
-    Particles that do not feel each other, and that operators change one by one, take steps of their own and
-    meet at every multiple of ``control.longest``; a step of the world is then from one to the next.
+    If particles do not interact, and operators change them one by one, each particle takes its own steps. All
+    meet at every multiple of ``control.longest``; a step of the world is then one such interval.
 
     Source: B16 Eqs (6.1)-(6.16).
     """
@@ -70,9 +70,9 @@ class Brownian(Stepper):
     viscosity: float = parameter("Pa s", "dynamic viscosity eta of the fluid", examples=[1e-3], gt=0)
     control: DriftLimit = option("step control")
     hydrodynamics: Literal["none", "oseen", "rotne-prager"] = option(
-        "hydrodynamic interaction: what D_ij is for i != j, zero or a tensor", "none"
+        "hydrodynamic interaction: tensor D_ij for i != j; none: D_ij = 0", "none"
     )
-    noise: Literal["exact", "fast"] = option("how noise is made", "exact")
+    noise: Literal["exact", "fast"] = option("method that makes the noise", "exact")
 
     all_pairs = True
     random: ClassVar = True
@@ -118,7 +118,8 @@ class Brownian(Stepper):
         return separate and self.hydrodynamics == "none"
 
     def countable(self, effects: Sequence[Effect]) -> float:
-        # Where each takes its own, the noise of a step is numbered by 32 bits of its interval.
+        # If each particle takes its own steps, the noise of a step is numbered by 32 bits within its
+        # interval.
         return 2**32 if self.independent(effects) else super().countable(effects)
 
     def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
@@ -156,5 +157,5 @@ class Brownian(Stepper):
 
 
 def _one_by_one(effect: Effect) -> bool:
-    """Return whether an effect changes each particle by itself, and a world as a whole never."""
+    """Return whether an effect changes particles one by one and never a world as a whole."""
     return isinstance(effect, Operator) and not effect.acts_on_worlds()

@@ -1,4 +1,4 @@
-"""Brownian particles that feel each other: all take the same step, the longest that each of them allows."""
+"""Interacting Brownian particles: all take the same step, the longest that every particle allows."""
 
 from tisim.backend.taichi import ti
 from tisim.program.phases import PerParticle, Phase
@@ -9,7 +9,7 @@ from tisim.steppers.context import StepContext
 
 @ti.data_oriented
 class Separate:
-    """Separate leaves out hydrodynamic interaction: D_ij = 0 for i != j."""
+    """No hydrodynamic interaction: D_ij = 0 for i != j."""
 
     def __init__(self, fluid) -> None:
         self.s, self.fluid = fluid.s, fluid
@@ -20,7 +20,7 @@ class Separate:
 
     @ti.func
     def push_velocity(self, w, i):
-        """Return the velocity (m/s) that forces give particle i, sum_j D_ij F_j / kT."""
+        """Return the velocity (m/s) of particle i due to forces, sum_j D_ij F_j / kT."""
         return self.fluid.push_velocity(w, i, self.fluid.mobility(w, i))
 
     @ti.func
@@ -30,7 +30,8 @@ class Separate:
 
 
 class BrownianDrift(PerParticle):
-    """This phase sets the velocity of drift at the start of a step, and notes the step that it allows."""
+    """This phase sets the drift velocity at the start of a step, and records the step length that it
+    allows."""
 
     def __init__(self, context: StepContext, fluid, interaction) -> None:
         super().__init__(context.s)
@@ -76,8 +77,8 @@ class Scatter(PerParticle):
 
 
 class Proceed(Phase):
-    """This phase moves time on, tells pair lists how far particles have moved, and lifts every limit on the
-    next step."""
+    """This phase advances time, reports displacements to the pair lists, and resets the limits on the next
+    step."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.lists = context.s, context.neighbour_lists

@@ -1,4 +1,4 @@
-"""How long a step of Brownian dynamics may be: from how far forces would push particles in it."""
+"""The step length of Brownian dynamics, limited by the displacement due to forces."""
 
 from __future__ import annotations
 
@@ -15,36 +15,35 @@ from tisim.state.status import WorldStatus
 from tisim.steppers.step_control import SHORTEST_STEP, Controller
 
 LARGEST_DRIFT = 1e9
-"""The number of steps in one longest step is at most this: a particle by itself numbers them with 32 bits."""
+"""Largest number of steps in one longest step; an independent particle numbers them with 32 bits."""
 
 
 @ti.func
 def fault(rate):
-    """Return the status that says what is wrong with a force that asks for steps of 1/rate which are too
-    short."""
+    """Return the status for a force that requires steps of 1/rate, which are too short."""
     return ti.select(finite(rate), WorldStatus.FORCE_TOO_STEEP, WorldStatus.NOT_FINITE)
 
 
 class DriftLimit(Controller):
-    """A step is so short that no force pushes a particle farther than a part of its radius.
+    """The step is so short that forces push no particle farther than a given part of its radius.
 
-    The velocity that is limited is that which forces give, sum_j D_ij F_j / kT, at the start of the step; so
-    the step depends on nothing that is random in it, and its noise has the law of a step given beforehand.
-    The flow is left out: it pushes neighbours alike, and to resolve it is up to ``longest``. What noise does
-    in a step is not limited either: a particle diffuses by sqrt(2 D dt) into the potential of another before
-    it feels that, and is pushed out again in steps of at most ``drift`` radii. So overlaps stay bounded
-    whatever the step, but for right statistics of contacts, ``longest`` has to keep sqrt(2 D dt) below the
-    range over which the potential changes by kT.
+    The limited velocity is the part due to forces, sum_j D_ij F_j / kT, at the start of the step. The step
+    therefore depends on nothing random within it, and its noise has the distribution of a step of given
+    length. The flow is not limited, because it moves neighbours alike; choose ``longest`` to resolve it. The
+    displacement by noise is not limited either: a particle diffuses by sqrt(2 D dt) into the potential of
+    another before it feels the force, and is then pushed out in steps of at most ``drift`` radii. So overlaps
+    stay bounded for any step length, but for correct statistics of contacts, ``longest`` must keep sqrt(2 D
+    dt) below the range over which the potential changes by kT.
     """
 
     longest: float = parameter(
         "s",
-        "longest step; particles by themselves meet at multiples of it",
+        "longest step; independent particles meet at multiples of it",
         examples=[1e-4],
         ge=SHORTEST_STEP,
     )
     shortest: float = parameter(
-        "s", "shortest step; a force that asks for less stops its world", 1e-12, ge=SHORTEST_STEP
+        "s", "shortest step; a force that requires a shorter one stops its world", 1e-12, ge=SHORTEST_STEP
     )
     drift: float = parameter("", "largest displacement by forces in a step, over the radius", 0.05, gt=0)
 
@@ -66,27 +65,27 @@ class DriftLimit(Controller):
 
     @ti.func
     def rate(self, s, w, i, velocity):
-        """Return 1 over the step (1/s, f64) that a particle allows which forces move at ``velocity``
+        """Return the inverse of the step (1/s, f64) that a particle allows if forces move it at ``velocity``
         (m/s)."""
         return ti.cast(velocity.norm() / (self.drift(w) * s.radius[w, i]), ti.f64)
 
     @ti.func
     def easy(self, s, w, i, velocity):
-        """Return whether a particle allows the longest step, found without root and division, which take
-        longer than the rest of a step; False for a NaN."""
+        """Return whether a particle allows the longest step; False for NaN. This is computed without root and
+        division, which would take longer than the rest of a step."""
         reach, path = self.drift(w) * s.radius[w, i], self.longest(w) * velocity
         return path.norm_sqr() < reach * reach
 
     @ti.func
     def hopeless(self, w, rate):
-        """Return whether the step for this rate (1/s) is too short; also True for a NaN."""
+        """Return whether the step for this rate (1/s) is too short; also True for NaN."""
         return not (rate * ti.cast(self.shortest(w), ti.f64) <= 1.0)
 
     @ti.func
     def step(self, w, rate):
         """Return the step (s, f64) for this rate (1/s)."""
         dt = ti.cast(self.longest(w), ti.f64)
-        # A branch that is mostly not taken: others need not wait for the force.
+        # This branch is rarely taken; then the other particles need not wait for the force.
         if rate * dt > 1.0:
             dt = 1.0 / rate
         return dt

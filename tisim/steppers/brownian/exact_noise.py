@@ -1,6 +1,7 @@
-"""Hydrodynamic interaction with noise of exactly the covariance it must have, by a Cholesky decomposition.
+"""Hydrodynamic interaction with noise of the exact covariance, by a Cholesky decomposition.
 
-D = C C^T (B16 Eqs 6.15, 6.16), one of each world in every step, of 9 N^3 operations; the matrix is kept.
+D = C C^T (B16 Eqs 6.15, 6.16): one decomposition of 9 N^3 operations per world and step; the matrix is
+stored.
 """
 
 from tisim.backend import runtime
@@ -14,25 +15,26 @@ from tisim.state.fields import Field
 from tisim.state.status import WorldStatus
 
 GAUSS = Field("gauss", "", 3, "keep", scratch=True)
-"""This field holds the three standard normal numbers of a particle in a step."""
+"""The three standard normal numbers of a particle in a step."""
 TILE_ROWS = 16
-"""So many rows of the matrix are reduced together, so that compilers vectorise it."""
+"""Number of rows of the matrix that are reduced together, so that compilers vectorise the loop."""
 COLUMNS = 6
-"""So many columns are, which share what is read of earlier ones; a whole number of particles. Sums of 6 times
-16 numbers stay in registers (measured: those of 3 times 32 were in memory, and took 1.7 times as long)."""
+"""Number of columns that are reduced together and share the values read from earlier ones; a multiple of 3,
+the columns of a particle. The 6 times 16 sums stay in registers. (Measured: 3 times 32 sums were kept in
+memory, and took 1.7 times as long.)"""
 
 
 @ti.data_oriented
 class Exact:
-    """Exact keeps the diffusion matrix of every world, over sqrt(D_ii D_jj); then C^T in its place, a row for
-    each column of C.
+    """The diffusion matrix of every world, over sqrt(D_ii D_jj), later replaced by C^T, with a row for each
+    column of C.
 
-    InputError is raised where all of them are more than the machine has room for.
+    InputError is raised if the matrices of all worlds exceed the memory of the machine.
     """
 
     def __init__(self, fluid, mobility, domain) -> None:
         self.s, self.fluid, self.mobility, self.domain = fluid.s, fluid, mobility, domain
-        # The last columns that are reduced together may reach past those of particles.
+        # The last columns that are reduced together may extend past the columns of particles.
         self.rows = -(-(3 * self.s.capacity + COLUMNS) // TILE_ROWS) * TILE_ROWS
         rule = f"within the {runtime.memory() / 1e9:.0f} GB that this process may have"
         fits = self.bytes() <= runtime.memory()
@@ -41,7 +43,7 @@ class Exact:
         builder = Builder()
         builder.dense(ti.i, self.s.worlds).dense(ti.jk, (self.rows, self.rows)).place(self.matrix)
         self.tree = Tree(builder)
-        # Pivots as small as rounding makes them are those of spheres in each other's place.
+        # Pivots at the level of rounding errors come from spheres at the same place.
         self.least = 1e-12 if self.s.real == ti.f64 else 1e-5
 
     def phases(self):
@@ -54,7 +56,7 @@ class Exact:
 
     @ti.func
     def push_velocity(self, w, i):
-        """Return the velocity (m/s) that forces give particle i, sum_j D_ij F_j / kT."""
+        """Return the velocity (m/s) of particle i due to forces, sum_j D_ij F_j / kT."""
         return self.s.velocity[w, i]
 
     @ti.func
@@ -64,7 +66,7 @@ class Exact:
         for j in range(i + 1):
             g = self.s.gauss[w, j]
             for a, b in ti.static(ti.ndrange(3, 3)):
-                # Also of the part above the diagonal of C, which is left as it was.
+                # The part above the diagonal of C, which was left unchanged, must not count.
                 z[a] += ti.select(3 * j + b <= 3 * i + a, self.matrix[w, 3 * j + b, 3 * i + a] * g[b], 0.0)
         return ti.sqrt(self.fluid.diffusivity(w, i)) * z
 
@@ -82,7 +84,7 @@ class Draw(PerParticle):
 
 
 class Push(PairSum):
-    """This phase sums what forces do, sum_j D_ij F_j / kT, and keeps it in ``velocity``."""
+    """This phase sums the velocities due to forces, sum_j D_ij F_j / kT, and stores them in ``velocity``."""
 
     def __init__(self, exact) -> None:
         super().__init__(exact.s, exact.domain, (exact.mobility,), None)
@@ -100,7 +102,7 @@ class Push(PairSum):
 
 
 class Fill(PerParticle):
-    """This phase fills in the block of a particle by itself, and those of it with the particles after it."""
+    """This phase fills in the blocks of a particle with itself and with the particles after it."""
 
     def __init__(self, exact) -> None:
         super().__init__(exact.s)
@@ -125,7 +127,7 @@ class Factor(Phase):
 
     def __init__(self, exact) -> None:
         self.s, self.m = exact.s, exact
-        # 9 N^3 operations of one thread, for which others wait.
+        # 9 N^3 operations of one thread, for which the other threads wait.
         self.others = self.s.capacity**3
 
     @ti.func
@@ -140,7 +142,7 @@ class Factor(Phase):
 
     @ti.func
     def reduce(self, w, column, row):
-        """Take what earlier columns account for off ``COLUMNS``, in a tile of rows."""
+        """Subtract the contributions of earlier columns from ``COLUMNS`` columns, in a tile of rows."""
         matrix = ti.static(self.m.matrix)
         left = [ti.Vector([0.0] * TILE_ROWS, self.s.real) for _ in ti.static(range(COLUMNS))]
         for lane in range(TILE_ROWS):
@@ -158,15 +160,15 @@ class Factor(Phase):
 
     @ti.func
     def close(self, w, first, column, n):
-        """Take what columns from ``first`` on account for off a column, and divide it by the root of the
-        pivot."""
+        """Subtract the contributions of the columns from ``first`` on from a column, and divide it by the
+        root of the pivot."""
         matrix = ti.static(self.m.matrix)
         for k in range(first, column):
             x = matrix[w, k, column]
             for row in range(column, n):
                 matrix[w, column, row] = matrix[w, column, row] - x * matrix[w, k, row]
         pivot = matrix[w, column, column]
-        # Not above: also true of NaN.
+        # Written as a negation, so that it is also true for NaN.
         if not (pivot > -self.m.least):
             self.s.fail(w, WorldStatus.NOT_POSITIVE_DEFINITE, column // 3)
         scale = ti.select(pivot > self.m.least, 1.0 / ti.sqrt(ti.max(pivot, self.m.least)), 0.0)

@@ -1,4 +1,4 @@
-"""Hydrodynamic interaction with noise of nearly the covariance it must have, from one sum over pairs: TEA-HI.
+"""Hydrodynamic interaction with noise of approximate covariance, from one sum over pairs: TEA-HI.
 
 The truncated expansion of T. Geyer and U. Winter, J. Chem. Phys. 130, 114905 (2009), as in B16 6.3, with
 rho_ij = D_ij / sqrt(D_ii D_jj) and N particles:
@@ -6,11 +6,11 @@ rho_ij = D_ij / sqrt(D_ii D_jj) and N particles:
     z_i = sqrt(D_ii) C_i (g_i + beta sum_(j != i) rho_ij g_j),   C_i^-2 = 1 + beta^2 sum_(j != i) rho_ij^2,
     beta = (1 - sqrt(1 - q))/q,   q = (N - 1) eps^2 - (N - 2) eps,   eps the mean of rho_ij, j != i.
 
-Variances are exact, and covariances are where all rho_ij are equal. N and the mean, of tr rho_ij / 3, are
-those of one axis, as the elements between axes have mean 0: with all 3 N coordinates in one mean, covariances
-of two spheres that touch are off by 9 % of D_ii instead of 2 %. In clouds they are off by much more, as one
-beta cannot suit all distances: by a quarter of D_ij in one of 5 % of spheres
-(tests/steppers/brownian/test_hydrodynamics.py). Nothing is stored but sums.
+Variances are exact; covariances are exact if all rho_ij are equal. N and the mean (of tr rho_ij / 3) refer to
+one axis, because the elements between different axes have mean 0: with all 3 N coordinates in one mean, the
+covariances of two touching spheres are wrong by 9 % of D_ii instead of 2 %. In clouds the errors are much
+larger, because one beta cannot suit all distances: a quarter of D_ij in a cloud with a volume fraction of 5 %
+(tests/steppers/brownian/test_hydrodynamics.py). Only sums are stored.
 """
 
 from tisim.backend.taichi import ti
@@ -26,13 +26,12 @@ SUMS = (
     Field("coupling_squares", "", 3, "keep", scratch=True),
     Field("coupling", "", 1, "keep", scratch=True),
 )
-"""These fields hold the sums of a particle: sum_j rho_ij g_j, sum_j rho_ij^2 for each coordinate, and the
-traces of rho_ij."""
+"""The sums of a particle: sum_j rho_ij g_j, sum_j rho_ij^2 for each coordinate, and the traces of rho_ij."""
 
 
 @ti.data_oriented
 class Fast:
-    """Fast makes the noise of a world by the truncated expansion."""
+    """The noise of a world by the truncated expansion."""
 
     def __init__(self, fluid, mobility, domain) -> None:
         self.s, self.fluid, self.mobility, self.domain = fluid.s, fluid, mobility, domain
@@ -43,12 +42,12 @@ class Fast:
 
     @ti.func
     def push_velocity(self, w, i):
-        """Return the velocity (m/s) that forces give particle i, sum_j D_ij F_j / kT."""
+        """Return the velocity (m/s) of particle i due to forces, sum_j D_ij F_j / kT."""
         return self.s.velocity[w, i]
 
     @ti.func
     def scattered(self, w, i):
-        """Return a random vector z_i (m/s^0.5) with nearly <z_i z_j> = D_ij."""
+        """Return a random vector z_i (m/s^0.5) with <z_i z_j> = D_ij approximately."""
         s = self.s
         beta = ti.cast(s.beta[w], s.real)
         scale = 1.0 / ti.sqrt(1.0 + beta * beta * s.coupling_squares[w, i])
@@ -56,8 +55,9 @@ class Fast:
 
 
 class Couple(PairSum):
-    """This phase makes all sums over the other particles: of what forces do, of noise, of squares, of traces;
-    and stops a world at pairs that cannot be, where the tensor does not exclude them."""
+    """This phase forms all sums over the other particles: velocities due to forces, noise, squares and
+    traces. If the tensor may be indefinite, it also stops a world at pairs for which it is not positive
+    definite."""
 
     by_inverse = True
 
@@ -78,7 +78,7 @@ class Couple(PairSum):
         noise = effect.times(parts, r, ti.sqrt(size) * self.s.gauss[w, j])
         a, b = parts[0], parts[1]
         along = a + b * square
-        # The diagonal of (a I + b r r^T)^2, of which the second is yet to be multiplied with squares of r.
+        # The diagonal of (a I + b r r^T)^2; the second term is multiplied by squares of r below.
         alike, apart = size * a * a, size * b * (a + along)
         total = ti.Vector.zero(self.s.real, self.components)
         for k in ti.static(range(3)):
@@ -119,5 +119,5 @@ class Weigh(Phase):
             n += ti.cast(self.fluid.mobile(w, i), ti.f64)
         mean = total / (3.0 * ti.max(n * (n - 1.0), 1.0))
         q = (n - 1.0) * mean * mean - (n - 2.0) * mean
-        # The same as above, without its 0/0 where nothing is coupled.
+        # The same as above, but without 0/0 if nothing is coupled.
         s.beta[w] = 1.0 / (1.0 + ti.sqrt(ti.max(1.0 - q, 0.0)))

@@ -1,4 +1,4 @@
-"""The fluid that Brownian particles move in: how each answers to forces, flow and heat by itself."""
+"""The fluid around Brownian particles: the response of each to forces, flow and heat by itself."""
 
 import scipy.constants
 
@@ -9,14 +9,14 @@ from tisim.sources.base import sources
 from tisim.steppers.context import StepContext
 
 PER_KELVIN = scipy.constants.k
-"""This is Boltzmann's constant, J/K."""
+"""Boltzmann's constant, J/K."""
 
 
 @ti.data_oriented
 class Fluid:
-    """The fluid is infinite, and at rest but for the flow.
+    """The fluid is infinite, and at rest except for the flow.
 
-    In a scene with the field ``fixed``, particles for which that is not 0 stay where they are.
+    Particles whose field ``fixed`` is not 0 stay in place, if the scene has this field.
     """
 
     def __init__(self, context: StepContext) -> None:
@@ -51,7 +51,7 @@ class Fluid:
 
     @ti.func
     def push_velocity(self, w, i, mobility):
-        """Return the velocity (m/s) that the force on particle i gives it."""
+        """Return the velocity (m/s) of particle i due to the force on it."""
         velocity = 0.0 * self.s.velocity[w, i]
         if ti.static(self.forced):
             velocity = mobility * self.s.force[w, i]
@@ -72,7 +72,7 @@ class Fluid:
 
     @ti.func
     def normals(self, w, i, step):
-        """Return three independent standard normal numbers, those of a particle in a step."""
+        """Return three independent standard normal numbers for a particle in a step."""
         return self.normals_of(self.words(w, i, step))
 
     @ti.func
@@ -82,6 +82,6 @@ class Fluid:
 
     @ti.func
     def normals_of(self, words):
-        """Return the three normal numbers that four words make."""
+        """Return three normal numbers made from four words."""
         g = philox.normals(words)
         return ti.cast(ti.Vector([g[0], g[1], g[2]]), self.s.real)

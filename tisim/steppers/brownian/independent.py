@@ -1,8 +1,8 @@
-"""Brownian particles that do not feel each other: each takes its own steps, many of them in one go.
+"""Brownian particles that do not interact: each takes its own steps, many of them in one launch.
 
-They meet at every multiple of the longest step, an interval, which is what counts as a step of the world (see
-intervals.py). A step of a particle is numbered by its interval and within it, so that how many
-intervals or steps a launch takes them through makes no difference to the noise either.
+They meet at every multiple of the longest step. Such an interval counts as a step of the world (see
+intervals.py). A step of a particle is numbered by its interval and by its place in it, so that the number of
+intervals or steps in a launch does not affect the noise.
 """
 
 from tisim.backend.taichi import ti
@@ -20,17 +20,17 @@ OWN_BROWNIAN_FIELDS = (
     Field("own_steps", "", 1, "keep", integer=True, scratch=True),
     Field("own_fault", "", 1, "keep", integer=True, scratch=True),
 )
-"""These fields say where a particle is on its way, after how many steps in its interval, and what has stopped
-it: a status of the world, or 0."""
+"""The progress of a particle: its time, the number of its steps in the interval, and its fault, a status of
+the world, or 0."""
 AHEAD = 8
-"""The noise of the first step, mostly the only one, is drawn for so many synchronisation intervals at once:
-in vectors."""
+"""Number of synchronisation intervals for which the noise of the first step, usually the only one, is drawn
+together, in vectors."""
 
 
 @ti.func
 def euler_step(s, fluid: ti.template(), w, i, mobility, push_velocity, t, dt, g):  # type: ignore[valid-type]
-    """Return the velocity of drift (m/s), u + F/(6 pi eta R), and the position (m) that a step leads to: by
-    dt times that + sqrt(2 D dt) g."""
+    """Return the drift velocity (m/s), u + F/(6 pi eta R), and the position (m) after a step: r plus
+    dt times this velocity + sqrt(2 D dt) g."""
     velocity = fluid.flow(w, i, t) + push_velocity
     width = ti.sqrt(2.0 * dt * fluid.heat(w) * mobility)
     return velocity, s.position[w, i] + (dt * velocity + width * g)
@@ -55,7 +55,7 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def advance(self, w, i):
-        """Take particle i through the intervals of the launch, from where it is."""
+        """Take particle i through the intervals of the launch, from its present time on."""
         s = self.s
         self.registers.load(w, i)
         interval, end = s.own_interval[w, i], s.intervals[w] + s.launch_intervals[w]
@@ -83,7 +83,7 @@ class IndependentBrownianSteps(PerParticle):
                     else:
                         interval, elapsed, carry, before = interval + 1.0, 0.0, 0.0, 0
         if self.able(w, i) == 0 and s.own_fault[w, i] == 0:
-            # It waits where the others will meet.
+            # The particle waits at the end of the launch for the others.
             interval, elapsed, carry, before = end, 0.0, 0.0, 0
         self.registers.store(w, i)
         s.own_interval[w, i], s.own_elapsed[w, i], s.own_carry[w, i] = interval, elapsed, carry
@@ -99,8 +99,7 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def able(self, w, i):
-        """Return 1 when there is anything to do for a particle, else 0: it is there, can move, and nothing
-        has stopped it."""
+        """Return 1 if a particle can still advance, else 0: it exists, can move, and has no fault."""
         s = self.s
         there = s.mass[w, i] > 0.0 and s.own_fault[w, i] == 0
         return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
@@ -108,9 +107,11 @@ class IndependentBrownianSteps(PerParticle):
     @ti.func
     def interval(self, w, i, interval, kick, start, rounding, before, most):
         """Take a particle through an interval from ``start`` (s) on, ``before`` steps after its beginning.
-        Return how far it gets (s), to the end unless stopped, in ``most`` further steps; the rounding error
-        of that; its steps in the interval; whether it can go on, and whether it is at the end. ``kick`` are
-        the normal numbers of the first step in the interval."""
+
+        Return the time it reaches (s), the end unless stopped or after ``most`` further steps; the rounding
+        error of this time; the number of its steps in the interval; whether it can go on; and whether it is
+        at the end. ``kick`` are the normal numbers of the first step in the interval.
+        """
         begin = beginning(self.s, self.control, w, interval)
         length = duration(self.s, self.control, w, interval, begin)
         elapsed, carry = start, rounding
@@ -143,7 +144,7 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def move(self, w, i, mobility, push_velocity, t, dt, g):
-        """Move a particle by a step, and let operators change it."""
+        """Move a particle by a step, and call the operators for it."""
         s, step = self.own, ti.cast(dt, self.s.real)
         s.velocity[w, i], s.position[w, i] = euler_step(
             s, self.fluid, w, i, mobility, push_velocity, t, step, g
@@ -160,14 +161,14 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def stop(self, w, i, fault):
-        """Stop a particle: it goes no further, and its world ends with the launch."""
+        """Stop a particle; its world ends with the launch."""
         s = self.s
         s.own_fault[w, i] = fault
         ti.atomic_max(s.halted[w], 1)
 
 
 class EndBrownianIntervals(EndIntervals):
-    """This phase ends the intervals, or finds the first particle to be stopped."""
+    """This phase ends the intervals, or finds the first stopped particle."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context)
@@ -175,7 +176,7 @@ class EndBrownianIntervals(EndIntervals):
 
     @ti.func
     def report_failure(self, w):
-        """Record the particle that was stopped first, and when."""
+        """Record the particle that stopped first, and when."""
         s = self.s
         first = self.slowest(w)
         self.stop(w, first, s.own_fault[w, first])

@@ -1,7 +1,7 @@
-"""How a sphere that is pushed drags others along: D_ij = kT/(6 pi eta) (a I + b r r^T), r from i to j.
+"""Hydrodynamic mobility of pairs of spheres: D_ij = kT/(6 pi eta) (a I + b r r^T), r from i to j.
 
-Both tensors have no divergence, sum_j dD_ij/dr_j = 0, so that none has to be added to the drift (B16 6.2.2).
-They are of an infinite fluid.
+Both tensors have no divergence, sum_j dD_ij/dr_j = 0, so no divergence term has to be added to the drift (B16
+6.2.2). They hold for an infinite fluid.
 """
 
 from tisim.backend.taichi import ti
@@ -9,8 +9,8 @@ from tisim.backend.taichi import ti
 
 @ti.data_oriented
 class Oseen:
-    """Oseen's tensor is that of points, a = 3/(4r), b = a/r^2 (B16 Eq. 6.9); it is not positive definite for
-    r < 3/2 sqrt(R_i R_j)."""
+    """Oseen's tensor, for point particles: a = 3/(4r), b = a/r^2 (B16 Eq. 6.9). It is not positive definite
+    for r < 3/2 sqrt(R_i R_j)."""
 
     sound = False
 
@@ -23,8 +23,7 @@ class Oseen:
 
 @ti.data_oriented
 class RotnePrager:
-    """This is the tensor of J. Rotne and S. Prager (1969) and H. Yamakawa (1970), for any radii, overlapping
-    or not.
+    """The tensor of J. Rotne and S. Prager (1969) and H. Yamakawa (1970), for any radii, overlapping or not.
 
     With R the larger radius, s = R_i + R_j, d = R_i - R_j, and b r^2 the second of each pair,
 
@@ -32,9 +31,9 @@ class RotnePrager:
         (s - (d^2 + 3 r^2)^2/(16 r^3))/(2 R_i R_j),        3 (d^2 - r^2)^2/(32 r^3 R_i R_j)     |d| < r <= s
         1/R,                                               0                                    r <= |d|
 
-    (P. J. Zuk, E. Wajnryb, K. A. Mizerski, P. Szymczak, J. Fluid Mech. 741, R5 (2014), Eqs 3.7-3.9; B16
-    Eq. 6.10 for equal radii). It is positive definite everywhere, but for spheres in each other's place:
-    those move as one, and the matrix is singular.
+    (P. J. Zuk, E. Wajnryb, K. A. Mizerski, P. Szymczak, J. Fluid Mech. 741, R5 (2014), Eqs 3.7-3.9; B16 Eq.
+    6.10 for equal radii). It is positive definite except for spheres at the same place: these move as one,
+    and the matrix is singular.
     """
 
     sound = True
@@ -42,7 +41,7 @@ class RotnePrager:
     @ti.func
     def of(self, one, other, r, inverse):
         """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m); inverse : 1/r."""
-        # In units of r. The radii are divided by themselves, so that this waits for no distance.
+        # In units of r. The division by the radii is separate, so that it need not wait for the distance.
         x, y, per_product = one * inverse, other * inverse, 1.0 / (one * other)
         squares, gap = 0.25 * (x * x + y * y), (x - y) * (x - y)
         around, within, apart = gap + 3.0, gap - 1.0, x + y < 1.0
@@ -50,7 +49,7 @@ class RotnePrager:
         a = ti.select(apart, inverse * (0.75 + squares), near)
         near = within * within * (per_product * (3.0 / 32.0))
         b = ti.select(apart, inverse * inverse * (0.75 - 3.0 * squares), near)
-        # Also true of spheres in one place, where the gap is not a number.
+        # Also true for spheres at the same place, for which the gap is not a number.
         inside = not (gap < 1.0)
         a = ti.select(inside, ti.select(one < other, one, other) * per_product, a)
         return ti.Vector([a, ti.select(inside, 0.0, b * inverse)])
@@ -58,7 +57,7 @@ class RotnePrager:
 
 @ti.data_oriented
 class Mobility:
-    """Mobility gives the blocks of a world over kT/(6 pi eta), 1/m; 0 between particles of which one cannot
+    """The blocks of the mobility matrix of a world over 1/(6 pi eta), 1/m; 0 if either particle cannot
     move."""
 
     short_ranged = False

@@ -1,8 +1,8 @@
-"""Brownian particles that do not feel each other, many at once: a particle in each lane of the CPU.
+"""Brownian particles that do not interact, many at once: one particle in each vector lane of the CPU.
 
-While every particle of a tile takes intervals in one step each, nothing branches, and compilers vectorise the
-loop over lanes. From the interval on in which one of them does not, the tile goes on one by one. The bits are
-the same.
+While every particle of a tile takes each interval in one step, nothing branches, and compilers vectorise the
+loop over lanes. From the first interval that one of them cannot take in one step, the particles of the tile
+advance one by one. The results are the same bit by bit.
 """
 
 from tisim.backend import runtime
@@ -16,8 +16,8 @@ from tisim.steppers.registers import Registers
 
 
 def vectorises(context: StepContext) -> bool:
-    """Return whether vectors are of use: on a CPU, in worlds with room for a tile, where all that a particle
-    meets in a step is arithmetic: no derived quantities, and no operators."""
+    """Return whether vectors help: on a CPU, if worlds have room for a tile and a step needs only arithmetic,
+    without derived quantities and operators."""
     simple = not context.operators and not context.force_sum.derived_solvers
     return simple and runtime.current().device == "cpu" and context.s.capacity >= TILE
 
@@ -46,8 +46,8 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
 
     @ti.func
     def level(self, w, first):
-        """Return 1 when all particles of a tile are where the launch begins, and have whole intervals before
-        them; else 0."""
+        """Return 1 if all particles of a tile are at the beginning of the launch and have only whole
+        intervals before them; else 0."""
         s = self.s
         level = ti.select(s.cut[w] > 0.0, 0, 1)
         for j in range(first, first + TILE):
@@ -57,8 +57,8 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
 
     @ti.func
     def tile(self, w, first):
-        """Take the particles from ``first`` on through as many intervals as all take in one step, and return
-        that number."""
+        """Take the particles from ``first`` on through intervals as long as all take each in one step, and
+        return the number of these intervals."""
         s = self.s
         place = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         drift = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
@@ -72,8 +72,8 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
             number, step = self.number(s.intervals[w] + finished), ti.cast(dt, s.real)
             if not (dt > 0.0):
                 halted = 1
-            # In loops of their own: one long chain of operations for each particle would fill the processor's
-            # queues, so that the next ones could not begin.
+            # Separate loops: with one long chain of operations per particle the processor's queues would
+            # fill, and the next particles could not begin.
             for lane in range(TILE):
                 drawn = self.lane_fluid.words(w, first + lane, number)
                 for k in ti.static(range(4)):

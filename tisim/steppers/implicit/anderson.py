@@ -1,9 +1,10 @@
-"""Anderson's acceleration of the fixed point (D. G. Anderson, J. ACM 12 (1965) 547-560), of depth 1.
+"""Anderson's acceleration of the fixed-point iteration (D. G. Anderson, J. ACM 12 (1965) 547-560), of depth
+1.
 
-The unknown is the force x that an iterate is made with; f(x) is the force that the iterate then gives, and
-r = f(x) - x the residual. In place of the next x = f the combination of the last two is taken that would make
-the residual smallest if f were linear: x = f - theta (f - f_last), theta = <r, r - r_last> / |r - r_last|^2.
-Forces enter the inner product as the displacement that they would cause. Torques go along with forces.
+The unknown is the force x used for an iterate; f(x) is the force at that iterate, and r = f(x) - x the
+residual. Instead of x = f, the next x is the combination of the last two that would minimise the residual if
+f were linear: x = f - theta (f - f_last), theta = <r, r - r_last> / |r - r_last|^2. Forces enter the inner
+product as the displacements that they would cause. Torques are treated together with forces.
 """
 
 from tisim.backend.taichi import ti
@@ -15,8 +16,8 @@ from tisim.steppers.context import StepContext
 
 
 def memory_of_iterates(turning: bool) -> tuple[Field, ...]:
-    """Return the fields of the force that an iterate was made with, that the last one gave, and its residual;
-    and of torques."""
+    """Return the fields of the force used for an iterate, of the last force, and of its residual; also for
+    torques."""
     names = [("force", "N"), *([("torque", "N m")] if turning else [])]
     return tuple(
         Field(f"{name}_{what}", unit, 3, "keep", scratch=True)
@@ -26,13 +27,14 @@ def memory_of_iterates(turning: bool) -> tuple[Field, ...]:
 
 
 def accelerated(context: StepContext, forces: tuple[Item, ...], sums: BlockSums) -> tuple[Item, ...]:
-    """Return the phases ``forces`` within an iteration, and those that mix the result with the last one."""
+    """Return the phases ``forces`` within an iteration, and the phases that mix the result with the last
+    one."""
     return (Used(context), *forces, Compare(context, sums), Mix(context, sums))
 
 
 class Mixed:
-    """Mixed lists what is mixed: value, that used, that of the last iterate, its residual; and whether it is
-    a torque."""
+    """The mixed quantities, each with its value, the used value, the value of the last iterate, its residual,
+    and whether it is a torque."""
 
     def __init__(self, context: StepContext) -> None:
         s = context.s
@@ -44,7 +46,7 @@ class Mixed:
 
 
 class Used(PerParticle):
-    """This phase notes the force that the present iterate was made with."""
+    """This phase stores the force used for the present iterate."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -57,7 +59,7 @@ class Used(PerParticle):
 
 
 class Compare(PerBlock):
-    """This phase sums <r, r - r_last> and |r - r_last|^2, of displacements."""
+    """This phase sums <r, r - r_last> and |r - r_last|^2, as displacements."""
 
     def __init__(self, context: StepContext, sums: BlockSums) -> None:
         super().__init__(sums)
@@ -70,7 +72,7 @@ class Compare(PerBlock):
         for column in ti.static(self.columns):
             inertia = s.mass[w, i]
             if ti.static(column[4]):
-                # A torque moves the surface as a force of 5/2 of it, over R, would: I = 2/5 m R^2.
+                # A torque moves the surface like a force of 5/2 times torque over R: I = 2/5 m R^2.
                 inertia *= 0.4 * s.radius[w, i]
             here = (column[0][w, i] - column[1][w, i]) / inertia
             change = here - column[3][w, i] / inertia
@@ -79,7 +81,7 @@ class Compare(PerBlock):
 
 
 class Mix(PerParticle):
-    """This phase takes x = f - theta (f - f_last); f itself when there is no last one."""
+    """This phase takes x = f - theta (f - f_last), or f itself in the first iteration."""
 
     def __init__(self, context: StepContext, sums: BlockSums) -> None:
         super().__init__(context.s)

@@ -1,4 +1,4 @@
-"""What implicit steppers have in common: attempts at a step, until one is accepted or all hope is lost."""
+"""Common parts of implicit steppers: attempts at a step, until one is accepted or none can succeed."""
 
 from tisim.backend.taichi import ti
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
@@ -9,11 +9,10 @@ from tisim.steppers.implicit.saved_state import SavedState
 from tisim.steppers.step_control import note_speed
 
 RETRY, ACCEPTED, HOPELESS = range(3)
-"""The verdict on an attempt is one of these: to be tried again with a shorter step, good, or given up for
-good."""
+"""The verdict on an attempt: try again with a shorter step, accepted, or given up."""
 
 SHORTER = 0.8
-"""A second attempt may be at most so long, in lengths of the first."""
+"""Largest length of a second attempt, over the length of the first."""
 
 
 class Begin(Phase):
@@ -37,8 +36,8 @@ class Begin(Phase):
 
 
 class SaveState(PerParticle):
-    """This phase keeps the state at the beginning of the step, and finds the largest speed where that limits
-    the step."""
+    """This phase stores the state at the beginning of the step, and finds the largest speed if it limits the
+    step."""
 
     def __init__(self, context: StepContext, saved_state: SavedState) -> None:
         super().__init__(saved_state.s)
@@ -52,7 +51,7 @@ class SaveState(PerParticle):
 
 
 class StepAttempt(Repeat):
-    """This repeat makes attempts at a step, until one is accepted or all hope is lost."""
+    """This repeat makes attempts at a step, until one is accepted or none can succeed."""
 
     def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
@@ -65,10 +64,10 @@ class StepAttempt(Repeat):
 
 @ti.func
 def length(s, control: ti.template(), w):  # type: ignore[valid-type]
-    """Return the length (s, f64) of the next attempt; the last step ends exactly on time."""
+    """Return the length (s, f64) of the next attempt; the last step ends exactly at the end of the run."""
     dt = control.step(s, w, s.next_dt[w], s.fastest[w])
     remaining = s.end[w] - s.time_before[w]
-    # A remainder as small as rounding leaves is not worth a step of its own.
+    # A remainder at the level of rounding errors gets no step of its own.
     if dt * (1.0 + 1e-6) >= remaining:
         dt = remaining
     return dt
@@ -76,8 +75,8 @@ def length(s, control: ti.template(), w):  # type: ignore[valid-type]
 
 @ti.func
 def report_failure(s, w):
-    """Record the particle whose last iterate changed most, and ask which force on it is at fault, see
-    failure_attribution.py."""
+    """Record the particle whose last iterate changed most, and request a search for the force on it that
+    fails (see failure_attribution.py)."""
     worst, most = 0, s.iterate_change[w, 0]
     for i in range(s.count[w]):
         if s.iterate_change[w, i] > most:
@@ -87,9 +86,9 @@ def report_failure(s, w):
 
 
 class RestoreState(PerParticle):
-    """After an attempt that has failed this phase puts everything back as it was, for the next one.
+    """After a failed attempt this phase restores the state at the beginning of the step.
 
-    One that is hopeless is left as it is: there, which force it was can still be seen (see
+    A hopeless attempt is left as it is, so that the force that failed can be found (see
     failure_attribution.py).
     """
 
@@ -113,7 +112,7 @@ class RestoreState(PerParticle):
 
 
 class Decide(Phase):
-    """This phase decides whether to try again."""
+    """This phase decides whether there is another attempt."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s

@@ -1,5 +1,5 @@
-"""The implicit stepper of high order: Lobatto's collocation, of which the papers' trapezoid is the first, and
-its step control, by an estimate of the error and by how its sweeps converge."""
+"""The implicit stepper of high order, Lobatto collocation, whose lowest order is the papers' trapezoidal
+rule; and its step control, by an error estimate and the convergence of its sweeps."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.step_control import SHORTEST_STEP
 
 CONTRACTION = 0.25
-"""A sweep is to multiply the error by this, at most, where convergence limits the step."""
+"""Largest factor by which a sweep should multiply the error, if convergence limits the step."""
 
 
 @ti.func
@@ -47,33 +47,33 @@ def eighth_powers(x):
 
 
 class StageControl(ImplicitControl):
-    """A step of collocation has the error that is asked for, and sweeps that converge.
+    """The error of each collocation step meets a requested error, and its sweeps converge.
 
-    The error is of position, of the sum over the particles or of each (``norm``), per "step": a bound of the
-    error of a step over the displacement in it, mostly far above the error itself; or per "run": the error at
-    the end over the size of the motion, by the leading term of the method's own error where forces are
-    smooth. A weak kink hides in that term, so where forces have kinks (``Effect.kinked``) the bound is taken
-    then, too. The resolution is there as for a particle that starts from rest the ratio of error and
-    displacement has no limit.
+    The error is an error of position, for the sum over the particles or for each particle (``norm``). With
+    per "step" it is a bound on the error of a step over the displacement in the step; the bound is usually
+    far above the error itself. With per "run" it is the error at the end over the size of the motion,
+    estimated for smooth forces by the leading term of the method's error. That term misses weak kinks, so for
+    forces with kinks (``Effect.kinked``) the bound is used with per "run" too. For a particle that starts
+    from rest the ratio of error and displacement would have no limit; the resolution prevents that.
 
-    With ``per="run"`` the error at the end was 0.03 to 30 times that asked for in 13 scenes, less under drag.
-    With kinks it was up to 9 times that for particles by themselves, and up to 70 for pairs at a cut-off
-    (docs/steppers.md). A chaotic motion multiplies it without bound.
+    With ``per="run"`` the error at the end was 0.03 to 30 times the requested error in 13 scenes, and smaller
+    under drag. With kinks it was up to 9 times the requested error for independent particles, and up to 70
+    times for pairs at a cut-off (docs/steppers.md). Chaotic motion amplifies it without bound.
 
-    With ``norm="each"`` a particle's error is compared with its own motion, so that slow ones, and small
-    orbits, are as accurate as large ones: the world has the norm of order 8 of these ratios, which is at
-    most N^(1/8) times the largest.
+    With ``norm="each"`` the error of a particle is compared with its own motion, so that slow particles and
+    small orbits are as accurate as large ones. The error of the world is the 8-norm of these ratios, which is
+    at most N^(1/8) times the largest.
 
-    Sweeps end once the change in the last one, times the factor by which a sweep makes the error smaller, is
-    below ``part`` of the error. The factor is that of the last two sweeps; in the first, that of the last
-    steps for the present length.
+    Sweeps end once the change in the last sweep, times the contraction, is below ``part`` of the requested
+    error. The contraction is the factor by which a sweep reduces the error. It is measured in the last two
+    sweeps; in the first sweep it is extrapolated from earlier steps to the present step length.
 
     Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Eqs (IV.8.10), (IV.8.11).
     """
 
-    error: float = parameter("", "error of position that is asked for, relative", 1e-6, gt=0)
-    part: float = parameter("", "part of that error that may be left when sweeps end", 0.3, gt=0)
-    sweeps: int = option("sweeps that a step may take at most", 10, ge=2)
+    error: float = parameter("", "requested error of position, relative", 1e-6, gt=0)
+    part: float = parameter("", "part of that error that may remain when sweeps end", 0.3, gt=0)
+    sweeps: int = option("largest number of sweeps in a step", 10, ge=2)
     safety: float = parameter(
         "",
         "part of that error at which the next step aims",
@@ -85,12 +85,12 @@ class StageControl(ImplicitControl):
         "", "part of its radius that is added to a particle's displacement or size of motion", 1e-3, ge=0
     )
     per: Per = option(
-        "what the error is relative to: the displacement in a step, or the motion of the run", "step"
+        "reference of the error: the displacement in a step, or the size of the motion in the run", "step"
     )
     norm: Literal["sum", "each"] = option(
-        "whether the sum over the particles has that error, or each particle by itself", "sum"
+        "whether the error refers to the sum over the particles or to each particle", "sum"
     )
-    first: float = parameter("s", "step that is tried first", 1e-6, ge=SHORTEST_STEP)
+    first: float = parameter("s", "first trial step", 1e-6, ge=SHORTEST_STEP)
     longest: float = parameter("s", "longest step", 1.0, ge=SHORTEST_STEP)
 
     accuracy_parameters = (AccuracyParameter(error=1),)
@@ -103,24 +103,24 @@ class StageControl(ImplicitControl):
         return self.per == "run"
 
     def leading(self, smooth: bool) -> bool:
-        """Return whether the estimate of error is of the leading term, not the bound: only for smooth
-        forces."""
+        """Return whether the error estimate is the leading term instead of the bound; for smooth forces
+        only."""
         return self.at_end and smooth
 
     def order(self, stages: int, smooth: bool) -> int:
-        """Return the power of dt with which an estimate of error falls, over what it is compared with."""
+        """Return the power of dt with which the relative error estimate decreases."""
         return 2 * stages - 2 if self.leading(smooth) else stages
 
     @ti.func
     def scale(self, s, w, i, moved, dt):
-        """Return what the error of a particle that has moved so far in a step of dt (s) is compared with
-        (m)."""
+        """Return the scale (m) of the error of a particle that has moved by ``moved`` (m) in a step of dt
+        (s)."""
         return error_scale(self, s, w, i, moved, dt)
 
     @ti.func
     def terms(self, change, error, scale, rounding):
-        """Return the terms (f64) of a particle in the sums over the world: what its motion changed by in this
-        sweep, its error, what both are compared with, and what they are rounded to (m)."""
+        """Return the terms (f64) of a particle in the sums over the world (m): the change of its motion in
+        this sweep, its error, the scale of both, and their rounding error."""
         terms = ti.cast(ti.Vector([change, error, scale, rounding]), ti.f64)
         if ti.static(self.norm == "each"):
             terms = eighth_powers(terms / ti.cast(scale, ti.f64))
@@ -138,7 +138,7 @@ class StageControl(ImplicitControl):
 
     @ti.func
     def solved(self, w, error):
-        """Return whether sweeps may end, with this much error left."""
+        """Return whether sweeps may end with this remaining error."""
         return error <= ti.cast(self.part(w) * self.error(w), ti.f64)
 
     @ti.func
@@ -148,7 +148,7 @@ class StageControl(ImplicitControl):
 
     @ti.func
     def factor(self, w, contraction, error, order):
-        """Return what the next step is to be multiplied by: the error falls as dt^order, the contraction as
+        """Return the factor for the next step size: the error decreases as dt^order, the contraction as
         dt^2."""
         tolerance = ti.cast(self.error(w), ti.f64)
         target = ti.cast(self.safety(w), ti.f64) * elementary.pow(tolerance, 1.0 / order)
@@ -157,20 +157,20 @@ class StageControl(ImplicitControl):
 
 
 class Collocation(Stepper):
-    """Lobatto's collocation advances time implicitly, with order 2s - 2 for s stages.
+    """Lobatto collocation advances time implicitly, with order 2s - 2 for s stages.
 
         v_i = v + dt sum_j a_ij v'_j,    r_i = r + dt sum_j a_ij v_j,    v'_j = F_j/m
 
-    It is symmetric, as the trapezoidal rule is, which it is for s = 2. The equations are solved by sweeps
-    over the stages, each with what is newest of the others. The first sweep starts from the polynomial of the
-    last step; what it turns out to be off at one stage tells what it is off at the later ones, so that one or
-    two sweeps are enough: some s - 1 to 2 (s - 1) force evaluations for a step. The part of the force that is
-    linear in velocity is solved exactly with each stage. Spin is stepped as velocity is. What the first sweep
-    starts from is made anew when there have been impacts.
+    It is symmetric; for s = 2 it is the trapezoidal rule. The equations are solved by sweeps over the stages,
+    in which each stage uses the newest values of the others. The first sweep starts from the polynomial of
+    the last step. The error of this prediction, once known at one stage, also corrects the later stages, so
+    that one or two sweeps are enough: about s - 1 to 2 (s - 1) force evaluations per step. The part of the
+    force that is linear in velocity is solved exactly with each stage. Spin is stepped as velocity is. After
+    impacts the polynomial of the last step is discarded.
 
-    It pays where forces are smooth, the more so the more digits are wanted. Kinks and jumps of forces cost it
-    its order: three stages are best there, and its control goes by a bound of the error (``StageControl``).
-    For contacts a leapfrog is cheaper.
+    Collocation pays for smooth forces, and more so for higher accuracy. Kinks and jumps of forces reduce its
+    order: three stages are then best, and the control uses a bound on the error (``StageControl``). For
+    contacts a leapfrog is cheaper.
 
     Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.5. Sweeps that
     start from the polynomial of the last step: E. Everhart, Celest. Mech. 10 (1974) 35-55, and H. Rein, D. S.

@@ -1,5 +1,5 @@
-"""The phases of an attempt at a step of collocation: sweeps over its stages, and the verdict, from how they
-converge and from the error of the step."""
+"""The phases of an attempt at a collocation step: sweeps over its stages, and the verdict, from their
+convergence and the error of the step."""
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER,
 
 
 class Forget(Phase):
-    """This phase forgets the last step after impacts, when the past says nothing about what is to come."""
+    """This phase discards the polynomial of the last step after impacts, which make it useless as a
+    prediction."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s
@@ -26,7 +27,7 @@ class Forget(Phase):
 
 
 class ChooseCollocationStep(Phase):
-    """This phase chooses the step, and begins at the first stage after its beginning."""
+    """This phase chooses the step, and starts at the first stage after its beginning."""
 
     def __init__(self, context: StepContext, stages) -> None:
         self.s, self.control, self.stages = context.s, context.control, stages
@@ -43,7 +44,7 @@ class ChooseCollocationStep(Phase):
 
 
 class OfStages(PerParticle):
-    """This is a loop over particles that knows the stages."""
+    """This phase is a loop over particles that has access to the stages."""
 
     def __init__(self, stages) -> None:
         super().__init__(stages.s)
@@ -71,7 +72,7 @@ class PredictStages(OfStages):
 
 
 class StageSweep(Repeat):
-    """This repeat takes stage after stage, again and again, until there is a verdict."""
+    """This repeat goes through the stages, sweep after sweep, until there is a verdict."""
 
     def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
@@ -83,7 +84,7 @@ class StageSweep(Repeat):
 
 
 class Place(OfStages):
-    """This phase puts particles where they are at the stage, as far as is known."""
+    """This phase puts particles at their present approximate places at the stage."""
 
     @ti.func
     def run(self, w, i):
@@ -102,9 +103,8 @@ class Place(OfStages):
 
 
 class TakeStages(PerBlock):
-    """This phase takes the rates that the forces at the stage give; it sums their change, as displacements
-    (m), and at the last stage the error, what both are compared with, and what displacements are rounded
-    to."""
+    """This phase stores the rates due to the forces at the stage. It sums their changes as displacements (m),
+    and at the last stage the error, the scale of both, and the rounding error of displacements."""
 
     def __init__(self, context: StepContext, sums, stages) -> None:
         super().__init__(sums)
@@ -131,21 +131,20 @@ class TakeStages(PerBlock):
             error = dt * dt * self.estimate(s.stage_acceleration, w, i)
             if ti.static(stages.turning):
                 error += dt * dt * s.radius[w, i] * self.estimate(s.stage_turning, w, i)
-            # Of the place, and of what the force there adds to it.
+            # Rounding of the position, and of the displacement due to the force.
             rounding = self.eps * (s.position[w, i].norm() + dt * dt * new.norm())
         return self.control.terms(dt * dt * change, error, scale, rounding)
 
     @ti.func
     def scale(self, w, i, dt):
-        """Return what the error of a particle is compared with (m), given where it will be at the end as far
-        as is known."""
+        """Return the scale (m) of the error of a particle, given its present approximate place at the end."""
         moved = self.stages.displacement(w, i, self.stages.number - 1, dt).norm()
         return self.control.scale(self.s, w, i, moved, dt)
 
     @ti.func
     def take(self, rate: ti.template(), w, i, stage, new):  # type: ignore[valid-type]
-        """Note a rate, and return how much it differs from what was known. Later stages are off alike
-        (``shape``)."""
+        """Store a rate, and return its change. In the first sweep, later stages are corrected by the same
+        error, scaled by ``shape``."""
         s, stages = self.s, self.stages
         off = new - stages.at(rate, w, i, stage)
         stages.put(rate, w, i, stage, new)
@@ -157,8 +156,8 @@ class TakeStages(PerBlock):
 
     @ti.func
     def estimate(self, rate: ti.template(), w, i):  # type: ignore[valid-type]
-        """Return the error over dt^2: |sum_j d_j rate_j|, which bounds it, or what that says of its leading
-        term."""
+        """Return the estimated error over dt^2: the bound |sum_j d_j rate_j|, or the leading term derived
+        from it."""
         total, largest = ti.Vector.zero(self.s.real, 3), ti.cast(0.0, self.s.real)
         for j in range(self.stages.number):
             here = self.stages.at(rate, w, i, j)
@@ -172,8 +171,8 @@ class TakeStages(PerBlock):
 
 
 class Conclude(OfStages):
-    """This phase sets the velocity at the end, and what the next step is predicted from; positions are there
-    already."""
+    """This phase sets the velocity at the end, and the rates from which the next step is predicted; positions
+    are already set."""
 
     conditional = True
 
@@ -194,15 +193,14 @@ class Conclude(OfStages):
 
 
 GUESS = 0.5
-"""This is taken for the factor by which a sweep makes the error smaller where nothing is known of it, and at
-most."""
+"""Contraction of a sweep if none has been measured, and its largest assumed value."""
 DIVERGED = 0.5
-"""A second attempt may be at most so long where sweeps did not converge, in lengths of the first."""
+"""Largest length of a second attempt if sweeps did not converge, over the length of the first."""
 
 
 class JudgeStages(Phase):
-    """This phase goes on to the next stage; after the last one it judges whether the step is solved, to be
-    swept again, or to be given up."""
+    """This phase goes on to the next stage. After the last stage it decides whether the step is solved, needs
+    another sweep, or is given up."""
 
     def __init__(self, context: StepContext, sums, stages) -> None:
         self.s, self.control, self.sums, self.stages = context.s, context.control, sums, stages
@@ -213,7 +211,7 @@ class JudgeStages(Phase):
         s, last = self.s, self.stages.number - 1
         total = self.control.norms(self.sums.total(w))
         s.force_evaluations[w] += 1
-        # A maximum would lose NaN.
+        # A maximum with NaN would ignore the NaN.
         if not finite(total[0]) or s.out_of_range[w] > 0:
             total[0] = infinity(s.count[w])
         s.stage_change[w] = ti.max(s.stage_change[w], total[0])
@@ -233,7 +231,7 @@ class JudgeStages(Phase):
         """Judge a sweep at its end."""
         s = self.s
         change, error = s.stage_change[w], ti.cast(0.0, ti.f64)
-        # Nothing moves where nothing changes: 0/0 is no error.
+        # If nothing changes, nothing moves: 0/0 is no error.
         if change > 0.0:
             change /= total[2]
         if total[1] > 0.0:
@@ -242,7 +240,8 @@ class JudgeStages(Phase):
         contraction = self.foreseen(w)
         if not first and s.last_change[w] > 0.0:
             contraction = change / s.last_change[w]
-            # For later steps no less than can be resolved: what is rounded away now is not 0 in longer ones.
+            # For later steps the contraction is at least the resolvable one: a change rounded to 0 now is not
+            # 0 in longer steps.
             resolved = total[3] / total[2] / s.last_change[w]
             s.contraction[w] = ti.select(resolved > contraction, resolved, contraction)
             s.measured_dt[w] = s.dt[w]
@@ -255,8 +254,8 @@ class JudgeStages(Phase):
 
     @ti.func
     def foreseen(self, w):
-        """Return what a sweep is foreseen to multiply the error by: it grows as dt^2 and, to be safe, falls
-        as dt only."""
+        """Return the expected contraction: it increases as dt^2 with longer steps and, to be safe, decreases
+        only as dt with shorter ones."""
         s = self.s
         factor = ti.cast(GUESS, ti.f64)
         if s.measured_dt[w] > 0.0:
@@ -266,16 +265,16 @@ class JudgeStages(Phase):
 
     @ti.func
     def decide(self, w, solved, contraction, error):
-        """Set the verdict, and how long the next step is to be."""
+        """Set the verdict, and the length of the next step."""
         s = self.s
         s.sweeping[w], s.verdict[w] = 0, RETRY
-        # One that is only foreseen may be of long ago: it is no reason for a shorter step.
+        # A contraction that was only extrapolated may be outdated: it is no reason for a shorter step.
         current_contraction = ti.select(s.sweep[w] > 1 or not solved, contraction, 0.0)
         factor = self.control.factor(w, current_contraction, error, self.order)
         if solved and self.control.accepts(w, error):
             s.verdict[w], s.last_dt[w] = ACCEPTED, s.dt[w]
         else:
-            # A step that was not accepted would fail again in the same way if it were as long.
+            # A rejected step of the same length would fail again in the same way.
             factor = ti.min(factor, ti.select(solved, SHORTER, DIVERGED))
             if self.control.hopeless(s, w, s.dt[w]):
                 s.verdict[w] = HOPELESS

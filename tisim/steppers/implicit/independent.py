@@ -1,7 +1,7 @@
-"""Particles that do not feel each other: each takes its own implicit steps, many of them in one go.
+"""Particles that do not interact: each takes its own implicit steps, many of them in one launch.
 
-There is no norm over all of them and nothing to wait for but the end of an interval (see intervals.py). How
-many intervals or attempts a launch takes them through makes no difference to what they do.
+There is no norm over all particles, and a particle waits only for the end of an interval (see intervals.py).
+The number of intervals or attempts in a launch does not affect the motion.
 """
 
 from tisim.backend.taichi import ti
@@ -68,9 +68,9 @@ class IndependentSteps(PerParticle):
 
     @ti.func
     def interval(self, w, i, begin, length, start, rounding, attempt_limit, aim):
-        """Take a particle through an interval from ``start`` (s) on. Return how far it gets (s), to the end
-        unless it is stuck or has made as many attempts as are allowed; the rounding error of that; its last
-        verdict, steps, attempts and iterations."""
+        """Take a particle through an interval from ``start`` (s) on. Return the time it reaches (s), the end
+        unless it is stuck or has used up its attempts; the rounding error of this time; its last verdict; and
+        the numbers of its steps, attempts and iterations."""
         s = self.own
         elapsed, carry = start, rounding
         steps, tries, iterations, verdict = ti.i64(0), ti.i64(0), ti.i64(0), ACCEPTED
@@ -91,13 +91,13 @@ class IndependentSteps(PerParticle):
                     steps += 1
                     if ti.static(self.control.at_end):
                         note_excursion(s, w, i, self.solve.step_displacement(w, i, ti.cast(dt, s.real)))
-                    # That a step has been cut short says nothing about the next one.
+                    # A last step that was cut short gives no information about the next one.
                     s.own_dt[w, i] = ti.max(s.own_dt[w, i], ti.cast(ti.select(last, target, 0.0), s.real))
         return elapsed, carry, verdict, steps, tries, iterations
 
     @ti.func
     def attempt(self, w, i, t, dt, aim):
-        """Attempt one step of this length (s). Return the verdict on it, and how many iterations it took."""
+        """Attempt one step of this length (s). Return the verdict, and the number of iterations."""
         s, solve = self.own, self.solve
         step, end = ti.cast(dt, s.real), t + dt
         v = solve.velocity(w, i, step, solve.jacobian(w, i, end))
@@ -106,7 +106,7 @@ class IndependentSteps(PerParticle):
         solve.advance(w, i, v, step)
         k, verdict, iterating = 1, RETRY, 1
         while iterating > 0:
-            # Before the force is written, so that what both depend on is computed once.
+            # Before the force is written, so that common subexpressions are computed once.
             jacobian = solve.jacobian(w, i, end)
             self.force_sum.single_particle(w, i, end)
             new = solve.velocity(w, i, step, jacobian)
@@ -117,7 +117,7 @@ class IndependentSteps(PerParticle):
                 v = new
                 change += solve.advance(w, i, v, step)
                 moved = solve.displacement(w, i, v, step).norm()
-                # Nothing moves where nothing changes: 0/0 is no error.
+                # If nothing changes, nothing moves: 0/0 is no error.
                 change = change / ti.select(change > 0.0, moved, 1.0)
                 error = solve.error(w, i, step)
                 error = error / ti.select(error > 0.0, self.control.scale(s, w, i, moved, step), 1.0)
@@ -127,7 +127,7 @@ class IndependentSteps(PerParticle):
                 iterating = 0
                 accepted = solved and self.control.accepts(w, off)
                 target = dt
-                # The longest step stays: a branch, as the next step then need not wait for the factor.
+                # If the longest step stays, this branch spares the next step the wait for the factor.
                 if not (accepted and self.control.stays(w, dt, aim, ratio, k, off)):
                     target *= self.control.factor(w, aim, ratio, ti.cast(k, ti.f64), off)
                 if accepted:

@@ -13,25 +13,25 @@ STATE_BEFORE = (
     FORCE_BEFORE,
 )
 CHANGE = Field("iterate_change", "m", 1, "keep", scratch=True)
-"""This field is how much the last iterate differs from the one before."""
+"""Difference of the last two iterates of a particle."""
 TURNING_BEFORE = (Field("spin_before", "rad/s", 3, "keep", scratch=True), TORQUE_BEFORE)
 
 
 def saved_fields(turning: bool) -> tuple[Field, ...]:
-    """Return the fields that the saved state takes, in a scene that has torques or not."""
+    """Return the fields of the saved state, in a scene with or without torques."""
     return (*STATE_BEFORE, *(TURNING_BEFORE if turning else ()))
 
 
 @ti.data_oriented
 class SavedState:
-    """SavedState keeps the state of a particle, and gives it back."""
+    """The state of particles at the beginning of a step, to be restored."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.domain, self.turning = context.s, context.domain, context.turning
 
     @ti.func
     def save(self, w, i):
-        """Keep the state of a particle at the beginning of a step."""
+        """Save the state of a particle at the beginning of a step."""
         s = self.s
         s.position_before[w, i], s.velocity_before[w, i] = s.position[w, i], s.velocity[w, i]
         s.force_before[w, i] = s.force[w, i]
@@ -49,5 +49,5 @@ class SavedState:
 
     @ti.func
     def sound(self, w, r):
-        """Return whether r (m) is a place that numbers can tell."""
+        """Return whether the place r (m) is finite and can be represented."""
         return finite(r.norm_sqr()) and not self.domain.lost(w, r)

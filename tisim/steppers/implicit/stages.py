@@ -1,4 +1,5 @@
-"""The rates of motion at the stages of a step, and the coefficients that make places and speeds of them.
+"""The rates of motion at the stages of a step, and the coefficients that turn them into positions and
+velocities.
 
 Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.5, Lobatto IIIA:
 the stages are the zeros of d^(s-2)/dx^(s-2) (x^(s-1) (x-1)^(s-1)), the first at the beginning of the step and
@@ -24,12 +25,13 @@ from tisim.steppers.implicit.saved_state import SavedState
 
 @ti.data_oriented
 class Stages(SavedState):
-    """Stages keep the rates: ``acceleration[w, i, 3 j + k]`` of stage j along axis k, and with torques
+    """The rates at the stages: ``acceleration[w, i, 3 j + k]`` of stage j along axis k, and with torques
     ``turning`` likewise.
 
-    ``c[j]`` is where stage j is, in parts of the step; ``speeds[i, j]`` gives v_i, ``places[i, j]`` r_i, and
-    ``estimate[j]`` the error. Of each world: ``predict[w, i, j]`` gives what the polynomial of the last step
-    says of stage i, ``shape[w, i]`` how much it is off there, compared with the other stages.
+    ``c[j]`` is the time of stage j over the step length. ``speeds[i, j]``, ``places[i, j]`` and
+    ``estimate[j]`` are the coefficients of v_i, of r_i and of the error. For each world, ``predict[w, i, j]``
+    are the coefficients of the rates at stage i extrapolated by the polynomial of the last step, and
+    ``shape[w, i]`` is its error at stage i, relative to the other stages.
     """
 
     def __init__(self, context: StepContext, number: int) -> None:
@@ -69,12 +71,13 @@ class Stages(SavedState):
         )
 
     def bytes(self) -> int:
-        """Return the device memory that the coefficients take, in bytes."""
+        """Return the device memory of the coefficients, in bytes."""
         return self.tree.bytes
 
     @ti.func
     def extrapolate(self, w, ratio):
-        """Prepare to predict a step that is ``ratio`` as long as the last one; 0 where there was none."""
+        """Prepare the prediction of a step ``ratio`` times as long as the last one; ratio 0 if there was
+        none."""
         for i in range(self.number):
             at = 1.0 + ratio * self.c[i]
             off = ti.cast(1.0, ti.f64)
@@ -83,7 +86,7 @@ class Stages(SavedState):
                 for k in range(self.number):
                     if k != j:
                         weight *= (at - self.c[k]) / (self.c[j] - self.c[k])
-                # Without a last step all stages are taken to be as the first.
+                # Without a last step the rates at all stages are taken from the first stage.
                 self.predict[w, i, j] = ti.select(ratio > 0.0, weight, ti.cast(j == 0, ti.f64))
                 off *= at - self.c[j]
             self.shape[w, i] = ti.select(ratio > 0.0, off, self.c[i])
@@ -121,12 +124,12 @@ class Stages(SavedState):
 
     @ti.func
     def step_displacement(self, w, i, dt):
-        """Return the displacement (m) in a step that has been accepted."""
+        """Return the displacement (m) in an accepted step."""
         return self.displacement(w, i, self.number - 1, dt)
 
     @ti.func
     def spin(self, w, i, stage, dt):
-        """Return the spin (rad/s) at a stage, made of the rates as the velocity is."""
+        """Return the spin (rad/s) at a stage, computed from the rates like the velocity."""
         return self.s.spin_before[w, i] + dt * self.sum(self.speeds, stage, self.s.stage_turning, w, i)
 
     @ti.func
@@ -136,8 +139,8 @@ class Stages(SavedState):
 
     @ti.func
     def newest(self, w, i, stage, dt, t):
-        """Return the acceleration (m/s^2) that the force at a stage gives; what is linear in velocity is
-        solved exactly: m v' = F + J dt a_ii (v' - v'_last)."""
+        """Return the acceleration (m/s^2) due to the force at a stage; the part linear in velocity is solved
+        exactly: m v' = F + J dt a_ii (v' - v'_last)."""
         s = self.s
         m = s.mass[w, i]
         new = s.force[w, i] / m
@@ -151,7 +154,7 @@ class Stages(SavedState):
 
 
 def nodes(stages: int) -> np.ndarray:
-    """Return where the stages are, in parts of the step, from 0 to 1."""
+    """Return the times of the stages over the step length, from 0 to 1."""
     inner = np.sort(Legendre.basis(stages - 1).deriv().roots().real)
     return np.concatenate([[0.0], (inner + 1.0) / 2.0, [1.0]])
 
@@ -166,18 +169,19 @@ def lagrange(c: np.ndarray) -> list[Polynomial]:
 
 
 def integrals(stages: int) -> np.ndarray:
-    """Return a_ij: a quantity at stage i is that at stage 0 plus dt sum_j a_ij rate_j (Hairer and Wanner
+    """Return a_ij: a quantity at stage i is its value at stage 0 plus dt sum_j a_ij rate_j (Hairer and Wanner
     IV.5)."""
     c = nodes(stages)
     return np.array([[basis.integ()(here) for basis in lagrange(c)] for here in c])
 
 
 def highest(stages: int) -> np.ndarray:
-    """Return the coefficients d_j of an estimate of error: of position, dt^2 |sum_j d_j acceleration_j|.
+    """Return the coefficients d_j of an error estimate for the position, dt^2 |sum_j d_j acceleration_j|.
 
     sum_j acceleration_j prod_k 1/(c_j - c_k) is the coefficient of the highest power in the polynomial of the
-    acceleration. A polynomial through all nodes but the last is without it, and off by it times
-    prod_(k<s-1) (c - c_k); in position at the end by at most the integral of (1 - c) |prod|.
+    acceleration. A polynomial through all nodes but the last lacks this power; its error is the coefficient
+    times prod_(k<s-1) (c - c_k). In the position at the end the error is at most the coefficient times the
+    integral of (1 - c) |prod|.
     """
     c = nodes(stages)
     return bound(c) * np.array([1.0 / np.prod(here - np.delete(c, j)) for j, here in enumerate(c)])
@@ -191,13 +195,13 @@ def bound(c: np.ndarray) -> float:
 
 
 def leading(stages: int) -> tuple[float, float]:
-    """Return l and p of the leading term of the error, in position dt^2 a (l e)^p, where e is the estimate by
-    ``highest`` over dt^2 a, and a the largest acceleration.
+    """Return l and p of the leading term of the error, which in position is dt^2 a (l e)^p; e is the estimate
+    by ``highest`` over dt^2 a, and a the largest acceleration.
 
-    The method multiplies a motion of rate k by the (s - 1, s - 1) approximant of Pade to exp(k dt), which is
-    off by c (k dt)^(2s - 1), c = ((s - 1)!)^2/((2s - 2)! (2s - 1)!) (Hairer and Wanner, section IV.3); in
-    position, by a/k^2 times that. The estimate tells the derivative of order s - 1: e = m (k dt)^(s - 1)/
-    (s - 1)! with m = ``bound``.
+    The method multiplies a motion of rate k by the (s - 1, s - 1) approximant of Pade to exp(k dt). Its error
+    is c (k dt)^(2s - 1), c = ((s - 1)!)^2/((2s - 2)! (2s - 1)!) (Hairer and Wanner, section IV.3); the error
+    in position is a/k^2 times as large. The estimate measures the derivative of order s - 1: e = m (k dt)^(s
+    - 1)/ (s - 1)! with m = ``bound``.
     """
     n = stages - 1
     pade, power = factorial(n) ** 2 / (factorial(2 * n) * factorial(2 * n + 1)), (2 * n - 1) / n

@@ -1,4 +1,4 @@
-"""How long the next step of an implicit stepper may be: from how its iteration went, and from its error."""
+"""The length of the next step of an implicit stepper, from the convergence of its iteration and its error."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
 
 LEAST_SAFETY = 0.01
-"""Steps may aim at no smaller part of an error asked for than this. Where that is below what rounding makes
-of an error, no step is short enough, and all would be the shortest."""
+"""Smallest part of a requested error at which steps may aim. If a smaller part lies below the rounding level
+of the error, no step is short enough, and all would be the shortest."""
 
 
 class ImplicitControl(StepControl):
-    """This is the contract of step control of implicit steppers: it sets the limits of a step."""
+    """The contract of step controls of implicit steppers, with the limits of a step."""
 
     contract: ClassVar[bool] = True
-    first: float = parameter("s", "step that is tried first, dt_0", 1e-5, ge=SHORTEST_STEP)
+    first: float = parameter("s", "first trial step, dt_0", 1e-5, ge=SHORTEST_STEP)
     longest: float = parameter("s", "longest step, dt_lim", 2.5e-4, ge=SHORTEST_STEP)
     shortest: float = parameter(
         "s",
-        "shortest step; one that fails there stops its world, with time, particle and force",
+        "shortest step; if it fails, its world stops, with time, particle and force",
         1e-12,
         ge=SHORTEST_STEP,
     )
-    most: float = parameter("", "largest factor by which the step grows in one go", 4.0, ge=1)
-    least: float = parameter("", "smallest factor by which the step shrinks in one go", 0.1, gt=0, lt=1)
+    most: float = parameter("", "largest factor between a step and the next", 4.0, ge=1)
+    least: float = parameter("", "smallest factor between a step and the next", 0.1, gt=0, lt=1)
     stride: float = parameter(
         "m",
-        "longest way of a particle in a step, at the speed of its beginning; 0 for no limit",
+        "longest path of a particle in a step, at its speed at the beginning; 0 for no limit",
         0.0,
         ge=0,
     )
 
     @property
     def at_end(self) -> bool:
-        """Return whether the control aims at the error at the end of the run."""
+        """Return whether the control limits the error at the end of the run."""
         return False
 
     @model_validator(mode="after")
@@ -65,24 +65,24 @@ class ImplicitControl(StepControl):
 
     @ti.func
     def step(self, s, w, target, speed):
-        """Return the step (s, f64) to take where ``target`` was wanted, which is 0 for the first step of all;
-        ``speed`` (m/s, f64) is that of the fastest particle that takes it."""
+        """Return the step (s, f64) to take for a wanted step ``target``, which is 0 before the first step;
+        ``speed`` (m/s, f64) : speed of the fastest particle in the step."""
         longest = ti.cast(self.longest(w), ti.f64)
         step = ti.min(ti.select(target > 0.0, target, ti.cast(self.first(w), ti.f64)), longest)
         stride = ti.cast(self.stride(w), ti.f64)
         if stride > 0.0:
-            # No speed at all sets no limit.
+            # Zero speed sets no limit.
             step = ti.min(step, stride / (speed + 1e-300))
         return ti.max(shortest_representable(s, w, self.shortest(w)), step)
 
     @ti.func
     def hopeless(self, s, w, dt):
-        """Return whether a step of this length (s) that has failed must not be made shorter."""
+        """Return whether a failed step of this length (s) must not be shortened further."""
         return dt <= shortest_representable(s, w, self.shortest(w)) * (1.0 + 1e-9)
 
     @ti.func
     def limited(self, w, target, actual):
-        """Return wanted / reached, between ``least`` and ``most``; the least for a NaN."""
+        """Return target / actual, limited to ``least`` .. ``most``; ``least`` for NaN."""
         least, most = ti.cast(self.least(w), ti.f64), ti.cast(self.most(w), ti.f64)
         factor = least
         if target >= least * actual:
@@ -91,19 +91,20 @@ class ImplicitControl(StepControl):
 
 
 class IterationControl(ImplicitControl):
-    """A step is so long that the fixed-point iteration meets its tolerance in the desired number of
-    iterations.
+    """The step length is chosen such that the fixed-point iteration meets its tolerance in the desired number
+    of iterations.
 
         Lambda_K = (TOL / w_0)^(1/(p K_d)) / (w_K / w_0)^(1/(p K))
 
-    w_K is the change of the last iteration over the displacement in the step, and w_0 = 1, as the first
-    iterate is compared with the place where the step began (Z13 A9, Z16 C.5). The step is accepted when w_K
-    <= TOL within K_d iterations; the next one is Lambda_K times as long, or a rejected one is tried again so.
+    w_K is the change of the last iteration over the displacement in the step, and w_0 = 1, because the first
+    iterate is compared with the position at the beginning of the step (Z13 A9, Z16 C.5). The step is accepted
+    if w_K <= TOL within K_d iterations. The length of the next step, or of the next trial of a rejected step,
+    is Lambda_K times the present one.
 
-    This bounds the error of the iteration only. That of the trapezoidal rule itself is not seen, and is left
-    to ``longest``. What the papers leave open: the step never changes by more than ``most`` or less than
-    ``least`` times in one go, and a step that fails at ``shortest`` stops the world, with time, particle and
-    force.
+    This bounds the error of the iteration only. The error of the trapezoidal rule itself is not measured;
+    limit it by ``longest``. The papers leave two points open. Here the factor from one step to the next is
+    limited to ``least`` .. ``most``, and a failed step of length ``shortest`` stops the world, with time,
+    particle and force.
 
     Source: Z16 section 8.1.
     """
@@ -125,19 +126,19 @@ class IterationControl(ImplicitControl):
 
     @ti.func
     def solved(self, w, change):
-        """Return whether the iteration may end, its last relative change having been this."""
+        """Return whether the iteration may end after this last relative change."""
         return change <= self.tolerance(w)
 
     @ti.func
     def accepts(self, w, error):
-        """Return whether a solved step is accurate enough; ``error`` is that of the rule over the
+        """Return whether a solved step is accurate enough; ``error`` : error of the rule over the
         displacement."""
         return True
 
     @ti.func
     def scale(self, s, w, i, moved, dt):
-        """Return what the error of a particle that has moved so far in a step of dt (s) is compared with
-        (m)."""
+        """Return the scale (m) of the error of a particle that has moved by ``moved`` (m) in a step of dt
+        (s)."""
         return moved
 
     @ti.func
@@ -147,14 +148,14 @@ class IterationControl(ImplicitControl):
 
     @ti.func
     def factor(self, w, aim, change, k, error):
-        """Return what the next step is to be multiplied by, after K = k iterations."""
+        """Return the factor for the next step size, after K = k iterations."""
         root = 1.0 / ti.cast(self.order(w), ti.f64)
         return self.limited(w, elementary.pow(aim, root), elementary.pow(change, root / k))
 
     @ti.func
     def stays(self, w, dt, aim, change, k, error):
-        """Return whether a step (s) is the longest that may be and ``factor`` is at least 1, so that the next
-        one is as long; there is no root to take."""
+        """Return whether a step (s) is the longest and ``factor`` would be at least 1, so that the next one
+        is equally long; computed without a root."""
         bound = ti.cast(1.0, ti.f64)
         for _ in range(k):
             bound *= aim
@@ -162,23 +163,23 @@ class IterationControl(ImplicitControl):
 
 
 class ErrorControl(IterationControl):
-    """A step meets the tolerance of its iteration, and its truncation error is that asked for.
+    """Each step meets the tolerance of its iteration, and its truncation error meets a requested error.
 
-    The iteration is held to its tolerance as by ``iteration_control``.
+    The iteration meets its tolerance as with ``iteration_control``. A step with a larger truncation error is
+    rejected; the error decreases as dt^2. It is the error of position as estimated by the stepper. With per
+    "step" it is the error of a step over the displacement in the step, which gives little information about
+    the error at the end of a run. With per "run" it is the error at the end over the size of the motion. For
+    a particle that starts from rest, or without a force, the ratio of error and displacement would have no
+    limit; the resolution prevents that.
 
-    A step with more error is rejected. The error falls as dt^2. It is of position, as the stepper estimates
-    it, per "step": the error of a step over the displacement in it, which says little about the end of a run;
-    or per "run": the error at the end over the size of the motion. The resolution is there as for a particle
-    that starts from rest, and for no force, the ratio of error and displacement has no limit.
-
-    With ``per="run"`` the error at the end was 0.2 to 15 times that asked for in 13 scenes, less under drag
-    (docs/steppers.md); a chaotic motion multiplies it without bound. ``tolerance`` stays one of a step: ask
-    for a hundredth of ``error``.
+    With ``per="run"`` the error at the end was 0.2 to 15 times the requested error in 13 scenes, and smaller
+    under drag (docs/steppers.md); chaotic motion amplifies it without bound. ``tolerance`` still refers to a
+    step: set it to a hundredth of ``error``.
 
     Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, Eq. (II.4.13).
     """
 
-    error: float = parameter("", "error of position that is asked for, relative", 1e-4, gt=0)
+    error: float = parameter("", "requested error of position, relative", 1e-4, gt=0)
     safety: float = parameter(
         "", "part of that error at which the next step aims", 0.8, ge=LEAST_SAFETY, lt=1
     )
@@ -186,7 +187,7 @@ class ErrorControl(IterationControl):
         "", "part of its radius that is added to a particle's displacement or size of motion", 1e-3, ge=0
     )
     per: Per = option(
-        "what the error is relative to: the displacement in a step, or the motion of the run", "step"
+        "reference of the error: the displacement in a step, or the size of the motion in the run", "step"
     )
 
     accuracy_parameters = (AccuracyParameter(error=1, tolerance=1),)

@@ -44,8 +44,7 @@ from tisim.steppers.intervals import (
 )
 
 OWN_STEP_FIELDS = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
-"""These are the fields of a particle that takes steps of its own: the length of the next one, and its
-clock."""
+"""The fields of a particle that takes steps of its own: the length of the next step, and its clock."""
 
 
 class Trapezoid(Stepper):
@@ -53,13 +52,13 @@ class Trapezoid(Stepper):
 
         v' = v + dt/m (phi F' + (1 - phi) F),    r' = r + dt (phi v' + (1 - phi) v),    spin as v
 
-    F' is the force at the end of the step: each iterate is made with the force that positions, velocities and
-    spins of the last one give, at the end of the step. The first one takes F itself. Each world has its own
-    step, iterations and end.
+    F' is the force at the end of the step. Each iterate is computed with the force at the positions,
+    velocities and spins of the last iterate; the first is computed with F. Each world has its own step,
+    iterations and end.
 
-    The part of the force that is linear in velocity, of effects that give ``velocity_jacobian``, is solved
-    exactly with each iterate. Anderson's acceleration makes iterates from the last two, which converges in
-    fewer of them, and where plain iteration does not. Particles that do not feel each other take their own
+    The part of the force that is linear in velocity, for effects that define ``velocity_jacobian``, is solved
+    exactly with each iterate. Anderson's acceleration forms each iterate from the last two. It needs fewer
+    iterates, and may converge when plain iteration does not. Particles that do not interact take their own
     steps and meet at every multiple of ``control.longest``; a step of the world is then such an interval.
 
     Source: Z13 (A1)-(A10); Z16 (8.4), (C.1)-(C.5).
@@ -67,13 +66,13 @@ class Trapezoid(Stepper):
 
     phi: float = parameter(
         "",
-        "weight phi of the end of a step: 1/2 of second order, 1 implicit Euler, 0 explicit",
+        "weight phi of the end of a step: 1/2 for second order, 1 for implicit Euler, 0 for explicit Euler",
         0.5,
         ge=0,
         le=1,
     )
     control: IterationControl = option("step control", IterationControl())
-    acceleration: Literal["none", "anderson"] = option("how the iteration is accelerated", "none")
+    acceleration: Literal["none", "anderson"] = option("acceleration of the fixed-point iteration", "none")
 
     counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     world_quantities: ClassVar = ("time_before", "next_dt", *INTERVAL_QUANTITIES)
@@ -133,7 +132,7 @@ class Trapezoid(Stepper):
 
 
 class Iteration(Repeat):
-    """This repeat makes iterations of an attempt, until there is a verdict."""
+    """This repeat computes iterates of an attempt, until there is a verdict."""
 
     usual = 2
 
@@ -147,8 +146,8 @@ class Iteration(Repeat):
 
 
 class ChooseTrapezoidStep(Phase):
-    """This phase chooses the step; the last one ends exactly on time. Forces will be those of the end of the
-    step."""
+    """This phase chooses the step, and sets the time to its end, at which forces are evaluated. The last step
+    ends exactly at the end of the run."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.control = context.s, context.control
@@ -163,7 +162,7 @@ class ChooseTrapezoidStep(Phase):
 
 
 class PredictEnd(PerParticle):
-    """This phase makes the first iterate, K = 1, with the force at the beginning of the step."""
+    """This phase computes the first iterate, K = 1, with the force at the beginning of the step."""
 
     def __init__(self, solve) -> None:
         super().__init__(solve.s)
@@ -182,8 +181,8 @@ class PredictEnd(PerParticle):
 
 
 class Correct(PerBlock):
-    """This phase makes the next iterate, and sums change, displacement, error, and what the error is compared
-    with (m)."""
+    """This phase computes the next iterate, and sums the change, the displacement, the error, and the scale
+    of the error (m)."""
 
     def __init__(self, context: StepContext, sums, solve) -> None:
         super().__init__(sums)
@@ -207,7 +206,7 @@ class Correct(PerBlock):
 
 
 class JudgeIteration(Phase):
-    """This phase judges whether the iteration is solved, to go on, or to be given up."""
+    """This phase decides whether the iteration has converged, goes on, or is given up."""
 
     def __init__(self, context: StepContext, sums) -> None:
         self.s, self.control, self.sums = context.s, context.control, sums
@@ -217,7 +216,7 @@ class JudgeIteration(Phase):
         s = self.s
         total = self.sums.total(w)
         change, error = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        # Nothing moves where nothing changes: 0/0 is no error.
+        # If nothing changes, nothing moves: 0/0 is no error.
         if total[0] != 0.0:
             change = total[0] / total[1]
         if total[2] > 0.0:
@@ -235,6 +234,6 @@ class JudgeIteration(Phase):
                 s.verdict[w] = HOPELESS
                 report_failure(s, w)
             factor = self.control.factor(w, self.control.aim(w), change, ti.cast(k, ti.f64), error)
-            # A step that was not accepted would fail again in the same way if it were as long.
+            # A rejected step of the same length would fail again in the same way.
             s.next_dt[w] = s.dt[w] * ti.select(s.verdict[w] == ACCEPTED, factor, ti.min(factor, SHORTER))
             s.iterating[w] = 0
