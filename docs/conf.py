@@ -47,7 +47,8 @@ TYPES = (
 INNER = "|".join(
     (
         r"tisim\.(io\.(recording|trajectory|recorder)|packing\.(clump|region|tried_places)|engine\.particle_state|backend\.runtime)\.\w+",
-        r"(tisim\.(components\.(materials|component)|steppers\.context|worlds\.(bound|program|state)|neighbours\.(lists|half_list)|engine\.assembly|interactions\.force_sum|effects\.contact\.granular\.parts)|optimize\.(methods\.\w+|problem\.(function|constraint|statistic)|storage\.cache|analysis\.\w+))\.\w+",
+        r"tisim\.(materials\.materials|components\.component|steppers\.context|state\.(bound|state)|program\.phases|pairs\.(lists|half_list)|engine\.assembly|forces\.force_sum|effects\.contact\.granular\.parts)\.\w+",
+        r"(tisim\.)?optimize\.(methods\.\w+|problem\.(function|constraint|statistic)|storage\.cache|analysis\.\w+)\.\w+",
     )
 )
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in (*OTHERS, *TYPES))]

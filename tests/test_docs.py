@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from tisim.describe.docstrings import PUBLICATIONS
+from tisim.version import __version__
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -51,3 +54,15 @@ def test_what_documents_point_to_is_there(page):
     for name in (*links, *files):
         assert (ROOT / name).exists() or (ROOT / page).parent.joinpath(name).exists(), name
     assert not re.search(r"@[A-Z]+@", text)
+
+
+def test_the_citation_is_of_this_version_and_names_all_publications():
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^version: (.+)$", text, re.M) == [__version__]
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert re.findall(r"^license: (.+)$", text, re.M) == re.findall(r'^license = "(.+)"$', project, re.M)
+    assert re.findall(r'^version = "(.+)"$', project, re.M) == [__version__]
+    names, years = (re.findall(rf"^ +(?:- )?{key}: (.+)$", text, re.M) for key in ("family-names", "year"))
+    for name, year, work in zip(names, years, PUBLICATIONS.values(), strict=True):
+        assert name in work
+        assert f"({year})" in work
