@@ -29,11 +29,11 @@ MEAN_VELOCITY = (100.0, 10.0, 10.0)
 """The mean velocity of the grains at the start, m/s (Z04 section 7)."""
 
 BEST = designs()[0]
-"""The design of rank 1 that Z04 publishes, in SI units."""
+"""The design of rank 1 in Z04, in SI units."""
 
 
 def _search(evaluations: int, published: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a search of that many runs; published : those of Zohdi's own algorithm."""
+    """Return the search settings for a number of runs; published : the settings of Zohdi's own algorithm."""
     usual = {"generations": evaluations, "max_evaluations": evaluations}
     return {**usual, "methods": {"zohdi": published}}
 
@@ -65,11 +65,11 @@ SIZES = {
 
 
 def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: float = DURATION) -> Scene:
-    """Return the flow of a design from one random start; with charges and fields where the design says what
-    they are.
+    """Return the flow of a design from one random start, with charges and fields if the design has their
+    genes.
 
-    In fields grains also see each other across the faces: where they attract each other, it must not matter
-    that the mean velocity carries all of them through the faces again and again.
+    With fields, grains also interact across the faces of the box: the mean velocity carries all grains
+    through the faces repeatedly, and this must not affect their attraction.
     """
     radius = design["length_ratio"] * HALF_SIDE / grains ** (1 / 3)
     v = design["relative_velocity"]
@@ -102,7 +102,7 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """Return the flow of the paper's best string."""
+    """Return the flow of the best design of Z04."""
     return scene(BEST, seed, **size_named(size, SIZES).scene)
 
 

@@ -1,4 +1,5 @@
-"""What L21 finds of avalanches, beside what a narrow cell shows of it, and what holds exactly."""
+"""Checks of the avalanche: findings of L21 that a narrow cell can reproduce, and relations that hold
+exactly."""
 
 from __future__ import annotations
 
@@ -21,22 +22,22 @@ from tisim.analysis import Mean
 from tisim.steppers import FixedStep, Verlet
 
 CHECKED_SEEDS = 6
-"""There are so many random starts of each avalanche."""
+"""Number of random starts of each avalanche."""
 MAGNETISATION = 11.9e3
-"""A/m; that of a single grain at 5 mT (L21 section 4.5)."""
+"""Magnetisation of a single grain at 5 mT, A/m (L21 section 4.5)."""
 BALANCE = 0.02
-"""How far the load on the walls may be from the weight of the grains where they count as at rest."""
+"""Largest relative difference between the load on the walls and the weight of the grains at rest."""
 
 
 def check(seeds: int = CHECKED_SEEDS) -> Iterator[Check | Claim | Shown]:
-    """Yield what must hold of two grains, and of avalanches from some starts."""
+    """Yield the checks of two grains and of avalanches from several starts."""
     yield from of_two_grains()
     wanted = [(d, field, seed) for d in DIAMETERS for field in (0.0, FLUX) for seed in range(seeds)]
     yield from of_avalanches(avalanches(DEFAULT, wanted))
 
 
 def pairs() -> list[Result]:
-    """Return two grains of each diameter in contact along the field, after a step."""
+    """Return two grains of each diameter in contact along the field, after one step."""
     scenes = []
     for d in DIAMETERS:
         place = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, d]])
@@ -47,8 +48,10 @@ def pairs() -> list[Result]:
 
 
 def of_two_grains() -> Iterator[Check]:
-    """Yield the magnetisation, and the attraction over the weight: ten times of 5 mm, about as much of 5 cm
-    (L21 section 4.5)."""
+    """Yield the magnetisation, and the attraction divided by the weight.
+
+    The ratio is about 10 for grains of 5 mm and about 1 for grains of 5 cm (L21 section 4.5).
+    """
     for d, result in zip(DIAMETERS, pairs(), strict=True):
         name = f"{1e3 * d:g} mm"
         force = abs(float(result.state["force"][0, 2]))
@@ -61,8 +64,11 @@ def of_two_grains() -> Iterator[Check]:
 
 
 def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim | Shown]:
-    """Yield what avalanches with and without a field show. The angle of magnetised slopes is not among it:
-    grains stand in chains as high as so small a heap."""
+    """Yield the checks of avalanches with and without a field.
+
+    The angle of magnetised slopes is not checked: in a heap this small, chains of grains are as high as the
+    heap.
+    """
     off = max(abs(load_on_walls(one.end) - 1) for one in runs)
     yield Check("load on the walls over weight, at worst", 1 + off, 1.0, BALANCE)
     by_size = {d: (of(runs, d, 0.0), of(runs, d, FLUX)) for d in DIAMETERS}
@@ -77,7 +83,7 @@ def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim | Shown]:
             (f"volume over that without (L21: {larger(d):.2f})", grown),
             ("volume as magnetised over that as settled", loosened[-1]),
         ):
-            # Of larger grains so few starts do not tell it from 1.
+            # # For larger grains these few starts cannot distinguish the value from 1.
             judged = d == DIAMETERS[0]
             mean = Mean.of(values)
             yield Claim(f"{name}: {what}", mean, 1.0) if judged else Shown(f"{name}: {what}", mean)
@@ -95,7 +101,8 @@ def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim | Shown]:
 
 
 def of_sweeps(bed: str, eigenvalues: np.ndarray) -> Iterator[Check | Shown]:
-    """Yield by what moments of a bed grow or shrink in a whole sweep, and that sweeps as made converge."""
+    """Yield the eigenvalues of a whole sweep of the moments of a bed, and the check that the relaxed sweeps
+    converge."""
     for name, value in (("least", eigenvalues[0]), ("largest", eigenvalues[-1])):
         yield Shown(f"5 mm, {bed}: {name} eigenvalue of moments", float(value), "whole sweeps: -1 to 1")
     off = np.abs(1 - RELAXATION + RELAXATION * eigenvalues[[0, -1]]).max()

@@ -1,4 +1,4 @@
-"""Numbers of Z16, and runs of the blast beside closed forms."""
+"""Checks of the blast: numbers of Z16, and comparisons of runs with closed forms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _speed(result: Result) -> float:
 
 
 def check() -> Iterator[Check]:
-    """Numbers of Z16, energy at the start, and what the field does to the cloud."""
+    """Yield the checks of numbers of Z16, of the initial energy, and of the field's effect on the cloud."""
     drag = 0.5 * AIR * 1.0 * SPEED * np.pi * RADIUS**2
     ratio = SPECIFIC_CHARGE * MASS * FLUX / drag
     yield Check("magnetic force over drag, C_D = 1 (printed: 56504.7)", float(ratio), 46126.3, 0.1)
@@ -28,9 +28,9 @@ def check() -> Iterator[Check]:
     yield Check("kinetic energy at the start, J", kinetic, ENERGY, 1e-8 * ENERGY)
     a, b = half_axes(still.state), half_axes(field.state)
     yield Check("no field: longest axis over shortest", float(a.max() / a.min()), 1.0, 0.05)
-    # Drag takes about 1 part in 1000 of the speed in this time.
+    # # Drag reduces the speed by about 1 part in 1000 in this time.
     yield Check("along the field, m: the field makes no difference", float(b[0] / a[0]), 1.0, 2e-3)
-    # The chord of a circle of radius v/w, w = q B/m, after the angle w t.
+    # # The chord of a circle of radius v/w, w = q B/m, that subtends the angle w t.
     rate = SPECIFIC_CHARGE * FLUX
     chord = 2 * SPEED / rate * abs(np.sin(rate * duration / 2))
     w, start = np.array([FLUX, 0.0, 0.0]), float(half_axes(field.start).mean())
