@@ -1,4 +1,4 @@
-"""Capture by one fibre after the other: the cascade of B16 section 6.4.5."""
+"""Capture by successive fibres: the cascade of B16 section 6.4.5."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What rules the clouds of L21 and their copies, in closed form: times, spins, energies and forces."""
+"""Governing numbers of the clouds of L21 and their copies, in closed form: times, spins, energies and
+forces."""
 
 from __future__ import annotations
 
@@ -32,22 +33,28 @@ from tisim.cases.granular_bench.closed_forms import hertz_depth, hertz_overlap, 
 from tisim.cases.statistics import Shown
 
 ACCELERATION = 5e-6
-"""At the surface of L21's asteroids, m/s^2; section 4.6."""
+"""Gravity at the surface of L21's asteroids, m/s^2; section 4.6."""
 FALLS = {d: free_fall(mean_density(d, SPACING, DENSITY)) for d in DIAMETERS}
-"""The time (s) in which a cloud of grains of a diameter (m) falls together without pressure."""
+"""The free-fall time (s) of a cloud without pressure, by grain diameter (m)."""
 COMPARED = DURATION * FALLS[DIAMETERS[1]] / FALLS[DIAMETERS[0]]
-"""When grains of 100 cm have fallen as far as L21's of 50 cm at 15 000 s, s."""
+"""The time for grains of 100 cm that corresponds to 15 000 s for L21's grains of 50 cm, s, in free-fall
+times."""
 
 
 def rotation_over_gravity(rotation: float, density: float) -> float:
-    """Return the energy of rotation of a ball of some density (kg/m^3) over that of its gravity: a third of
-    (rotation over critical spin)^2; rotation : rad/s."""
+    """Return the rotational energy of a ball of some density (kg/m^3) divided by its gravitational energy.
+
+    It is a third of (rotation over critical spin)^2; rotation : rad/s.
+    """
     return (rotation / critical_spin(density)) ** 2 / 3
 
 
 def virial_ratio_of_cloud(diameter: float, number: int = NUMBER) -> float:
-    """Return twice the thermal energy of L21's cloud of grains of a diameter (m), without its seed, over that
-    of its gravity, 3/5 G M^2 / R: above 1 it expands at first, and above 2 it is not bound by gravity."""
+    """Return twice the thermal energy of L21's cloud, without its seed, over its gravitational energy, 3/5 G
+    M^2 / R.
+
+    Above 1 the cloud expands at first, and above 2 it is not bound by gravity. diameter : of the grains, m.
+    """
     mass = number * sphere_mass(diameter, DENSITY)
     radius = (3 * number / (4 * np.pi)) ** (1 / 3) * SPACING
     square = 3 * float(thermal_speed(diameter, np.array(mass / number))) ** 2
@@ -55,22 +62,24 @@ def virial_ratio_of_cloud(diameter: float, number: int = NUMBER) -> float:
 
 
 def impact_depth(diameter: float, scale: float, softened: float = 1.0) -> float:
-    """Return how deep an impact at scale * IMPACT presses two grains into each other, over a radius."""
+    """Return the largest overlap of two grains in an impact at scale * IMPACT, divided by a radius."""
     mass = sphere_mass(diameter, DENSITY)
     modulus = young(scale, softened) / (2 * (1 - POISSON**2))
     return float(hertz_depth(scale * IMPACT, diameter / 4, reduced(mass, mass), modulus)) / (diameter / 2)
 
 
 def magnetic_depth(diameter: float, scale: float, magnetisation: float, softened: float = 1.0) -> float:
-    """Return how deep the attraction of two magnets in line presses them into each other, over a radius;
-    magnetisation : that of L21's grains, A/m."""
+    """Return the overlap of two magnets in line under their attraction, divided by a radius.
+
+    magnetisation : of L21's grains, A/m.
+    """
     modulus = young(scale, softened) / (2 * (1 - POISSON**2))
     force = attraction(diameter, scale * magnetisation)
     return float(hertz_overlap(force, diameter / 4, modulus)) / (diameter / 2)
 
 
 def regime() -> Iterator[Shown]:
-    """Yield how L21's numbers go together, and what the copy of the default size has."""
+    """Yield the governing numbers of L21's clouds, and of the copy of the default size."""
     for d in DIAMETERS:
         yield from of_clouds(d)
     yield Shown(f"100 cm: time that is as {DURATION:g} s of 50 cm, s", COMPARED)
@@ -84,7 +93,7 @@ def regime() -> Iterator[Shown]:
 
 
 def of_clouds(d: float) -> Iterator[Shown]:
-    """Yield numbers of L21's clouds and asteroids of grains of a diameter (m)."""
+    """Yield numbers of L21's clouds and asteroids with grains of a diameter (m)."""
     name, density, packed = (
         f"{1e2 * d:g} cm",
         mean_density(d, SPACING, DENSITY),
