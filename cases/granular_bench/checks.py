@@ -1,4 +1,4 @@
-"""The tests of single contacts that codes of discrete elements are held to, each beside its expectation."""
+"""Standard tests of single contacts in discrete element codes, each compared with its expected value."""
 
 from __future__ import annotations
 
@@ -28,28 +28,30 @@ from tisim.cases.runs import sound
 from tisim import Scene, run
 
 BOUND = 1e-3
-"""How far an impact in 800 steps may be off, over the speed at which two approach."""
+"""Largest error of an impact in 800 steps, relative to the approach speed."""
 HALVES = (0.25, 0.5)
-"""Twice at which the speed of what is let go is looked at, s: what springs have taken up by then is over."""
+"""Fractions of the duration at which a speed is sampled after release, s; springs are fully loaded by
+then."""
 SHEARED_FRACTIONS, RATIO_BOUND = (0.52, 0.56, 0.58), 0.07
-"""The cells that are sheared have these solid fractions, and mu of each may be so far from that of glass
+"""Solid fractions of the sheared cells, and the largest difference between their mu and that of glass
 beads."""
 RISE_BOUND = 0.5
-"""How far the rise of mu from the slowest to the fastest of the cells may be short of that of glass beads, in
-parts of the latter: one mu for all cells has none. Of three starts it was 1.4, 1.6 and 2.0 times as large, so
-nothing is asked of how far it is above."""
+"""Largest shortfall of the rise of mu from the slowest to the fastest cell, as a fraction of the rise for
+glass beads. A constant mu has no rise. In three starts the rise was 1.4, 1.6 and 2.0 times as large, so there
+is no upper limit."""
 COARSE = 4000
-"""Steps of an impact in NumPy that a run is held against."""
+"""Number of steps of an impact in the NumPy reference."""
 
 
 def rebounds(impacts: Sequence[ParticleImpact]) -> list[Rebound]:
-    """Return what becomes of some impacts, run as one batch."""
+    """Return the rebounds of several impacts, run as one batch."""
     results = sound(run([impact.scene() for impact in impacts]))
     return [rebound(impact, result) for impact, result in zip(impacts, results, strict=True)]
 
 
 def check() -> Iterator[Check]:
-    """Yield the tests of Chung and Ooi (2011), friction, rolling and rest, adhesion, a beam, a shear cell."""
+    """Yield the tests of Chung and Ooi (2011), friction, rolling and rest, adhesion, a beam, and a shear
+    cell."""
     everything = [impact for test in particle_tests.TESTS.values() for impact in test]
     found = dict(zip(everything, rebounds(everything), strict=True))
     yield from normal_impacts(found)
@@ -61,7 +63,7 @@ def check() -> Iterator[Check]:
 
 
 def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
-    """Yield tests 1 to 3: Hertz's force, depth and time, the rebound, and coefficients of restitution."""
+    """Yield tests 1 to 3: Hertz's force, depth and duration, the rebound, and coefficients of restitution."""
     elastic = particle_tests.ELASTIC + particle_tests.ELASTIC_PLANE
     for impact, curve in zip(elastic, force_curves(elastic), strict=True):
         what = f"{impact.substance}, {'two spheres' if impact.partner == 'twin' else 'at a plane'}"
@@ -81,15 +83,17 @@ def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
 
 
 def slides_throughout(impact: ParticleImpact) -> bool:
-    """Return whether a surface is so fast that it slides through all of an impact, with a margin for a
-    sphere that is elastic."""
+    """Return whether the surface slides throughout an impact, with a margin for an elastic sphere."""
     speed = abs(impact.sideways - impact.radius * impact.spin) / impact.speed
     return bool(speed > 1.15 * sliding_limit(impact.friction, impact.restitution))
 
 
 def oblique_checks(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
-    """Yield tests 4 to 8: where the surface slides throughout against the closed form, for rigid spheres up
-    to half of the depth over the radius; at all angles and spins against the law in NumPy."""
+    """Yield tests 4 to 8: comparisons with the closed form and with the NumPy reference.
+
+    The closed form holds for rigid spheres whose surface slides throughout; deviations up to half of the
+    depth over the radius are allowed. The reference covers all angles and spins.
+    """
     for number in (4, 5, 6, 7, 8):
         impacts = particle_tests.TESTS[number]
         velocity, spin = oblique_impacts(impacts, COARSE)
@@ -109,7 +113,8 @@ def oblique_checks(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
 
 
 def sliding_checks(number: int, sliding: Sequence[Rebound]) -> Iterator[Check]:
-    """Yield what spheres of a test that slide throughout gain and lose, over mu (1 + e) v and 5/2 of that."""
+    """Yield the velocity and spin changes of sliding spheres, divided by mu (1 + e) v and 5/2 of that over
+    R."""
     gains = []
     for one in sliding:
         impact = one.impact
@@ -126,21 +131,26 @@ def sliding_checks(number: int, sliding: Sequence[Rebound]) -> Iterator[Check]:
 
 
 def friction_excess(restitution: float) -> float:
-    """Return the sum of |N| over that of N in an impact: damping pulls before surfaces part, and Coulomb's
-    limit goes by the size of the force, pull or push. 1 where nothing is lost; by NumPy, at a plane."""
+    """Return the ratio of the sums of |N| and N over an impact, from the NumPy reference, at a plane.
+
+    Damping pulls before the surfaces separate, and Coulomb's limit uses the magnitude of the force, so the
+    ratio exceeds 1. It is 1 without damping.
+    """
     one = ParticleImpact("glass", 1.0, 1e-3, restitution, 0.01, sideways=1.0)
     ((velocity,), _) = oblique_impacts([one], COARSE)
     return float((1.0 - velocity) / sliding_impact(1e-3, 0.01, restitution, 1.0)[0])
 
 
 def last_states(*scenes: Scene) -> list[dict[str, np.ndarray]]:
-    """Return the states at the ends of some scenes."""
+    """Return the final states of several scenes."""
     return [by_id(result) for result in sound(run(list(scenes)))]
 
 
 def friction_and_rest() -> Iterator[Check]:
-    """Yield a sphere that slides and comes to roll, rolls and stops, on a slope, between two planes; and a
-    column at rest."""
+    """Yield the motions of a sphere and a column at rest.
+
+    The sphere slides and begins to roll, rolls and stops, lies on a slope, and lies between two planes.
+    """
     m = motions
     steep = [m.on_slope(part * 3.5 * m.FRICTION) for part in m.SLOPES]
     rough = [m.on_slope(part * m.ROLLING_FRICTION, m.ROLLING_FRICTION, t) for part in m.HOLDS for t in HALVES]
@@ -199,7 +209,8 @@ def friction_and_rest() -> Iterator[Check]:
 
 
 def sliding_way(lever: float) -> float:
-    """Return how far a sphere gets (m) that slides first and then rolls, in twice the time it slides."""
+    """Return the distance (m) of a sphere that first slides and then rolls, after twice the time until it
+    rolls."""
     m = motions
     slows = m.FRICTION * m.G
     until = m.SPEED / (slows * (1 + 2.5 * lever**2 / m.SPHERE_RADIUS**2))
@@ -208,7 +219,7 @@ def sliding_way(lever: float) -> float:
 
 
 def pull_offs() -> Iterator[Check]:
-    """Yield what holds two spheres that are drawn apart: DMT and a liquid bridge, then JKR."""
+    """Yield the adhesion of two spheres that are drawn apart: DMT and a liquid bridge, then JKR."""
     a = adhesion
     radius, rupture = a.STICKY_RADIUS / 2, bridge_rupture(a.ANGLE, a.VOLUME)
     stretch = jkr_stretch(a.ENERGY, radius, a.STICKY_MODULUS)
@@ -230,7 +241,8 @@ def pull_offs() -> Iterator[Check]:
 
 
 def beam_checks() -> Iterator[Check]:
-    """Yield how far a row of cemented spheres bends, and below and above which load it breaks."""
+    """Yield the deflection of a row of cemented spheres, and whether it breaks below and above its breaking
+    load."""
     most = beams.breaking_load()
     scenes = [beams.beam(beams.LOAD), *(beams.beam(part * most, rises=True) for part in (0.97, 1.03))]
     bent, whole, broken = last_states(*scenes)
@@ -245,7 +257,7 @@ def beam_checks() -> Iterator[Check]:
 
 
 def shear_checks() -> Iterator[Check]:
-    """Yield the stress ratio of cells that are sheared, and its rise with I, beside those of glass beads."""
+    """Yield the stress ratio of sheared cells and its rise with I, compared with glass beads."""
     beds = sheared_beds(SHEARED_FRACTIONS)
     expected = expected_ratio(np.array([bed.inertial_number for bed in beds]))
     for bed, ratio in zip(beds, expected, strict=True):
