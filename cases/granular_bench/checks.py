@@ -30,8 +30,7 @@ from tisim import Scene, run
 BOUND = 1e-3
 """Largest error of an impact in 800 steps, relative to the approach speed."""
 HALVES = (0.25, 0.5)
-"""Fractions of the duration at which a speed is sampled after release, s; springs are fully loaded by
-then."""
+"""Two times after release at which the speed is sampled, s; the springs are fully loaded by the first."""
 SHEARED_FRACTIONS, RATIO_BOUND = (0.52, 0.56, 0.58), 0.07
 """Solid fractions of the sheared cells, and the largest difference between their mu and that of glass
 beads."""

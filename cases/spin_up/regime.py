@@ -1,4 +1,5 @@
-"""What rules the piles of the case spin_up, in closed form: scale, times, and how deep grains overlap."""
+"""Governing numbers of the piles of the case spin_up, in closed form: scale, times, and overlaps of
+grains."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from tisim.cases.statistics import Shown
 
 
 def regime() -> Iterator[Shown]:
-    """Yield what the copy of the default size has."""
+    """Yield the numbers of the copy of the default size."""
     d, softened = DIAMETERS[1], DEFAULT["softened"]
     scale = scale_of(DEFAULT["number"], NUMBERS[d])
     yield Shown("scale of the copy", scale)
