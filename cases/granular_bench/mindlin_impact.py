@@ -5,7 +5,7 @@ used for them. A sphere of mass m and radius R, with I = 2/5 m R^2, meets a part
 are formed:
 
     m* dv_n/dt = -N,    N = 4/3 E* sqrt(R*) delta^1.5 + c sqrt(S_n m*) v_n,    S_n = 2 E* sqrt(R* delta)
-    F = T + c sqrt(S_t m*) u,    dT/dt = S_t u + T dln(S_t)/dt during unloading,    |F| <= mu N,    S_t = 8 G* a
+    F = T + c sqrt(S_t m*) u,   dT/dt = S_t u + T dln(S_t)/dt if S_t falls,   |F| <= mu N,   S_t = 8 G* a
     m du/dt = -(F / share) (1 + 5 L^2 / (2 R^2)),    L = R - delta / 2
 """
 

@@ -1,4 +1,4 @@
-"""Numbers of Z13, and runs of the array beside the closed forms of its centre of gravity."""
+"""Checks of Z13: its numbers, and comparisons of runs with the closed forms of the centre of gravity."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from tisim.steppers import Collocation, StageControl
 
 
 def deviation(results: list[Result]) -> float:
-    """Largest distance of the centre of gravity from its closed form, over the largest displacement."""
+    """Return the largest distance of the centre of gravity from its closed form, over the largest
+    displacement."""
     computed, true = (np.array([f(result) for result in results]) for f in (centre, exact))
     return float(np.linalg.norm(computed - true, axis=1).max() / np.linalg.norm(true, axis=1).max())
 
 
 def check() -> Iterator[Check]:
-    """Z13's numbers and slip; the centre of gravity, resonances and beats against their closed forms."""
+    """Yield Z13's numbers and its misprint; centre of gravity, resonances and beats compared with their
+    closed forms."""
     slow, fast = resonances(CYCLOTRON, STIFFNESS / MASS)
     yield Check("w = q B/m, 1/s (printed: 1819.385)", CYCLOTRON, 954.930, 1e-3)
     yield Check("sqrt(k/m), 1/s", float(np.sqrt(STIFFNESS / MASS)), 21.851, 1e-3)
