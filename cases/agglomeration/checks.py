@@ -137,7 +137,7 @@ def closed_forms() -> Iterator[Check]:
 
     expected = 4 * gamma / (HARDNESS * LENGTH)
     size = onset(breaks, 0.3 * expected, 3 * expected)
-    yield Check("largest radius that sticks (m)", size, expected, CLOSED_FORM_BOUND * expected)
+    yield Check("largest radius of grains that bond (m)", size, expected, CLOSED_FORM_BOUND * expected)
 
 
 def energy(result: Result) -> tuple[float, float]:
@@ -163,7 +163,7 @@ def conservation() -> Iterator[Check]:
     """Yield the checks of mass, momentum and energy of a flow in which grains bond and break."""
     flow = agglomeration.scene({**agglomeration.BEST, "surface_energy": 5e4}, seed=1, grains=1000)
     result = tisim.run(flow)
-    yield Check("the flow reaches its end (1 = yes)", float(result.status.ok), 1.0, 0.0)
+    yield Check("the run completes (1 = yes)", float(result.status.ok), 1.0, 0.0)
     before, after = result.start, result.state
     mass = before["mass"].sum()
     yield Check("mass (kg)", after["mass"].sum(), mass, CONSERVATION_BOUND * mass)
@@ -174,7 +174,7 @@ def conservation() -> Iterator[Check]:
         yield Check(f"momentum along {'xyz'[axis]} (kg m/s)", momentum[1][axis], momentum[0][axis], bound)
     start, end = energy(result)
     turned_over = float(result.state["cooling_loss"].sum() + result.state["reaction_heat"].sum()) + start
-    yield Check("energy, all books (J)", end, start, CONSERVATION_BOUND * turned_over)
+    yield Check("total energy with losses and sources (J)", end, start, CONSERVATION_BOUND * turned_over)
 
 
 def check() -> Iterator[Check]:

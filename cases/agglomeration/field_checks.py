@@ -121,9 +121,11 @@ def closed_forms() -> Iterator[Check]:
     time = fall_time(MASS, CHARGE, START_DISTANCE, 2 * RADIUS)
     for name, stepper, bound in (
         (f"{STEPS} steps", Verlet(control=FixedStep(dt=time / STEPS)), FORM_BOUND),
-        ("the steps of the case", OWN_STEPPER, OWN_STEPPER_BOUND),
+        ("steps of the case", OWN_STEPPER, OWN_STEPPER_BOUND),
     ):
-        yield Check(f"opposite charges meet, in {name} (s)", meeting(stepper, time), time, bound * time)
+        yield Check(
+            f"time until opposite charges meet, {name} (s)", meeting(stepper, time), time, bound * time
+        )
 
     flux, duration = 0.8, 2e-3
     magnetic = {**fields.NO_FIELDS, "magnetic_field": flux}
@@ -132,7 +134,7 @@ def closed_forms() -> Iterator[Check]:
     (x, _, _), (v, _, _) = (end.state[name][1] - end.state[name][0] for name in ("position", "velocity"))
     speed = dipole_speed(MASS, iron_moment(flux), START_DISTANCE, x)
     yield Check(
-        f"magnetised grains close in from {START_DISTANCE / x:.3g} times as far (m/s)",
+        f"closing speed of magnetised grains, distance reduced {START_DISTANCE / x:.3g} times (m/s)",
         -v,
         speed,
         FORM_BOUND * speed,
@@ -145,7 +147,10 @@ def closed_forms() -> Iterator[Check]:
     way += electric["electric_amplitude"] * (turn * duration - np.sin(turn * duration)) / turn**2
     way *= CHARGE / MASS
     yield Check(
-        "a charge in an oscillating field goes (m)", end.state["position"][0, 1], way, FORM_BOUND * way
+        "displacement of a charge in an oscillating field (m)",
+        end.state["position"][0, 1],
+        way,
+        FORM_BOUND * way,
     )
 
 
@@ -155,9 +160,12 @@ def conservation() -> Iterator[Check]:
     soft = {**agglomeration.BEST, "hardness": 1e5, **CHARGED, "charge_ratio": -0.5}
     result = tisim.run(agglomeration.scene(soft, seed=1, grains=250))
     before, after = result.start, result.state
-    yield Check("the charged flow reaches its end (1 = yes)", float(result.status.ok), 1.0, 0.0)
+    yield Check("the run of the charged flow completes (1 = yes)", float(result.status.ok), 1.0, 0.0)
     yield Check(
-        "grains less mergers, at the end", 250.0 - result.work["merges"], float(len(after["mass"])), 0.0
+        "grains at the end: initial number less mergers",
+        250.0 - result.work["merges"],
+        float(len(after["mass"])),
+        0.0,
     )
     for name, unit in (("charge", "C"), ("mass", "kg")):
         bound = CONSERVATION_BOUND * np.abs(before[name]).sum()
@@ -165,5 +173,5 @@ def conservation() -> Iterator[Check]:
     momentum = [(s["mass"][:, None] * s["velocity"]).sum(axis=0) for s in (before, after)]
     bound = CONSERVATION_BOUND * (before["mass"] * np.linalg.norm(before["velocity"], axis=1)).sum()
     for axis in range(3):
-        what = f"its momentum along {'xyz'[axis]} (kg m/s)"
+        what = f"momentum of the charged flow along {'xyz'[axis]} (kg m/s)"
         yield Check(what, momentum[1][axis], momentum[0][axis], bound)

@@ -41,9 +41,9 @@ VARIANTS = {
 """Genes that each variant of the inverse problem adds to GENES: surface energy, and charges and fields."""
 
 MEANINGS = {
-    "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 where all grains are one",
-    "b_f / b_0": "mean radius at the end over that at the start",
-    "n_f": "(b_f/b_0)^3, grains of the start in one of the mean radius at the end",
+    "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 if all grains have merged",
+    "b_f / b_0": "final over initial mean radius",
+    "n_f": "(b_f/b_0)^3, number of initial grains in a grain of the final mean radius",
 }
 
 

@@ -64,7 +64,7 @@ def main() -> None:
     console = Console()
 
     table = Table(
-        "rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published strings"
+        "rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published individuals"
     )
     for rank, (design, published) in enumerate(zip(designs(), PUBLISHED_COSTS, strict=True), start=1):
         mean, half = estimate([scene(design, seed, options.grains) for seed in range(options.starts)])
@@ -75,7 +75,7 @@ def main() -> None:
     console.print(table)
 
     if options.sensitivity:
-        table = Table("string 1 with", "Pi, 95 % CI", title="One assumption changed at a time")
+        table = Table("individual 1 with", "Pi, 95 % CI", title="One assumption changed at a time")
         for name, change in CHANGES.items():
             scenes = [change(scene(designs()[0], seed, options.grains)) for seed in range(options.starts)]
             mean, half = estimate(scenes)

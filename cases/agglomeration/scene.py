@@ -40,7 +40,7 @@ def _search(evaluations: int, published: Mapping[str, Any]) -> dict[str, Any]:
 
 SIZES = {
     "small": Size(
-        "60 grains; a look in seconds",
+        "60 grains; runs in seconds",
         {"grains": 60},
         _search(400, {
             "options": {"population": 10, "parents": 4}, "generations": 3,
@@ -55,7 +55,7 @@ SIZES = {
         }),
     ),
     "paper": Size(
-        "1000 grains, a search of 1600 runs; Zohdi's own is 25 generations of 20, as Z04 section 8",
+        "1000 grains, a search of 1600 runs; Zohdi's algorithm has 25 generations of 20 (Z04 8)",
         {"grains": 1000},
         _search(1600, {
             "generations": 25, "ensemble": {"tolerance": 5e-4, "min_starts": 12, "block": 12, "confirm": 48},

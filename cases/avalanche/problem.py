@@ -46,7 +46,7 @@ KNOWN: Mapping[str, float] = IRON_DESIGN
 EXAMPLE = Measurement(27.9, 3.0)
 """The angle of repose of KNOWN without a field, degrees: the mean of 16 starts, and the standard deviation of
 one start, 2.8, rounded up. ``tests/benchmarks/known_slope.py`` prints both."""
-MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
+MEANINGS = {"misfit": "mean squared difference from the measurement, in uncertainties"}
 
 
 def simulated(result: Result, target: Target) -> dict[str, float]:

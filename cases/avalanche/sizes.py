@@ -49,7 +49,7 @@ SIZES = {
     "large": Size(f"{LARGE_CELL.number} grains, 18 diameters high, softened", {"cell": LARGE_CELL}),
     **{
         name: Size(
-            f"{L21_CELLS[diameter].number} grains of {text} as stiff as L21 has them",
+            f"{L21_CELLS[diameter].number} grains of {text} with L21's stiffness",
             {"cell": L21_CELLS[diameter], "diameter": diameter, "stiffness": None},
         )
         for name, diameter, text in (

@@ -29,18 +29,22 @@ def check() -> Iterator[Check]:
     a, b = half_axes(still.state), half_axes(field.state)
     yield Check("no field: longest axis over shortest", float(a.max() / a.min()), 1.0, 0.05)
     # # Drag reduces the speed by about 1 part in 1000 in this time.
-    yield Check("along the field, m: the field makes no difference", float(b[0] / a[0]), 1.0, 2e-3)
+    yield Check("half axis along the field, with field over without", float(b[0] / a[0]), 1.0, 2e-3)
     # # The chord of a circle of radius v/w, w = q B/m, that subtends the angle w t.
     rate = SPECIFIC_CHARGE * FLUX
     chord = 2 * SPEED / rate * abs(np.sin(rate * duration / 2))
     w, start = np.array([FLUX, 0.0, 0.0]), float(half_axes(field.start).mean())
     exact = np.sqrt(5 * np.diag(ellipsoid(w, duration, start)))
-    yield Check("half axes over their closed form: off by", float(np.abs(b / exact - 1).max()), 0.0, 5e-3)
+    yield Check(
+        "half axes over closed form: largest deviation from 1", float(np.abs(b / exact - 1).max()), 0.0, 5e-3
+    )
     reach = np.linalg.norm((field.state["position"] - field.start["position"])[:, 1:], axis=1).max()
-    yield Check("farthest across the field, over the chord of its circle", float(reach / chord), 1.0, 5e-3)
+    yield Check("largest displacement across the field over its chord", float(reach / chord), 1.0, 5e-3)
     speed = np.linalg.norm(field.state["velocity"], axis=1)
     touching = run(scene(contact=True, duration=0.1))
     free = run(scene(duration=0.1))
     minimal = half_axes(touching.state) / half_axes(free.state)
-    yield Check("half axes with contact over without: off by", float(np.abs(minimal - 1).max()), 0.0, 1e-3)
-    yield Check("speed at the end over that without field", float(speed.mean() / _speed(still)), 1.0, 1e-3)
+    yield Check(
+        "half axes with contact over without: deviation from 1", float(np.abs(minimal - 1).max()), 0.0, 1e-3
+    )
+    yield Check("final speed with field over without", float(speed.mean() / _speed(still)), 1.0, 1e-3)

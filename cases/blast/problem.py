@@ -77,7 +77,7 @@ def problem(size: str = "default", variant: str = "ellipsoid", goal: np.ndarray 
         scene=lambda design, seed: scene(design, seed, number),
         objective=lambda result: misfit(moments(result.state), target),
         symbol="misfit",
-        meanings={"misfit": "|S - S*|/|S*| of second moments S of the cloud, S* those that are wanted"},
+        meanings={"misfit": "|S - S*|/|S*| of second moments S of the cloud, S* the target"},
         picture=lambda scene, result: cloud(result),
         details=lambda design, result: details(design, result, target),
     )

@@ -53,17 +53,17 @@ SEARCH_SETTINGS = {
 }  # fmt: skip
 
 SIZES = {
-    "small": Size("500 particles that do not feel each other, 1 s", {"number": 500}, SEARCH_SETTINGS),
-    "default": Size("2000 particles that do not feel each other, 1 s, in the field", {}, SEARCH_SETTINGS),
+    "small": Size("500 particles without interaction, 1 s", {"number": 500}, SEARCH_SETTINGS),
+    "default": Size("2000 particles without interaction, 1 s, in the field", {}, SEARCH_SETTINGS),
     "no_field": Size("the same without the field", {"flux": 0.0}),
-    "contact": Size("2000 particles in contact, 1 s", {"contact": True}),
+    "contact": Size("2000 particles with contact, 1 s", {"contact": True}),
     "contact_no_field": Size("the same without the field", {"contact": True, "flux": 0.0}),
     "near_field": Size(
-        "2000 in contact and with the near field as printed, between all; some minutes",
+        "2000 particles with contact and the printed near field of all pairs; some minutes",
         {"contact": True, "near": True},
     ),
     "clumps": Size(
-        "2000 in contact and with the near field of neighbours only",
+        "2000 particles with contact and the near field of neighbours only",
         {"contact": True, "near": True, "cutoff": NEIGHBOURS},
     ),
     "clumps_no_field": Size(

@@ -46,16 +46,16 @@ GENES = {
 }
 """The genes of each variant of the problem."""
 WANTED = {
-    "fraction": "the soft fibres and the field that catch the most particles from a stream",
-    "hard": "the hard magnets and the field that catch the most particles from a stream",
-    "throughput": "the front of fraction caught and throughput, with speed and radius of particles free",
+    "fraction": "the soft fibres and the field that capture the most particles from a stream",
+    "hard": "the hard magnets and the field that capture the most particles from a stream",
+    "throughput": "the front of captured fraction and throughput, with free speed and particle radius",
 }
 """The goal of each variant of the problem."""
 MEANINGS = {
-    "captured": "fraction of the particles that is caught",
-    "throughput": "water that flows through the channel",
+    "captured": "captured fraction of the particles",
+    "throughput": "volume flow of water through the channel",
     "aspect": "length of a fibre over its diameter D",
-    "spacing": "distance of the axes of fibres side by side",
+    "spacing": "distance between the axes of neighbouring fibres",
 }
 
 

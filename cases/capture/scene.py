@@ -48,9 +48,9 @@ SEARCH_SETTINGS = {
 
 SIZES = {
     "default": Size("100 particles of 125 nm about a short transverse cylinder, 50 s", {}, SEARCH_SETTINGS),
-    "longitudinal": Size("the same about one along the field", {"angle": 0.0}),
-    "long": Size("about a transverse cylinder of length 20 D", {"aspect": 20.0}),
-    "25nm": Size("100 particles of 25 nm, which take far longer", {"nanometres": 25}),
+    "longitudinal": Size("the same about a longitudinal cylinder", {"angle": 0.0}),
+    "long": Size("the same about a transverse cylinder of length 20 D", {"aspect": 20.0}),
+    "25nm": Size("100 particles of 25 nm, which are captured far later", {"nanometres": 25}),
 }
 
 

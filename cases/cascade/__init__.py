@@ -8,7 +8,7 @@ from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="cascade",
-    title="Magnetic colloids captured by one fibre after the other (B16)",
+    title="Magnetic colloids captured by successive fibres (B16)",
     source="R. J. Baars, thesis, Utrecht University (2016), section 6.4.5",
     sizes=SIZES,
     scene=scene_for,

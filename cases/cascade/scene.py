@@ -28,7 +28,7 @@ STAGE = {25: 10.0, 125: 0.5}
 
 SIZES = {
     "default": Size("100 particles of 125 nm about a random cylinder of L/D 20, 0.5 s", {}),
-    "optimal": Size("the same about a transverse one", {"orientation": "optimal"}),
+    "optimal": Size("the same about a transverse cylinder", {"orientation": "optimal"}),
     "25nm": Size("100 particles of 25 nm, 10 s", {"nanometres": 25, "stage": 10.0}),
 }
 

@@ -50,7 +50,7 @@ def check(repeats: int = CHECK_REPEATS) -> Iterator[Claim]:
         yield from of_orientation(mean_times, base)
     for base in short:
         ratio = mean_times[replace(base, orientation="directions")].over(mean_times[base])
-        yield Claim(f"{base.nanometres} nm, L/D 5/3, all directions: random over optimal", ratio, 1.0, 1.5)
+        yield Claim(f"{base.nanometres} nm, L/D 5/3, isotropic: random over optimal", ratio, 1.0, 1.5)
     for one in stages:
         yield stage_claim(mean_times, one)
 
@@ -66,16 +66,16 @@ def of_orientation(mean_times: Means, base: Cascade) -> Iterator[Claim]:
     random, best = PUBLISHED_TIMES[base.nanometres]
     name, ratio = name_of(base), random / best
     bounds = (0.75 * best, 1.25 * best) if base.gap else (0.0, 0.75 * best)
-    yield Claim(f"{name}: s to 90 %, optimal (B16 {best:g})", mean_times[base], *bounds)
+    yield Claim(f"{name}: time to 90 %, s, optimal (B16 {best:g})", mean_times[base], *bounds)
     for how, bounds in zip(RANDOM, ((1.0, 1.25 * ratio), (0.75 * ratio, 2 * ratio)), strict=True):
         ours = mean_times[replace(base, orientation=how)].over(mean_times[base])
-        yield Claim(f"{name}: random over optimal, all {how} alike (B16 {ratio:.1f})", ours, *bounds)
+        yield Claim(f"{name}: random over optimal, uniform {how} (B16 {ratio:.1f})", ours, *bounds)
 
 
 def stage_claim(mean_times: Means, one: Cascade) -> Claim:
     """A longer stage captures more slowly; a shorter stage does so only if particles start away from the
     cylinder."""
     ours = mean_times[one].over(mean_times[replace(one, stage=STAGE[125])])
-    name = f"{name_of(one)}, {one.orientation}: s to 90 % with stages of {one.stage:g} s over 0.5 s"
+    name = f"{name_of(one)}, {one.orientation}: time to 90 % with stages of {one.stage:g} s over 0.5 s"
     worse = one.stage == LONG or one.gap > 0
     return Claim(name, ours, least=1.0) if worse else Claim(name, ours, most=1.0)

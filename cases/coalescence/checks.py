@@ -54,17 +54,17 @@ def of_the_cloud() -> Iterator[Check]:
         density = mass.sum() / (4 / 3 * np.pi * radius**3)
         turns = critical_spin(density)
         expected = critical_spin(mean_density(d, SPACING, DENSITY))
-        yield Check(f"{1e2 * d:g} cm: spin that parts the cloud, urad/s", 1e6 * turns, 1e6 * expected, 2.0)
+        yield Check(f"{1e2 * d:g} cm: critical spin of the cloud, urad/s", 1e6 * turns, 1e6 * expected, 2.0)
 
 
 def of_conservation(runs: Sequence[CloudRun]) -> Iterator[Check]:
     """Yield the conservation of momenta under gravity, contacts and magnetism, and the loss of energy."""
     momentum = max(_off(one, "momentum") for one in runs)
-    yield Check("momentum, change over the sum of magnitudes", momentum, 0.0, ROUNDING)
+    yield Check("momentum: largest change over the sum of magnitudes", momentum, 0.0, ROUNDING)
     angular = max(_off(one, "angular") for one in runs)
-    yield Check("angular momentum with spins, the same", angular, 0.0, ROUNDING)
+    yield Check("angular momentum: largest change over the sum of magnitudes", angular, 0.0, ROUNDING)
     gained = max(_gained(one) for one in of_magnetisation(runs, 0.0))
-    yield Check("0 A/m: largest gain of energy, over that of gravity", gained, 0.0, GAINED)
+    yield Check("0 A/m: largest gain of energy over gravitational energy", gained, 0.0, GAINED)
 
 
 def _off(run: CloudRun, name: str) -> float:
@@ -86,17 +86,26 @@ def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
         for name, least, part in (("two or more", "some", theirs.some), ("over ten", "many", theirs.many)):
             mean = Mean.of([getattr(one.at(COMPARED), least) for one in group])
             beside = f"L21, 50 cm: {part:.3g}"
-            yield Shown(f"{m:g} A/m: of grains outside, in clusters of {name}", mean, beside)
+            yield Shown(f"{m:g} A/m: fraction of outside grains in clusters of {name}", mean, beside)
     # # A difference of at least one grain is required; equality does not support the claim.
     grain = 1 / len(runs[0].end["mass"])
     yield _difference(
-        "in clusters, 1190 less 0 A/m, of all grains", runs, lambda one: one.at(COMPARED).bound, least=grain
+        "fraction of all grains in clusters, 1190 minus 0 A/m",
+        runs,
+        lambda one: one.at(COMPARED).bound,
+        least=grain,
     )
     yield _difference(
-        "in clusters of those outside, 1190 less 0 A/m", runs, lambda one: one.at(COMPARED).some, least=grain
+        "fraction of outside grains in clusters, 1190 minus 0 A/m",
+        runs,
+        lambda one: one.at(COMPARED).some,
+        least=grain,
     )
     weak = _difference(
-        "in clusters, 119 less 0 A/m, of all grains", runs, lambda one: one.at(COMPARED).bound, of=119.0
+        "fraction of all grains in clusters, 119 minus 0 A/m",
+        runs,
+        lambda one: one.at(COMPARED).bound,
+        of=119.0,
     )
     yield Shown(weak.name, weak.mean)
     for m in MAGNETISATIONS[1:]:
@@ -105,7 +114,7 @@ def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
             (f"at {COMPARED:.0f} s", [one.at(COMPARED).chain for one in group]),
             ("at the end", [one.agglomerations[-1].chain for one in group]),
         ):
-            yield Shown(f"{m:g} A/m: grains in a row, head to tail, {when}", Mean.of(chains))
+            yield Shown(f"{m:g} A/m: chain length in grains, {when}", Mean.of(chains))
 
 
 def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
@@ -122,7 +131,7 @@ def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
         name = f"{m:g} A/m: longest axis over shortest"
         yield Shown(name, Mean.of([one.elongation for one in asteroids]), beside)
     yield _difference(
-        "density, 1190 less 0 A/m, kg/m^3", runs, lambda one: one.asteroid.density, most=-LOOSER
+        "density, 1190 minus 0 A/m, kg/m^3", runs, lambda one: one.asteroid.density, most=-LOOSER
     )
     strong = of_magnetisation(runs, MAGNETISATIONS[-1])
     bulk = [MAGNETISATIONS[-1] * one.magnetised_part for one in strong]

@@ -82,14 +82,14 @@ def regime() -> Iterator[Shown]:
     """Yield the governing numbers of L21's clouds, and of the copy of the default size."""
     for d in DIAMETERS:
         yield from of_clouds(d)
-    yield Shown(f"100 cm: time that is as {DURATION:g} s of 50 cm, s", COMPARED)
+    yield Shown(f"100 cm: time equivalent to {DURATION:g} s of 50 cm, s", COMPARED)
     scale, d = scale_of(DEFAULT["number"]), DIAMETERS[1]
     yield Shown("default: scale of the copy", scale)
-    yield Shown("default: magnetisation of its 1190 A/m, A/m", scale * MAGNETISATIONS[-1])
+    yield Shown("default: magnetisation for L21's 1190 A/m, A/m", scale * MAGNETISATIONS[-1])
     yield Shown("default: step, s", step(d, scale))
-    yield Shown("default: depth of an impact over a radius", impact_depth(d, scale))
+    yield Shown("default: overlap of an impact over a radius", impact_depth(d, scale))
     packed = critical_spin(PACKED * DENSITY)
-    yield Shown("default: spin at the end over critical", spin_when_packed(ROTATION, d, SPACING) / packed)
+    yield Shown("default: final over critical spin", spin_when_packed(ROTATION, d, SPACING) / packed)
 
 
 def of_clouds(d: float) -> Iterator[Shown]:
@@ -100,19 +100,21 @@ def of_clouds(d: float) -> Iterator[Shown]:
         critical_spin(PACKED * DENSITY),
     )
     yield Shown(f"{name}: density of the cloud, kg/m^3", density)
-    yield Shown(f"{name}: free fall, s", FALLS[d])
-    yield Shown(f"{name}: spin that parts the cloud, urad/s", 1e6 * critical_spin(density))
+    yield Shown(f"{name}: free-fall time, s", FALLS[d])
+    yield Shown(f"{name}: critical spin of the cloud, urad/s", 1e6 * critical_spin(density))
     for rotation in ROTATIONS:
         turns, end = f"{name}, {1e6 * rotation:g} urad/s", spin_when_packed(rotation, d, SPACING) / packed
-        yield Shown(f"{turns}: over what parts the cloud", rotation / critical_spin(density))
-        yield Shown(f"{turns}: energy over that of gravity", rotation_over_gravity(rotation, density))
-        yield Shown(f"{turns}: spin at the end over critical", end)
+        yield Shown(f"{turns}: over critical spin of the cloud", rotation / critical_spin(density))
+        yield Shown(
+            f"{turns}: rotational over gravitational energy", rotation_over_gravity(rotation, density)
+        )
+        yield Shown(f"{turns}: final over critical spin", end)
         axes = AXES.get((d, rotation, 0.0))
         beside = f"L21: axes {axes[0] / axes[2]:.2f}" if axes else ""
-        yield Shown(f"{turns}, as microdegrees: the same", end * np.pi / 180, beside)
+        yield Shown(f"{turns}, read as microdegrees: final over critical spin", end * np.pi / 180, beside)
     speed = 3**0.5 * float(thermal_speed(d, np.array(sphere_mass(d, DENSITY))))
     yield Shown(f"{name}: thermal speed, mm/s", 1e3 * speed)
     yield Shown(f"{name}: 2 K / |U| of the cloud", virial_ratio_of_cloud(d))
     for m in MAGNETISATIONS[1:]:
         weight = surface_weight(d, DENSITY, ACCELERATION)
-        yield Shown(f"{name}, {m:g} A/m: attraction of two over weight", attraction(d, m) / weight)
+        yield Shown(f"{name}, {m:g} A/m: attraction of two grains over weight", attraction(d, m) / weight)

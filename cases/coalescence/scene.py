@@ -40,7 +40,7 @@ from tisim.effects import (
 from tisim.effects.base import Effect
 from tisim.steppers import FixedStep, Verlet
 
-TITLE = "Magnetised grains fall together into a rubble pile"
+TITLE = "Magnetised grains coalesce into a rubble pile"
 
 IMPACT = 0.02
 """Speed, m/s, of the impact whose duration sets the step: the speed of a fall onto L21's asteroid with grains
@@ -64,7 +64,7 @@ LAW = Granular(
 )
 
 SIZES = {
-    "default": Size("180 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's cloud", DEFAULT),
+    "default": Size("180 grains of 100 cm, magnetised to 1190 A/m, in a scaled copy of L21's cloud", DEFAULT),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
     "small": Size("60 grains, and a seed with the same share of the mass", SMALL),
     "l21": Size(
@@ -72,7 +72,7 @@ SIZES = {
         {"rotation": published.ROTATIONS[1], "tree": True, "duration": published.DURATION},
     ),
     "l21_50cm": Size(
-        "the same of grains of 50 cm",
+        "the same with grains of 50 cm",
         {
             "diameter": DIAMETERS[0], "rotation": published.ROTATIONS[1], "tree": True,
             "duration": published.DURATION,

@@ -41,13 +41,13 @@ FIELD_DIGITS = 5
 
 SIZES = {
     "default": Size("64 particles of 75 nm at 0.5 g/mL above a transverse cylinder, 10 ms", {}),
-    "25nm": Size("the same of 25 nm, which form no chains", {"nanometres": 25, "duration": 2e-3}),
+    "25nm": Size("the same with 25 nm, which form no chains, 2 ms", {"nanometres": 25, "duration": 2e-3}),
     "flow": Size(
-        "24 particles of 75 nm that feel each other's flow, until some are captured",
+        "24 particles of 75 nm with hydrodynamic interaction, until some are captured",
         {"number": 24, "hydrodynamics": "rotne-prager", "duration": 0.3, "coarse": 3.0},
     ),
     "paper": Size(
-        "500 of them, 1 s, as B16: days",
+        "500 of these, 1 s, as in B16; takes days",
         {"number": 500, "hydrodynamics": "rotne-prager", "duration": 1.0, "coarse": 3.0},
     ),
 }

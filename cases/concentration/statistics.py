@@ -101,7 +101,9 @@ def of_chains(repeats: int) -> Iterator[Claim]:
     for setting, group in zip(settings, results(settings, repeats), strict=True):
         size, c = int(setting["nanometres"]), float(setting["concentration"])
         longer = Mean.of([grown(result) for result in group])
-        name = f"{size} nm, {c:g} g/mL: chains after 1 ms longer by (Eq. 6.26: {chain_length(size, c):.1g})"
+        name = (
+            f"{size} nm, {c:g} g/mL: growth of the mean chain in 1 ms (Eq. 6.26: {chain_length(size, c):.1g})"
+        )
         yield Claim(name, longer, most=0.5) if size == 25 else Claim(name, longer, least=1.0)
     early = [{"concentration": c, **CHAINS, "duration": FORMING} for c in (DENSE, DENSEST)]
     few, many = (
@@ -128,16 +130,16 @@ def of_capture(repeats: int) -> Iterator[Claim]:
     along, across = first_captures[0.0, DENSE], first_captures[90.0, DENSE]
     name = "75 nm, 0.5 g/mL, longitudinal: first capture, s (B16 0.1 to 0.25)"
     yield Claim(name, Mean.of(along), least=NO_CAPTURE_BEFORE)
-    yield Claim("transverse over longitudinal (B16: almost 2)", Mean.of(across / along), least=1.5)
-    by = f"first capture at {DENSE:g} g/mL, sooner by, s, than"
+    yield Claim("the same: transverse over longitudinal (B16: almost 2)", Mean.of(across / along), least=1.5)
+    by = f"first capture at {DENSE:g} g/mL, lead in s over"
     for (angle, name), lone in zip(ORIENTATIONS.items(), without_interaction(repeats), strict=True):
         late, soon = first_captures[angle, DILUTE], first_captures[angle, DENSE]
-        yield Claim(f"{name}: {by} at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
-        than = f"{name}: {by} of particles that feel nothing of each other"
+        yield Claim(f"{name}: {by} {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
+        than = f"{name}: {by} particles without interaction"
         yield Claim(than, Mean.of(lone - soon), least=0.0)
     across_both = [{"angle": 90.0, "concentration": c, **CAPTURE} for c in (DENSE, DENSEST)]
     dense, densest = map(firsts, results(across_both, MORE * repeats))
-    name = f"transverse: first capture at {DENSEST:g} g/mL, sooner by, s, than at {DENSE:g} g/mL"
+    name = f"transverse: first capture at {DENSEST:g} g/mL, lead in s over {DENSE:g} g/mL"
     yield Claim(name, Mean.of(dense - densest), least=0.0)
 
 

@@ -70,12 +70,12 @@ def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
         depth = float(hertz_depth(*impact.hertz))
         peak = float(hertz_force(depth, radius, modulus))
         yield Check(f"1, 2: largest force, {what} (N)", float(curve.force.max()), peak, BOUND * peak)
-        yield Check(f"1, 2: depth, {what} (m)", float(curve.overlap.max()), depth, BOUND * depth)
+        yield Check(f"1, 2: largest overlap, {what} (m)", float(curve.overlap.max()), depth, BOUND * depth)
         duration = impact.duration
         yield Check(f"1, 2: duration, {what} (s)", curve.lasted, duration, BOUND * duration)
         off = np.abs(curve.force - hertz_force(curve.overlap, radius, modulus)).max() / peak
-        yield Check(f"1, 2: force against overlap, {what}: off by", float(off), 0.0, 1e-9)
-        yield Check(f"1, 2: speed after over before, {what}", found[impact].restitution, 1.0, BOUND)
+        yield Check(f"1, 2: force against overlap, {what}: largest deviation", float(off), 0.0, 1e-9)
+        yield Check(f"1, 2: speed of rebound over approach, {what}", found[impact].restitution, 1.0, BOUND)
     for impact in particle_tests.DAMPED:
         name = f"3: restitution, {impact.substance}, e = {impact.restitution:g}"
         yield Check(name, found[impact].restitution, impact.restitution, BOUND)
@@ -102,10 +102,10 @@ def oblique_checks(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
         turning = np.array([found[impact].spin[1] for impact in impacts])
         off = float((np.abs(along - velocity) / scale).max())
         yield Check(
-            f"{number}: velocity sideways, {len(impacts)} impacts: off from NumPy by", off, 0.0, BOUND
+            f"{number}: tangential velocity, {len(impacts)} impacts: deviation from NumPy", off, 0.0, BOUND
         )
         off = float((np.abs(turning - spin) * radius / scale).max())
-        yield Check(f"{number}: R times spin, the same: off from NumPy by", off, 0.0, BOUND)
+        yield Check(f"{number}: R times spin, same impacts: deviation from NumPy", off, 0.0, BOUND)
         for substance in dict.fromkeys(impact.substance for impact in impacts):
             some = [one for one in impacts if one.substance == substance and slides_throughout(one)]
             yield from sliding_checks(number, [found[impact] for impact in some])
@@ -122,9 +122,9 @@ def sliding_checks(number: int, sliding: Sequence[Rebound]) -> Iterator[Check]:
         pushed, turned = abs(one.velocity[0] - impact.sideways), abs(one.spin[1] - impact.spin)
         gains.append((pushed / change, turned / turn))
     (pushed, turned), impact = np.mean(gains, axis=0), sliding[0].impact
-    what = f"{number}: {len(gains)} impacts of {impact.substance} that slide"
+    what = f"{number}: {len(gains)} impacts of {impact.substance} with sliding"
     excess = friction_excess(impact.restitution)
-    yield Check(f"{what}: loss over mu (1 + e) v", pushed, excess, BOUND)
+    yield Check(f"{what}: velocity loss over mu (1 + e) v", pushed, excess, BOUND)
     lever = impact.depth / impact.radius
     yield Check(f"{what}: spin over 5/2 mu (1 + e) v/R", turned, excess, BOUND + lever / 2 * excess)
 
@@ -161,32 +161,36 @@ def friction_and_rest() -> Iterator[Check]:
 
     lever = m.SPHERE_RADIUS - m.sunk() / 2
     speed = m.SPEED / (1 + 0.4 * m.SPHERE_RADIUS**2 / lever**2)
-    yield Check("slides and comes to roll: speed over the first (5/7)", rolling["velocity"][0, 0] / m.SPEED,
+    yield Check("sliding, then rolling: final over initial speed (5/7)", rolling["velocity"][0, 0] / m.SPEED,
                 speed / m.SPEED, BOUND)  # fmt: skip
     slip = rolling["velocity"][0, 0] - lever * rolling["spin"][0, 1]
-    yield Check("the same: velocity of its surface, m/s", float(slip), 0.0, BOUND)
+    yield Check("sliding, then rolling: surface velocity, m/s", float(slip), 0.0, BOUND)
     away = sliding_way(lever)
-    yield Check("the same: way, m", rolling["position"][0, 0], away, BOUND * away)
+    yield Check("sliding, then rolling: distance, m", rolling["position"][0, 0], away, BOUND * away)
     held_back = m.ROLLING_FRICTION * m.G / (lever / m.SPHERE_RADIUS + 0.4 * m.SPHERE_RADIUS / lever)
     expected = m.ROLL_SPEED - held_back * m.stops_after() / 2
-    yield Check("rolls, held back by mu_r R m g: speed halfway, m/s", slowed["velocity"][0, 0], expected,
+    yield Check("rolling against mu_r R m g: speed at half time, m/s", slowed["velocity"][0, 0], expected,
                 BOUND * m.ROLL_SPEED)  # fmt: skip
-    yield Check("the same: speed at the end, m/s", float(np.abs(stopped["velocity"]).max()), 0.0, BOUND)
+    yield Check(
+        "rolling against mu_r R m g: final speed, m/s", float(np.abs(stopped["velocity"]).max()), 0.0, BOUND
+    )
     way = m.ROLL_SPEED**2 / (2 * held_back)
-    yield Check("the same: way, m", stopped["position"][0, 0], way, 3 * BOUND * way)
+    yield Check("rolling against mu_r R m g: distance, m", stopped["position"][0, 0], way, 3 * BOUND * way)
 
     weight = results[3].measures["walls_force_z"]
     yield Check("a column at rest: force on the floor, N", weight, -m.COLUMN * m.WEIGHT, 1e-6 * m.WEIGHT)
     height = m.column_height()
     sunk = (2 * m.COLUMN - 1) * m.SPHERE_RADIUS - height
-    yield Check("the same: height of the top one, m", lying["position"][-1, 2], height, BOUND * sunk)
-    yield Check("the same: fastest, m/s", float(np.abs(lying["velocity"]).max()), 0.0, 1e-6)
+    yield Check(
+        "a column at rest: height of the top sphere, m", lying["position"][-1, 2], height, BOUND * sunk
+    )
+    yield Check("a column at rest: largest speed, m/s", float(np.abs(lying["velocity"]).max()), 0.0, 1e-6)
 
     for part, one, state in zip(m.SLOPES, steep, others[:4], strict=True):
         gx, _, gz = one.gravity
         rolls_down = part < 1
         pull = gx / (1 + 0.4) if rolls_down else gx + m.FRICTION * gz
-        name = f"on a slope of {part:g} times 7/2 mu: speed, {'5/7 g sin' if rolls_down else 'it slides'}"
+        name = f"on a slope of {part:g} times 7/2 mu: speed, {'5/7 g sin' if rolls_down else 'sliding'}"
         yield Check(f"{name}, m/s", state["velocity"][0, 0], pull * one.duration, 3 * BOUND * gx)
     ends = [
         (state["velocity"][0, 0], result.time) for state, result in zip(others[4:], results[8:], strict=True)
@@ -228,15 +232,15 @@ def pull_offs() -> Iterator[Check]:
     yield Check("pull-off, DMT: 4 pi gamma R* (N)", touching.largest, expected, BOUND * expected)
     expected = jkr_pull_off(a.ENERGY, radius)
     yield Check("pull-off, JKR: 3 pi gamma R* (N)", jkr.largest, expected, BOUND * expected)
-    yield Check("the same: gap at which it ends (m)", jkr.ends, stretch, 5e-3 * stretch)
+    yield Check("JKR: gap at which the contact ends (m)", jkr.ends, stretch, 5e-3 * stretch)
     curve = np.array([jkr_force(x, a.ENERGY, radius, a.STICKY_MODULUS) for x in jkr.overlap[jkr.force != 0]])
     off = float(np.abs(jkr.force[jkr.force != 0] - curve).max() / expected)
-    yield Check("the same: force against overlap: off by", off, 0.0, 1e-6)
+    yield Check("JKR: force against overlap: largest deviation", off, 0.0, 1e-6)
     wet = bridge_force(-bridge.overlap, 2 * radius, a.TENSION, a.ANGLE, a.VOLUME)
     gaps = (bridge.overlap < 0) & (bridge.force != 0)
     off = float(np.abs(bridge.force[gaps] + wet[gaps]).max() / wet.max())
-    yield Check("a liquid bridge: pull against gap, Willett et al.: off by", off, 0.0, 1e-9)
-    yield Check("the same: gap at which it ruptures (m)", bridge.ends, rupture, 5e-3 * rupture)
+    yield Check("liquid bridge: force against gap, Willett et al.: deviation", off, 0.0, 1e-9)
+    yield Check("liquid bridge: gap at rupture (m)", bridge.ends, rupture, 5e-3 * rupture)
 
 
 def beam_checks() -> Iterator[Check]:
@@ -247,12 +251,12 @@ def beam_checks() -> Iterator[Check]:
     bent, whole, broken = last_states(*scenes)
     smooth, discrete = beams.bends(beams.LOAD)
     end = bent["position"][-1, 1]
-    yield Check("cantilever of 6 spheres: P l^3/(3 E I) between and shear in bonds (m)", end, discrete,
+    yield Check("cantilever of 6 spheres: deflection by bending and shear (m)", end, discrete,
                 3e-3 * discrete)  # fmt: skip
-    yield Check("the same over Euler and Bernoulli's P l^3/(3 E I)", end / smooth, 1.0, 0.08)
+    yield Check("cantilever: deflection over Euler and Bernoulli's P l^3/(3 E I)", end / smooth, 1.0, 0.08)
     for part, state, bonds in ((0.97, whole, beams.SPHERES), (1.03, broken, beams.SPHERES - 1)):
         count = (state["parallel_bond_past"] != 0).any(axis=1).sum()
-        yield Check(f"the same at {part:g} of its breaking load: bonds", float(count), bonds, 0.0)
+        yield Check(f"cantilever at {part:g} of its breaking load: number of bonds", float(count), bonds, 0.0)
 
 
 def shear_checks() -> Iterator[Check]:
@@ -263,4 +267,6 @@ def shear_checks() -> Iterator[Check]:
         name = f"plane shear: mu at I = {bed.inertial_number:.2f}, Jop et al."
         yield Check(name, bed.ratio, float(ratio), RATIO_BOUND)
     rise, line = beds[0].ratio - beds[-1].ratio, float(expected[0] - expected[-1])
-    yield Check("the same: its rise is short of theirs by", max(0.0, line - rise), 0.0, RISE_BOUND * line)
+    yield Check(
+        "plane shear: shortfall of the rise of mu, Jop et al.", max(0.0, line - rise), 0.0, RISE_BOUND * line
+    )

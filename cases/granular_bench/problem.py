@@ -75,7 +75,7 @@ EXAMPLES: Mapping[str, Measured] = {
     for size, values in MEASURED.items()
 }
 """The target if no file is given."""
-MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
+MEANINGS = {"misfit": "mean squared difference from the measurements, in uncertainties"}
 
 
 def other_runs(design: Mapping[str, float], size: str, starts: int) -> list[Scene]:

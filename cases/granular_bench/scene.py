@@ -67,11 +67,11 @@ BED = "bed"
 SIZES = {
     "default": Size("a draw-down test of 1500 grains; a heap on a disc of 16 diameters", {}, SEARCH_SETTINGS),
     "large": Size(
-        "the same of 8000 grains; a heap on a disc of 32 diameters",
+        "the same with 8000 grains; a heap on a disc of 32 diameters",
         {"number": 8000, "silo": 10.0, "outlet": 8.0, "disc": 16.0, "drop": 16.0, "duration": 3.0},
     ),
     "small": Size(
-        "the same of 600 softer grains; a heap on a disc of 12 diameters",
+        "the same with 600 softer grains; a heap on a disc of 12 diameters",
         {
             "number": 600,
             "silo": 4.5,

@@ -64,7 +64,7 @@ def balances(results: Sequence[Result]) -> Iterator[Check]:
     """Yield the balance of the forces on the rafts; drag and inertia of the grains between them are small."""
     forces = np.array([[raft_force(one, group)[0] for group in (LOWER, UPPER)] for one in results])
     off = forces.sum(axis=1) / np.abs(forces).sum(axis=1)
-    name = "forces on both rafts along the flow: sum over that of sizes, of the start where it is largest"
+    name = "forces on both rafts along the flow: sum over sum of magnitudes, largest of all starts"
     yield Check(name, float(np.abs(off).max()), 0.0, BALANCE)
 
 
@@ -73,13 +73,13 @@ def chains(results: Sequence[Result]) -> Iterator[Claim]:
     orders = [order(one.state, one.scene.domain) for one in results]
     name = "sheared chains: mean of (3 cos^2 - 1)/2 of contacts to the field"
     yield Claim(name, Mean.of([one.alignment for one in orders]), 0.0)
-    yield Claim("the same: contacts of a grain", Mean.of([one.contacts for one in orders]), 3.0, 6.0)
+    yield Claim("sheared chains: contacts of a grain", Mean.of([one.contacts for one in orders]), 3.0, 6.0)
 
 
 def as_magnetised(results: Sequence[Result]) -> Iterator[Shown]:
     """Yield the largest overlap of grains, and their moment relative to a single grain in the field."""
-    yield Shown("the same: largest overlap over a radius", Mean.of([overlap(one) for one in results]))
-    name = "the same: moment of a grain over that of one by itself"
+    yield Shown("sheared chains: largest overlap over a radius", Mean.of([overlap(one) for one in results]))
+    name = "sheared chains: moment of a grain over moment of a single one"
     yield Shown(name, Mean.of([magnetised_part(one) for one in results]))
 
 
@@ -90,11 +90,11 @@ def flows(curve: Curve, whole: Sequence[Result], weak: Sequence[Result]) -> Iter
     theirs = f"{1e-3 * measured:g} measured; L21 {1e-3 * simulated:g}, by seed {spread:.1%}"
     yields = Mean(*(1e-3 * one for one in fit.yield_stress))
     yield Shown("Bingham yield stress at 0.6 T, kPa", yields, theirs)
-    name = f"Bingham yield stress at 0.6 T over that measured, {1e-3 * measured:g} kPa"
+    name = f"Bingham yield stress at 0.6 T over the measured {1e-3 * measured:g} kPa"
     yield Claim(name, Mean(*fit.yield_stress).over(Mean(measured, 0.0)), *YIELD_BOUNDS)
     viscous = Mean(*fit.plastic_viscosity).over(Mean(curve.values[-1] / curve.x[-1], 0.0))
-    yield Claim("the same: viscous part of the stress at the fastest rate", viscous, most=0.5)
-    yield Claim("stress at 0.6 T over that at 0.3 T", paired(whole, weak), 2.0, 6.0)
+    yield Claim("Bingham fit: viscous part of the stress at the highest rate", viscous, most=0.5)
+    yield Claim("stress at 0.6 T over stress at 0.3 T", paired(whole, weak), 2.0, 6.0)
 
 
 def compared(parts: Mapping[str, Sequence[Result]], whole: Sequence[Result]) -> Iterator[Claim | Shown]:
@@ -102,5 +102,5 @@ def compared(parts: Mapping[str, Sequence[Result]], whole: Sequence[Result]) -> 
     2.4.2)."""
     ratio = {name: paired(parts[name], whole) for name in (*SAID, SATURATES)}
     for name, says in SAID.items():
-        yield Shown(f"stress, {name}, over that of the whole model", ratio[name], f"L21: {says}")
-    yield Claim(f"stress, {SATURATES}, over that of the whole model", ratio[SATURATES], most=1.0)
+        yield Shown(f"stress, {name}, over stress of the whole model", ratio[name], f"L21: {says}")
+    yield Claim(f"stress, {SATURATES}, over stress of the whole model", ratio[SATURATES], most=1.0)

@@ -36,13 +36,13 @@ BOUND = 24e-3
 WANTED = {
     "front": "the front of shear stress in the field and viscosity without it",
     "bounded": f"the highest shear stress of fluids of at most {1e3 * BOUND:g} mPa s without field",
-    "field": "the front of shear stress, viscosity without field, and the field that it takes",
+    "field": "the front of shear stress, viscosity without field, and field",
 }
 """The goal of each variant of the problem."""
 MEANINGS = {
     "stress": "shear stress in the field, the mean over a strain",
-    "viscosity": "viscosity without field, after Krieger and Dougherty",
-    "small": "share of the small grains of the volume of all",
+    "viscosity": "viscosity without field, by Krieger and Dougherty",
+    "small": "volume share of the small grains",
     "fraction": "volume fraction of the grains",
 }
 

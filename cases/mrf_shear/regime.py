@@ -54,9 +54,9 @@ def regime() -> Iterator[Shown]:
     for rate in (RATES[0], RATES[-1]):
         yield Shown(f"Mason number at {rate:g} 1/s", mason_number(rate, flux))
     force = attraction(DIAMETER, magnetisation(flux))
-    yield Shown("attraction of two in line that touch, uN", 1e6 * force)
-    yield Shown("it moves a grain by a radius in, us", 1e6 * approach_time(flux))
-    yield Shown("oil stops a grain in, us", 1e6 * stokes_time())
-    yield Shown(f"a strain of 1 at {RATES[-1]:g} 1/s takes, us", 1e6 / RATES[-1])
+    yield Shown("attraction of two touching grains in line, uN", 1e6 * force)
+    yield Shown("time in which it moves a grain by a radius, us", 1e6 * approach_time(flux))
+    yield Shown("time in which oil stops a grain, us", 1e6 * stokes_time())
+    yield Shown(f"duration of a strain of 1 at {RATES[-1]:g} 1/s, us", 1e6 / RATES[-1])
     saturated = f"iron saturates at {1e-6 * CARBONYL_IRON.saturation:.2f}"
-    yield Shown("magnetisation of a grain by itself, MA/m", 1e-6 * magnetisation(flux), saturated)
+    yield Shown("magnetisation of a single grain, MA/m", 1e-6 * magnetisation(flux), saturated)

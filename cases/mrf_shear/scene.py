@@ -92,7 +92,7 @@ LEPS: dict[str, Any] = {
 """L21's own cell, open along the field, sheared at its highest rate."""
 SIZES = {
     "default": Size(
-        "183 grains of 6.7 um in a cell of 40 x 40 x 60 um, at 2000 1/s; a search has 32 x 32 x 48 um", {},
+        "183 grains of 6.7 um in a cell of 40 x 40 x 60 um, at 2000 1/s; a search uses 32 x 32 x 48 um", {},
         SEARCH_SETTINGS,
     ),
     "small": Size("94 grains in a cell of 32 x 32 x 48 um, at 10 000 1/s, for shorter strains", SEARCHED),
@@ -104,7 +104,7 @@ SIZES = {
         },
     ),
     "l21": Size(
-        "L21's own: a cube of 250 um, its mixture 00:100 by number, steps of 0.2 ns",
+        "L21's own cell: a cube of 250 um, its mixture 00:100 by number, steps of 0.2 ns",
         {**LEPS, "grains": magnetorheological(0.0)},
     ),
     "l21_volume": Size("the same, 00:100 by volume", {**LEPS, "grains": magnetorheological(0.0, "mass")}),

@@ -50,17 +50,19 @@ def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
         density = Mean.of([one.steps[0].asteroid.density for one in group])
         yield Shown(f"{m:g} A/m: density at rest, kg/m^3", density)
         critical = Mean.of([1e6 * critical_spin(one.steps[0].asteroid.density) for one in group])
-        yield Shown(f"{m:g} A/m: critical spin of that density, urad/s", critical)
+        yield Shown(f"{m:g} A/m: critical spin at this density, urad/s", critical)
         for name, theirs, value in (
             ("deforms", DEFORMATION[m], "deformation"), ("breaks", DISRUPTION[m], "disruption"),
         ):  # fmt: skip
             mean = Mean.of(at_least([getattr(one, value) for one in group]))
-            yield Shown(f"{m:g} A/m: {name} at, urad/s", mean, f"L21: {1e6 * theirs:.0f}")
+            yield Shown(f"{m:g} A/m: spin at which it {name}, urad/s", mean, f"L21: {1e6 * theirs:.0f}")
     plain, strong = (
         at_least([one.disruption for one in runs if one.magnetisation == m])
         for m in (MAGNETISATIONS[0], MAGNETISATIONS[-1])
     )
-    yield Claim("breaks at, 1190 less 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=LATER)
+    yield Claim(
+        "spin at which it breaks, 1190 minus 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=LATER
+    )
 
 
 def at_least(rates: Sequence[float]) -> np.ndarray:

@@ -29,7 +29,7 @@ SETTLED = 7500.0
 DEFAULT: Mapping[str, Any] = {"number": 80, "spacing": 1.3, "softened": 10.0, "duration": SETTLED}
 
 SIZES = {
-    "default": Size("80 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's pile", DEFAULT),
+    "default": Size("80 grains of 100 cm, magnetised to 1190 A/m, in a scaled copy of L21's pile", DEFAULT),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
     "l21": Size("L21's 4088 grains of 100 cm, gravity by a tree", {"tree": True}),
     "l21_50cm": Size("L21's 33,220 grains of 50 cm", {"diameter": DIAMETERS[0], "tree": True}),

@@ -37,7 +37,7 @@ class Duct:
         must(self.straight > 0, "length of the constriction", "above 0", self.straight)
         must(self.taper > 0, "length of a cone", "above 0", self.taper)
         least = self.straight + 2 * self.taper
-        rule = f"above {least:g} m, that of the constriction with its cones"
+        rule = f"above {least:g} m, the length of the constriction with its cones"
         must(self.length > least, "length of the duct", rule, self.length)
 
     @property

@@ -50,16 +50,16 @@ BOUND = 23.5e-9
 """Least open flow in the variant "field", m^3/s: the flow of a constriction 4.6 of L21's largest grains
 wide."""
 WANTED = {
-    "front": "the front of the field that arrests the flow and of what flows without it",
-    "field": f"the least field that arrests the flow, of valves of {1e9 * BOUND:g} mm^3/s without",
-    "never": f"the fewest grains across a constriction that a field of {published.FLUX:g} T never arrests",
+    "front": "the front of arresting field and open flow",
+    "field": f"the least field that arrests the flow, for open flows of at least {1e9 * BOUND:g} mm^3/s",
+    "never": f"the narrowest constriction, in grains, that a field of {published.FLUX:g} T never arrests",
 }
 """The goal of each variant of the problem."""
 MEANINGS = {
     "field": f"flux density that arrests the flow; {MISSED * STRONGEST:g} T for a start in which it does not",
-    "open flow": "volume that flows without field, after Hagen, Poiseuille, Krieger and Dougherty; none "
+    "open flow": "volume flow without field, by Hagen, Poiseuille, Krieger and Dougherty; 0 "
     "for a start that is not arrested",
-    "width": "diameter of the constriction over that of the grains; "
+    "width": "diameter of the constriction over diameter of the grains; "
     f"{MISSED * MOST_ACROSS:.2g} for a start that is arrested",
     "throat": "diameter of the constriction",
     "diameter": "diameter of the grains",

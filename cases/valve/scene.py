@@ -125,7 +125,7 @@ def scene(
     All are values of one structure: valves that differ in them run as one batch.
     """
     shape = duct(throat, bore, throat / 4 if straight is None else straight, slope, length)
-    must(pressure is None or speed is None, "pressure", "left out where the speed is given", pressure)
+    must(pressure is None or speed is None, "pressure", "left out if the speed is given", pressure)
     if speed is None:
         speed = speed_of(GRADIENT * length if pressure is None else pressure, shape, grains, fraction)
     half = (bore / 2, bore / 2, length / 2)

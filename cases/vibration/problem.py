@@ -35,7 +35,7 @@ GENES = (
 """The range of the flux includes the paper's 1 T; the stiffness begins at twice the paper's 0.5 N/m, and
 sqrt(k/m) is 31 to 977 1/s."""
 
-MEANING = "largest displacement of the centre of gravity; with a minus sign where the largest is wanted"
+MEANING = "largest displacement of the centre of gravity; with a minus sign if it is maximised"
 
 
 def scene(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> Scene:
@@ -94,5 +94,5 @@ def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
         "slow resonance of the design, 1/s": slow,
         "nearest resonance over drive": nearest(design) / DRIVE,
         "largest displacement, m": displacement(result),
-        "the same in closed form, m": closed_form(design),
+        "largest displacement in closed form, m": closed_form(design),
     }

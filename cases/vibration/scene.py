@@ -48,12 +48,10 @@ SEARCH_SETTINGS = {
 }  # fmt: skip
 
 SIZES = {
-    "alone": Size(
-        "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}
-    ),
-    "default": Size("343 particles, the near field as printed, 0.005 s", {}, SEARCH_SETTINGS),
+    "alone": Size("343 particles without interaction, 0.05 s", {"near_field": "none", "duration": 0.05}),
+    "default": Size("343 particles, near field as printed, 0.005 s", {}, SEARCH_SETTINGS),
     "equilibrium": Size(
-        "343 particles, near field in balance with the six neighbours, 0.05 s",
+        "343 particles, near field in equilibrium with the six neighbours, 0.05 s",
         {"near_field": "equilibrium", "duration": 0.05},
     ),
 }
