@@ -26,7 +26,7 @@ class Cell:
 DEFAULT = Cell(number=400, column=10.0, width=5.25, length=40.0, height=14.0)
 """The width is slightly more than twice the cut-off of the dipoles."""
 SMALL = Cell(number=200, column=7.0, width=5.25, length=28.0, height=11.0)
-"""Half as many grains, in a column of the same ratio of width to height."""
+"""Half the number of grains, in a column of the same ratio of width to height."""
 LARGE_CELL = Cell(number=2500, column=25.0, width=5.25, length=90.0, height=30.0)
 """A column 18 diameters high, whose slope is longer than the chains of grains on it."""
 L21_CELLS = {

@@ -103,7 +103,7 @@ def scale_of(number: int, of: int = published.NUMBER) -> float:
 def thermal_speed(diameter: float, mass: np.ndarray) -> np.ndarray:
     """Return the standard deviation (m/s) of each velocity component for given masses (kg).
 
-    The temperature is that of L21 for grains of a diameter (m).
+    The temperature is L21's for grains of a diameter (m).
     """
     return np.sqrt(Boltzmann * published.TEMPERATURE * diameter**3 / mass)
 

@@ -28,7 +28,7 @@ STEPS = 800
 LASTS = 4
 """Simulated time in units of that duration; damped impacts take longer."""
 STIFFER = 1e9
-"""Young's modulus of a rigid plane, divided by that of the sphere."""
+"""Ratio of Young's moduli of a rigid plane and the sphere."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def closest_packing(diameters: Sequence[float], parts: Sequence[float]) -> float
 
 
 def relative_viscosity(fraction: float, closest: float) -> float:
-    """Return the viscosity of a suspension divided by that of its fluid; infinite at closest packing and
+    """Return the ratio of viscosities of a suspension and its fluid; infinite at closest packing and
     above.
 
         eta_r = (1 - phi / phi_m)^(-2.5 phi_m)

@@ -2,8 +2,8 @@
 
 A cloud without rotation and without a seed particle collapses; then its angular velocity is increased in
 steps (``stages.py``). The spin at which gravity alone no longer holds a pile depends on its density, not on
-the number of its grains. The contribution of magnetism depends on stresses, which equal those of a scaled
-copy of L21's pile (``cases/coalescence/scaling.py``).
+the number of its grains. The contribution of magnetism depends on stresses, which are as in a
+scaled copy of L21's pile (``cases/coalescence/scaling.py``).
 
 Departures from L21: fewer grains, softer grains, and a closer lattice, from which the collapse is earlier and
 slower.

@@ -16,8 +16,8 @@ from tisim.cases.valve.studies import ValveRuns, by_throat
 from tisim.analysis import Mean
 
 STARTS = 6
-"""Number of starts of each valve. The narrow one has twice as many, with and without a field, and the one
-with fine grains half as many."""
+"""Number of starts of each valve. The narrow one has twice this number, with and without a field, and the one
+with fine grains has half of it."""
 BALANCE = 0.05
 """Largest relative difference between the force on the walls and the drag on an arrested flow."""
 

@@ -21,8 +21,8 @@ from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain
 
 STARTS = 6
-"""Number of starts of each setting. The narrow valve in the strongest field and without one has twice as
-many, and the one with fine grains half as many."""
+"""Number of starts of each setting. The narrow valve in the strongest field and without one has twice this
+number, and the one with fine grains has half of it."""
 COLOURS = ("#4477aa", "#cc6677", "#228833", "#aaaaaa")
 """Colours of the narrow and of the wide constriction, of fine grains, and of runs without a field."""
 FASTEST = 0.6

@@ -72,9 +72,10 @@ def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) ->
 def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
     """Return the runs of the compared constrictions and grains.
 
-    They are coarse grains in each constriction, in the narrow one from twice as many starts; fine grains in
-    the narrow one, of which there are eight times as many, from half as many starts; and coarse grains in the
-    narrow one without a field, from the same starts as with it.
+    They are, with the number of starts:
+    - coarse grains in the narrow constriction, 2 ``starts``, with a field and without one;
+    - coarse grains in the wide constriction, ``starts``;
+    - fine grains, of which there are eight times more, in the narrow constriction, ``starts`` / 2.
     """
     narrow, wide = THROATS
     wanted = [

@@ -57,7 +57,10 @@ def test_magnetised_grains_that_do_not_agglomerate_more_are_against_it(weak, str
     """Of 40 grains some are lost without magnetisation, or with it."""
     runs = [made(m, 18, seed, lost=strong if m > 1000 else weak) for m in MAGNETISATIONS for seed in (0, 1)]
     claims = {claim.name: claim for claim in (*of_agglomeration(runs), *of_structure(runs))}
-    for of in ("1190 less 0 A/m, of all grains", "of those outside, 1190 less 0 A/m"):
+    for of in (
+        "of all grains in clusters, 1190 minus 0 A/m",
+        "of outside grains in clusters, 1190 minus 0 A/m",
+    ):
         (claim,) = [one for name, one in claims.items() if of in name]
         assert claim.ok == (weak > strong)
     # The asteroids are the same.
