@@ -18,7 +18,7 @@ CEMENT = BEAM_WIDTH * BEAD_RADIUS
 """The radius of the cement, m."""
 AREA, SECOND = np.pi * CEMENT**2, np.pi * CEMENT**4 / 4
 SPHERES = 6
-"""Number of spheres beside the one that is held."""
+"""Number of spheres in addition to the one that is held."""
 LOAD = 0.25
 """Load, N."""
 HELD_MASS, BEAD_MASS, DURATION = 1e9, 1e-2, 0.4
