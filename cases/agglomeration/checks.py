@@ -132,7 +132,7 @@ def closed_forms() -> Iterator[Check]:
         ends = _run([
             pair(fastest, impact(), breaking(gamma, b), Agglomeration(), radius=b) for b in radii
         ])  # fmt: skip
-        # # At this speed a pair either bonds or breaks.
+        # At this speed a pair either bonds or breaks.
         return np.array([r.work["fractures"] > 0 and r.work["merges"] == 0 for r in ends])
 
     expected = 4 * gamma / (HARDNESS * LENGTH)

@@ -29,7 +29,7 @@ from tisim.sources import ElectricField, MagneticField
 from tisim.steppers import ApproachTime, Stepper, Verlet
 
 CHARGE_GENES = (
-    # # The electric field at the surface, at most 4.5e8 V/m, is half of the field that pulls electrons out of
+    # The electric field at the surface, at most 4.5e8 V/m, is half of the field that pulls electrons out of
     # a metal in vacuum; air withstands less than a hundredth of it.
     Gene("surface_charge", "C/m^2", 0.0, 4e-3),
     Gene("charge_ratio", "", -1.0, 1.0),

@@ -28,11 +28,11 @@ GENES = (
 )
 """The search ranges of Z04 section 8."""
 
-# # As printed. No grain breaks anywhere in this range.
+# As printed. No grain breaks anywhere in this range.
 UNBREAKABLE = Gene("surface_energy", "J/m^2", 1e6, 1e16, "log")
 VARIANTS = {
     "paper": (UNBREAKABLE,),
-    # # From a surface energy at which nearly every hard impact breaks an agglomerate to one at which none
+    # From a surface energy at which nearly every hard impact breaks an agglomerate to one at which none
     # does. Measured with the best design and 1000 grains: breakages per grain 1.4 at 1e2, 0.1 at 1e4, 1e-4 at
     # 1e5; Pi 0.90, 0.79, 0.76.
     "fragmenting": (Gene("surface_energy", "J/m^2", 1e2, 1e5, "log"),),

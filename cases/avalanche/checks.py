@@ -85,7 +85,7 @@ def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim | Shown]:
             (f"volume with field over volume without (L21: {larger(d):.2f})", grown),
             ("volume magnetised over volume settled", loosened[-1]),
         ):
-            # # For larger grains these few starts cannot distinguish the value from 1.
+            # For larger grains these few starts cannot distinguish the value from 1.
             judged = d == DIAMETERS[0]
             mean = Mean.of(values)
             yield Claim(f"{name}: {what}", mean, 1.0) if judged else Shown(f"{name}: {what}", mean)

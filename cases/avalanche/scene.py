@@ -62,9 +62,9 @@ SUSCEPTIBILITY = 999.0
 """Susceptibility at a relative permeability of 1000, at which a single grain has L21's 11.9 kA/m at 5 mT
 (section 4.5). L21 does not state it; beyond 400 it changes the moment by less than 1 %."""
 CUTOFF = 5.0
-"""Cut-off of the dipole interaction, in radii (2.5 diameters). L21 uses three diameters in section 4.2.1.2 and
-gives no value for avalanches. At 2.5 diameters the force of two dipoles in a row is a fortieth of the force at
-contact."""
+"""Cut-off of the dipole interaction, in radii (2.5 diameters). L21 uses three diameters in section 4.2.1.2
+and gives no value for avalanches. At 2.5 diameters the force of two dipoles in a row is a fortieth of the
+force at contact."""
 RELAXATION = 0.6
 """Relaxation factor of a sweep of the moments. L21 uses 1, which diverges here: in a settled bed the least
 eigenvalue of mutual magnetisation is below -1, and the moments grow by that factor in each step."""

@@ -28,9 +28,9 @@ def check() -> Iterator[Check]:
     yield Check("kinetic energy at the start, J", kinetic, ENERGY, 1e-8 * ENERGY)
     a, b = half_axes(still.state), half_axes(field.state)
     yield Check("no field: longest axis over shortest", float(a.max() / a.min()), 1.0, 0.05)
-    # # Drag reduces the speed by about 1 part in 1000 in this time.
+    # Drag reduces the speed by about 1 part in 1000 in this time.
     yield Check("half axis along the field, with field over without", float(b[0] / a[0]), 1.0, 2e-3)
-    # # The chord of a circle of radius v/w, w = q B/m, that subtends the angle w t.
+    # The chord of a circle of radius v/w, w = q B/m, that subtends the angle w t.
     rate = SPECIFIC_CHARGE * FLUX
     chord = 2 * SPEED / rate * abs(np.sin(rate * duration / 2))
     w, start = np.array([FLUX, 0.0, 0.0]), float(half_axes(field.start).mean())

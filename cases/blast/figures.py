@@ -111,7 +111,7 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
     figure = empty(10.4, 7.2)
     left, bottom, side = common([frame.arrays for frame in chosen], NO_BOX)
     fastest = max(np.linalg.norm(frame.arrays["velocity"], axis=1).max() for frame in chosen)
-    # # The longest arrow is an eighth of the picture, so a margin is added for it.
+    # The longest arrow is an eighth of the picture, so a margin is added for it.
     left, bottom, side = left - side / 8, bottom - side / 8, 1.25 * side
     scale = 8.0 * fastest / side
     axes = figure.subplots(2, 3)
@@ -161,7 +161,7 @@ def envelope(history: BlastHistory) -> Figure:
     legend_above(right)
     along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=AXIS_COLOURS[0], lw=0.7)
     along.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"paths of {PATHS} particles")
-    # # The particle that starts fastest across the field, enlarged: its circle is far smaller than the cloud.
+    # The particle that starts fastest across the field, enlarged: its circle is far smaller than the cloud.
     across.plot(
         history.paths[:, fastest, 1], history.paths[:, fastest, 2], line, ms=3, color=AXIS_COLOURS[0], lw=0.8
     )
@@ -202,7 +202,7 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
         axis = figure.add_subplot(grid[0, 3 * k : 3 * k + 3])
         snapshot(axis, frame.arrays, square)
         axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"))
-    # # The last panel has space for the axes.
+    # The last panel has space for the axes.
     directions(figure.axes[-1], square, NO_GRAVITY, share=0.12)
     along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
     colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")

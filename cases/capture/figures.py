@@ -94,7 +94,7 @@ def plane(reach: float) -> np.ndarray:
     """Return points of the xz plane up to reach (m) from the origin, (PLANE, PLANE, 3) in m."""
     line = np.linspace(-reach, reach, PLANE)
     x, z = np.meshgrid(line, line)
-    # # A tiny offset from the plane of symmetry, so that no point lies on an edge.
+    # A tiny offset from the plane of symmetry, so that no point lies on an edge.
     return np.stack([x, np.full_like(x, 1e-9), z], axis=-1)
 
 

@@ -126,7 +126,7 @@ def caught(result: Result) -> Figure:
             z, y = arrays["position"][which][:, 2], arrays["position"][which][:, k]
             axis.plot(z / MILLI, y / MILLI, "o", ms=3, color=colour, label=name)
         axis.set_ylabel(f"{'xy'[k]} (mm)")
-        # # Both panels have the same width, whatever their heights, so that their z axes are aligned.
+        # Both panels have the same width, whatever their heights, so that their z axes are aligned.
         axis.set_aspect("equal", "datalim")
         plain(axis)
     side.set_title(f"from the side, the flow upwards: {stopped.mean():.0%} caught")

@@ -109,9 +109,9 @@ def of_orientation(repeats: int) -> Iterator[Claim]:
 def of_aspect(repeats: int) -> Iterator[Claim]:
     """Section 6.4.3: averaged over angles, shorter cylinders capture slightly more.
 
-    The cause is their lateral surface, which is inactive when they lie along the field. Averaged over
-    directions, and across the field, shorter cylinders capture less. In section 6.4.4, "relatively small"
-    means L/D < 6.
+    The cause is the lateral surface, which is larger in long cylinders and inactive in cylinders along the
+    field. Averaged over directions, and across the field, shorter cylinders capture less. In section 6.4.4,
+    "relatively small" means L/D < 6.
     """
     settings = [
         {"nanometres": 125, "angle": angle, "aspect": aspect} for aspect in ASPECTS for angle in ANGLES

@@ -43,7 +43,7 @@ def captured_at(
         results = sound(run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going]))
         for (one, at, _), result in zip(going, results, strict=True):
             when = result.state["captured_at"]
-            # # Particles keep no identity between stages, so capture times fill the row from its start.
+            # Particles keep no identity between stages, so capture times fill the row from its start.
             first = int(np.isfinite(at).sum())
             caught = np.sort(when[when >= 0])
             at[first : first + len(caught)] = passed * one.stage + caught

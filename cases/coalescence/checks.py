@@ -49,7 +49,7 @@ def of_the_cloud() -> Iterator[Check]:
     for d in DIAMETERS:
         start = scene(diameter=d, rotation=ROTATIONS[1], magnetisation=0.0).start()
         mass, place = start["mass"][1:], start["position"][1:]
-        # # The radius of the ball with the second moments of the lattice.
+        # The radius of the ball with the second moments of the lattice.
         radius = np.sqrt(5 / 3 * np.average((place**2).sum(axis=1), weights=mass))
         density = mass.sum() / (4 / 3 * np.pi * radius**3)
         turns = critical_spin(density)
@@ -87,7 +87,7 @@ def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
             mean = Mean.of([getattr(one.at(COMPARED), least) for one in group])
             beside = f"L21, 50 cm: {part:.3g}"
             yield Shown(f"{m:g} A/m: fraction of outside grains in clusters of {name}", mean, beside)
-    # # A difference of at least one grain is required; equality does not support the claim.
+    # A difference of at least one grain is required; equality does not support the claim.
     grain = 1 / len(runs[0].end["mass"])
     yield _difference(
         "fraction of all grains in clusters, 1190 minus 0 A/m",

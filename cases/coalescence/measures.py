@@ -78,7 +78,7 @@ class Gathering:
         """Return the progress of agglomeration in a state."""
         cluster = clusters_of(state)
         inside = body(cluster, state["mass"])
-        # # A single grain is not an asteroid.
+        # A single grain is not an asteroid.
         inside &= inside.sum() > 1
         others = cluster[~inside]
         some, many = (fraction_in_clusters(others, least) for least in (2, CLUMP))

@@ -102,7 +102,7 @@ def scene(
     radius = nanometres * 1e-9
     half = side(number, radius, concentration) / 2
     axis = np.asarray(body.direction)
-    # # Above the point of the rim that is nearest to the direction of the field.
+    # Above the point of the rim that is nearest to the direction of the field.
     outward = np.array([axis[2], 0.0, -axis[0]])
     centre = (body.length / 2 + distance + half) * axis + body.radius * outward
     low, high = centre - half - radius, centre + half + radius

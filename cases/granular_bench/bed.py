@@ -68,7 +68,7 @@ def bed(
     return Scene(
         name="granular_bench",
         particles=grains(number, radius, height),
-        # # With a stiffness too, so that Hooke's law can be compared with Hertz's.
+        # With a stiffness too, so that Hooke's law can be compared with Hertz's.
         materials={"grain": material.model_copy(update={"stiffness": three_digits(linear_stiffness(young))})},
         effects=(
             LAW,

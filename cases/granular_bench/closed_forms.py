@@ -99,7 +99,7 @@ def jkr_force(overlap: float, energy: float, radius: float, modulus: float) -> f
     def beyond(a: float) -> float:
         return a**2 / radius - 2 * np.sqrt(np.pi * energy * a / modulus) - overlap
 
-    # # The overlap has its minimum here and grows with the contact radius beyond it.
+    # The overlap has its minimum here and grows with the contact radius beyond it.
     least = (np.pi * energy * radius**2 / (4 * modulus)) ** (1 / 3)
     most = np.sqrt(radius * abs(overlap)) + 8 * least
     a = float(brentq(beyond, least, 2 * most, xtol=1e-15 * most, rtol=1e-14)) if beyond(least) < 0 else least

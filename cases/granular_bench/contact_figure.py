@@ -103,7 +103,7 @@ def oblique(tangential: Axes, spin: Axes, found: Found) -> None:
     angles = np.linspace(1.0, 89.0, 89)
     tangent, mu = np.tan(np.radians(angles)), particle_tests.OBLIQUE["friction"]
     e, radius = particle_tests.OBLIQUE["restitution"], particle_tests.OBLIQUE["radius"]
-    # # Without tangential elasticity a surface slides throughout, or its final speed is 0.
+    # Without tangential elasticity a surface slides throughout, or its final speed is 0.
     loss = np.minimum(mu * (1 + e), 2 / 7 * tangent)
     tangential.plot(angles, 1 - loss / tangent, **RIGID, label="rigid spheres")
     down = particle_tests.OBLIQUE_SPEED * np.cos(np.radians(angles))

@@ -200,7 +200,7 @@ def force_curves(impacts: Sequence[ParticleImpact], every: int = 4) -> list[Forc
     curves = []
     for rows in seen:
         time, overlap, force = np.array(rows).T
-        # # The speed is constant after contact, so the end of contact follows by extrapolation.
+        # The speed is constant after contact, so the end of contact follows by extrapolation.
         since = overlap[-1] / ((overlap[-1] - overlap[-2]) / (time[-1] - time[-2]))
         curves.append(ForceCurve(time, overlap, force, float(time[-1] - since)))
     return curves

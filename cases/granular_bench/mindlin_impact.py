@@ -43,7 +43,7 @@ def oblique_impacts(
     speed, radius, mass, modulus = np.array([one.hertz for one in impacts]).T
     shear = np.array([shear_modulus(one) for one in impacts])
     dt = np.array([one.duration for one in impacts]) / steps
-    # # Twins have the same motion and spin, so the surfaces slide past each other at twice the speed.
+    # Twins have the same motion and spin, so the surfaces slide past each other at twice the speed.
     both = np.array([2.0 if one.partner == "twin" else 1.0 for one in impacts])
     logarithm = np.log(e)
     loss = -2 * np.sqrt(5 / 6) * logarithm / np.hypot(logarithm, np.pi)

@@ -57,7 +57,7 @@ SEARCH_SETTINGS = {
 }  # fmt: skip
 SMALL_SEARCH_SETTINGS = {
     **SEARCH_SETTINGS, "generations": 14,
-    # # One heap with so few grains determines its angle only to 2 degrees, and the best design over a few
+    # One heap with so few grains determines its angle only to 2 degrees, and the best design over a few
     # heaps is partly best by chance: held-out starts decide.
     "ensemble": {"min_starts": 4, "confirm": 12},
 }  # fmt: skip
@@ -126,7 +126,7 @@ def scene(
     d = DIAMETER
     hole, radius, floor = outlet * d / 2, silo * d, -drop * d
     height = number * d / (6 * LOOSE * silo**2)
-    # # The flat bottom is a cone with a very small slope.
+    # The flat bottom is a cone with a very small slope.
     below = (0.0, 0.0, -1e-3 * d)
     total = number * DENSITY * np.pi / 6 * d**3
     return Scene(

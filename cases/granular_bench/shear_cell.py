@@ -126,7 +126,7 @@ def rough_wall(height: float) -> np.ndarray:
     """Return centres (m) of the grains of a wall at a height, in rows, displaced by up to a quarter of a
     diameter."""
     x, y = np.meshgrid(np.arange(CELL_LENGTH) + 0.5, np.arange(CELL_WIDTH) + 0.5, indexing="ij")
-    # # Multiples of the golden ratio: no two neighbours have the same height, and no two rows are equal.
+    # Multiples of the golden ratio: no two neighbours have the same height, and no two rows are equal.
     up = (np.arange(CELL_LENGTH * CELL_WIDTH) * (np.sqrt(5) - 1) / 2) % 1 - 0.5
     return np.column_stack([x.ravel() * DIAMETER, y.ravel() * DIAMETER, height + 0.5 * DIAMETER * up])
 
@@ -236,9 +236,9 @@ def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]], state: Arrays) 
     pressing, dragging, fraction = scalars.mean(axis=0)
     edges = np.linspace(0.0, gap, BINS + 1)
     count = numbers.sum(axis=0)
-    # # Grains cannot reach the middle of a wall.
+    # Grains cannot reach the middle of a wall.
     velocity = np.where(count > 0, sums.sum(axis=0) / np.maximum(count, 1), np.nan)
-    # # Each stress is the mean over both walls.
+    # Each stress is the mean over both walls.
     return ShearedBed(
         gap=gap,
         pressure=pressing / (2 * CELL_AREA),

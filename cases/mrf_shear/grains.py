@@ -36,7 +36,7 @@ MONODISPERSE = mixture(0.0)
 
 def number_of(grains: Sequence[GrainClass], fraction: float, volume: float) -> int:
     """Return the number of grains that fill a fraction of a volume (m^3)."""
-    # # The number of a class is per kg of its share.
+    # The number of a class is per kg of its share.
     filled = sum(one.share / one.density for one in grains)
     return round(fraction * volume * sum(one.number() for one in grains) / filled)
 

@@ -85,7 +85,7 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
         square = (left - room, bottom - room, WIDER * side)
         for axis, rate in zip(row, SHOWN, strict=True):
             step = run.at(rate)
-            # # Centred on all grains: a view around the largest fragment would cut off other fragments.
+            # Centred on all grains: a view around the largest fragment would cut off other fragments.
             close_up(axis, step.state, step.state, square)
             axis.set_title(f"{m:g} A/m, {1e6 * step.rate:.0f} µrad/s")
     directions(axes[0, 0], square, NO_GRAVITY)

@@ -77,7 +77,7 @@ class SpinUp:
         """Return after which steps the pile has lost LOST or more of all grains since its largest mass; shape
         (steps,)."""
         held = np.array([step.held for step in self.steps])
-        # # The reference is the largest mass so far, because grains may still fall onto the pile after the
+        # The reference is the largest mass so far, because grains may still fall onto the pile after the
         # start.
         return np.asarray(np.maximum.accumulate(held) - held >= LOST)
 

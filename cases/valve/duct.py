@@ -120,7 +120,7 @@ class Duct:
         for low, high, first, last in zip(heights[:-1], heights[1:], radii[:-1], radii[1:], strict=True):
             z, b = low + part * (high - low) - self.length / 2, first + part * (last - first)
             core = np.pi * narrow**2 * self.oil_speed(np.zeros(SLICES), z)
-            # # From the radius of the constriction out to the wall.
+            # From the radius of the constriction out to the wall.
             ring = 2 * np.pi * (wide * (b**2 - narrow**2) / 2 - (b**3 - narrow**3) / 3) / (wide - narrow)
             total += float((core + ring).mean() * (high - low))
         return total

@@ -115,7 +115,7 @@ def clusters(state: Arrays, scene: Scene) -> Clusters:
     size = np.bincount(labels(len(radius), pairs)).max()
     x, y, z = position.T
     inside = np.abs(z) <= duct.straight / 2 + duct.taper
-    # # Connected within the constriction only.
+    # Connected within the constriction only.
     there = labels(len(radius), pairs[inside[pairs].all(axis=1)])
     aside = np.abs(y) < np.tan(np.radians(ARCH_ANGLE)) * np.abs(x)
     touches = inside & aside & (duct.depth(np.hypot(x, y), z) <= radius)

@@ -140,7 +140,7 @@ def scene(
         domain=Box(low=(-half[0], -half[1], -half[2]), high=half, periodic=(False, False, True)),
         effects=(
             MagneticField(constant=(flux, 0.0, 0.0), begin=flowing),
-            # # One sweep a step, as in L21 (section 2.2.3).
+            # One sweep a step, as in L21 (section 2.2.3).
             MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, cutoff=CUTOFF),
             TruncatedDipoleDipole(cutoff=CUTOFF),
             CONTACT,
