@@ -37,8 +37,8 @@ ACCELERATION = 5e-6
 FALLS = {d: free_fall(mean_density(d, SPACING, DENSITY)) for d in DIAMETERS}
 """The free-fall time (s) of a cloud without pressure, by grain diameter (m)."""
 COMPARED = DURATION * FALLS[DIAMETERS[1]] / FALLS[DIAMETERS[0]]
-"""The time for grains of 100 cm that corresponds to 15 000 s for L21's grains of 50 cm, s, in free-fall
-times."""
+"""The time, s, for grains of 100 cm that equals 15 000 s for L21's grains of 50 cm in units of the free-fall
+time."""
 
 
 def rotation_over_gravity(rotation: float, density: float) -> float:

@@ -31,7 +31,7 @@ T = TypeVar("T")
 class CloudRun:
     """The results of a cloud.
 
-    magnetisation : that L21's cloud has, A/m. scale : ratio of the copy's magnetisation to it. scene : of the
+    magnetisation : of the grains in L21's cloud, A/m. scale : ratio of the copy's magnetisation to it. scene : of the
     run.
     times : of the samples, s. agglomerations, conserved : progress of agglomeration and conserved quantities
     at these times.

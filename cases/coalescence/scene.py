@@ -194,7 +194,7 @@ def scene(
     """Return a cloud that collapses.
 
     number : of grains, without the seed particle. diameter : of the grains, m.
-    magnetisation : that L21's cloud has, A/m. rotation : of the cloud, rad/s.
+    magnetisation : of the grains in L21's cloud, A/m. rotation : of the cloud, rad/s.
     seed_diameter : m; 0 for no seed particle. spacing : of the lattice, m.
     of : number of grains in the cloud of L21 of which this is a copy. duration : s.
     tree : whether gravity is computed by a tree and dipoles have L21's cut-off; otherwise both are over all

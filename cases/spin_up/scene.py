@@ -46,7 +46,7 @@ def scene(
     """Return a cloud without rotation that collapses.
 
     number : of grains; by default L21's number for that diameter. diameter : m.
-    magnetisation : that L21's pile has, A/m. duration : s. settings : others of the scene of coalescence.
+    magnetisation : of the grains in L21's pile, A/m. duration : s. settings : others of the scene of coalescence.
     """
     whole = NUMBERS[diameter]
     return coalescence.scene(
