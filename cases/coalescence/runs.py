@@ -31,10 +31,9 @@ T = TypeVar("T")
 class CloudRun:
     """The results of a cloud.
 
-    magnetisation : of the grains in L21's cloud, A/m. scale : ratio of the copy's magnetisation to it. scene : of the
-    run.
-    times : of the samples, s. agglomerations, conserved : progress of agglomeration and conserved quantities
-    at these times.
+    magnetisation : of the grains in L21's cloud, A/m. scale : ratio of the copy's magnetisation to it.
+    scene : of the run. times : of the samples, s.
+    agglomerations, conserved : progress of agglomeration and conserved quantities at these times.
     end : state of the grains at the end.
     """
 

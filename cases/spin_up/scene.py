@@ -2,8 +2,8 @@
 
 A cloud without rotation and without a seed particle collapses; then its angular velocity is increased in
 steps (``stages.py``). The spin at which gravity alone no longer holds a pile depends on its density, not on
-the number of its grains. The contribution of magnetism depends on stresses, which are as in a
-scaled copy of L21's pile (``cases/coalescence/scaling.py``).
+the number of its grains. The contribution of magnetism depends on stresses, which are as in a scaled
+copy of L21's pile (``cases/coalescence/scaling.py``).
 
 Departures from L21: fewer grains, softer grains, and a closer lattice, from which the collapse is earlier and
 slower.
@@ -46,7 +46,8 @@ def scene(
     """Return a cloud without rotation that collapses.
 
     number : of grains; by default L21's number for that diameter. diameter : m.
-    magnetisation : of the grains in L21's pile, A/m. duration : s. settings : others of the scene of coalescence.
+    magnetisation : of the grains in L21's pile, A/m. duration : s.
+    settings : others of the scene of coalescence.
     """
     whole = NUMBERS[diameter]
     return coalescence.scene(

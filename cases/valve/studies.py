@@ -75,7 +75,7 @@ def by_throat(starts: int, progress: Progress = lambda part: None) -> list[Valve
     They are, with the number of starts:
     - coarse grains in the narrow constriction, 2 ``starts``, with a field and without one;
     - coarse grains in the wide constriction, ``starts``;
-    - fine grains, of which there are eight times more, in the narrow constriction, ``starts`` / 2.
+    - fine grains, with eight times the number, in the narrow constriction, ``starts`` / 2.
     """
     narrow, wide = THROATS
     wanted = [
