@@ -50,7 +50,7 @@ class MeasuredProfile:
         rises = bool((np.diff(self.distance) > 0).all() and self.distance[0] >= 0)
         must(rises, "distance", "rising, and not below 0", self.distance.tolist())
         sound = bool(np.isfinite(self.height).all() and (self.height >= 0).all() and self.height.max() > 0)
-        must(sound, "height", "finite, not below 0, and above 0 somewhere", self.height.tolist())
+        must(sound, "height", "finite and not below 0, with some value above 0", self.height.tolist())
         known = bool(np.isfinite(self.uncertainty).all() and (self.uncertainty > 0).all())
         must(known, "uncertainty", "finite and above 0", self.uncertainty.tolist())
 
