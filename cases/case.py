@@ -1,6 +1,7 @@
-"""The contract of a case: a package in ``cases`` with a ``CASE``. Found by looking; registered nowhere.
+"""The interface of a case: a package in ``cases`` with a ``CASE``. Cases are discovered; there is no
+registry.
 
-A ``CASE`` names its figures, checks and inverse problem as ``Late``, so that listing the cases stays quick.
+A ``CASE`` names its figures, checks and inverse problem as ``Late``, so that listing the cases is fast.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Check:
-    """A number that a case must reproduce: right when |measured - expected| <= bound."""
+    """A number that a case must reproduce; it passes if |measured - expected| <= bound."""
 
     name: str
     measured: float
@@ -40,17 +41,17 @@ class Check:
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """Measured, expected, off by, allowed; for people."""
+        """Return measured value, expected value, deviation and bound as text for a table."""
         off = abs(self.measured - self.expected)
         return f"{self.measured:.10g}", f"{self.expected:.10g}", f"{off:.1e}", f"{self.bound:.1e}"
 
 
 @dataclass(frozen=True)
 class Size:
-    """How large a case is run.
+    """A size of a case.
 
-    summary : for people. scene : its settings that differ. search : those of the search; None where the
-    inverse problem is not of this size.
+    summary : description for users. scene : settings of the scene that differ from the defaults.
+    search : settings of the search; None if the inverse problem is not available in this size.
     """
 
     summary: str
@@ -59,14 +60,14 @@ class Size:
 
 
 def size_named(name: str, sizes: Mapping[str, Size]) -> Size:
-    """Return a size by name; InputError when there is none of that name."""
+    """Return a size by name; InputError if there is no such size."""
     must(name in sizes, "size", f"one of {', '.join(sizes)}", name)
     return sizes[name]
 
 
 def searched_size(name: str, sizes: Mapping[str, Size]) -> Size:
-    """Return a size by name of which a case has a search; InputError when there is none of that name, or no
-    search of it."""
+    """Return a size by name that has a search; InputError if there is no such size, or if it has no
+    search."""
     searched = [key for key, one in sizes.items() if one.search is not None]
     must(name in searched, "size", f"one of {', '.join(searched)} for the inverse problem", name)
     return sizes[name]
@@ -74,14 +75,14 @@ def searched_size(name: str, sizes: Mapping[str, Size]) -> Size:
 
 @dataclass(frozen=True)
 class Late:
-    """A function of a case's module that is imported when it is called first."""
+    """A function of a case's module; the module is imported at the first call."""
 
     module: str
     name: str
 
     @property
     def function(self) -> Callable[..., Any]:
-        """The function itself, for which its module is imported."""
+        """The function itself; reading it imports the module."""
         return getattr(importlib.import_module(self.module), self.name)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -90,18 +91,19 @@ class Late:
 
 @dataclass(frozen=True)
 class Case:
-    """A runnable scenario, and the inverse problem on it where there is one.
+    """A runnable scenario, with its inverse problem if it has one.
 
-    name : of the package. title, source : for people. sizes : by name; "default" is among them.
-    scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known, also
-    those that are only shown.
-    quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
-    cost_size : the size that 'tisim cost' takes unless one is given; None for "default".
+    name : of the package. title, source : for users. sizes : by name; "default" is among them.
+    scene : (size, seed) -> Scene.
+    check : runs the checks and yields each number when it is known, including numbers that are only shown.
+    quantities : the quantities that 'tisim cost' compares in a scene of the case; None for its defaults.
+    cost_size : the size that 'tisim cost' uses if none is given; None for "default".
     problem : (size, variant) -> Problem; variants : its names, the first the default.
-    calibration : (size, variant, file) -> Problem, the same for measurements that a file has.
-    pictures : what the case is about, drawn from a run's trajectory; by name of file.
-    scenes : (size, seed) -> Scene of those variants that are not about ``scene``, by name.
-    figures : (size, progress) -> what takes many runs: figures, and tables as text; by name of file.
+    calibration : (size, variant, file) -> Problem, the same problem with the measurements in a file as
+    target.
+    pictures : pictures of a run drawn from its trajectory, by file name.
+    scenes : (size, seed) -> Scene of the variants that do not use ``scene``, by name.
+    figures : (size, progress) -> figures, and tables as text, that need many runs; by file name.
     """
 
     name: str
@@ -120,13 +122,13 @@ class Case:
     scenes: Mapping[str, Callable[[str, int], Scene]] = field(default_factory=dict)
 
     def size(self, name: str) -> Size:
-        """Return a size by name; InputError when there is none of that name."""
+        """Return a size by name; InputError if there is no such size."""
         return size_named(name, self.sizes)
 
     def scene_of(self, size: str, seed: int, variant: str | None = None) -> Scene:
-        """Return the scene of a size and a seed; of a variant, where one is given.
+        """Return the scene of a size and a seed; of a variant, if one is given.
 
-        InputError when there is no size of that name, or no scene of that variant.
+        InputError if there is no size of that name, or no scene of that variant.
         """
         self.size(size)
         if variant is None:
@@ -142,8 +144,8 @@ class Case:
     ) -> tuple[Problem, Mapping[str, Any]]:
         """Return the inverse problem (its first variant for None), and the settings of its search.
 
-        measured : a file of measurements that it is to meet, in place of the case's own.
-        InputError when the case has none, or not of that size, or takes no measurements.
+        measured : a file of measurements that replaces the case's own target.
+        InputError if the case has no inverse problem, has none of that size, or takes no measurements.
         """
         self.size(size)
         if self.problem is None:

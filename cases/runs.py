@@ -1,4 +1,4 @@
-"""Results of runs of a case: that none has failed, and how deep grains overlap."""
+"""Results of the runs of a case: a test for failed runs, and the largest overlap of grains."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from tisim import Result, RunError
 from tisim.analysis import largest_overlap, periodic_sides
 
 OTHER_STARTS = 1_000_000
-"""The seeds of runs of which a search is to know nothing are from this one on."""
+"""The first of the held-out seeds, which no search uses."""
 
 
 def sound(results: Sequence[Result]) -> list[Result]:
-    """Return results of worlds that are at their end or on the way to it; RunError where one has failed: the
-    state of its last good step would be taken for that of the others."""
+    """Return results of worlds that have ended or are still running; RunError if one has failed.
+
+    Without this test, the last good state of a failed world would be used like the results of the others.
+    """
     for result in results:
         if not result.status.ok and result.status.reason != "running":
             raise RunError(f"{result.scene.name}: {result.status.reason}")
@@ -21,7 +23,7 @@ def sound(results: Sequence[Result]) -> list[Result]:
 
 
 def overlap(result: Result) -> float:
-    """Return the largest overlap of two grains at the end, over the mean radius of all."""
+    """Return the largest overlap of two grains at the end, divided by the mean radius."""
     position, radius = result.state["position"], result.state["radius"]
     return largest_overlap(position, radius, periodic_sides(result.scene.domain, result.time)) / float(
         radius.mean()

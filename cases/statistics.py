@@ -13,7 +13,7 @@ from tisim.numerics.statistics import CONFIDENCE
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement about random runs: right when all of the confidence interval lies in least..most."""
+    """A statement about random runs; it holds if the whole confidence interval is within least..most."""
 
     name: str
     mean: Mean
@@ -28,7 +28,7 @@ class Claim:
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """Measured, expected, off by, allowed; for people."""
+        """Return mean, bounds, an empty cell and the confidence level as text for a table."""
         bounds = [f"above {self.least:.4g}"] * bool(np.isfinite(self.least))
         bounds += [f"below {self.most:.4g}"] * bool(np.isfinite(self.most))
         return str(self.mean), ", ".join(bounds), "", f"{CONFIDENCE:.0%} confidence"
@@ -36,7 +36,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Shown:
-    """A number that is shown beside what is said of it elsewhere, and not judged."""
+    """A number that is shown with a value from elsewhere, without a verdict."""
 
     name: str
     value: float | Mean
@@ -45,5 +45,5 @@ class Shown:
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """The number, and what it is shown beside; for people."""
+        """Return the number and the value shown beside it as text for a table."""
         return str(self.value) if isinstance(self.value, Mean) else f"{self.value:.4g}", self.beside, "", ""

@@ -1,5 +1,5 @@
-"""The quantities whose accuracy ``tisim cost`` measures in the flow of Z04: the mean radius at the end, over
-random starts."""
+"""Quantities whose accuracy ``tisim cost`` measures in the flow of Z04: the mean radius at the end, over
+random starts (seeds)."""
 
 from __future__ import annotations
 
@@ -13,5 +13,6 @@ def mean_radius(result: Result) -> float:
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Impacts are chaotic: one more digit anywhere gives other agglomerates, and the same mean."""
+    """Return the mean radius; impacts are chaotic, so a change in the last digit gives other agglomerates but
+    the same mean."""
     return (Quantity("mean radius", mean_radius, random=True),)

@@ -1,8 +1,9 @@
-"""Z04's closed forms, met by real scenes of two equal grains, and the conservation laws of a whole flow.
+"""Checks of Z04: closed forms for two equal grains, and conservation laws for a whole flow.
 
 Two grains of radius b_0 meet head-on, each at speed v. With a_0 = 0, a_f = 1 (Z04 4.13-4.15, 5.4, 5.5):
-e = 1 - v / v*, v* = sqrt(3 H beta / (2 rho)), and they bond above v*. A grain breaks into eight, halving its
-radius, at v = sqrt(6 gamma / (rho b_0 (1 - e^2))). At v* grains larger than 4 gamma / (a_f H beta) break.
+e = 1 - v / v*, v* = sqrt(3 H beta / (2 rho)), and the grains bond above v*. A grain breaks into eight grains
+of half its radius at v = sqrt(6 gamma / (rho b_0 (1 - e^2))). At v*, grains larger than 4 gamma / (a_f H
+beta) break.
 """
 
 from __future__ import annotations
@@ -22,15 +23,17 @@ from tisim.scene.initial_state import Arrays
 from tisim.steppers import FixedStep, Verlet
 
 HARDNESS, DENSITY, RADIUS, LENGTH = 3e5, 2000.0, 1e-3, 0.8
-"""The grains of the checks: hardness H (Pa), density rho (kg/m^3), radius b_0 (m), length beta."""
+"""Properties of the grains in the checks: hardness H (Pa), density rho (kg/m^3), radius b_0 (m), length
+beta."""
 CLOSED_FORM_BOUND = 1e-10
-"""Runs may differ from a closed form by this part of it."""
+"""Largest relative difference between a run and a closed form."""
 CONSERVATION_BOUND = 1e-12
-"""A conserved sum of a thousand terms may change by this part of it, by rounding."""
+"""Largest relative change of a conserved sum of about a thousand terms, from rounding."""
 
 
 def pair(speed: float, *effects: Effect, radius: float = RADIUS) -> Scene:
-    """Two equal grains that meet head-on along x, each at ``speed`` (m/s), and some time after."""
+    """Return a scene with two equal grains that meet head-on along x, each at ``speed`` (m/s), and then
+    separate."""
     gap = 0.1 * radius
     return Scene(
         name="pair",
@@ -53,25 +56,28 @@ def impact(initial: float = 0.0, final: float = 1.0) -> Impact:
 
 
 def breaking(surface_energy: float, radius: float = RADIUS) -> Fragmentation:
-    """Pieces of half the radius and no smaller."""
+    """Return fragmentation into pieces of half the radius, which do not break again."""
     mass = DENSITY * 4 / 3 * np.pi * radius**3
     return Fragmentation(surface_energy=surface_energy, grain_mass=mass / 8, threshold=0.5)
 
 
 def adhesion_speed(final: float = 1.0) -> float:
-    """Speed (m/s) of each grain from which equal grains bond (Z04 4.14)."""
+    """Return the speed (m/s) of each grain above which equal grains bond (Z04 4.14)."""
     return float(np.sqrt(3 * final * HARDNESS * LENGTH / (2 * DENSITY)))
 
 
 def restitution(speed: np.ndarray, initial: float, final: float) -> np.ndarray:
-    """e of equal grains at each speed (m/s): the root of D e^2 - (a_f + D) e + a_f - A = 0 in 0..1."""
+    """Return e of equal grains at each speed (m/s): the root of D e^2 - (a_f + D) e + a_f - A = 0 in 0..1."""
     d, a = final - initial, 2 * DENSITY * speed**2 / (3 * LENGTH * HARDNESS)
     half = (final + d) / 2
     return (final - a) / (half + np.sqrt(half**2 - d * (final - a)))
 
 
 def onset(happened: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> float:
-    """Return where in low..high something begins to happen, to rounding; a batch narrows it thirty times."""
+    """Return the smallest value in low..high at which ``happened`` becomes true, to rounding error.
+
+    Each batch of 32 runs narrows the interval by a factor of about thirty.
+    """
     while True:
         points = np.linspace(low, high, 32)
         first = int(np.argmax(happened(points)))
@@ -85,7 +91,7 @@ def _run(scenes: Sequence[Scene]) -> list[Result]:
 
 
 def closed_forms() -> Iterator[Check]:
-    """Restitution, adhesion, fragmentation, and which size sticks."""
+    """Yield the checks of restitution, adhesion, fragmentation and the largest size that bonds."""
     for initial, final in ((0.0, 1.0), (0.3, 1.0), (0.1, 2.5)):
         speeds = np.linspace(0.02, 0.98, 32) * adhesion_speed(final)
         ends = _run([pair(v, impact(initial, final)) for v in speeds])
@@ -126,17 +132,20 @@ def closed_forms() -> Iterator[Check]:
         ends = _run([
             pair(fastest, impact(), breaking(gamma, b), Agglomeration(), radius=b) for b in radii
         ])  # fmt: skip
-        # At this speed a pair does one or the other.
+        # At this speed a pair either bonds or breaks.
         return np.array([r.work["fractures"] > 0 and r.work["merges"] == 0 for r in ends])
 
     expected = 4 * gamma / (HARDNESS * LENGTH)
     size = onset(breaks, 0.3 * expected, 3 * expected)
-    yield Check("largest radius that sticks (m)", size, expected, CLOSED_FORM_BOUND * expected)
+    yield Check("largest radius of grains that bond (m)", size, expected, CLOSED_FORM_BOUND * expected)
 
 
 def energy(result: Result) -> tuple[float, float]:
-    """Return the energy of a flow at the start and the end, J: kinetic, thermal, radiated and fracture
-    energy, less what reaction and deformation work have supplied."""
+    """Return the energy of a flow at the start and at the end, J.
+
+    It is the sum of kinetic, thermal, radiated and fracture energy, less the energy supplied by reaction and
+    deformation work.
+    """
     capacity = next(e for e in result.scene.effects if isinstance(e, Heating)).heat_capacity
 
     def energy_of_grains(s: Arrays) -> float:
@@ -151,10 +160,10 @@ def energy(result: Result) -> tuple[float, float]:
 
 
 def conservation() -> Iterator[Check]:
-    """Mass, momentum and energy of a flow in which grains bond and break."""
+    """Yield the checks of mass, momentum and energy of a flow in which grains bond and break."""
     flow = agglomeration.scene({**agglomeration.BEST, "surface_energy": 5e4}, seed=1, grains=1000)
     result = tisim.run(flow)
-    yield Check("the flow reaches its end (1 = yes)", float(result.status.ok), 1.0, 0.0)
+    yield Check("the run completes (1 = yes)", float(result.status.ok), 1.0, 0.0)
     before, after = result.start, result.state
     mass = before["mass"].sum()
     yield Check("mass (kg)", after["mass"].sum(), mass, CONSERVATION_BOUND * mass)
@@ -165,11 +174,11 @@ def conservation() -> Iterator[Check]:
         yield Check(f"momentum along {'xyz'[axis]} (kg m/s)", momentum[1][axis], momentum[0][axis], bound)
     start, end = energy(result)
     turned_over = float(result.state["cooling_loss"].sum() + result.state["reaction_heat"].sum()) + start
-    yield Check("energy, all books (J)", end, start, CONSERVATION_BOUND * turned_over)
+    yield Check("total energy with losses and sources (J)", end, start, CONSERVATION_BOUND * turned_over)
 
 
 def check() -> Iterator[Check]:
-    """Yield the closed forms, then the conservation laws, without charges and with them."""
+    """Yield the closed forms, then the conservation laws, first without charges and then with charges."""
     yield from closed_forms()
     yield from conservation()
     yield from field_checks.closed_forms()

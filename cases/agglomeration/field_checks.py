@@ -1,17 +1,19 @@
-"""Closed forms of two charged or magnetised grains, and what merging conserves of charged ones.
+"""Checks of charged and magnetised grains: closed forms for two grains, and conservation laws for charged
+grains that merge.
 
-Two grains of mass m and charges q and -q are at rest, their centres d_0 apart. In the distance d they move as
-one particle of the reduced mass mu = m/2, and with k = q^2 / (4 pi epsilon_0), from mu d'' = -k/d^2,
+Two grains of mass m and charges q and -q start at rest with their centres d_0 apart. Their distance d changes
+as the position of one particle of the reduced mass mu = m/2. With k = q^2 / (4 pi epsilon_0), mu d'' = -k/d^2
+gives
 
     t(d) = sqrt(mu d_0^3 / (2 k)) (arccos sqrt(u) + sqrt(u (1 - u))),    u = d/d_0
 
-as in the fall of two masses; they meet at d = 2 b. Two moments M in line attract each other with 3 mu_0 M^2 /
-(2 pi d^4) (L21 Eqs 4.8, 4.9), so they close in at the speed
+as in the gravitational fall of two masses; they meet at d = 2 b. Two moments M in line attract each other
+with 3 mu_0 M^2 / (2 pi d^4) (L21 Eqs 4.8, 4.9), so their closing speed is
 
     v(d) = sqrt(mu_0 M^2 / (pi mu) (1/d^3 - 1/d_0^3)).
 
-One charge in E_0 + E_1 sin(omega t) goes (q/m) (E_0 t^2/2 + E_1 (omega t - sin omega t) / omega^2) (Z13 Eq.
-16).
+One charge in E_0 + E_1 sin(omega t) moves by (q/m) (E_0 t^2/2 + E_1 (omega t - sin omega t) / omega^2) (Z13
+Eq. 16).
 """
 
 from __future__ import annotations
@@ -30,25 +32,27 @@ from tisim.effects import CARBONYL_IRON, Agglomeration, Impact
 from tisim.steppers import FixedStep, Stepper, Verlet
 
 RADIUS, GRAIN_DENSITY, START_DISTANCE = 1e-3, 5e3, 8e-3
-"""The two grains of the checks: radius b (m), density (kg/m^3), distance d_0 of their centres (m)."""
+"""The two grains of the checks: radius b (m), density (kg/m^3), initial distance d_0 of their centres (m)."""
 MASS = GRAIN_DENSITY * 4 / 3 * np.pi * RADIUS**3
 CHARGED: Mapping[str, float] = {**fields.NO_FIELDS, "surface_charge": 2e-3}
 CHARGE = 4 * np.pi * RADIUS**2 * CHARGED["surface_charge"]
 OWN_STEPPER = fields.stepper({**CHARGED, "density": GRAIN_DENSITY}, RADIUS)
-"""The stepper of the case for the two charges."""
+"""The stepper that the case uses for the two charges."""
 STEPS = 4000
-"""Number of steps in which two grains fall together; the error goes with the square of the step."""
+"""Number of steps until two grains meet; the error is proportional to the square of the step."""
 FORM_BOUND = 1e-7
-"""Runs in such steps may differ from a closed form by this part of it."""
+"""Largest relative difference between a run of ``STEPS`` steps and a closed form."""
 OWN_STEPPER_BOUND = 1e-3
-"""So may a fall in the steps of the case."""
+"""Largest relative difference for a fall with the steps of the case."""
 CONSERVATION_BOUND = 1e-12
-"""A conserved sum of hundreds of terms may change by this part of it, by rounding."""
+"""Largest relative change of a conserved sum of hundreds of terms, from rounding."""
 
 
 def fall_time(mass: float, charge: float, apart: float, distance: float) -> float:
-    """Return the time (s) in which two grains of a mass (kg), of charges +- ``charge`` (C), fall from rest
-    ``apart`` (m) to a distance (m)."""
+    """Return the time (s) in which two grains fall from rest ``apart`` (m) to ``distance`` (m).
+
+    mass : of each grain, kg. charge : of the two grains, + and - this value, C.
+    """
     u = distance / apart
     attraction = charge**2 / (4 * np.pi * epsilon_0)
     scale = np.sqrt(0.5 * mass * apart**3 / (2 * attraction))
@@ -56,14 +60,19 @@ def fall_time(mass: float, charge: float, apart: float, distance: float) -> floa
 
 
 def dipole_speed(mass: float, moment: float, apart: float, distance: float) -> float:
-    """Return the speed (m/s) at which two grains of a mass (kg) and a moment (A m^2), in line, close in at a
-    distance (m), from rest ``apart`` (m)."""
+    """Return the closing speed (m/s) of two grains with moments in line at ``distance`` (m), from rest
+    ``apart`` (m).
+
+    mass : of each grain, kg. moment : of each grain, A m^2.
+    """
     return float(np.sqrt(2 * mu_0 * moment**2 / (np.pi * mass) * (distance**-3 - apart**-3)))
 
 
 def iron_moment(flux: float) -> float:
-    """Return the moment (A m^2) of a sphere of iron of RADIUS in a field (T): the root of Froehlich's law for
-    its magnetisation M, with H = B/mu_0 - M/3 inside."""
+    """Return the moment (A m^2) of an iron sphere of RADIUS in a field (T).
+
+    It is the root of Froehlich's law for the magnetisation M, with H = B/mu_0 - M/3 inside the sphere.
+    """
     chi, saturation = CARBONYL_IRON.parameters().values()
     field = flux / mu_0
     # chi H (M_s - M) = M_s M, a quadratic in M.
@@ -93,7 +102,10 @@ def pair(
 
 
 def meeting(stepper: Stepper, expected: float) -> float:
-    """Return when two opposite charges meet (s), to 1e-9 of it: the shortest run in which they become one."""
+    """Return the time (s) at which two opposite charges meet, to a relative error of 1e-9.
+
+    It is the duration of the shortest run in which they merge.
+    """
     low, high = 0.9 * expected, 1.1 * expected
     while high - low > 1e-9 * expected:
         times = np.linspace(low, high, 32)
@@ -104,13 +116,16 @@ def meeting(stepper: Stepper, expected: float) -> float:
 
 
 def closed_forms() -> Iterator[Check]:
-    """Two charges fall together, two magnetised grains too, and fields move one charge."""
+    """Yield the fall of two opposite charges, the fall of two magnetised grains, and the path of one charge
+    in a field."""
     time = fall_time(MASS, CHARGE, START_DISTANCE, 2 * RADIUS)
     for name, stepper, bound in (
         (f"{STEPS} steps", Verlet(control=FixedStep(dt=time / STEPS)), FORM_BOUND),
-        ("the steps of the case", OWN_STEPPER, OWN_STEPPER_BOUND),
+        ("steps of the case", OWN_STEPPER, OWN_STEPPER_BOUND),
     ):
-        yield Check(f"opposite charges meet, in {name} (s)", meeting(stepper, time), time, bound * time)
+        yield Check(
+            f"time until opposite charges meet, {name} (s)", meeting(stepper, time), time, bound * time
+        )
 
     flux, duration = 0.8, 2e-3
     magnetic = {**fields.NO_FIELDS, "magnetic_field": flux}
@@ -119,7 +134,7 @@ def closed_forms() -> Iterator[Check]:
     (x, _, _), (v, _, _) = (end.state[name][1] - end.state[name][0] for name in ("position", "velocity"))
     speed = dipole_speed(MASS, iron_moment(flux), START_DISTANCE, x)
     yield Check(
-        f"magnetised grains close in from {START_DISTANCE / x:.3g} times as far (m/s)",
+        f"closing speed of magnetised grains, distance reduced {START_DISTANCE / x:.3g} times (m/s)",
         -v,
         speed,
         FORM_BOUND * speed,
@@ -132,18 +147,25 @@ def closed_forms() -> Iterator[Check]:
     way += electric["electric_amplitude"] * (turn * duration - np.sin(turn * duration)) / turn**2
     way *= CHARGE / MASS
     yield Check(
-        "a charge in an oscillating field goes (m)", end.state["position"][0, 1], way, FORM_BOUND * way
+        "displacement of a charge in an oscillating field (m)",
+        end.state["position"][0, 1],
+        way,
+        FORM_BOUND * way,
     )
 
 
 def conservation() -> Iterator[Check]:
-    """Charge, mass and momentum of a flow of charged grains that merge, in no field."""
+    """Yield the checks of charge, mass and momentum of a flow of charged grains that merge, without external
+    fields."""
     soft = {**agglomeration.BEST, "hardness": 1e5, **CHARGED, "charge_ratio": -0.5}
     result = tisim.run(agglomeration.scene(soft, seed=1, grains=250))
     before, after = result.start, result.state
-    yield Check("the charged flow reaches its end (1 = yes)", float(result.status.ok), 1.0, 0.0)
+    yield Check("the run of the charged flow completes (1 = yes)", float(result.status.ok), 1.0, 0.0)
     yield Check(
-        "grains less mergers, at the end", 250.0 - result.work["merges"], float(len(after["mass"])), 0.0
+        "grains at the end: initial number less mergers",
+        250.0 - result.work["merges"],
+        float(len(after["mass"])),
+        0.0,
     )
     for name, unit in (("charge", "C"), ("mass", "kg")):
         bound = CONSERVATION_BOUND * np.abs(before[name]).sum()
@@ -151,5 +173,5 @@ def conservation() -> Iterator[Check]:
     momentum = [(s["mass"][:, None] * s["velocity"]).sum(axis=0) for s in (before, after)]
     bound = CONSERVATION_BOUND * (before["mass"] * np.linalg.norm(before["velocity"], axis=1)).sum()
     for axis in range(3):
-        what = f"its momentum along {'xyz'[axis]} (kg m/s)"
+        what = f"momentum of the charged flow along {'xyz'[axis]} (kg m/s)"
         yield Check(what, momentum[1][axis], momentum[0][axis], bound)

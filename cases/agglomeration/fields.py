@@ -1,15 +1,18 @@
 """Charges and fields in the flow of Z04: the near field of its remark 4.2, which it leaves to others.
 
-Grains are of two classes, half of them each, equal but for their charge. They attract and repel each other
-by Coulomb's law (Z13 Eq. 22, the near field of Eq. 24), an electric field across the flow pushes them (Z13
-Eq. 3), and a magnetic field along it magnetises them as iron, so that they act on each other as dipoles (L21
+Half of the grains belong to each of two classes, which differ only in their charge. The grains interact by
+Coulomb's law (Z13 Eq. 22, the near field of Eq. 24). An electric field across the flow acts on their charges
+(Z13 Eq. 3). A magnetic field along the flow magnetises them as iron, so that they interact as dipoles (L21
 Eqs 4.8, 4.9). Each field has a constant and an oscillating part (Z13 Eq. 16).
 
-The charge of a grain is given over its surface, and its magnetic moment is its magnetisation times its
-volume. So the speed that attraction gives two grains before they meet does not depend on their size, nor does
-that from which on they bond (Z04 4.15), and the genes mean the same in all sizes of the case. A magnetic
-field also turns the velocities of charges, by q B t/m, which is below 3e-4 in a whole flow for grains of 1 mm
-and more: that is left out, so that a leapfrog, which keeps pressed grains at rest, can step all forces.
+The charge of a grain is given as a surface charge density, and its magnetic moment is its magnetisation times
+its volume. Therefore the speed that two grains gain by attraction before they meet does not depend on their
+size, and neither does the speed above which they bond (Z04 4.15). The genes have the same meaning in all
+sizes of the case.
+
+A magnetic field also turns the velocities of charges, by q B t/m, which is below 3e-4 in a whole flow for
+grains of 1 mm and more. This is left out so that a leapfrog, which keeps pressed grains at rest, can
+integrate all forces.
 """
 
 from __future__ import annotations
@@ -26,12 +29,12 @@ from tisim.sources import ElectricField, MagneticField
 from tisim.steppers import ApproachTime, Stepper, Verlet
 
 CHARGE_GENES = (
-    # Its field, 4.5e8 V/m at most, is half of what pulls electrons out of a metal in vacuum; air withstands
-    # less than a hundredth of it.
+    # The electric field at the surface, at most 4.5e8 V/m, is half of the field that pulls electrons out of
+    # a metal in vacuum; air withstands less than a hundredth of it.
     Gene("surface_charge", "C/m^2", 0.0, 4e-3),
     Gene("charge_ratio", "", -1.0, 1.0),
 )
-"""Surface charge density of the first class of grains, and the ratio of the second class's to it."""
+"""Surface charge density of the first class of grains, and the ratio of the second class's density to it."""
 ELECTRIC_GENES = (
     # Vacuum between electrodes withstands some 1e7 V/m.
     Gene("electric_field", "V/m", 0.0, 1e7),
@@ -45,23 +48,24 @@ MAGNETIC_GENES = (
     Gene("magnetic_frequency", "Hz", 50.0, 1e3, "log"),
 )
 FIELD_GENES = (*CHARGE_GENES, *ELECTRIC_GENES, *MAGNETIC_GENES)
-"""From half an oscillation to ten in a flow, and from nothing of each to where it outdoes the flow."""
+"""All genes of charges and fields. Frequencies range from half an oscillation to ten in a flow, amplitudes
+from zero to values at which the field dominates the flow."""
 NO_FIELDS: Mapping[str, float] = {gene.name: max(gene.low, 0.0) for gene in FIELD_GENES}
-"""The values of these genes at which grains feel nothing of each other but impacts."""
+"""Values of these genes at which the grains interact only by impacts."""
 SHOWN: Mapping[str, float] = {
     "surface_charge": 3e-3, "charge_ratio": -0.8,
     "electric_field": 5e6, "electric_amplitude": 5e6, "electric_frequency": 100.0,
     "magnetic_field": 0.5, "magnetic_amplitude": 0.3, "magnetic_frequency": 100.0,
 }  # fmt: skip
-"""Charges and fields that are felt, of the flow that is shown with them."""
+"""Charges and fields strong enough to change the flow; used for the scene that is shown with them."""
 
 COULOMB = NearField(alpha2=1 / (4 * math.pi * epsilon_0), beta2=2, strength="charge")
 PHASE = 0.1
-"""Steps are at most as long as this over the rate of an oscillation that the forces of fields can cause."""
+"""Largest product of the step and the rate of an oscillation that the forces of the fields can cause."""
 
 
 def has_fields(design: Mapping[str, float]) -> bool:
-    """Return whether a design says something of charges and fields, be it that there are none."""
+    """Return whether a design has genes of charges and fields, even if their values are zero."""
     return "surface_charge" in design
 
 
@@ -75,7 +79,7 @@ def charged_classes(design: Mapping[str, float], radius: float) -> tuple[GrainCl
 
 
 def forces(design: Mapping[str, float]) -> tuple[Effect, ...]:
-    """Return the forces of charges and fields. They are the same for all designs, so that all of a search run
+    """Return the forces of charges and fields. All designs have the same effects, so that a whole search runs
     in one batch."""
     electric, magnetic = (2 * math.pi * design[f"{kind}_frequency"] for kind in ("electric", "magnetic"))
     return (
@@ -97,12 +101,12 @@ def forces(design: Mapping[str, float]) -> tuple[Effect, ...]:
 
 
 def rate(design: Mapping[str, float], radius: float) -> float:
-    """Return the rate (1/s) of an oscillation that charges and fields can cause: sqrt(a/b), b the radius and
-    a the acceleration of two touching grains by all forces of the fields together.
+    """Return the rate (1/s) of the fastest oscillation that charges and fields can cause.
 
-    With the surface charge sigma and the magnetisation M, a touching pair attracts each other by
-    pi b^2 sigma^2 / epsilon_0 and pi mu_0 b^2 M^2 / 6, and a field E pulls by 4 pi b^2 sigma E. Charge and
-    moment of grains that merge are summed, so that larger grains have no higher rate.
+    It is sqrt(a/b), with b the radius and a the acceleration of two touching grains by all forces of the
+    fields together. With the surface charge sigma and the magnetisation M, the two grains attract each other
+    by pi b^2 sigma^2 / epsilon_0 and pi mu_0 b^2 M^2 / 6, and a field E pulls by 4 pi b^2 sigma E. Charges
+    and moments add up when grains merge, so larger grains have no higher rate.
     """
     charge = design["surface_charge"] * max(1.0, abs(design["charge_ratio"]))
     electric, magnetic = (
@@ -114,8 +118,11 @@ def rate(design: Mapping[str, float], radius: float) -> float:
 
 
 def stepper(design: Mapping[str, float], radius: float) -> Stepper:
-    """Return the stepper of grains of a design and a radius (m) in fields: forces act between impacts, too,
-    so that steps are bounded by what these can do."""
+    """Return the stepper for a design and a radius (m) in fields.
+
+    Forces also act between impacts, so the step is limited by the rate of the oscillations that they can
+    cause.
+    """
     fastest, usual = rate(design, radius), ApproachTime()
     longest = min(PHASE / fastest, usual.longest) if fastest else usual.longest
     return Verlet(control=ApproachTime(shortest=min(usual.shortest, longest), longest=longest))

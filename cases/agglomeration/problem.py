@@ -1,5 +1,5 @@
-"""The inverse problem of agglomeration: the flow that grows the largest grains (Z04 section 7), by itself or
-with charges and fields."""
+"""The inverse problem of agglomeration: the flow that grows the largest grains (Z04 section 7), with or
+without charges and fields."""
 
 from __future__ import annotations
 
@@ -26,34 +26,36 @@ GENES = (
     Gene("activation_energy", "J/mol", 1e2, 1e3),
     Gene("reaction", "J/m^2", 1e6, 1e7),
 )
-"""Z04 section 8: the search ranges."""
+"""The search ranges of Z04 section 8."""
 
-# As printed. Nothing breaks anywhere in it.
+# As printed. No grain breaks anywhere in this range.
 UNBREAKABLE = Gene("surface_energy", "J/m^2", 1e6, 1e16, "log")
 VARIANTS = {
     "paper": (UNBREAKABLE,),
-    # From where nearly every hard impact breaks an agglomerate to where none does. Measured with the best
-    # string and 1000 grains: breakages per grain 1.4 at 1e2, 0.1 at 1e4, 1e-4 at 1e5; Pi 0.90, 0.79, 0.76.
+    # From a surface energy at which nearly every hard impact breaks an agglomerate to one at which none
+    # does. Measured with the best design and 1000 grains: breakages per grain 1.4 at 1e2, 0.1 at 1e4, 1e-4 at
+    # 1e5; Pi 0.90, 0.79, 0.76.
     "fragmenting": (Gene("surface_energy", "J/m^2", 1e2, 1e5, "log"),),
     "fields": (UNBREAKABLE, *FIELD_GENES),
 }
-"""Genes that a variant of the inverse problem has beside GENES: surface energy, and charges and fields."""
+"""Genes that each variant of the inverse problem adds to GENES: surface energy, and charges and fields."""
 
 MEANINGS = {
-    "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 where all grains are one",
-    "b_f / b_0": "mean radius at the end over that at the start",
-    "n_f": "(b_f/b_0)^3, grains of the start in one of the mean radius at the end",
+    "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 if all grains have merged",
+    "b_f / b_0": "final over initial mean radius",
+    "n_f": "(b_f/b_0)^3, number of initial grains in a grain of the final mean radius",
 }
 
 
 def cost(result: Result) -> float:
-    """Pi = 1 - b_f / b*, b_f the mean final radius and b* that of all the mass in one sphere (Z04 7.1)."""
+    """Return Pi = 1 - b_f / b*, with b_f the mean final radius and b* the radius of one sphere of all the
+    mass (Z04 7.1)."""
     whole = np.cbrt((result.start["radius"] ** 3).sum())
     return max(0.0, float(1.0 - result.state["radius"].mean() / whole))  # below 0 by rounding only
 
 
 def problem(size: str = "default", variant: str = "paper") -> Problem:
-    """Return the inverse problem of Z04 section 7: the flow whose grains grow the most."""
+    """Return the inverse problem of Z04 section 7: find the flow that grows the largest grains."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     settings = size_named(size, SIZES).scene
     energy, *fields = VARIANTS[variant]

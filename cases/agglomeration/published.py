@@ -1,8 +1,8 @@
-"""The six best strings that Z04 publishes (tables 1-3), run here, beside the values it gives them.
+"""The six best individuals of Z04 (tables 1-3) are run again and compared with the published values.
 
     python -m tisim.cases.agglomeration.published [--grains 1000] [--starts 48] [--sensitivity]
 
-With ``--sensitivity`` the first string is run again with one assumption changed at a time.
+With ``--sensitivity`` the first individual is also run with one assumption changed at a time.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from tisim.steppers import ApproachTime, Verlet
 
 
 def changed(control: ApproachTime) -> Callable[[Scene], Scene]:
-    """A change of a scene to another step control."""
+    """Return a function that gives a scene another step control."""
     return lambda s: s.model_copy(update={"stepper": Verlet(control=control)})
 
 
 def setting(key: str, value: float | bool) -> Callable[[Scene], Scene]:
-    """A change of one setting of a scene, by its dotted key."""
+    """Return a function that changes one setting of a scene, by its dotted key."""
     return lambda s: s.replace({key: value})
 
 
@@ -49,13 +49,13 @@ CHANGES: Mapping[str, Callable[[Scene], Scene]] = {
 
 
 def estimate(scenes: list[Scene]) -> tuple[float, float]:
-    """Mean Pi and half of its 95 % confidence interval."""
+    """Return the mean of Pi and half of its 95 % confidence interval."""
     values = np.array([cost(result) for result in tisim.run(scenes)])
     return float(values.mean()), float(half_width(values))
 
 
 def main() -> None:
-    """Run the published strings and print them beside what Z04 has."""
+    """Run the published individuals and print the results beside the values of Z04."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--grains", type=int, default=1000)
     parser.add_argument("--starts", type=int, default=48)
@@ -64,7 +64,7 @@ def main() -> None:
     console = Console()
 
     table = Table(
-        "rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published strings"
+        "rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published individuals"
     )
     for rank, (design, published) in enumerate(zip(designs(), PUBLISHED_COSTS, strict=True), start=1):
         mean, half = estimate([scene(design, seed, options.grains) for seed in range(options.starts)])
@@ -75,7 +75,7 @@ def main() -> None:
     console.print(table)
 
     if options.sensitivity:
-        table = Table("string 1 with", "Pi, 95 % CI", title="One assumption changed at a time")
+        table = Table("individual 1 with", "Pi, 95 % CI", title="One assumption changed at a time")
         for name, change in CHANGES.items():
             scenes = [change(scene(designs()[0], seed, options.grains)) for seed in range(options.starts)]
             mean, half = estimate(scenes)

@@ -29,18 +29,18 @@ MEAN_VELOCITY = (100.0, 10.0, 10.0)
 """The mean velocity of the grains at the start, m/s (Z04 section 7)."""
 
 BEST = designs()[0]
-"""The design of rank 1 that Z04 publishes, in SI units."""
+"""The design of rank 1 in Z04, in SI units."""
 
 
 def _search(evaluations: int, published: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a search of that many runs; published : those of Zohdi's own algorithm."""
+    """Return the search settings for a number of runs; published : the settings of Zohdi's own algorithm."""
     usual = {"generations": evaluations, "max_evaluations": evaluations}
     return {**usual, "methods": {"zohdi": published}}
 
 
 SIZES = {
     "small": Size(
-        "60 grains; a look in seconds",
+        "60 grains; runs in seconds",
         {"grains": 60},
         _search(400, {
             "options": {"population": 10, "parents": 4}, "generations": 3,
@@ -55,7 +55,7 @@ SIZES = {
         }),
     ),
     "paper": Size(
-        "1000 grains, a search of 1600 runs; Zohdi's own is 25 generations of 20, as Z04 section 8",
+        "1000 grains, a search of 1600 runs; Zohdi's algorithm has 25 generations of 20 (Z04 8)",
         {"grains": 1000},
         _search(1600, {
             "generations": 25, "ensemble": {"tolerance": 5e-4, "min_starts": 12, "block": 12, "confirm": 48},
@@ -65,11 +65,11 @@ SIZES = {
 
 
 def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: float = DURATION) -> Scene:
-    """Return the flow of a design from one random start; with charges and fields where the design says what
-    they are.
+    """Return the flow of a design from one random start, with charges and fields if the design has their
+    genes.
 
-    In fields grains also see each other across the faces: where they attract each other, it must not matter
-    that the mean velocity carries all of them through the faces again and again.
+    With fields, grains also interact across the faces of the box: the mean velocity carries all grains
+    through the faces repeatedly, and this must not affect their attraction.
     """
     radius = design["length_ratio"] * HALF_SIDE / grains ** (1 / 3)
     v = design["relative_velocity"]
@@ -102,7 +102,7 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """Return the flow of the paper's best string."""
+    """Return the flow of the best design of Z04."""
     return scene(BEST, seed, **size_named(size, SIZES).scene)
 
 

@@ -1,15 +1,15 @@
-"""What each kind of gene adds to the search for the largest grains, at equal budget.
+"""Compare the kinds of genes in the search for the largest grains, at equal budget.
 
     python -m tisim.cases.agglomeration.what_fields_add [--size small] [--runs 400] [--searches 5]
         [--method NAME] [--starts N] [--fresh 64] [--out what_fields_add.png]
     python -m tisim.cases.agglomeration.what_fields_add --one-flow [--size small] [--fresh 256]
 
-Each kind is searched several times, from other seeds; genes that are left out are those of no charge and no
-field. The best design of each search is then run from fresh starts that no search has seen, the same for
-all. The table has the mean over searches of these fresh values, with its 95 % confidence interval, and the
-mean of the values that the searches themselves report.
+Each kind is searched several times with different seeds; genes that are left out have the values of no charge
+and no field. The best design of each search is then run from held-out starts, which are the same for all
+searches. The table shows the mean of these values over the searches, with its 95 % confidence interval, and
+the mean of the values that the searches themselves report.
 
-With ``--one-flow`` nothing is searched: the flow that Z04 finds best, as soft as the ranges allow, is run
+With ``--one-flow`` nothing is searched: the best flow of Z04, with the lowest hardness in the range, is run
 with one kind of field after another, each from the same starts.
 """
 
@@ -46,7 +46,7 @@ KINDS_OF_GENES: Mapping[str, tuple[Gene, ...]] = {
     "and magnetic field": fields.MAGNETIC_GENES,
     "all": fields.FIELD_GENES,
 }
-"""The genes that each kind of search has besides those of Z04."""
+"""The genes that each kind of search adds to the genes of Z04."""
 
 OPPOSITE_CHARGES = {"surface_charge": 4e-3, "charge_ratio": -1.0}
 FELT: Mapping[str, Mapping[str, float]] = {
@@ -62,12 +62,12 @@ FELT: Mapping[str, Mapping[str, float]] = {
     "constant B": {"magnetic_field": 1.0},
     "B of 100 Hz": {"magnetic_amplitude": 1.0, "magnetic_frequency": 100.0},
 }
-"""What the grains of one flow feel, each at its most."""
+"""The fields in the comparison of one flow, each at its upper limit."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """The best design of a search. claimed : Pi as the search has it. true : Pi from fresh starts."""
+    """The best design of a search. claimed : Pi reported by the search. true : Pi over held-out starts."""
 
     design: Mapping[str, float]
     claimed: float
@@ -75,12 +75,12 @@ class Found:
 
 
 def without_the_rest(design: Mapping[str, float], seed: int, grains: int) -> Scene:
-    """Return the flow of a design from a start, in which there is nothing that it does not say."""
+    """Return the flow of a design from a start; charges and fields that the design does not name are zero."""
     return scene({**fields.NO_FIELDS, **design}, seed, grains)
 
 
 def problem_of(kind: str, size: str) -> Problem:
-    """Return the inverse problem of a kind."""
+    """Return the inverse problem with a kind of genes."""
     return dataclasses.replace(
         problem(size, "fields"),
         name=f"agglomeration-{size}-{kind}",
@@ -90,7 +90,7 @@ def problem_of(kind: str, size: str) -> Problem:
 
 
 def search(kind: str, size: str, seed: int, fresh: int, settings: Mapping[str, Any]) -> Found:
-    """Search once, and run the best design from fresh starts."""
+    """Search once, and run the best design from held-out starts."""
     searched = problem_of(kind, size)
     best = optimize.run(searched, seed=seed, **settings).designs[0]
     starts = range(OTHER_STARTS, OTHER_STARTS + fresh)
@@ -100,7 +100,7 @@ def search(kind: str, size: str, seed: int, fresh: int, settings: Mapping[str, A
 
 
 def searches(size: str, number: int, fresh: int, settings: Mapping[str, Any]) -> Iterator[tuple[str, Found]]:
-    """Search each kind a number of times."""
+    """Search with each kind of genes a number of times."""
     for seed in range(number):
         for kind in KINDS_OF_GENES:
             yield kind, search(kind, size, seed, fresh, settings)
@@ -120,8 +120,8 @@ def table(found: Mapping[str, Sequence[Found]]) -> str:
 
 
 def one_flow(grains: int, starts: int) -> str:
-    """Return a table of what fields do to one flow: Pi, and by how much it is less than from the same starts
-    without any."""
+    """Return a table of the effect of fields on one flow: Pi, and its reduction relative to no field from the
+    same starts."""
     soft = {**BEST, "hardness": 1e5}
     values = {
         name: np.array(
@@ -165,11 +165,11 @@ def main() -> None:
     """Search, print the table and draw the picture."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--size", default="small", choices=SIZES)
-    parser.add_argument("--runs", type=int, default=400, help="budget of a search")
-    parser.add_argument("--searches", type=int, default=5, help="of each kind")
-    parser.add_argument("--method", help="by name; unless given, that of optimize.run")
-    parser.add_argument("--starts", type=int, help="of each design; unless given, as optimize.run does")
-    parser.add_argument("--fresh", type=int, default=64, help="starts from which best designs are run again")
+    parser.add_argument("--runs", type=int, default=400, help="number of runs of a search")
+    parser.add_argument("--searches", type=int, default=5, help="number of searches with each kind of genes")
+    parser.add_argument("--method", help="name of the method; by default as in optimize.run")
+    parser.add_argument("--starts", type=int, help="starts of each design; by default as in optimize.run")
+    parser.add_argument("--fresh", type=int, default=64, help="held-out starts of the best designs")
     parser.add_argument("--one-flow", action="store_true", help="fields in one flow, without a search")
     parser.add_argument("--out", type=Path, help="file of the picture")
     options = parser.parse_args()

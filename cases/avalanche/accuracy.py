@@ -1,5 +1,5 @@
-"""The quantities whose accuracy ``tisim cost`` measures in an avalanche: the angle of repose and the volume
-of the heap, over random starts."""
+"""Quantities whose accuracy ``tisim cost`` measures in an avalanche: the angle of repose and the volume of
+the heap, over random starts."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ def width(result: Result) -> float:
 
 
 def volume(result: Result) -> float:
-    """Return the volume of the heap over that of its grains."""
+    """Return the volume of the heap divided by the volume of its grains."""
     return heap_volume(result.state, width(result)) / grains_volume(result.state)
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths of grains are chaotic; what counts is the heap that they leave, and how deep they press into each
-    other."""
+    """Return the properties of the final heap and the largest overlap; the paths of single grains are
+    chaotic."""
     return (
         Quantity("angle of repose", lambda result: repose(result.state), random=True),
         Quantity("volume of the heap", volume, random=True),

@@ -1,4 +1,5 @@
-"""The picture of an avalanche on its way: grains in the colours of the strips of the column they are from."""
+"""Pictures of an avalanche in motion; the colour of a grain shows the strip of the column in which it
+started."""
 
 from __future__ import annotations
 
@@ -18,24 +19,24 @@ from tisim.plotting.style import empty, letters
 from tisim.scene.initial_state import Arrays
 
 AFTER = (0.0, 2.0, 4.0, 6.0, 10.0, 30.0)
-"""The avalanche is drawn so long after the dividing wall has gone, in sqrt(d/g) (L21 Fig. 4.14)."""
+"""Times of the pictures after the dividing wall is removed, in sqrt(d/g) (L21 Fig. 4.14)."""
 STRIP = 3.0
-"""A strip of the column is so many diameters wide."""
+"""Width of a strip of the column, in diameters."""
 STRIP_COLOURS = ("#4477aa", "#ccbb44", "#228833", "#cc6677")
-"""Strips have these colours in turn."""
+"""Colours of the strips, repeated in this order."""
 
 
 def opening(scene: Scene) -> float:
-    """Return when the dividing wall of a scene goes, s."""
+    """Return the time at which the dividing wall of a scene is removed, s."""
     gate = next(one for one in scene.effects if isinstance(one, Walls) and one.name == "gate")
     assert isinstance(gate.motion, Translation)
     return gate.motion.begin
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """calving.png: how the slope comes down once the wall has gone, seen from the side.
+    """calving.png: the collapse of the slope after the wall is removed, seen from the side.
 
-    None of a file with fewer frames than are drawn, such as a result.h5.
+    Returns nothing for a file with fewer frames than are drawn, such as a result.h5.
     """
     if len(trajectory) < len(AFTER):
         return {}
@@ -60,13 +61,13 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 
 def strips_of(state: Arrays, d: float) -> dict[int, int]:
-    """Return the strip of the column in which each grain is, by its id."""
+    """Return the strip of the column of each grain, by its id."""
     strip = (state["position"][:, 0] / (STRIP * d)).astype(int)
     return dict(zip(state["id"].tolist(), strip.tolist(), strict=True))
 
 
 def side_view(axis: Axes, state: Arrays, strips: Mapping[int, int]) -> None:
-    """Draw grains as they are seen along the width of the cell, in the colours of their strips."""
+    """Draw the grains as seen along the width of the cell, in the colours of their strips."""
     order = np.argsort(-state["position"][:, 1])
     place, size = (state[name][order] / diameter(state) for name in ("position", "radius"))
     colours = [STRIP_COLOURS[strips[k] % len(STRIP_COLOURS)] for k in state["id"][order].tolist()]

@@ -1,4 +1,5 @@
-"""What L21 finds of avalanches, beside what a narrow cell shows of it, and what holds exactly."""
+"""Checks of the avalanche: findings of L21 that a narrow cell can reproduce, and relations that hold
+exactly."""
 
 from __future__ import annotations
 
@@ -21,22 +22,22 @@ from tisim.analysis import Mean
 from tisim.steppers import FixedStep, Verlet
 
 CHECKED_SEEDS = 6
-"""There are so many random starts of each avalanche."""
+"""Number of random starts of each avalanche."""
 MAGNETISATION = 11.9e3
-"""A/m; that of a single grain at 5 mT (L21 section 4.5)."""
+"""Magnetisation of a single grain at 5 mT, A/m (L21 section 4.5)."""
 BALANCE = 0.02
-"""How far the load on the walls may be from the weight of the grains where they count as at rest."""
+"""Largest relative difference between the load on the walls and the weight of the grains at rest."""
 
 
 def check(seeds: int = CHECKED_SEEDS) -> Iterator[Check | Claim | Shown]:
-    """Yield what must hold of two grains, and of avalanches from some starts."""
+    """Yield the checks of two grains and of avalanches from several starts."""
     yield from of_two_grains()
     wanted = [(d, field, seed) for d in DIAMETERS for field in (0.0, FLUX) for seed in range(seeds)]
     yield from of_avalanches(avalanches(DEFAULT, wanted))
 
 
 def pairs() -> list[Result]:
-    """Return two grains of each diameter in contact along the field, after a step."""
+    """Return two grains of each diameter in contact along the field, after one step."""
     scenes = []
     for d in DIAMETERS:
         place = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, d]])
@@ -47,24 +48,31 @@ def pairs() -> list[Result]:
 
 
 def of_two_grains() -> Iterator[Check]:
-    """Yield the magnetisation, and the attraction over the weight: ten times of 5 mm, about as much of 5 cm
-    (L21 section 4.5)."""
+    """Yield the magnetisation, and the attraction divided by the weight.
+
+    The ratio is about 10 for grains of 5 mm and about 1 for grains of 5 cm (L21 section 4.5).
+    """
     for d, result in zip(DIAMETERS, pairs(), strict=True):
         name = f"{1e3 * d:g} mm"
         force = abs(float(result.state["force"][0, 2]))
-        yield Check(f"{name}: attraction of two over weight", force / weight(d), ratio(d), 1e-5 * ratio(d))
+        yield Check(
+            f"{name}: attraction of two grains over weight", force / weight(d), ratio(d), 1e-5 * ratio(d)
+        )
         if d == DIAMETERS[0]:
             alone = moment(d) / (math.pi / 6 * d**3)
-            yield Check(f"{name}: magnetisation of one, A/m", alone, MAGNETISATION, 50.0)
+            yield Check(f"{name}: magnetisation of a single grain, A/m", alone, MAGNETISATION, 50.0)
             tenfold = math.log10(attraction(d) / weight(d))
-            yield Check(f"{name}: magnetism dominates by an order of magnitude", tenfold, 1.0, 0.3)
+            yield Check(f"{name}: log10 of attraction over weight (L21: 1)", tenfold, 1.0, 0.3)
 
 
 def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim | Shown]:
-    """Yield what avalanches with and without a field show. The angle of magnetised slopes is not among it:
-    grains stand in chains as high as so small a heap."""
+    """Yield the checks of avalanches with and without a field.
+
+    The angle of magnetised slopes is not checked: in a heap this small, chains of grains are as high as the
+    heap.
+    """
     off = max(abs(load_on_walls(one.end) - 1) for one in runs)
-    yield Check("load on the walls over weight, at worst", 1 + off, 1.0, BALANCE)
+    yield Check("load on the walls over weight, largest deviation", 1 + off, 1.0, BALANCE)
     by_size = {d: (of(runs, d, 0.0), of(runs, d, FLUX)) for d in DIAMETERS}
     loosened: list[np.ndarray] = []
     for d, (without, magnetised) in by_size.items():
@@ -74,19 +82,19 @@ def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim | Shown]:
         grown = [b.volume / a.volume for a, b in zip(without, magnetised, strict=True)]
         loosened.append(np.array([one.loosened for one in magnetised]))
         for what, values in (
-            (f"volume over that without (L21: {larger(d):.2f})", grown),
-            ("volume as magnetised over that as settled", loosened[-1]),
+            (f"volume with field over volume without (L21: {larger(d):.2f})", grown),
+            ("volume magnetised over volume settled", loosened[-1]),
         ):
-            # Of larger grains so few starts do not tell it from 1.
+            # For larger grains these few starts cannot distinguish the value from 1.
             judged = d == DIAMETERS[0]
             mean = Mean.of(values)
             yield Claim(f"{name}: {what}", mean, 1.0) if judged else Shown(f"{name}: {what}", mean)
     small, _, large = loosened
-    yield Claim("volume grows by more, 5 mm than 5 cm", Mean.of(small - large), least=0.0)
+    yield Claim("growth of the volume, 5 mm minus 5 cm", Mean.of(small - large), least=0.0)
     alike = steeper_by(by_size[DIAMETERS[0]][0], by_size[DIAMETERS[2]][0])
     theirs = SLOPES[DIAMETERS[0]][0].angle - SLOPES[DIAMETERS[2]][0].angle
-    beside = f"0 of copies; L21: {theirs:.1f}"
-    yield Shown("without a field: 5 mm steeper than 5 cm by, degrees", Mean.of(alike), beside)
+    beside = f"0 for scaled copies; L21: {theirs:.1f}"
+    yield Shown("without a field: angle of 5 mm minus 5 cm, degrees", Mean.of(alike), beside)
     bed = by_size[DIAMETERS[0]][1][0]
     yield from of_sweeps("settled", moment_eigenvalues(bed.settled, bed.width))
     yield from of_sweeps("magnetised", moment_eigenvalues(bed.magnetised, bed.width))
@@ -95,8 +103,11 @@ def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim | Shown]:
 
 
 def of_sweeps(bed: str, eigenvalues: np.ndarray) -> Iterator[Check | Shown]:
-    """Yield by what moments of a bed grow or shrink in a whole sweep, and that sweeps as made converge."""
+    """Yield the eigenvalues of a whole sweep of the moments of a bed, and the check that the relaxed sweeps
+    converge."""
     for name, value in (("least", eigenvalues[0]), ("largest", eigenvalues[-1])):
-        yield Shown(f"5 mm, {bed}: {name} eigenvalue of moments", float(value), "whole sweeps: -1 to 1")
+        yield Shown(
+            f"5 mm, {bed}: {name} eigenvalue of mutual magnetisation", float(value), "unrelaxed: -1 to 1"
+        )
     off = np.abs(1 - RELAXATION + RELAXATION * eigenvalues[[0, -1]]).max()
-    yield Check(f"5 mm, {bed}: factor of a sweep as it is made", float(off), 0.0, 1.0)
+    yield Check(f"5 mm, {bed}: growth factor of a relaxed sweep", float(off), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Avalanches that are compared: those of one size of grains and one field, by their starts."""
+"""Selection and comparison of avalanches of one grain size and one field, start by start."""
 
 from __future__ import annotations
 
@@ -15,5 +15,5 @@ def of(runs: Sequence[Avalanche], diameter: float, field: float) -> list[Avalanc
 
 
 def steeper_by(these: Sequence[Avalanche], those: Sequence[Avalanche]) -> np.ndarray:
-    """Return by how many degrees the slopes of some are steeper than those of others of the same starts."""
+    """Return the difference in slope angle (degrees) between two groups of avalanches, start by start."""
     return np.array([a.angle - b.angle for a, b in zip(these, those, strict=True)])

@@ -1,4 +1,4 @@
-"""Figures of the case avalanche: slopes, how densely heaps are filled, and forces by size."""
+"""Figures of the case avalanche: slopes, filling of the heaps, and forces by grain size."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain
 
 SEEDS = 3
-"""Slopes are drawn of so many starts."""
+"""Number of starts whose slopes are drawn."""
 COLOURS = ("#4477aa", "#cc6677")
-"""Those of slopes without a field, and of magnetised ones."""
+"""Colours of slopes without a field and of magnetised slopes."""
 GROUP_NAMES = ("without a field", "magnetised")
 SHOWN = (30.0, 16.0)
-"""A heap is drawn so far and so high, in diameters."""
+"""Length and height of the drawn part of a heap, in diameters."""
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """slopes.png, slopes.csv: profiles and angles by grain size, with and without a field; density.png: how
-    densely heaps are filled; forces.png: magnetic force over weight."""
+    """slopes.png, slopes.csv: profiles and angles by grain size, with and without a field; density.png:
+    fraction of the volume filled by grains; forces.png: magnetic force over weight."""
     settings = dict(size_named(size, SIZES).scene)
     some = [name for name, one in SIZES.items() if "diameter" not in one.scene]
     rule = f"one whose cell holds grains of each diameter in turn ({', '.join(some)})"
@@ -50,7 +50,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def slopes_figure(runs: Sequence[Avalanche]) -> Figure:
-    """Draw the mean profile of slopes with and without a field, a panel for each diameter of grains."""
+    """Draw the mean profile of slopes with and without a field, one panel per grain diameter."""
     figure = empty(11.6, 3.6)
     axes = figure.subplots(1, len(DIAMETERS), sharey=True)
     for axis, d in zip(axes, DIAMETERS, strict=True):
@@ -73,7 +73,8 @@ def slopes_figure(runs: Sequence[Avalanche]) -> Figure:
 
 
 def mean_profile(group: Sequence[Avalanche]) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (m) along the cell and the mean height there (m) of slopes of one diameter of grains."""
+    """Return positions (m) along the cell and the mean height (m) of the slopes there, for one grain
+    diameter."""
     d = group[0].diameter
     place = (np.arange(SHOWN[0]) + 0.5) * d
     heights = [np.interp(place, *profile(one.end.state), right=0.0) for one in group]
@@ -81,7 +82,7 @@ def mean_profile(group: Sequence[Avalanche]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def density_figure(runs: Sequence[Avalanche]) -> Figure:
-    """Draw how densely heaps of the smallest grains are filled, without a field and with one, as means over
+    """Draw the filled fraction of heaps of the smallest grains, with and without a field, as means over
     starts (L21 Fig. 4.13)."""
     d = DIAMETERS[0]
     figure = empty(11.6, 3.4)
@@ -96,7 +97,7 @@ def density_figure(runs: Sequence[Avalanche]) -> Figure:
 
 
 def filled(axis: Axes, group: Sequence[Avalanche]) -> QuadMesh:
-    """Draw the part of the volume that grains of some slopes fill, and return what a colour bar is of."""
+    """Draw the fraction of the volume filled by grains, and return the mesh for the colour bar."""
     length, height = SHOWN
     parts = np.mean(
         [
@@ -111,8 +112,10 @@ def filled(axis: Axes, group: Sequence[Avalanche]) -> QuadMesh:
 
 
 def forces_figure() -> Figure:
-    """Draw the attraction of two grains in contact over their weight by their diameter, for some fields, as
-    they magnetise each other and as they do not (L21 Figs 4.15 and 4.16)."""
+    """Draw attraction over weight of two touching grains against their diameter, for several fields.
+
+    Solid lines include mutual magnetisation, dotted lines do not (L21 Figs 4.15 and 4.16).
+    """
     figure = empty(5.6, 4.0)
     axis = figure.subplots()
     line = np.geomspace(1e-4, 1.0, 50)

@@ -1,4 +1,4 @@
-"""What is measured of a slope: its angles, the volume of the heap, and how densely grains fill it."""
+"""Measures of a slope: its angles, the volume of the heap, and the fraction filled by grains."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tisim.analysis import largest_overlap, slope_angles, surface_profile
 from tisim.scene.initial_state import Arrays
 
 SAMPLES = 8
-"""The part that grains fill is counted at so many points along each diameter."""
+"""Number of sample points along each diameter for the filled fraction."""
 
 
 def diameter(state: Arrays) -> float:
@@ -20,20 +20,25 @@ def diameter(state: Arrays) -> float:
 
 
 def profile(state: Arrays) -> tuple[np.ndarray, np.ndarray]:
-    """Return places along the cell, a diameter apart, and the height of the surface there; m."""
+    """Return positions along the cell, one diameter apart, and the height of the surface there; m."""
     return surface_profile(state["position"], state["radius"], along=0, across=1)
 
 
 def repose(state: Arrays) -> float:
-    """Return the angle of repose, degrees, of a line through the slope between a fifth and four fifths of its
-    height; NaN where that is less than three diameters long."""
+    """Return the angle of repose, degrees; NaN if the fitted part is shorter than three diameters.
+
+    It is the angle of a line fitted to the slope between one fifth and four fifths of its height.
+    """
     place, height = profile(state)
     return float(np.degrees(_angles(place, height, 1)[0]))
 
 
 def two_slopes(state: Arrays) -> tuple[float, float]:
-    """Return the angles of the upper and the lower part of the slope, degrees, of a line that is bent where
-    it fits best; NaN where the slope is less than six diameters long."""
+    """Return the angles of the upper and the lower part of the slope, degrees; NaN if the slope is shorter
+    than six diameters.
+
+    They are the angles of the best fitting line with one bend.
+    """
     place, height = profile(state)
     upper, lower = np.degrees(_angles(place, height, 2))
     return float(upper), float(lower)
@@ -47,8 +52,11 @@ def _angles(place: np.ndarray, height: np.ndarray, pieces: int) -> np.ndarray:
 
 
 def heap_volume(state: Arrays, width: float) -> float:
-    """Return the volume (m^3) below the surface of a heap in a cell of a width (m): squares of about a
-    diameter are filled up to the highest point of a grain in each."""
+    """Return the volume (m^3) below the surface of a heap in a cell of a given width (m).
+
+    The floor is divided into squares of about one diameter; each is filled up to the highest point of a grain
+    in it.
+    """
     d, place = diameter(state), state["position"]
     rows = round(width / d)
     column = (place[:, 0] / d).astype(int)
@@ -64,10 +72,12 @@ def grains_volume(state: Arrays) -> float:
 
 
 def filled_parts(state: Arrays, width: float, length: float, height: float) -> np.ndarray:
-    """Return the part of the volume that grains fill in squares of a diameter along and up, means over the
-    width; shape (length, height) in diameters. width, length, height : those of the cell, m.
+    """Return the fraction of the volume filled by grains, in squares of one diameter along and up; shape
+    (length, height) in diameters.
 
-    It is counted at SAMPLES points along each diameter, which are in a grain or not; grains are of one size.
+    It is averaged over the width, from SAMPLES points along each diameter. All grains must have the same
+    size.
+    width, length, height : of the cell, m.
     """
     d = diameter(state)
     columns, layers = round(length / d), round(height / d)
@@ -83,12 +93,12 @@ def filled_parts(state: Arrays, width: float, length: float, height: float) -> n
 
 
 def overlap(state: Arrays, width: float) -> float:
-    """Return the largest overlap of two grains in a cell of a width (m), over a radius."""
+    """Return the largest overlap of two grains in a cell of a given width (m), divided by a radius."""
     radius = state["radius"]
     return largest_overlap(state["position"], radius, (0.0, width, 0.0)) / float(radius.mean())
 
 
 def load_on_walls(result: Result) -> float:
-    """Return the force of the grains on floor and walls downwards, over their weight: 1 at rest."""
+    """Return the downward force of the grains on floor and walls divided by their weight; 1 at rest."""
     down = -(result.measures["box_force_z"] + result.measures["gate_force_z"])
     return down / (float(result.state["mass"].sum()) * GRAVITY)

@@ -1,10 +1,12 @@
-"""The inverse problem of avalanche: which grains come to rest at a measured angle, or in a measured profile?
+"""The inverse problem of avalanche: find grains that come to rest at a measured angle or in a measured
+profile.
 
-A design is the friction, the rolling friction and the cohesion of the grains, without a field. An avalanche
-is run of it, and the misfit is the squared distance from what was measured, in uncertainties: where it is
-below 1, it is met within them. One angle does not tell three parameters: designs that meet it lie on a
-surface, of which the table of the best designs shows some. A profile tells a little more, as where a slope
-begins and how far grains run out go by friction and cohesion in unlike ways.
+A design is the friction, the rolling friction and the cohesion of the grains, without a field. The misfit is
+the mean squared difference between the simulated avalanche and the measurement, in units of the
+uncertainties; below 1, the measurement is met within them. One angle does not determine three parameters: the
+designs that meet it lie on a surface, and the table of the best designs shows some of them. A profile gives a
+little more information, because the top of the slope and the run-out distance depend on friction and cohesion
+in different ways.
 """
 
 from __future__ import annotations
@@ -37,24 +39,25 @@ GENES = (
     Gene("rolling_friction", "", 0.0, 0.6),
     Gene("cohesion", "J/m^3", 0.0, 1000.0),
 )
-"""Beyond the cohesion pulls as much as a grain weighs, in contacts of softened grains."""
+"""At the upper limit of the cohesion, the pull in a contact of softened grains equals the weight of a
+grain."""
 KNOWN: Mapping[str, float] = IRON_DESIGN
-"""The design whose angle is to be met where no file is given."""
+"""The design whose angle is the target if no file is given."""
 EXAMPLE = Measurement(27.9, 3.0)
-"""The angle of repose of KNOWN without a field, degrees: the mean of 16 starts, and the deviation of one, 2.8
-and rounded up, which ``tests/benchmarks/known_slope.py`` prints."""
-MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
+"""The angle of repose of KNOWN without a field, degrees: the mean of 16 starts, and the standard deviation of
+one start, 2.8, rounded up. ``tests/benchmarks/known_slope.py`` prints both."""
+MEANINGS = {"misfit": "mean squared difference from the measurement, in uncertainties"}
 
 
 def simulated(result: Result, target: Target) -> dict[str, float]:
-    """Return of the slope of a result what was measured."""
+    """Return the simulated values that correspond to the target."""
     if isinstance(target, MeasuredProfile):
         return target.compared(*profile(result.state))
     return {"angle of repose": repose(result.state)}
 
 
 def measured(target: Target) -> dict[str, tuple[float, float]]:
-    """Return what was measured with its uncertainties."""
+    """Return the measured values with their uncertainties."""
     if isinstance(target, MeasuredProfile):
         pairs = zip(target.height.tolist(), target.uncertainty.tolist(), strict=True)
         return dict(zip(target.names, pairs, strict=True))
@@ -62,7 +65,7 @@ def measured(target: Target) -> dict[str, tuple[float, float]]:
 
 
 def other_runs(design: Mapping[str, float], size: str, starts: int) -> list[Scene]:
-    """Return runs of a design from so many starts that are others than those of a search."""
+    """Return runs of a design from a number of held-out starts."""
     settings = size_named(size, SIZES).scene
     return [scene(design=design, field=0.0, seed=OTHER_STARTS + k, **settings) for k in range(starts)]
 
@@ -73,7 +76,7 @@ def problem(size: str = "default", variant: str = "calibrate") -> Problem:
 
 
 def calibration(size: str, variant: str, path: Path) -> Problem:
-    """Return the calibration to a CSV file, as ``measured`` has it."""
+    """Return the calibration to a CSV file in the format of ``measured``."""
     return _problem(size, variant, read(path))
 
 

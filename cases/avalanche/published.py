@@ -1,4 +1,4 @@
-"""What L21 has of avalanches: table 4.5."""
+"""Published results of L21 for avalanches: table 4.5."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Slope:
-    """A slope has an angle of repose, degrees, and a heap of a volume, m^3."""
+    """The slope of a heap: angle of repose, degrees, and volume, m^3."""
 
     angle: float
     volume: float
@@ -18,11 +18,12 @@ SLOPES = {
     1e-2: (Slope(32.4847, 1.4859), Slope(34.4926, 1.6097)),
     5e-2: (Slope(31.2953, 37.6239), Slope(31.4193, 38.1069)),
 }
-"""By the diameter of the grains, m: without a field and with one. The volumes are larger than those of cells
-that so many grains would fill to four tenths, and than the cells of 1.2 m^3: what counts is their ratio."""
+"""Slopes without a field and with one, by grain diameter, m. Only the ratio of the volumes is used: they are
+larger than the volume of 1.2 m^3 of the cells, and larger than the volume of these numbers of grains at a
+packing fraction of four tenths."""
 
 
 def larger(diameter: float) -> float:
-    """Return the volume of a magnetised heap over that of one without a field."""
+    """Return the ratio of the volumes of a heap with and without a field."""
     without, magnetised = SLOPES[diameter]
     return magnetised.volume / without.volume

@@ -1,5 +1,5 @@
-"""What magnetism does: the force of two grains that touch beside their weight (L21 section 4.5), and what
-moments of a bed do to each other."""
+"""Scaling of magnetism in a bed: the attraction of two touching grains over their weight (L21 section 4.5),
+and the eigenvalues of mutual magnetisation."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ def moment(diameter: float, field: float = FLUX) -> float:
 
 
 def attraction(diameter: float, field: float = FLUX, mutual: bool = True) -> float:
-    """Return the force (N) with which two grains in contact along the field attract each other, with
-    moments that are 1 / (1 - 2 a) as large where grains magnetise each other, a = chi / (3 + chi) / 8."""
+    """Return the attraction (N) of two grains in contact along the field.
+
+    With mutual magnetisation the moments are larger by the factor 1 / (1 - 2 a), a = chi / (3 + chi) / 8.
+    """
     grown = 1 / (1 - CONTRAST / 4) if mutual else 1.0
     return attraction_in_line(grown * moment(diameter, field), diameter)
 
@@ -36,13 +38,17 @@ def weight(diameter: float) -> float:
 
 
 def ratio(diameter: float, field: float = FLUX, mutual: bool = True) -> float:
-    """Return the attraction over the weight; it falls as the diameter."""
+    """Return the attraction over the weight; it is inversely proportional to the diameter."""
     return attraction(diameter, field, mutual) / weight(diameter)
 
 
 def moment_eigenvalues(state: Arrays, width: float) -> np.ndarray:
-    """Return the eigenvalues, rising, of what the moments of equal grains in a cell of a width (m) do to each
-    other within the cut-off: whole sweeps from the last moments converge where all are between -1 and 1."""
+    """Return the eigenvalues, in rising order, of the mutual magnetisation of equal grains within the
+    cut-off.
+
+    Whole sweeps, each from the previous moments, converge if all eigenvalues are between -1 and 1. width : of
+    the cell, m.
+    """
     place, d = state["position"], 2 * float(state["radius"].mean())
     apart = place[None] - place[:, None]
     apart = nearest_image(apart.reshape(-1, 3), (0.0, width, 0.0)).reshape(apart.shape)

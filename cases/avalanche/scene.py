@@ -1,12 +1,13 @@
-"""An avalanche of iron grains: a column beside a wall runs out over a floor when the wall goes (L21 4.4).
+"""An avalanche of iron grains: a column runs out over a floor when the wall beside it is removed (L21 4.4).
 
-Grains are as in table 4.4 of L21, in the gravity of the asteroid Psyche, and a field along gravity makes
-dipoles of them. What counts is the magnetic force between two that touch over their weight, which falls as
-their size: ``scaling.py``. All else is made in units of a grain's diameter d and of the time sqrt(d/g) in
-which it falls by half of one, the stiffness too, so that grains of all sizes are scaled copies of each other
-but for the field and a weak cohesion.
+Grains have the properties of table 4.4 of L21 and the gravity of the asteroid Psyche; a field along gravity
+magnetises them. The governing ratio is the magnetic attraction of two touching grains over their weight,
+which is inversely proportional to the diameter: see ``scaling.py``. All other quantities, including the
+stiffness, are given in units of the grain diameter d and the time sqrt(d/g) in which a grain falls by d/2.
+Scenes with different grain sizes are therefore scaled copies of each other except for the field and a weak
+cohesion.
 
-Departures from L21: fewer grains, in a cell of fewer diameters, and softer ones (STIFFNESS).
+Departures from L21: fewer grains, a cell of fewer diameters, and softer grains (STIFFNESS).
 """
 
 from __future__ import annotations
@@ -45,43 +46,43 @@ from tisim.steppers import FixedStep, Verlet
 TITLE = "Avalanches of iron grains with and without a magnetic field"
 
 DIAMETERS = (5e-3, 1e-2, 5e-2)
-"""m; L21 table 4.4."""
+"""Diameters of the grains, m; L21 table 4.4."""
 DENSITY, POISSON, RESTITUTION = 7750.0, 0.278, 0.2
-"""kg/m^3 and ratios; L21 table 4.4."""
+"""Density, kg/m^3, Poisson's ratio and restitution; L21 table 4.4."""
 ROLLING_DAMPING = 0.4
-"""gamma_r of L21 table 4.4, as the damping over the critical one. Its k_r = 10 has no unit there; the
-stiffness against rolling is that which goes with the model, of ``rolling_epsd``."""
+"""gamma_r of L21 table 4.4, as a fraction of critical damping. L21 gives k_r = 10 without a unit; the rolling
+stiffness here is that of the ``rolling_epsd`` model."""
 IRON_DESIGN = {"friction": 0.6, "rolling_friction": 0.4, "cohesion": 10.0}
 """The design of the grains: friction, rolling friction, and cohesion in J/m^3; L21 table 4.4."""
 YOUNG = 1e9
-"""Pa; L21 table 4.4."""
+"""Young's modulus, Pa; L21 table 4.4."""
 GRAVITY, FLUX = 0.144, 5e-3
-"""m/s^2 and T; L21 section 4.4.1.3."""
+"""Gravity, m/s^2, and flux density, T; L21 section 4.4.1.3."""
 SUSCEPTIBILITY = 999.0
-"""That of a relative permeability of 1000, with which a single grain has L21's 11.9 kA/m at 5 mT (section
-4.5); L21 does not state it, and beyond 400 it changes the moment by less than 1 %."""
+"""Susceptibility at a relative permeability of 1000, at which a single grain has L21's 11.9 kA/m at 5 mT
+(section 4.5). L21 does not state it; beyond 400 it changes the moment by less than 1 %."""
 CUTOFF = 5.0
-"""Dipoles act within so many radii, 2.5 diameters. L21 has three in section 4.2.1.2, and does not state it of
-avalanches: at 2.5 the force of two in a row is a fortieth of that in contact."""
+"""Cut-off of the dipole interaction, in radii (2.5 diameters). L21 uses three diameters in section 4.2.1.2
+and gives no value for avalanches. At 2.5 diameters the force of two dipoles in a row is a fortieth of the
+force at contact."""
 RELAXATION = 0.6
-"""A sweep of the moments goes so much of its way. L21 goes all of it. Here that diverges: in a settled bed
-the least eigenvalue of what moments do to each other is below -1, and moments grow by as much in each
-step."""
+"""Relaxation factor of a sweep of the moments. L21 uses 1, which diverges here: in a settled bed the least
+eigenvalue of mutual magnetisation is below -1, and the moments grow by that factor in each step."""
 STIFFNESS = 2e5
-"""Young's modulus over the weight of a grain by its section, rho g d, of softened grains. L21's 1e9 Pa is
-1.8e8 of it for grains of 5 mm, and 1.8e7 for those of 5 cm."""
+"""Young's modulus of softened grains in units of rho g d, the weight of a grain over its cross-section. L21's
+1e9 Pa is 1.8e8 in these units for grains of 5 mm, and 1.8e7 for grains of 5 cm."""
 STEPS_OF_IMPACT = 16.0
-"""A step is one of so many parts of the time of an elastic impact of two grains at sqrt(g d)."""
+"""Number of steps in the duration of an elastic impact of two grains at sqrt(g d)."""
 LOOSE = 0.25
-"""The part of the space that grains fill at the start, before they fall."""
+"""Fraction of the space that is filled by grains at the start, before they fall."""
 AWAY = 100.0
-"""The dividing wall goes away at so many sqrt(g d): grains cannot follow."""
+"""Speed at which the dividing wall moves away, in sqrt(g d): too fast for grains to follow."""
 OPENS, DURATION, LATEST = 20.0, 45.0, 25.0
-"""When the dividing wall of a run in one go opens, and when it ends; and when a stage ends at the latest; in
+"""Times at which the dividing wall opens and at which a single run ends, and latest end of a stage; in
 sqrt(d/g)."""
 REST = {"energy": 1e-3, "unbalanced": 5e-2}
-"""Where a stage ends: the kinetic energy over that of a fall by a radius, and the unbalanced force over the
-weight."""
+"""Criteria for the end of a stage: kinetic energy over the energy of a fall by one radius, and unbalanced
+force over weight."""
 
 LAW = Granular(
     normal=HertzMaterial(),
@@ -98,13 +99,13 @@ def time_unit(diameter: float) -> float:
 
 
 def young(diameter: float, stiffness: float | None = STIFFNESS) -> float:
-    """Return Young's modulus (Pa) of grains of a diameter (m): ``stiffness`` times rho g d, or that of L21
+    """Return Young's modulus (Pa) of grains of a diameter (m): ``stiffness`` times rho g d, or L21's value
     for None."""
     return YOUNG if stiffness is None else stiffness * DENSITY * GRAVITY * diameter
 
 
 def step(diameter: float, stiffness: float | None, parts: float = STEPS_OF_IMPACT) -> float:
-    """Return a step (s): one of so many parts of the time of an impact at sqrt(g d)."""
+    """Return a step (s): the duration of an impact at sqrt(g d) divided by ``parts``."""
     mass = DENSITY * math.pi / 6 * diameter**3
     modulus = young(diameter, stiffness) / (2 * (1 - POISSON**2))
     speed = math.sqrt(GRAVITY * diameter)
@@ -113,7 +114,7 @@ def step(diameter: float, stiffness: float | None, parts: float = STEPS_OF_IMPAC
 
 
 def iron(design: Mapping[str, float], diameter: float, stiffness: float | None) -> Material:
-    """Return the material of grains and walls of a design, as IRON_DESIGN has one."""
+    """Return the material of grains and walls of a design; see IRON_DESIGN."""
     return Material(
         young=young(diameter, stiffness), poisson=POISSON, restitution=RESTITUTION,
         friction=design["friction"], rolling_friction=design["rolling_friction"],
@@ -122,7 +123,7 @@ def iron(design: Mapping[str, float], diameter: float, stiffness: float | None) 
 
 
 def loose(cell: Cell, diameter: float) -> Cloud:
-    """Return so many grains as the cell holds at random places beside its dividing wall."""
+    """Return the grains of a cell at random positions beside its dividing wall."""
     d = diameter
     height = cell.number * math.pi / 6 / (LOOSE * cell.column * cell.width)
     return Cloud(
@@ -133,16 +134,21 @@ def loose(cell: Cell, diameter: float) -> Cloud:
 
 
 def handed_on(state: Arrays) -> Particles:
-    """Return the grains of a state, in the order of their ids. What contacts remember is not handed on: the
-    elastic part of friction begins anew, and a bed sinks by less than a hundredth of an overlap for it."""
+    """Return the grains of a state, in the order of their ids, for the next stage.
+
+    The contact history is not passed on: elastic friction displacements restart at zero, and a bed sinks by
+    less than a hundredth of an overlap.
+    """
     order = np.argsort(state["id"])
     core = {name: state[name][order] for name in ("position", "velocity", "radius", "mass")}
     return Particles(**core, quantities={"spin": state["spin"][order]})
 
 
 def walls(cell: Cell, diameter: float, opens: float | None) -> tuple[Walls, Walls]:
-    """Return the floor and the ends of a cell, and the dividing wall, which goes away at a time (s), or stays
-    where there is none."""
+    """Return the floor and the ends of a cell, and the dividing wall.
+
+    opens : time at which the dividing wall moves away, s; it stays if None.
+    """
     d = diameter
     ends = [((0.0, 0.0, 0.0), 1.0), ((cell.length * d, 0.0, 0.0), -1.0)]
     planes = [Plane(point=point, normal=(inwards, 0.0, 0.0)) for point, inwards in ends]
@@ -158,8 +164,12 @@ def walls(cell: Cell, diameter: float, opens: float | None) -> tuple[Walls, Wall
 
 
 def magnetism(field: float) -> tuple[Effect, ...]:
-    """Return what a flux density (T) along gravity makes of the grains, which magnetise each other, in one
-    sweep a step as in L21 section 4.4.1.2; nothing where there is none."""
+    """Return the effects of a flux density (T) along gravity: the field, mutual magnetisation, and dipole
+    forces.
+
+    The moments are updated by one sweep in each step, as in L21 section 4.4.1.2. Without a field, nothing is
+    returned.
+    """
     if field == 0:
         return ()
     return (
@@ -184,12 +194,13 @@ def scene(
 ) -> Scene:
     """Return an avalanche, or a stage of one.
 
-    design : friction, rolling_friction and cohesion (J/m^3) of all contacts. diameter : m. field : flux
-    density along gravity, T; without one nothing magnetic is compiled. state : that in which grains begin;
-    loose above the floor without it. opens : when the dividing wall goes, in sqrt(d/g); None where it stays.
-    duration : the latest end, in the same unit. rests : whether it ends when grains are at rest. stiffness :
-    Young's modulus over rho g d; None for that of L21.
-    parts : of the time of an impact that a step is one of.
+    design : friction, rolling_friction and cohesion (J/m^3) of all contacts. diameter : of the grains, m.
+    field : flux density along gravity, T; at zero no magnetic effect is compiled.
+    state : initial state of the grains; if None, they start loose above the floor.
+    opens : time at which the dividing wall moves away, in sqrt(d/g); it stays if None.
+    duration : latest end, in the same unit. rests : whether the run ends when grains are at rest.
+    stiffness : Young's modulus over rho g d; None for L21's value.
+    parts : number of steps in the duration of an impact.
     """
     d, unit = diameter, time_unit(diameter)
     return Scene(
@@ -215,5 +226,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """Return the avalanche of a size in one go: grains settle in the field, and then the wall goes."""
+    """Return the avalanche of a size as one run: grains settle in the field, then the wall is removed."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -1,4 +1,4 @@
-"""The sizes of the case avalanche: how many grains there are, and the cell in diameters of a grain."""
+"""Sizes of the case avalanche: the number of grains, and the cell in grain diameters."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from tisim.cases.case import Size
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell holds grains beside a dividing wall; lengths are in diameters of a grain.
+    """A cell with grains beside a dividing wall; lengths are in grain diameters.
 
-    number : of grains. column : from the end to the dividing wall. width : periodic. length : of the whole.
-    height : what is drawn of it.
+    number : of grains. column : distance from the end to the dividing wall. width : periodic. length : of the
+    whole cell.
+    height : of the drawn part.
     """
 
     number: int
@@ -23,18 +24,18 @@ class Cell:
 
 
 DEFAULT = Cell(number=400, column=10.0, width=5.25, length=40.0, height=14.0)
-"""Its width is just twice the cut-off of the dipoles."""
+"""The width is slightly more than twice the cut-off of the dipoles."""
 SMALL = Cell(number=200, column=7.0, width=5.25, length=28.0, height=11.0)
-"""Half as many grains in a column as wide for its height."""
+"""Half the number of grains, in a column of the same ratio of width to height."""
 LARGE_CELL = Cell(number=2500, column=25.0, width=5.25, length=90.0, height=30.0)
-"""A column 18 diameters high, whose slope is longer than the chains that stand on it."""
+"""A column 18 diameters high, whose slope is longer than the chains of grains on it."""
 L21_CELLS = {
     5e-3: Cell(number=500_000, column=150.0, width=80.0, length=300.0, height=400.0),
     1e-2: Cell(number=77_000, column=75.0, width=40.0, length=150.0, height=200.0),
     5e-2: Cell(number=70_000, column=75.0, width=40.0, length=150.0, height=200.0),
 }
-"""By the diameter of the grains, m: cells of 1.5 m by 0.4 m by 2 m, and of 7.5 m by 2 m by 10 m (L21 section
-4.4.1.3). Where the dividing wall stands is not said there; here it is in the middle."""
+"""Cells of L21 by grain diameter, m: 1.5 m by 0.4 m by 2 m, and 7.5 m by 2 m by 10 m (L21 section 4.4.1.3).
+L21 does not give the position of the dividing wall; here it is in the middle."""
 
 SEARCH_SETTINGS = {
     "generations": 6, "ensemble": {"min_starts": 1, "select": 0, "confirm": 3},
@@ -48,7 +49,7 @@ SIZES = {
     "large": Size(f"{LARGE_CELL.number} grains, 18 diameters high, softened", {"cell": LARGE_CELL}),
     **{
         name: Size(
-            f"{L21_CELLS[diameter].number} grains of {text} as stiff as L21 has them",
+            f"{L21_CELLS[diameter].number} grains of {text} with L21's stiffness",
             {"cell": L21_CELLS[diameter], "diameter": diameter, "stiffness": None},
         )
         for name, diameter, text in (

@@ -1,7 +1,8 @@
-"""The stages of an avalanche: grains settle, are magnetised, and run out when the dividing wall goes.
+"""The stages of an avalanche: grains settle, are magnetised, and run out when the dividing wall is removed.
 
-Each stage is a scene, of all avalanches as a batch, that ends when grains are at rest; the next one begins
-with its state. Avalanches of one size and start settle together whatever the field is, as it is off then.
+Each stage is a batch of scenes, one for each avalanche, and ends when the grains are at rest. The next stage
+begins from its final states. Avalanches of the same grain size and start share one settling run, because the
+field is off while grains settle.
 """
 
 from __future__ import annotations
@@ -22,8 +23,11 @@ from tisim.scene.initial_state import Arrays
 
 @dataclass(frozen=True)
 class Avalanche:
-    """An avalanche has a cell, the diameter of its grains (m), a field (T) and a seed; the states in which
-    grains have settled and are magnetised, and what has become of them when all has run out."""
+    """An avalanche: its settings and its states after each stage.
+
+    cell : of the avalanche. diameter : of the grains, m. field : T. seed : of the start.
+    settled, magnetised : states after the first and the second stage. end : result of the last stage.
+    """
 
     cell: Cell
     diameter: float
@@ -50,17 +54,17 @@ class Avalanche:
 
     @property
     def volume(self) -> float:
-        """Return the volume of the heap over that of its grains."""
+        """Return the volume of the heap divided by the volume of its grains."""
         return heap_volume(self.end.state, self.width) / grains_volume(self.end.state)
 
     @property
     def loosened(self) -> float:
-        """Return the volume of the column as it is magnetised over that as it has settled."""
+        """Return the ratio of the column's volumes when magnetised and when settled."""
         return heap_volume(self.magnetised, self.width) / heap_volume(self.settled, self.width)
 
     @property
     def overlap(self) -> float:
-        """Return the largest overlap at the end, over a radius."""
+        """Return the largest overlap at the end, divided by a radius."""
         return overlap(self.end.state, self.width)
 
 
@@ -71,9 +75,9 @@ Key = tuple[float, float, int]
 def avalanches(
     cell: Cell, wanted: Sequence[Key], progress: Progress = lambda part: None, **more: Any
 ) -> list[Avalanche]:
-    """Run the avalanches of some diameters (m), flux densities (T) and seeds.
+    """Run the avalanches of given diameters (m), flux densities (T) and seeds.
 
-    progress : is told the part that is done, 0..1. more : settings of all scenes. RunError where one fails.
+    progress : receives the completed fraction, 0..1. more : settings of all scenes. RunError if one fails.
     """
 
     def stage(number: int, begin: Mapping[Key, Arrays | None], opens: float | None) -> dict[Key, Result]:

@@ -1,4 +1,4 @@
-"""Numbers of Z16, and runs of the blast beside closed forms."""
+"""Checks of the blast: numbers of Z16, and comparisons of runs with closed forms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _speed(result: Result) -> float:
 
 
 def check() -> Iterator[Check]:
-    """Numbers of Z16, energy at the start, and what the field does to the cloud."""
+    """Yield the checks of numbers of Z16, of the initial energy, and of the field's effect on the cloud."""
     drag = 0.5 * AIR * 1.0 * SPEED * np.pi * RADIUS**2
     ratio = SPECIFIC_CHARGE * MASS * FLUX / drag
     yield Check("magnetic force over drag, C_D = 1 (printed: 56504.7)", float(ratio), 46126.3, 0.1)
@@ -28,19 +28,23 @@ def check() -> Iterator[Check]:
     yield Check("kinetic energy at the start, J", kinetic, ENERGY, 1e-8 * ENERGY)
     a, b = half_axes(still.state), half_axes(field.state)
     yield Check("no field: longest axis over shortest", float(a.max() / a.min()), 1.0, 0.05)
-    # Drag takes about 1 part in 1000 of the speed in this time.
-    yield Check("along the field, m: the field makes no difference", float(b[0] / a[0]), 1.0, 2e-3)
-    # The chord of a circle of radius v/w, w = q B/m, after the angle w t.
+    # Drag reduces the speed by about 1 part in 1000 in this time.
+    yield Check("half axis along the field, with field over without", float(b[0] / a[0]), 1.0, 2e-3)
+    # The chord of a circle of radius v/w, w = q B/m, that subtends the angle w t.
     rate = SPECIFIC_CHARGE * FLUX
     chord = 2 * SPEED / rate * abs(np.sin(rate * duration / 2))
     w, start = np.array([FLUX, 0.0, 0.0]), float(half_axes(field.start).mean())
     exact = np.sqrt(5 * np.diag(ellipsoid(w, duration, start)))
-    yield Check("half axes over their closed form: off by", float(np.abs(b / exact - 1).max()), 0.0, 5e-3)
+    yield Check(
+        "half axes over closed form: largest deviation from 1", float(np.abs(b / exact - 1).max()), 0.0, 5e-3
+    )
     reach = np.linalg.norm((field.state["position"] - field.start["position"])[:, 1:], axis=1).max()
-    yield Check("farthest across the field, over the chord of its circle", float(reach / chord), 1.0, 5e-3)
+    yield Check("largest displacement across the field over its chord", float(reach / chord), 1.0, 5e-3)
     speed = np.linalg.norm(field.state["velocity"], axis=1)
     touching = run(scene(contact=True, duration=0.1))
     free = run(scene(duration=0.1))
     minimal = half_axes(touching.state) / half_axes(free.state)
-    yield Check("half axes with contact over without: off by", float(np.abs(minimal - 1).max()), 0.0, 1e-3)
-    yield Check("speed at the end over that without field", float(speed.mean() / _speed(still)), 1.0, 1e-3)
+    yield Check(
+        "half axes with contact over without: deviation from 1", float(np.abs(minimal - 1).max()), 0.0, 1e-3
+    )
+    yield Check("final speed with field over without", float(speed.mean() / _speed(still)), 1.0, 1e-3)

@@ -1,4 +1,4 @@
-"""Figures of the case blast: of one run, and of the runs of Z16 side by side."""
+"""Figures of the case blast: figures of one run, and a comparison of the runs of Z16."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, pla
 from tisim.scene.initial_state import Arrays
 
 SEQUENCE_FRAMES = 6
-"""A sequence shows so many frames."""
+"""Number of frames in a sequence."""
 NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
-"""The blast is in open space and weightless."""
+"""The blast has no box and no gravity."""
 PATHS = 40
-"""The paths of so many particles are drawn."""
+"""Number of particles whose paths are drawn."""
 RUNS = {
     "no_field": "no field (Z16 Fig. 7)",
     "default": "in the field, no interaction (Fig. 5)",
@@ -38,13 +38,17 @@ RUNS = {
     "near_field": "contact and near field as printed (Fig. 9)",
     "clumps": "contact and near field of neighbours",
 }
-"""The runs that are set side by side, and what they show, by size."""
+"""Titles of the compared runs, by size."""
 
 
 @dataclass(frozen=True)
 class BlastHistory:
-    """A run in time (s, (frames,)): half axes along x, y and z (m, (frames, 3)), pairs that touch, paths of
-    some particles (m) and their velocities (m/s), shape (frames, PATHS, 3)."""
+    """The history of a run, with one entry per frame.
+
+    time : s, (frames,). axes : half axes along x, y and z, m, (frames, 3). touching : number of touching
+    pairs.
+    paths, velocities : of PATHS particles, m and m/s, (frames, PATHS, 3).
+    """
 
     time: np.ndarray
     axes: np.ndarray
@@ -54,7 +58,7 @@ class BlastHistory:
 
     @classmethod
     def of(cls, trajectory: Frames) -> BlastHistory:
-        """Read the history of all frames, each once; particles are always in the order of their ids."""
+        """Read the history from all frames in one pass; particles are always in the order of their ids."""
         axes, touching, paths, velocities = [], [], [], []
         for frame in trajectory:
             state = frame.arrays
@@ -67,17 +71,17 @@ class BlastHistory:
         )
 
     def dense(self, k: int) -> bool:
-        """Return whether frames of a particle are so near in time that a line may join them: 8 a circle or
-        more."""
+        """Return whether the frames of a particle are dense enough to be joined by a line: 8 or more per
+        circle."""
         v = self.velocities[:, k, 1] + 1j * self.velocities[:, k, 2]
         return bool(np.median(np.abs(np.angle(v[1:] * v[:-1].conj()))) < np.pi / 4)
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """sequence.png: the cloud at six times; velocities.png: its velocities then; envelope.png: half axes,
-    velocities of one particle, and paths.
+    """sequence.png: the cloud at six times; velocities.png: its velocities at these times; envelope.png: half
+    axes, velocities of one particle, and paths.
 
-    None of a file with fewer frames than SEQUENCE_FRAMES, such as a result.h5.
+    Returns nothing for a file with fewer frames than SEQUENCE_FRAMES, such as a result.h5.
     """
     if len(trajectory) < SEQUENCE_FRAMES:
         return {}
@@ -90,7 +94,7 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 
 def sequence(chosen: Sequence[Frame]) -> Figure:
-    """Return the cloud from its start on, all on one scale, as in Z16 figures 5 to 9."""
+    """Return the cloud at the chosen times, all on one scale, as in Z16 figures 5 to 9."""
     figure = empty(10.4, 7.2)
     square = common([frame.arrays for frame in chosen], NO_BOX)
     axes = figure.subplots(2, 3)
@@ -103,11 +107,11 @@ def sequence(chosen: Sequence[Frame]) -> Figure:
 
 
 def velocities(chosen: Sequence[Frame]) -> Figure:
-    """Velocity vectors at the places of the particles, all on one scale (Z16 Fig. 6, left)."""
+    """Draw velocity vectors at the positions of the particles, all on one scale (Z16 Fig. 6, left)."""
     figure = empty(10.4, 7.2)
     left, bottom, side = common([frame.arrays for frame in chosen], NO_BOX)
     fastest = max(np.linalg.norm(frame.arrays["velocity"], axis=1).max() for frame in chosen)
-    # The longest arrow is an eighth of the picture, and finds room at its edge.
+    # The longest arrow is an eighth of the picture, so a margin is added for it.
     left, bottom, side = left - side / 8, bottom - side / 8, 1.25 * side
     scale = 8.0 * fastest / side
     axes = figure.subplots(2, 3)
@@ -134,12 +138,13 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
 
 
 def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> None:
-    """Draw a state as it is seen in a square: left, bottom and side, m."""
+    """Draw a state within a square: left, bottom and side, m."""
     panel(axis, state, square, NO_BOX)
 
 
 def envelope(history: BlastHistory) -> Figure:
-    """Half axes of the cloud in time; velocities across the field (Z16 Fig. 6); paths along and across it."""
+    """Draw the half axes of the cloud over time, velocities across the field (Z16 Fig. 6), and paths along
+    and across it."""
     figure = empty(10.4, 7.4)
     (left, right), (along, across) = figure.subplots(2, 2)
     for k, colour in enumerate(AXIS_COLOURS):
@@ -156,7 +161,7 @@ def envelope(history: BlastHistory) -> Figure:
     legend_above(right)
     along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=AXIS_COLOURS[0], lw=0.7)
     along.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"paths of {PATHS} particles")
-    # The one that starts fastest across the field, from near: its circle is far smaller than the cloud.
+    # The particle that starts fastest across the field, enlarged: its circle is far smaller than the cloud.
     across.plot(
         history.paths[:, fastest, 1], history.paths[:, fastest, 2], line, ms=3, color=AXIS_COLOURS[0], lw=0.8
     )
@@ -169,7 +174,8 @@ def envelope(history: BlastHistory) -> Figure:
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """blast.png, blast.csv: the runs of Z16 side by side, of 500 particles at size small, else of 2000."""
+    """blast.png, blast.csv: comparison of the runs of Z16, with 500 particles for the size small and
+    otherwise 2000."""
     number = int(size_named(size, blast.SIZES).scene.get("number", blast.NUMBER))
     histories, ends = {}, {}
     for finished, name in enumerate(RUNS):
@@ -188,7 +194,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> Figure:
-    """Return the clouds at the end on one scale, and their half axes and contacts in time."""
+    """Draw the clouds at the end on one scale, and their half axes and contacts over time."""
     figure = empty(11.6, 6.4)
     grid = figure.add_gridspec(2, 15, height_ratios=(0.75, 1.0))
     square = common([frame.arrays for frame in ends.values()], NO_BOX)
@@ -196,7 +202,7 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
         axis = figure.add_subplot(grid[0, 3 * k : 3 * k + 3])
         snapshot(axis, frame.arrays, square)
         axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"))
-    # Here there is room.
+    # The last panel has space for the axes.
     directions(figure.axes[-1], square, NO_GRAVITY, share=0.12)
     along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
     colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")
@@ -228,7 +234,7 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
 
 
 def table(histories: Mapping[str, BlastHistory]) -> str:
-    """Half axes and contacts of all runs in time as CSV."""
+    """Return the half axes and contacts of all runs over time as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["run", "time_s", "half_axis_x_m", "half_axis_y_m", "half_axis_z_m", "pairs_that_touch"])

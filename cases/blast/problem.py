@@ -1,9 +1,9 @@
-"""The inverse problem of blast: the magnetic field that gives a wanted ellipsoid.
+"""The inverse problem of blast: the magnetic field that gives a target ellipsoid.
 
-A field of one strength gives an ellipsoid of revolution about it, so its direction is the long axis of the
-wanted one, up to sign, and its strength follows from the others. By default the wanted ellipsoid is what
-TARGET_FLUX gives in closed form, in the direction and with the half axes that it has: the search must find
-that field.
+A uniform field makes the cloud an ellipsoid of revolution about the field. The direction of the field is
+therefore the long axis of the target, up to sign, and its strength follows from the other half axes. By
+default, the target is the ellipsoid that TARGET_FLUX gives in closed form, and the search must find that
+field.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from tisim.errors import must
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("ellipsoid",)
-"""The inverse problems: a wanted shape of the cloud."""
+"""The inverse problems: a target shape of the cloud."""
 TARGET_FLUX = np.array([0.6, 0.3, -0.2])
-"""The field that the search must find, T. Within DURATION particles go a third of a circle in it."""
+"""The field that the search must find, T. Within DURATION, particles complete a third of a circle in it."""
 DURATION = 0.3
-"""The simulated time after which the cloud has the wanted shape, s."""
+"""The simulated time after which the cloud has the target shape, s."""
 GENES = tuple(Gene(f"flux_{axis}", "T", -1.0, 1.0) for axis in "xyz")
 
 
@@ -38,29 +38,33 @@ def field(design: Mapping[str, float]) -> np.ndarray:
 def scene(design: Mapping[str, float], seed: int, number: int = blast.NUMBER) -> Scene:
     """Return the blast without interaction in the field of a design, until DURATION.
 
-    In steps of 5 ms: of the circle itself they miss 1 part in 1000 at most, (w dt)^2/12.
+    Steps of 5 ms deviate from the exact circle by at most 1 part in 1000, (w dt)^2/12.
     """
     return blast.scene(field(design), number=number, duration=DURATION, seed=seed, first=5e-3, longest=5e-3)
 
 
 def misfit(tensor: np.ndarray, target: np.ndarray) -> float:
-    """|S - S_target|/|S_target| of second moments (Frobenius norm)."""
+    """Return |S - S_target|/|S_target| of second moments (Frobenius norm)."""
     return float(np.linalg.norm(tensor - target) / np.linalg.norm(target))
 
 
 def start(number: int, starts: int = 8) -> float:
-    """Half axis (m) of the ball that so many particles fill at the start, the mean over random ones.
+    """Return the half axis (m) of the ball filled by ``number`` particles at the start, a mean over random
+    starts.
 
-    Centres are a radius or more within the ball that spheres are put in; random addition fills it somewhat
-    more towards its surface.
+    Centres are at least one radius inside the ball that contains the spheres; random addition makes the
+    density slightly higher near its surface.
     """
     scenes = [blast.scene(number=number, seed=seed) for seed in range(starts)]
     return float(np.mean([ball(moments(s.particles.arrays(s.domain, s.seed))) for s in scenes]))
 
 
 def problem(size: str = "default", variant: str = "ellipsoid", goal: np.ndarray | None = None) -> Problem:
-    """Return the field that gives an ellipsoid of second moments ``goal`` (m^2, (3, 3)); by default
-    TARGET_FLUX."""
+    """Return the problem of finding the field that gives an ellipsoid of second moments ``goal`` (m^2, (3,
+    3)).
+
+    Without ``goal``, the target is the ellipsoid of TARGET_FLUX.
+    """
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     number = int(size_named(size, blast.SIZES).scene.get("number", blast.NUMBER))
     target = ellipsoid(TARGET_FLUX, DURATION, start(number)) if goal is None else goal
@@ -73,14 +77,15 @@ def problem(size: str = "default", variant: str = "ellipsoid", goal: np.ndarray 
         scene=lambda design, seed: scene(design, seed, number),
         objective=lambda result: misfit(moments(result.state), target),
         symbol="misfit",
-        meanings={"misfit": "|S - S*|/|S*| of second moments S of the cloud, S* those that are wanted"},
+        meanings={"misfit": "|S - S*|/|S*| of second moments S of the cloud, S* the target"},
         picture=lambda scene, result: cloud(result),
         details=lambda design, result: details(design, result, target),
     )
 
 
 def details(design: Mapping[str, float], result: Result, target: np.ndarray) -> dict[str, float]:
-    """Half axes wanted and reached, and the angle of the field to the long axis that was wanted."""
+    """Return the target and simulated half axes, and the angle between the field and the target's long
+    axis."""
     result_moments = moments(result.state)
     axis = np.linalg.eigh(target)[1][:, -1]
     flux = field(design)

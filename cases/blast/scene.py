@@ -1,11 +1,12 @@
 """A blast of charged particles in air and a magnetic field (Z16).
 
 Z16 is T. I. Zohdi, Comput. Methods Appl. Mech. Engrg. 308 (2016) 47-72. Spheres packed at random in a ball
-get the same speed away from its centre. Without a field they stay a sphere; with one along x they circle
-about it, no farther than 3 cm, and the cloud becomes an ellipsoid along the field.
+start with the same speed away from its centre. Without a field the cloud stays a sphere. With a field along x
+the particles circle about it, at a distance of at most 3 cm, and the cloud becomes an ellipsoid along the
+field.
 
-Z16 (6.3) gives 56504.7 for the ratio of magnetic force to drag at the start; with the density of air that the
-paper states, 1.225 kg/m^3, it is 46126.3 (56504.8 is that of 1 kg/m^3).
+Z16 (6.3) gives 56504.7 for the ratio of magnetic force to drag at the start. With the air density stated in
+the paper, 1.225 kg/m^3, the ratio is 46126.3 (1 kg/m^3 gives 56504.8).
 """
 
 from __future__ import annotations
@@ -34,34 +35,35 @@ from tisim.steppers import IterationControl, Trapezoid
 TITLE = "A blast of charged particles in a magnetic field"
 
 NUMBER, RADIUS, DENSITY, BALL = 2000, 0.05, 7000.0, 1.0
-"""Particles, their radius (m) and density (kg/m^3), radius of the ball at the start (m) (Z16 section 6.1)."""
+"""Number of particles, their radius (m) and density (kg/m^3), radius of the ball at the start (m) (Z16
+section 6.1)."""
 ENERGY, FLUX, SPECIFIC_CHARGE = 1e4, 10.0, 10.0
 """Energy W of the blast (J), field B along x (T), charge per mass (C/kg) (Z16 section 6.1)."""
 AIR, VISCOSITY = 1.225, 1.8e-5
 """Density of air, kg/m^3, and its viscosity, Pa s (Z16 sections 4.2 and 6.1)."""
 MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
 SPEED = float(np.sqrt(2 * ENERGY / (NUMBER * MASS)))
-"""The speed of every particle at the start, m/s (Z16 3.4)."""
+"""The initial speed of every particle, m/s (Z16 3.4)."""
 
 NEIGHBOURS = 3 * RADIUS
-"""Distance within which the size "clumps" has a near field, m: half a diameter between surfaces."""
+"""Cut-off distance of the near field in the size "clumps", m: half a diameter between surfaces."""
 
 SEARCH_SETTINGS = {
     "generations": 24, "ensemble": {"confirm": 8},
 }  # fmt: skip
 
 SIZES = {
-    "small": Size("500 particles that do not feel each other, 1 s", {"number": 500}, SEARCH_SETTINGS),
-    "default": Size("2000 particles that do not feel each other, 1 s, in the field", {}, SEARCH_SETTINGS),
+    "small": Size("500 particles without interaction, 1 s", {"number": 500}, SEARCH_SETTINGS),
+    "default": Size("2000 particles without interaction, 1 s, in the field", {}, SEARCH_SETTINGS),
     "no_field": Size("the same without the field", {"flux": 0.0}),
-    "contact": Size("2000 particles in contact, 1 s", {"contact": True}),
+    "contact": Size("2000 particles with contact, 1 s", {"contact": True}),
     "contact_no_field": Size("the same without the field", {"contact": True, "flux": 0.0}),
     "near_field": Size(
-        "2000 in contact and with the near field as printed, between all; some minutes",
+        "2000 particles with contact and the printed near field of all pairs; some minutes",
         {"contact": True, "near": True},
     ),
     "clumps": Size(
-        "2000 in contact and with the near field of neighbours only",
+        "2000 particles with contact and the near field of neighbours only",
         {"contact": True, "near": True, "cutoff": NEIGHBOURS},
     ),
     "clumps_no_field": Size(
@@ -72,9 +74,10 @@ SIZES = {
 
 
 def interaction(contact: bool, near: bool, cutoff: float | None = None) -> tuple[Effect, ...]:
-    """Contact and near field of Z16 section 9; the latter of pairs within ``cutoff`` (m) only, if given.
+    """Return the effects of contact and of the near field of Z16 section 9.
 
-    Bonds (7.16) are left out, as the paper gives no strain at which they form; ``contact_bond`` adds them.
+    The near field acts only on pairs within ``cutoff`` (m), if given. Bonds (7.16) are left out because the
+    paper gives no strain at which they form; ``contact_bond`` adds them.
     """
     touching = (
         Contact(stiffness=1e7, exponent=2),
@@ -97,9 +100,10 @@ def scene(
     seed: int = 0,
     **control: Any,
 ) -> Scene:
-    """Return the blast. flux : along x, or of shape (3,), T. A smaller number has the same speed and density.
+    """Return the blast. flux : along x, or of shape (3,), T.
 
-    ``control`` goes to the papers' step control.
+    A smaller ``number`` keeps the speed and the density. ``control`` is passed to the step control of the
+    papers.
     """
     b = np.asarray(flux, float)
     return Scene(

@@ -1,5 +1,4 @@
-"""The quantities whose accuracy ``tisim cost`` measures in capture: how many particles are caught, over
-random starts."""
+"""Quantities whose accuracy ``tisim cost`` measures in capture: the captured fraction, over random starts."""
 
 from __future__ import annotations
 
@@ -10,5 +9,5 @@ from tisim.accuracy import Quantity
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths are random; what counts is how many are caught."""
+    """Return the captured fraction; the paths of single particles are random."""
     return (Quantity("captured fraction", lambda result: fraction(result.state), random=True),)

@@ -1,4 +1,5 @@
-"""Captured fractions of the case capture in time and at the end, by angle, particle size and aspect ratio."""
+"""Captured fractions of the case capture over time and at the end, by angle, particle size and aspect
+ratio."""
 
 from __future__ import annotations
 
@@ -29,14 +30,14 @@ from tisim.engine.batches import Progress, progress_of_part
 from tisim.plotting.style import empty, legend_beside, letters, plain
 
 CURVE_REPEATS = 10
-"""Curves are means over so many starts of a setting; the checks take more."""
+"""Number of starts of each setting for the curves; the checks use more."""
 TIMES = np.linspace(0.0, capture.DURATION, 101)
 """The times of the points of a curve, s."""
 SOME = (50, 125, 212)
-"""The radii of particles for which the aspect ratio of the cylinder is varied, nm."""
+"""The particle radii for which the aspect ratio of the cylinder is varied, nm."""
 
 Row = tuple[Settings, Sequence[Result]]
-"""A setting, and what has come of it."""
+"""A setting and its results."""
 
 
 def figures(progress: Progress) -> Mapping[str, Figure | str]:
@@ -59,8 +60,11 @@ def figures(progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def captured(angles: Sequence[Row], sizes: Sequence[Row], aspects: Sequence[Row]) -> Figure:
-    """Fraction in time by angle, TOP and SIDE (B16 Fig. 6.4), by size, and by aspect ratio; at the end by
-    angle and size (6.6a), and by aspect ratio and size (6.6b)."""
+    """Draw the captured fraction over time and at the end.
+
+    Over time: by angle for TOP and SIDE (B16 Fig. 6.4), by size, and by aspect ratio. At the end: by angle
+    and size (6.6a), and by aspect ratio and size (6.6b).
+    """
     figure = empty(12.0, 13.0)
     grid = figure.subplots(4, 2)
     for k, axis in enumerate(grid[:2].flat):
@@ -83,7 +87,7 @@ def captured(angles: Sequence[Row], sizes: Sequence[Row], aspects: Sequence[Row]
 
 
 def curve(group: Iterable[Result]) -> np.ndarray:
-    """Captured fraction at TIMES, the mean over repeats."""
+    """Return the captured fraction at TIMES, the mean over repeats."""
     return np.mean([[fraction(result.state, t) for t in TIMES] for result in group], axis=0)
 
 
@@ -139,7 +143,7 @@ def by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
 def bars(
     axis: Axes, x: Sequence[float], means: Sequence[Mean], colour: object, label: str, line: str = "-"
 ) -> None:
-    """Means with their confidence intervals."""
+    """Draw means with their confidence intervals."""
     axis.errorbar(
         x, [m.value for m in means], [m.half for m in means], color=colour, lw=1.3, ls=line, marker="o",
         ms=3, capsize=2, label=label,
@@ -147,7 +151,7 @@ def bars(
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return what is captured at the end, as CSV."""
+    """Return the captured fractions at the end as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["radius_nm", "angle_deg", "aspect", "part", "repeats", "captured", "half_width_95"])

@@ -1,4 +1,4 @@
-"""Figures of the case capture: of one run, and of its magnet."""
+"""Figures of the case capture: figures of one run, and of its magnet."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ from tisim.plotting.style import TIME, empty, letters, plain
 from tisim.sources import Cylinder, MagneticCylinders, sample
 
 LEAST_FORCE = 0.5e-15
-"""What draws a particle at least with this force counts as capture volume, N (B16 section 6.4.1)."""
+"""Least attractive force on a particle within the capture volume, N (B16 section 6.4.1)."""
 PLANE, SPACE = 181, 96
-"""There are so many points along a side of a map, and of the box in which capture volume is counted."""
+"""Number of points along a side of a map, and along a side of the box in which the capture volume is
+counted."""
 MARKS = (-2000, 0, 2000)
-"""Maps of forces have marks at these places along both axes, µm."""
+"""Positions of the tick marks along both axes of the force maps, µm."""
 BEYOND = 2.5e-3
-"""The capture volume of particles of 50 nm reaches less far from the cylinder than this, m."""
+"""Upper bound of the distance of the capture volume from the cylinder for particles of 50 nm, m."""
 
 
 def cylinder(scene: Scene) -> Cylinder:
@@ -35,7 +36,7 @@ def cylinder(scene: Scene) -> Cylinder:
 
 
 def outline(axis: Axes, body: Cylinder) -> None:
-    """A cylinder whose axis lies in the xz plane, as seen along y. In µm."""
+    """Draw a cylinder whose axis lies in the xz plane, as seen along y, in µm."""
     along = np.array(body.direction)[[0, 2]]
     across = np.array([-along[1], along[0]])
     a, b = 0.5 * body.length * along / MICRO, body.radius * across / MICRO
@@ -44,9 +45,10 @@ def outline(axis: Axes, body: Cylinder) -> None:
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """trajectories.png: paths in the xz plane coloured by time (B16 Fig. 6.5), and captured fraction in time.
+    """trajectories.png: paths in the xz plane coloured by time (B16 Fig. 6.5), and captured fraction over
+    time.
 
-    None of a file with fewer than three frames, such as a result.h5.
+    Returns nothing for a file with fewer than three frames, such as a result.h5.
     """
     if len(trajectory) < 3:
         return {}
@@ -80,21 +82,24 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """field.png, volume.png: of the magnet; capture.png, capture.csv: captured fractions, for particles of
-    all sizes whatever ``size`` is."""
+    """field.png, volume.png: field and capture volume of the magnet; capture.png, capture.csv: captured
+    fractions.
+
+    The captured fractions are of all particle sizes, for any ``size``.
+    """
     return {"field.png": field(), "volume.png": volume(), **curves.figures(progress)}
 
 
 def plane(reach: float) -> np.ndarray:
-    """Points of the xz plane up to reach (m) from the origin, (PLANE, PLANE, 3) in m."""
+    """Return points of the xz plane up to reach (m) from the origin, (PLANE, PLANE, 3) in m."""
     line = np.linspace(-reach, reach, PLANE)
     x, z = np.meshgrid(line, line)
-    # Off the plane of symmetry by next to nothing, so that no point lies on an edge.
+    # A tiny offset from the plane of symmetry, so that no point lies on an edge.
     return np.stack([x, np.full_like(x, 1e-9), z], axis=-1)
 
 
 def field() -> Figure:
-    """Field lines and |B| around a short cylinder at three angles to the field."""
+    """Draw field lines and |B| around a short cylinder at three angles to the field."""
     figure = empty(10.4, 3.7)
     axes = figure.subplots(1, 3, sharey=True)
     for axis, angle in zip(axes, (0.0, 45.0, 90.0), strict=True):
@@ -120,8 +125,12 @@ def field() -> Figure:
 
 
 def volume() -> Figure:
-    """Magnetic force on a particle of 50 nm towards the cylinder, where above LEAST_FORCE (B16 Fig. 6.3;
-    there magnetised along the field, here as Stoner and Wohlfarth say)."""
+    """Draw the magnetic force on a particle of 50 nm towards the cylinder, if above LEAST_FORCE (B16 Fig.
+    6.3).
+
+    The cylinder of B16's figure is magnetised along the field; here its direction follows the model of Stoner
+    and Wohlfarth.
+    """
     figure = empty(10.4, 6.8)
     grid = figure.subplots(2, 3)
     for row, aspect in zip(grid, (5 / 3, 20 / 3), strict=True):
@@ -150,7 +159,8 @@ def volume() -> Figure:
 
 
 def pull(scene: Scene, points: np.ndarray) -> np.ndarray:
-    """Magnetic force (N) on a particle of the scene towards its cylinder, at points (..., 3) in m."""
+    """Return the magnetic force (N) on a particle of the scene towards its cylinder, at points (..., 3) in
+    m."""
     b, slope = sample(scene.effects, "magnetic_flux_density", points.reshape(-1, 3))
     size = scene.particles.arrays(scene.domain, scene.seed)["saturation_moment"][0]
     moment = size * b / np.linalg.norm(b, axis=-1, keepdims=True)
@@ -159,10 +169,10 @@ def pull(scene: Scene, points: np.ndarray) -> np.ndarray:
 
 
 def capture_volume(scene: Scene) -> float:
-    """Return the volume in which the cylinder draws a particle with LEAST_FORCE or more, over its own (B16
-    6.4.1).
+    """Return the capture volume divided by the volume of the cylinder (B16 6.4.1).
 
-    From the middles of cells, SPACE along each side of a box that reaches BEYOND the cylinder.
+    In the capture volume the cylinder attracts a particle with LEAST_FORCE or more. It is counted at the
+    centres of cells, SPACE along each side of a box that extends BEYOND the cylinder.
     """
     body = cylinder(scene)
     half = 0.5 * body.length * np.abs(body.direction) + BEYOND
@@ -173,7 +183,8 @@ def capture_volume(scene: Scene) -> float:
 
 
 def attraction(force: np.ndarray, points: np.ndarray, body: Cylinder) -> np.ndarray:
-    """Component of a force (N) towards the nearest point of a cylinder at the origin; 0 inside it."""
+    """Return the component of a force (N) towards the nearest point of a cylinder at the origin; 0 inside
+    it."""
     axis = np.asarray(body.direction)
     z = points @ axis
     radial = points - z[..., None] * axis

@@ -1,8 +1,8 @@
-"""A filter of magnetised fibres in a channel that water flows through, and the scene of its particles.
+"""A filter of magnetised fibres in a channel with flowing water, and the scene of its particles.
 
-Fibres of one size lie along z, side by side in layers one behind the other, in a uniform field in any
-direction of the xz plane. The water flows along y. Fibres of soft steel are magnetised as the field decides
-(soft_magnet.py). As in B16, the flow is uniform: that fibres turn it aside is left out.
+Fibres of one size lie along z, side by side in successive layers, in a uniform field in any direction of the
+xz plane. The water flows along y. The field determines the magnetisation of fibres of soft steel
+(soft_magnet.py). The flow is uniform, as in B16: its deflection by the fibres is neglected.
 """
 
 from __future__ import annotations
@@ -30,34 +30,37 @@ from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.steppers import Brownian, DriftLimit
 
 WIRE = 20 * DIAMETER
-"""All fibres together are so long at most, m: as one of B16's longest."""
+"""Largest total length of the fibres, m: the length of one of B16's longest."""
 CHANNEL_WIDTH, CHANNEL_HEIGHT = 6 * DIAMETER, 20 * DIAMETER
-"""The channel is so wide along x, and so high along z, m."""
+"""Width of the channel along x and height along z, m."""
 UPSTREAM, SLAB, DOWNSTREAM = 3 * DIAMETER, DIAMETER, 2 * DIAMETER
-"""Particles start so far before the first layer, in a slab so thick, and are seen until so far behind the
-last one, m."""
+"""Distance between the starting slab and the first layer, thickness of that slab, and distance behind the
+last layer at which the simulation ends, m."""
 FILTER_PARTICLES = 120
-"""So many particles flow through a filter in a run."""
+"""Number of particles that flow through a filter in a run."""
 FLOW_SPEED, FILTER_RADIUS = 3e-4, 125.0
-"""The speed of the flow, m/s, and the radius of the particles, nm, where they are no genes."""
+"""Speed of the flow, m/s, and radius of the particles, nm, unless they are genes."""
 DOMAIN_MOMENT = 2.3e-19
-"""The moment of a magnetite grain of 10 nm, A m^2 (B16 7.6): particles are saturated from some 0.1 T on."""
+"""The moment of a magnetite grain of 10 nm, A m^2 (B16 7.6): particles are saturated above about 0.1 T."""
 PUSHED, CARRIED = 5e-6, 20e-6
-"""How far forces and the flow move a particle in a step at most, m."""
+"""Largest displacement of a particle in a step by forces and by the flow, m."""
 LARGEST = 212
-"""The radius of B16's largest particles, nm. Those of other sizes have its moment (table 6.1) by volume."""
+"""The radius of B16's largest particles, nm. The moment of other sizes is scaled from theirs (table 6.1) by
+volume."""
 TABLE_DIGITS = 3
-"""The field of the fibres is tabulated to so many digits; what decides is random."""
+"""Number of digits in the table of the fibres' field; random motion outweighs this error."""
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A filter, the particles, and how fast they come.
+    """A filter, the particles, and the speed of the flow.
 
-    flux : of the uniform field, T; field_angle : of it to the axis of the fibres, degrees;
-    magnetisation_angle : of theirs, saturated, if they are hard magnets; None for soft steel. aspect : L/D.
-    number : of fibres, rounded. spacing : of neighbours in D: between axes, and along them the gap is one
-    less. speed : of the flow, m/s. radius : of particles, nm.
+    flux : of the uniform field, T. field_angle : between the field and the axis of the fibres, degrees.
+    magnetisation_angle : between the magnetisation of saturated hard magnets and that axis; None for soft
+    steel.
+    aspect : L/D. number : of fibres, rounded.
+    spacing : of neighbours in D, between their axes; the gap along the axes is spacing - 1.
+    speed : of the flow, m/s. radius : of particles, nm.
     """
 
     flux: float = 1.0
@@ -71,7 +74,7 @@ class Filter:
 
     @property
     def length(self) -> float:
-        """The length of a fibre, m."""
+        """Return the length of a fibre, m."""
         return self.aspect * DIAMETER
 
     def magnetisation(self) -> Vector:
@@ -82,9 +85,9 @@ class Filter:
         return magnetisation((0.0, 0.0, 1.0), DIAMETER / 2, self.length, SATURATION_MAGNETISATION, field)
 
     def places(self) -> list[Vector]:
-        """Centres of the fibres, m: layer after layer, each from its middle outwards.
+        """Return the centres of the fibres, m: layer after layer, each from its middle outwards.
 
-        InputError when there is not wire enough, or no fibre.
+        InputError if there is no fibre, or if the fibres need more wire than is available.
         """
         count = round(self.number)
         must(count >= 1, "number of fibres", "at least 1", count)
@@ -97,7 +100,7 @@ class Filter:
         return list(islice(layers, count))
 
     def scene(self, seed: int, number: int = FILTER_PARTICLES) -> Scene:
-        """Particles that flow through it."""
+        """Return the scene of particles that flow through the filter."""
         places, radius = self.places(), self.radius * 1e-9
         start = -UPSTREAM - SLAB
         way = places[-1][1] + DOWNSTREAM - start
@@ -138,7 +141,7 @@ class Filter:
 
 
 def _row(count: int, pitch: float) -> np.ndarray:
-    """Places (m) of so many in a row about 0, a pitch (m) apart."""
+    """Return the positions (m) of ``count`` points in a row about 0, a pitch (m) apart."""
     return pitch * (np.arange(count) - (count - 1) / 2)
 
 

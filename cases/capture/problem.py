@@ -1,11 +1,12 @@
-"""The inverse problem of capture: a filter of magnetised fibres that catches the most from a stream.
+"""The inverse problem of capture: a filter of magnetised fibres that captures the most particles from a
+stream.
 
-Particles come from upstream, evenly over the channel, and are caught or pass by (``filter.py``). The wire
-that fibres are cut from is limited, so that many short ones compete with few long ones.
+Particles come from upstream, evenly distributed over the channel, and are captured or pass (``filter.py``).
+The total length of wire is limited, so the search must choose between many short fibres and few long ones.
 
-What B16 found for one cylinder, a search must find by itself: transverse, which is that its axis lies across
-the field and not along it (section 6.4.2), and short, as short ones have more capture volume for their own
-(6.4.1).
+The search must find the conclusions of B16 for one cylinder by itself. The best cylinder is transverse: its
+axis lies across the field and not along it (section 6.4.2). It is short, because the ratio of capture volume
+to its own volume is larger for short cylinders (6.4.1).
 """
 
 from __future__ import annotations
@@ -45,34 +46,37 @@ GENES = {
 }
 """The genes of each variant of the problem."""
 WANTED = {
-    "fraction": "the soft fibres and the field that catch the most particles from a stream",
-    "hard": "the hard magnets and the field that catch the most particles from a stream",
-    "throughput": "the front of fraction caught and throughput, with speed and radius of particles free",
+    "fraction": "the soft fibres and the field that capture the most particles from a stream",
+    "hard": "the hard magnets and the field that capture the most particles from a stream",
+    "throughput": "the front of captured fraction and throughput, with free speed and particle radius",
 }
-"""What each variant of the problem looks for."""
+"""The goal of each variant of the problem."""
 MEANINGS = {
-    "captured": "fraction of the particles that is caught",
-    "throughput": "water that flows through the channel",
+    "captured": "captured fraction of the particles",
+    "throughput": "volume flow of water through the channel",
     "aspect": "length of a fibre over its diameter D",
-    "spacing": "distance of the axes of fibres side by side",
+    "spacing": "distance between the axes of neighbouring fibres",
 }
 
 
 def captured(result: Result) -> float:
-    """Return the fraction of the particles that is caught."""
+    """Return the captured fraction of the particles."""
     return float((result.state["captured_by"] >= 0).mean())
 
 
 def throughput(result: Result) -> float:
-    """Water that flows through the channel, m^3/s."""
+    """Return the volume flow of water through the channel, m^3/s."""
     flow = next(e for e in result.scene.effects if isinstance(e, UniformFlow))
     return flow.velocity[1] * CHANNEL_WIDTH * CHANNEL_HEIGHT
 
 
 def problem(size: str = "default", variant: str = "fraction") -> Problem:
-    """Return the filter that catches the largest fraction of FLOW_SPEED and FILTER_RADIUS: "fraction", of
-    soft steel, or "hard", of magnets with a direction of their own. "throughput": the front of fraction and
-    throughput, where speed and radius are free too. Of size "default" only."""
+    """Return the inverse problem of a variant; only of the size "default".
+
+    "fraction" maximises the captured fraction at FLOW_SPEED and FILTER_RADIUS with fibres of soft steel;
+    "hard" does so with magnets whose direction is free. "throughput" is the front of fraction and throughput,
+    with speed and radius also free.
+    """
     must(variant in GENES, "variant", f"one of {', '.join(GENES)}", variant)
     fraction = Objective("captured", captured, maximise=True)
     flow = Objective("throughput", throughput, "m^3/s", maximise=True)
@@ -90,7 +94,7 @@ def problem(size: str = "default", variant: str = "fraction") -> Problem:
 
 
 def details(design: Mapping[str, float], result: Result) -> dict[str, float]:
-    """Return what the best filter is like, in the terms of B16."""
+    """Return the properties of the best filter in the terms of B16."""
     best = Filter(**design)
     m = np.asarray(best.magnetisation())
     return {
@@ -103,8 +107,8 @@ def details(design: Mapping[str, float], result: Result) -> dict[str, float]:
 
 
 def caught(result: Result) -> Figure:
-    """Return the channel from the side and as the flow sees it: fibres, and where particles began and
-    ended."""
+    """Draw the channel from the side and along the flow: fibres, and start and end positions of the
+    particles."""
     figure = empty(10.4, 6.6)
     side, front = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 4.0))
     state, start = result.state, result.start
@@ -122,7 +126,7 @@ def caught(result: Result) -> Figure:
             z, y = arrays["position"][which][:, 2], arrays["position"][which][:, k]
             axis.plot(z / MILLI, y / MILLI, "o", ms=3, color=colour, label=name)
         axis.set_ylabel(f"{'xy'[k]} (mm)")
-        # Of one width both, whatever their heights, so that z is in one place.
+        # Both panels have the same width, whatever their heights, so that their z axes are aligned.
         axis.set_aspect("equal", "datalim")
         plain(axis)
     side.set_title(f"from the side, the flow upwards: {stopped.mean():.0%} caught")

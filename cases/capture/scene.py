@@ -1,12 +1,12 @@
 """Magnetic colloids that a magnetised fibre captures (B16 chapter 6).
 
 B16 is R. J. Baars, thesis, Utrecht University (2016): particles of table 6.1 in water about a steel cylinder
-in a field of 1 T along x, at an angle to its axis. The cylinder is saturated, in the direction that the model
-of Stoner and Wohlfarth gives. Particles are so dilute that they do not feel each other; their moment is along
-the field. One that touches the cylinder stays.
+in a field of 1 T along x, at an angle to its axis. The cylinder is saturated, in the direction given by the
+model of Stoner and Wohlfarth. The suspension is so dilute that particles do not interact; their moment is
+along the field. A particle that touches the cylinder stays there.
 
-The paper draws its start regions TOP and SIDE without saying how wide they are. Here they are one cylinder
-radius wide and together the whole layer around it, in which ``part`` chooses.
+The paper draws its start regions TOP and SIDE but does not give their width. Here they are one cylinder
+radius wide and together form the layer around the cylinder; ``part`` chooses one of them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from tisim.steppers import Brownian, DriftLimit
 DIAMETER, SATURATION_MAGNETISATION, FLUX = 600e-6, 985e3, 1.0
 """The cylinder's diameter, m, and magnetisation, A/m; the flux density along x, T (B16 section 6.3)."""
 TEMPERATURE, VISCOSITY, DURATION, NUMBER = 298.0, 1e-3, 50.0, 100
-"""The water's temperature, K, and viscosity, Pa s; time, s, and particles of a run (B16 section 6.3)."""
+"""The water's temperature, K, and viscosity, Pa s; duration, s, and number of particles of a run (B16 section
+6.3)."""
 SATURATION_MOMENTS = {
     25: 0.016e-16,
     50: 0.344e-16,
@@ -36,9 +37,9 @@ SATURATION_MOMENTS = {
 }
 """The saturation moment of a particle, A m^2, by its hydrodynamic radius in nm (B16 table 6.1)."""
 DENSITY = 1500.0
-"""The density of particles, kg/m^3. Without inertia and gravity it makes no difference."""
+"""The density of particles, kg/m^3. It has no effect without inertia and gravity."""
 LONGEST_MOVE, LONGEST_STEP = 2e-6, 0.05
-"""How far (m) and how long (s) a particle goes in a step at most: the field changes over 300 um."""
+"""Largest displacement (m) and longest step (s) of a particle: the field changes over 300 um."""
 
 
 SEARCH_SETTINGS = {
@@ -47,9 +48,9 @@ SEARCH_SETTINGS = {
 
 SIZES = {
     "default": Size("100 particles of 125 nm about a short transverse cylinder, 50 s", {}, SEARCH_SETTINGS),
-    "longitudinal": Size("the same about one along the field", {"angle": 0.0}),
-    "long": Size("about a transverse cylinder of length 20 D", {"aspect": 20.0}),
-    "25nm": Size("100 particles of 25 nm, which take far longer", {"nanometres": 25}),
+    "longitudinal": Size("the same about a longitudinal cylinder", {"angle": 0.0}),
+    "long": Size("the same about a transverse cylinder of length 20 D", {"aspect": 20.0}),
+    "25nm": Size("100 particles of 25 nm, which are captured far later", {"nanometres": 25}),
 }
 
 
@@ -74,10 +75,10 @@ def scene(
     duration: float = DURATION,
     seed: int = 0,
 ) -> Scene:
-    """Particles of a radius of table 6.1 (nm) about a cylinder at an angle (degrees) to the field.
+    """Return particles of a radius of table 6.1 (nm) about a cylinder at an angle (degrees) to the field.
 
     aspect : length of the cylinder over its diameter.
-    part : of the layer where particles start: "top", beyond both ends; "side", beside the rest; or "all".
+    part : of the layer in which particles start: "top", beyond both ends; "side", beside the rest; or "all".
     duration : s.
     """
     body = fibre(axis(angle), aspect)
@@ -111,5 +112,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """Capture of a size, from the random start of a seed."""
+    """Return the capture of a size, from the random start of a seed."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -1,9 +1,9 @@
-"""What fraction of the particles of the case capture is caught: sweeps over its settings, many repeats each.
+"""Captured fractions in the case capture: sweeps over its settings, with many repeats each.
 
-All runs of a sweep are the worlds of one batch. A run knows when each of its particles was captured, so the
-fraction at any earlier time needs no run of its own. Start k is the same for all settings, up to what they
-change: fractions of one start are not independent of each other, so settings are compared and averaged start
-by start.
+All runs of a sweep are the worlds of one batch. A run records the capture time of each particle, so the
+fraction at any earlier time needs no further run. Start k is the same for all settings, except for the
+changes that a setting makes. Fractions of one start are therefore not independent, and settings are compared
+and averaged start by start.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
 
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0)
-"""The angles of the cylinder to the field that are swept, degrees (B16 section 6.4.2)."""
+"""The swept angles of the cylinder to the field, degrees (B16 section 6.4.2)."""
 ASPECTS = (5 / 3, 10 / 3, 20 / 3, 20.0)
-"""The lengths of the cylinder over its diameter that are swept (B16 section 6.4.3)."""
+"""The swept ratios of the cylinder's length to its diameter (B16 section 6.4.3)."""
 CHECK_REPEATS = 30
-"""Checks run each setting from so many starts, as B16 section 6.3 does."""
+"""Number of starts of each setting in the checks, as in B16 section 6.3."""
 MICRO = 1e-6
 """A micrometre, m."""
 
@@ -37,25 +37,26 @@ Settings = Mapping[str, Any]
 def results(
     settings: Sequence[Settings], repeats: int, progress: Progress | None = None
 ) -> list[list[Result]]:
-    """Results of the scene of capture with each setting, from as many starts; RunError when one fails."""
+    """Return results of capture for each setting, with the same number of starts each; RunError if one
+    fails."""
     scenes = [capture.scene(**setting, seed=seed) for setting in settings for seed in range(repeats)]
     return grouped(scenes, repeats, progress)
 
 
 def grouped(scenes: Sequence[Scene], repeats: int, progress: Progress | None = None) -> list[list[Result]]:
-    """Results of scenes, repeats of one thing after the other; RunError when one fails."""
+    """Return results of scenes in groups of ``repeats``; RunError if one fails."""
     runs = sound(run(scenes, progress))
     return [runs[k : k + repeats] for k in range(0, len(runs), repeats)]
 
 
 def fraction(state: Arrays, time: float = np.inf) -> float:
-    """Return the fraction of the particles that is captured by a time (s)."""
+    """Return the fraction of the particles captured by a time (s)."""
     at = state["captured_at"]
     return float(((at >= 0) & (at <= time)).mean())
 
 
 def fractions(group: Sequence[Result], time: float = np.inf) -> np.ndarray:
-    """Return the captured fraction by a time (s) of each start."""
+    """Return the captured fraction of each start by a time (s)."""
     return np.array([fraction(result.state, time) for result in group])
 
 
@@ -65,21 +66,23 @@ def mean(group: Sequence[Result], time: float = np.inf) -> Mean:
 
 
 def isotropic(by_angle: np.ndarray) -> np.ndarray:
-    """Return the mean over directions that are all equally likely, of each start, from those at ANGLES,
-    (angles, starts): weights sin(alpha)."""
+    """Return the mean over an isotropic distribution of directions for each start.
+
+    by_angle : values at ANGLES, (angles, starts). The weights are sin(alpha).
+    """
     weights = np.sin(np.radians(ANGLES))
     weights[[0, -1]] /= 2
     return np.average(by_angle, axis=0, weights=weights)
 
 
 def even(by_angle: np.ndarray) -> np.ndarray:
-    """Return the mean over angles that are all equally likely, as over the curves of B16 Fig. 6.7, of each
-    start."""
+    """Return the mean over a uniform distribution of angles for each start, as over the curves of B16 Fig.
+    6.7."""
     return by_angle.mean(axis=0)
 
 
 def check(repeats: int = CHECK_REPEATS) -> Iterator[Check | Claim]:
-    """Yield what B16 concludes of one cylinder, each with its confidence interval."""
+    """Yield B16's conclusions for one cylinder, each with its confidence interval."""
     yield from of_orientation(repeats)
     yield from of_aspect(repeats)
     yield from of_size(repeats)
@@ -104,9 +107,12 @@ def of_orientation(repeats: int) -> Iterator[Claim]:
 
 
 def of_aspect(repeats: int) -> Iterator[Claim]:
-    """Section 6.4.3: shorter cylinders capture a little more, averaged over angles; which is their inactive
-    lateral surface when they lie along the field. Averaged over directions it is the other way round, and
-    across the field too. Section 6.4.4: "relatively small" is L/D < 6."""
+    """Section 6.4.3: averaged over angles, shorter cylinders capture slightly more.
+
+    The cause is the lateral surface, which is larger in long cylinders and inactive in cylinders along the
+    field. Averaged over directions, and across the field, shorter cylinders capture less. In section 6.4.4,
+    "relatively small" means L/D < 6.
+    """
     settings = [
         {"nanometres": 125, "angle": angle, "aspect": aspect} for aspect in ASPECTS for angle in ANGLES
     ]
@@ -115,19 +121,22 @@ def of_aspect(repeats: int) -> Iterator[Claim]:
     gain = shortest - long
     yield Claim("125 nm, L/D 5/3 minus 20, longitudinal", Mean.of(gain[0]), least=0.0)
     yield Claim("125 nm, L/D 5/3 minus 20, transverse", Mean.of(gain[-1]), most=0.0)
-    yield Claim("125 nm, L/D 5/3 minus 20, even mean over angles", Mean.of(even(gain)), least=0.0)
-    yield Claim("the same, all directions equally likely", Mean.of(isotropic(gain)), most=0.0)
-    yield Claim("125 nm, L/D 10/3 minus 20, even mean over angles", Mean.of(even(short - long)), least=0.0)
-    yield Claim("125 nm, L/D 20/3 minus 20, even mean over angles", Mean.of(even(medium - long)), most=0.02)
+    yield Claim("125 nm, L/D 5/3 minus 20, uniform mean over angles", Mean.of(even(gain)), least=0.0)
+    yield Claim("125 nm, L/D 5/3 minus 20, isotropic mean", Mean.of(isotropic(gain)), most=0.0)
+    yield Claim("125 nm, L/D 10/3 minus 20, uniform mean over angles", Mean.of(even(short - long)), least=0.0)
+    yield Claim(
+        "125 nm, L/D 20/3 minus 20, uniform mean over angles", Mean.of(even(medium - long)), most=0.02
+    )
 
 
 def of_size(repeats: int) -> Iterator[Claim]:
-    """Sections 6.4.2 and 6.4.4: from 50 nm on captured within 50 s, 25 nm not."""
+    """Sections 6.4.2 and 6.4.4: particles of 50 nm and more are captured within 50 s, particles of 25 nm are
+    not."""
     sizes = tuple(capture.SATURATION_MOMENTS)
     settings = [{"nanometres": size, "angle": 90.0, "aspect": 5 / 3} for size in sizes]
     by_size = dict(zip(sizes, results(settings, repeats), strict=True))
     for size in sizes[1:]:
         yield Claim(f"{size} nm captured within 50 s, transverse, L/D 5/3", mean(by_size[size]), least=0.7)
-    yield Claim("25 nm", mean(by_size[25]), most=0.5)
+    yield Claim("25 nm captured within 50 s, transverse, L/D 5/3", mean(by_size[25]), most=0.5)
     late = Mean.of([fraction(r.state) - fraction(r.state, 25.0) for r in by_size[25]])
-    yield Claim("25 nm: part captured in the second half of the time", late, least=0.05)
+    yield Claim("25 nm: fraction captured in the second half of the time", late, least=0.05)

@@ -1,4 +1,4 @@
-"""Capture by one fibre after the other: the cascade of B16 section 6.4.5."""
+"""Capture by successive fibres: the cascade of B16 section 6.4.5."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="cascade",
-    title="Magnetic colloids captured by one fibre after the other (B16)",
+    title="Magnetic colloids captured by successive fibres (B16)",
     source="R. J. Baars, thesis, Utrecht University (2016), section 6.4.5",
     sizes=SIZES,
     scene=scene_for,

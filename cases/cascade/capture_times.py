@@ -1,4 +1,4 @@
-"""When the particles of a cascade are captured, stage after stage."""
+"""Capture times of the particles of a cascade, stage by stage."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tisim import run
 from tisim.engine.batches import Progress
 
 CAPTURED_SHARE = 0.9
-"""Capture is timed until this share of the particles is captured."""
+"""Share of the particles at which the capture time is measured."""
 MAX_STAGES = 1000
-"""A cascade is given up after so many stages."""
+"""Largest number of stages of a cascade."""
 
 
 def captured_at(
@@ -24,10 +24,11 @@ def captured_at(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> list[np.ndarray]:
-    """When each particle was captured, s from the start of the cascade; inf for those still free when
-    ``share`` had been, or after MAX_STAGES. One array (repeats, number) for each cascade, rows sorted.
+    """Return the capture time of each particle, s from the start of the cascade.
 
-    A stage of all cascades and repeats that are not done is one batch of worlds. RunError when one fails.
+    The result is one array (repeats, number) for each cascade, with sorted rows. Particles that are still
+    free when ``share`` has been captured, or after MAX_STAGES, have inf. Each stage of all unfinished
+    cascades and repeats is one batch of worlds. RunError if a run fails.
     """
     times = [np.full((repeats, one.number), np.inf) for one in cascades]
     rows = [
@@ -42,7 +43,7 @@ def captured_at(
         results = sound(run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going]))
         for (one, at, _), result in zip(going, results, strict=True):
             when = result.state["captured_at"]
-            # A particle has no name in the next stage: those that are captured fill the row from its start.
+            # Particles keep no identity between stages, so capture times fill the row from its start.
             first = int(np.isfinite(at).sum())
             caught = np.sort(when[when >= 0])
             at[first : first + len(caught)] = passed * one.stage + caught
@@ -52,5 +53,6 @@ def captured_at(
 
 
 def time_to(share: float, times: np.ndarray) -> np.ndarray:
-    """When a share of the particles was captured, of each repeat: shape (repeats,), s; inf for never."""
+    """Return the time at which a share of the particles was captured in each repeat: shape (repeats,), s; inf
+    for never."""
     return np.asarray(times[:, int(np.ceil(share * times.shape[1])) - 1])

@@ -1,4 +1,5 @@
-"""Figures of the case cascade: captured fractions in time, and random cascades beside optimal ones."""
+"""Figures of the case cascade: captured fractions over time, and a comparison of random and optimal
+cascades."""
 
 from __future__ import annotations
 
@@ -20,21 +21,21 @@ from tisim.engine.batches import Progress
 from tisim.plotting.style import empty, legend_beside, letters, plain
 
 CURVE_SHARE = 0.97
-"""Curves go up to this share of the particles."""
+"""Share of the particles at which curves end."""
 CURVE_REPEATS = 20
-"""Curves are means over so many repeats of a cascade."""
+"""Number of repeats of a cascade for each curve."""
 STAGES = (0.1, 0.5, 2.0, 10.0)
-"""The lengths of a stage that are drawn for 125 nm, s (B16 Fig. 6.11b)."""
+"""Stage durations in the figure of 125 nm, s (B16 Fig. 6.11b)."""
 SIZE_COLOURS = {25: "#cc6677", 125: "#4477aa"}
 LIKELY = {"directions": "all directions alike", "angles": "all angles alike"}
-"""What is equally likely in a random cascade, by its orientation."""
+"""The uniformly distributed quantity of a random cascade, by its orientation."""
 LINES: dict[Orientation, str] = {"optimal": "-", "directions": ":", "angles": "--"}
 
 Times = Mapping[Cascade, np.ndarray]
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """cascade.png, cascade.csv: all cascades whatever ``size`` is."""
+    """cascade.png, cascade.csv: all cascades, for any ``size``."""
     runs = [
         Cascade(n, STAGE[n], how, aspect, gap=gap)
         for gap, aspect in ((OFF, 20.0), (0.0, 20.0), (0.0, 5 / 3))
@@ -58,7 +59,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def curve(axis: Axes, times: np.ndarray, label: str, **style: Any) -> None:
-    """Captured fraction in time, the mean over repeats."""
+    """Draw the captured fraction over time, the mean over repeats."""
     when = np.sort(times[np.isfinite(times)])
     share = np.arange(1, len(when) + 1) / times.size
     in_range = share <= CURVE_SHARE
@@ -66,7 +67,7 @@ def curve(axis: Axes, times: np.ndarray, label: str, **style: Any) -> None:
 
 
 def of_size(axis: Axes, times_of: Times, nanometres: int) -> None:
-    """Random and optimal cascade of a size (B16 Fig. 6.11a), and its times to 90 %."""
+    """Draw random and optimal cascades of a size (B16 Fig. 6.11a), and the published times to 90 %."""
     for how, line in LINES.items():
         one = Cascade(nanometres, STAGE[nanometres], how, gap=OFF)
         label = {"optimal": "optimal", "directions": "random direction", "angles": "random angle"}[how]
@@ -89,7 +90,7 @@ def of_size(axis: Axes, times_of: Times, nanometres: int) -> None:
 
 
 def of_stage(axis: Axes, times_of: Times) -> None:
-    """125 nm with stages of different lengths (B16 Fig. 6.11b)."""
+    """Draw cascades of 125 nm with different stage durations (B16 Fig. 6.11b)."""
     for stage, colour in zip(STAGES, ("#aa3377", "#4477aa", "#228833", "#ccbb44"), strict=True):
         for how in ORIENTATIONS[:2]:
             label = f"{stage:g} s, {'optimal' if how == 'optimal' else 'random direction'}"
@@ -104,7 +105,8 @@ def of_stage(axis: Axes, times_of: Times) -> None:
 
 
 def of_ratio(axis: Axes, times_of: Times) -> None:
-    """Time to 90 % of random cascades over that of the optimal ones, by L/D, layer and what random means."""
+    """Draw the time to 90 % of random cascades over the optimal ones, by L/D, layer and kind of
+    randomness."""
     bases = [one for one in times_of if one.orientation == "optimal" and one.stage == STAGE[one.nanometres]]
     names = {(r.aspect, r.gap): f"L/D {r.aspect:.3g},\n{r.gap:g} R off" for r in bases}
     places = {key: k for k, key in enumerate(names)}
@@ -126,13 +128,13 @@ def of_ratio(axis: Axes, times_of: Times) -> None:
 
 
 def ratio(times_of: Times, one: Cascade) -> Mean:
-    """Return the time to 90 % of a cascade over that of the optimal one."""
+    """Return the time to 90 % of a cascade divided by the time of the optimal one."""
     best = times_of[replace(one, orientation="optimal")]
     return Mean.of(time_to(CAPTURED_SHARE, times_of[one])).over(Mean.of(time_to(CAPTURED_SHARE, best)))
 
 
 def table(times_of: Times) -> str:
-    """Time to 90 % of each cascade, as CSV."""
+    """Return the time to 90 % of each cascade, as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     names = [field.name for field in fields(Cascade)]

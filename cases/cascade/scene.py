@@ -1,12 +1,13 @@
-"""Capture by one fibre after the other: the cascade of B16 section 6.4.5.
+"""Capture by successive fibres: the cascade of B16 section 6.4.5.
 
-N particles spend ``stage`` seconds about one cylinder; those it has not captured are placed anew around a
-cylinder of another orientation, and so on. "optimal": every cylinder lies across the field. "directions":
-each has a random direction, all equally likely. "angles": its angle to the field is random, all angles from
-0 to 90 degrees equally likely, as B16 averages elsewhere (section 6.4.3).
+N particles spend ``stage`` seconds about one cylinder. The particles that it has not captured are then placed
+at random around a cylinder of another orientation, and so on. "optimal": every cylinder lies across the
+field. "directions": each has a random direction, with a uniform distribution over all directions. "angles":
+its angle to the field is random, with a uniform distribution from 0 to 90 degrees, which is the average that
+B16 uses elsewhere (section 6.4.3).
 
-B16 says neither which of the two its random orientation is, nor L/D, nor where particles are placed: here in
-a layer ``thickness`` wide and ``gap`` away from the cylinder, both in radii of it.
+B16 does not say which of the two its random orientation is, nor gives L/D or the start positions. Here
+particles start in a layer ``thickness`` wide and ``gap`` away from the cylinder, both in units of its radius.
 """
 
 from __future__ import annotations
@@ -27,14 +28,17 @@ STAGE = {25: 10.0, 125: 0.5}
 
 SIZES = {
     "default": Size("100 particles of 125 nm about a random cylinder of L/D 20, 0.5 s", {}),
-    "optimal": Size("the same about a transverse one", {"orientation": "optimal"}),
+    "optimal": Size("the same about a transverse cylinder", {"orientation": "optimal"}),
     "25nm": Size("100 particles of 25 nm, 10 s", {"nanometres": 25, "stage": 10.0}),
 }
 
 
 @dataclass(frozen=True)
 class Cascade:
-    """One kind of cascade. nanometres : of the particles; stage : s about each cylinder; see above."""
+    """The settings of a cascade. nanometres : radius of the particles. stage : time about each cylinder, s.
+
+    orientation, thickness, gap : see the module. aspect : L/D. number : of particles.
+    """
 
     nanometres: int = 125
     stage: float = 0.5
@@ -54,7 +58,7 @@ class Cascade:
         }[self.orientation]
 
     def scene(self, number: int, generator: np.random.Generator) -> Scene:
-        """Return the stage of ``number`` particles about the next cylinder."""
+        """Return one stage: ``number`` particles about the next cylinder."""
         scene = capture.scene(
             nanometres=self.nanometres,
             angle=self.angle(generator),

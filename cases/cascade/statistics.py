@@ -1,4 +1,5 @@
-"""How long cascades take to capture 90 %: B16 section 6.4.5 and what decides its numbers."""
+"""Times at which cascades have captured 90 %: B16 section 6.4.5 and the assumptions that affect its
+numbers."""
 
 from __future__ import annotations
 
@@ -15,10 +16,10 @@ from tisim.analysis import Mean
 PUBLISHED_TIMES = {25: (1100.0, 500.0), 125: (12.5, 5.5)}
 """The time to 90 %, s, of random and optimal cascades by radius in nm (B16 section 6.4.5)."""
 SHORT, LONG = 0.1, 10.0
-"""A shorter and a longer stage of 125 nm than 0.5 s, s (B16 Fig. 6.11b)."""
+"""A shorter and a longer stage than 0.5 s for 125 nm, s (B16 Fig. 6.11b)."""
 OFF = 0.15
-"""Gap, in radii of the cylinder, with which the optimal cascades take as long as in B16, at both sizes: the
-larger it is, the longer that of 25 nm takes beside that of 125 nm."""
+"""Gap, in radii of the cylinder, at which the optimal cascades of both particle sizes take as long as in B16.
+The ratio of the times of 25 nm and 125 nm rises with the gap."""
 GAPS = (0.0, OFF)
 RANDOM: tuple[Orientation, ...] = ("directions", "angles")
 ORIENTATIONS: tuple[Orientation, ...] = ("optimal", *RANDOM)
@@ -35,8 +36,7 @@ def means(cascades: Sequence[Cascade], repeats: int) -> Means:
 
 
 def check(repeats: int = CHECK_REPEATS) -> Iterator[Claim]:
-    """Yield the random cascade beside the optimal one, and the length of a stage; with confidence
-    intervals."""
+    """Yield comparisons of random and optimal cascades and of stage durations, with confidence intervals."""
     bases = [Cascade(n, STAGE[n], "optimal", gap=gap) for gap in GAPS for n in PUBLISHED_TIMES]
     short = [replace(base, aspect=5 / 3) for base in bases[:2]]
     cascades = [replace(one, orientation=how) for one in bases for how in ORIENTATIONS]
@@ -50,30 +50,32 @@ def check(repeats: int = CHECK_REPEATS) -> Iterator[Claim]:
         yield from of_orientation(mean_times, base)
     for base in short:
         ratio = mean_times[replace(base, orientation="directions")].over(mean_times[base])
-        yield Claim(f"{base.nanometres} nm, L/D 5/3, all directions: random over optimal", ratio, 1.0, 1.5)
+        yield Claim(f"{base.nanometres} nm, L/D 5/3, isotropic: random over optimal", ratio, 1.0, 1.5)
     for one in stages:
         yield stage_claim(mean_times, one)
 
 
 def name_of(one: Cascade) -> str:
-    """Size and layer of a cascade, for people."""
+    """Return a readable name for the size and layer of a cascade."""
     return f"{one.nanometres} nm, {one.gap:g} R off"
 
 
 def of_orientation(mean_times: Means, base: Cascade) -> Iterator[Claim]:
-    """Random over optimal, L/D 20: the published ratio lies between what the two kinds of random give."""
+    """Random over optimal, L/D 20: the published ratio lies between the ratios of the two kinds of random
+    cascades."""
     random, best = PUBLISHED_TIMES[base.nanometres]
     name, ratio = name_of(base), random / best
     bounds = (0.75 * best, 1.25 * best) if base.gap else (0.0, 0.75 * best)
-    yield Claim(f"{name}: s to 90 %, optimal (B16 {best:g})", mean_times[base], *bounds)
+    yield Claim(f"{name}: time to 90 %, s, optimal (B16 {best:g})", mean_times[base], *bounds)
     for how, bounds in zip(RANDOM, ((1.0, 1.25 * ratio), (0.75 * ratio, 2 * ratio)), strict=True):
         ours = mean_times[replace(base, orientation=how)].over(mean_times[base])
-        yield Claim(f"{name}: random over optimal, all {how} alike (B16 {ratio:.1f})", ours, *bounds)
+        yield Claim(f"{name}: random over optimal, uniform {how} (B16 {ratio:.1f})", ours, *bounds)
 
 
 def stage_claim(mean_times: Means, one: Cascade) -> Claim:
-    """A stage that is too long is worse; one that is too short only where particles have some way to go."""
+    """A longer stage captures more slowly; a shorter stage does so only if particles start away from the
+    cylinder."""
     ours = mean_times[one].over(mean_times[replace(one, stage=STAGE[125])])
-    name = f"{name_of(one)}, {one.orientation}: s to 90 % with stages of {one.stage:g} s over 0.5 s"
+    name = f"{name_of(one)}, {one.orientation}: time to 90 % with stages of {one.stage:g} s over 0.5 s"
     worse = one.stage == LONG or one.gap > 0
     return Claim(name, ours, least=1.0) if worse else Claim(name, ours, most=1.0)

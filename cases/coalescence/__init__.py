@@ -1,4 +1,4 @@
-"""Magnetised grains fall together into a rubble pile."""
+"""Magnetised grains coalesce into a rubble pile."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The quantities whose accuracy ``tisim cost`` measures in a cloud that falls together: the part that has
-agglomerated, and how dense the asteroid is, over random starts."""
+"""Quantities whose accuracy ``tisim cost`` measures in a coalescing cloud: the fraction of grains in
+clusters, the density of the asteroid and the largest overlap, over random starts."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tisim.analysis import largest_overlap
 
 
 def overlap(result: Result) -> float:
-    """Return the largest overlap of two grains at the end, over the smallest radius."""
+    """Return the largest overlap of two grains at the end, divided by the smallest radius."""
     position, radius = result.state["position"], result.state["radius"]
     return largest_overlap(position, radius) / float(radius.min())
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths of grains are chaotic; what counts is how many are bound, and how the asteroid is packed."""
+    """Return properties of the clusters and the asteroid; the paths of single grains are chaotic."""
     return (
         Quantity("part in clusters", lambda result: Gathering.of(result.state).bound, random=True),
         Quantity("density", lambda result: Asteroid.of(result.state).density, random=True),

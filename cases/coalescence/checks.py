@@ -1,5 +1,5 @@
-"""What L21 finds of clouds that fall together, beside what a copy of few grains shows, and what holds
-exactly."""
+"""Checks of coalescing clouds: findings of L21 that a copy with few grains reproduces, and relations that
+hold exactly."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ from tisim.cases.statistics import Claim, Shown
 from tisim.analysis import Mean
 
 ROUNDING = 1e-11
-"""Momenta may be off by so much of the sum of what the grains have."""
+"""Largest change of a momentum, relative to the sum of its magnitudes over the grains."""
 GAINED = 1e-4
-"""Kinetic energy and that of gravity may rise by so much of the latter, by what contacts had stored."""
+"""Largest rise of kinetic plus gravitational energy, relative to the gravitational energy; contacts release
+stored energy."""
 LOOSER = 1.0
-"""An asteroid is less dense where it is so by more than this, kg/m^3; no difference is no support."""
+"""Least difference in density that counts as less dense, kg/m^3; equal densities do not support the claim."""
 
 
 def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
-    """Yield what rules clouds, and what must hold of them from some starts."""
+    """Yield the governing numbers of clouds, and the checks of clouds from several starts."""
     yield from regime()
     yield from of_the_cloud()
     runs = clouds(seeds, **DEFAULT)
@@ -44,58 +45,67 @@ def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
 
 
 def of_the_cloud() -> Iterator[Check]:
-    """Yield at which rotation L21's cloud flies apart by its moments, beside a ball of its density."""
+    """Yield the critical rotation of L21's cloud from its second moments, and from a ball of its density."""
     for d in DIAMETERS:
         start = scene(diameter=d, rotation=ROTATIONS[1], magnetisation=0.0).start()
         mass, place = start["mass"][1:], start["position"][1:]
-        # That of the ball with the second moments of the lattice.
+        # The radius of the ball with the second moments of the lattice.
         radius = np.sqrt(5 / 3 * np.average((place**2).sum(axis=1), weights=mass))
         density = mass.sum() / (4 / 3 * np.pi * radius**3)
         turns = critical_spin(density)
         expected = critical_spin(mean_density(d, SPACING, DENSITY))
-        yield Check(f"{1e2 * d:g} cm: spin that parts the cloud, urad/s", 1e6 * turns, 1e6 * expected, 2.0)
+        yield Check(f"{1e2 * d:g} cm: critical spin of the cloud, urad/s", 1e6 * turns, 1e6 * expected, 2.0)
 
 
 def of_conservation(runs: Sequence[CloudRun]) -> Iterator[Check]:
-    """Yield how well momenta are kept by gravity, contacts and magnetism, and that energy is lost."""
+    """Yield the conservation of momenta under gravity, contacts and magnetism, and the loss of energy."""
     momentum = max(_off(one, "momentum") for one in runs)
-    yield Check("momentum, change over the sum of magnitudes", momentum, 0.0, ROUNDING)
+    yield Check("momentum: largest change over the sum of magnitudes", momentum, 0.0, ROUNDING)
     angular = max(_off(one, "angular") for one in runs)
-    yield Check("angular momentum with spins, the same", angular, 0.0, ROUNDING)
+    yield Check("angular momentum: largest change over the sum of magnitudes", angular, 0.0, ROUNDING)
     gained = max(_gained(one) for one in of_magnetisation(runs, 0.0))
-    yield Check("0 A/m: largest gain of energy, over that of gravity", gained, 0.0, GAINED)
+    yield Check("0 A/m: largest gain of energy over gravitational energy", gained, 0.0, GAINED)
 
 
 def _off(run: CloudRun, name: str) -> float:
-    """Return the largest change of a momentum since the start over the sum of its magnitudes then."""
+    """Return the largest change of a momentum since the start over the initial sum of its magnitudes."""
     values = np.array([getattr(one, name) for one in run.conserved])
     return float(np.linalg.norm(values - values[0], axis=1).max() / getattr(run.conserved[0], f"{name}_sum"))
 
 
 def _gained(run: CloudRun) -> float:
-    """Return the largest rise of energy between looks, over the energy of gravity."""
+    """Return the largest rise of energy between samples, divided by the gravitational energy."""
     energy = np.array([one.energy for one in run.conserved])
     return float(np.diff(energy).max(initial=0.0) / abs(run.conserved[-1].gravity))
 
 
 def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
-    """Yield how fast grains agglomerate: the faster, the more they are magnetised (L21 section 4.2.2.1)."""
+    """Yield the rate of agglomeration, which increases with magnetisation (L21 section 4.2.2.1)."""
     for m in MAGNETISATIONS:
         group, theirs = of_magnetisation(runs, m), BOUND[m]
         for name, least, part in (("two or more", "some", theirs.some), ("over ten", "many", theirs.many)):
             mean = Mean.of([getattr(one.at(COMPARED), least) for one in group])
             beside = f"L21, 50 cm: {part:.3g}"
-            yield Shown(f"{m:g} A/m: of grains outside, in clusters of {name}", mean, beside)
-    # More by a grain of all, or more: no difference is no support.
+            yield Shown(f"{m:g} A/m: fraction of outside grains in clusters of {name}", mean, beside)
+    # A difference of at least one grain is required; equality does not support the claim.
     grain = 1 / len(runs[0].end["mass"])
     yield _difference(
-        "in clusters, 1190 less 0 A/m, of all grains", runs, lambda one: one.at(COMPARED).bound, least=grain
+        "fraction of all grains in clusters, 1190 minus 0 A/m",
+        runs,
+        lambda one: one.at(COMPARED).bound,
+        least=grain,
     )
     yield _difference(
-        "in clusters of those outside, 1190 less 0 A/m", runs, lambda one: one.at(COMPARED).some, least=grain
+        "fraction of outside grains in clusters, 1190 minus 0 A/m",
+        runs,
+        lambda one: one.at(COMPARED).some,
+        least=grain,
     )
     weak = _difference(
-        "in clusters, 119 less 0 A/m, of all grains", runs, lambda one: one.at(COMPARED).bound, of=119.0
+        "fraction of all grains in clusters, 119 minus 0 A/m",
+        runs,
+        lambda one: one.at(COMPARED).bound,
+        of=119.0,
     )
     yield Shown(weak.name, weak.mean)
     for m in MAGNETISATIONS[1:]:
@@ -104,12 +114,15 @@ def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
             (f"at {COMPARED:.0f} s", [one.at(COMPARED).chain for one in group]),
             ("at the end", [one.agglomerations[-1].chain for one in group]),
         ):
-            yield Shown(f"{m:g} A/m: grains in a row, head to tail, {when}", Mean.of(chains))
+            yield Shown(f"{m:g} A/m: chain length in grains, {when}", Mean.of(chains))
 
 
 def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
-    """Yield how dense and long asteroids are at the end, and how much of the magnetisation of their grains
-    they have (L21 sections 4.2.2.2, 4.2.2.3, 4.6)."""
+    """Yield the density, elongation and bulk magnetisation of asteroids at the end.
+
+    The bulk magnetisation is compared with the magnetisation of the grains (L21 sections 4.2.2.2, 4.2.2.3,
+    4.6).
+    """
     for m in MAGNETISATIONS:
         asteroids = [one.asteroid for one in of_magnetisation(runs, m)]
         yield Shown(f"{m:g} A/m: density, kg/m^3", Mean.of([one.density for one in asteroids]))
@@ -118,7 +131,7 @@ def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
         name = f"{m:g} A/m: longest axis over shortest"
         yield Shown(name, Mean.of([one.elongation for one in asteroids]), beside)
     yield _difference(
-        "density, 1190 less 0 A/m, kg/m^3", runs, lambda one: one.asteroid.density, most=-LOOSER
+        "density, 1190 minus 0 A/m, kg/m^3", runs, lambda one: one.asteroid.density, most=-LOOSER
     )
     strong = of_magnetisation(runs, MAGNETISATIONS[-1])
     bulk = [MAGNETISATIONS[-1] * one.magnetised_part for one in strong]
@@ -132,6 +145,6 @@ def _difference(
     of: float = MAGNETISATIONS[-1],
     **bounds: float,
 ) -> Claim:
-    """Return the claim on a difference of magnetised clouds and of others from the same starts."""
+    """Return the claim on the difference between magnetised and unmagnetised clouds from the same starts."""
     pairs = zip(of_magnetisation(runs, of), of_magnetisation(runs, 0.0), strict=True)
     return Claim(name, Mean.of([value(a) - value(b) for a, b in pairs]), **bounds)

@@ -1,4 +1,5 @@
-"""Figures of the case coalescence: how clouds agglomerate, asteroids side by side, forces by size."""
+"""Figures of the case coalescence: agglomeration over time, final asteroids side by side, and forces by grain
+size."""
 
 from __future__ import annotations
 
@@ -35,17 +36,17 @@ from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
 SHELLS = 2
-"""Voronoi volumes are means over so many shells of equal volume; of so few grains those farther out, in
-more shells, have no cells within the asteroid."""
+"""Number of shells of equal volume over which Voronoi volumes are averaged. With few grains, the outer ones
+of more shells have no cells within the asteroid."""
 SEMI_AXES = ("semi_major_axis_m", "semi_intermediate_axis_m", "semi_minor_axis_m")
-"""The headings of those of the bounding ellipsoid."""
+"""Column headings of the semi-axes of the bounding ellipsoid."""
 NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
-"""Clouds are in open space."""
+"""Clouds have no box and no gravity."""
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """coalescence.png: what part of the grains is bound, in time; asteroids.png: the grains at the end,
-    coloured by cluster; forces.png: forces on a grain by size; coalescence.csv: what is measured of each."""
+    """coalescence.png: fraction of grains in clusters over time; asteroids.png: the final grains, coloured by
+    cluster; forces.png: forces on a grain by size; coalescence.csv: the measures of each cloud."""
     runs = clouds(SEEDS, progress, **of_all_magnetisations(size, SIZES))
     return {
         "coalescence.png": growth(runs),
@@ -56,8 +57,11 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def growth(runs: Sequence[CloudRun]) -> Figure:
-    """Draw the part of all grains in clusters of two or more and in the asteroid, in time (L21 Fig. 4.1), and
-    the Voronoi volumes at the end by shell (Fig. 4.6); thin lines are single clouds."""
+    """Draw the fractions of grains in clusters and in the asteroid over time, and the final Voronoi volumes.
+
+    Clusters have two or more grains (L21 Fig. 4.1). Voronoi volumes are drawn by shell (Fig. 4.6). Thin lines
+    are single clouds.
+    """
     figure = empty(11.6, 3.6)
     left, middle, right = figure.subplots(1, 3)
     for m, colour in zip(MAGNETISATIONS, AXIS_COLOURS, strict=True):
@@ -82,15 +86,15 @@ def growth(runs: Sequence[CloudRun]) -> Figure:
 
 
 def shells(run: CloudRun) -> np.ndarray:
-    """Return the mean Voronoi volume in shells of the asteroid at the end, over the volume of a grain."""
+    """Return the mean Voronoi volume in shells of the final asteroid, divided by the volume of a grain."""
     asteroid = run.asteroid
     volume = voronoi_by_shell(asteroid.grains["position"], asteroid.ellipsoid, SHELLS).volume
     return np.asarray(volume / (4 / 3 * np.pi * float(asteroid.grains["radius"].min()) ** 3))
 
 
 def asteroids(runs: Sequence[CloudRun]) -> Figure:
-    """Draw the grains of clouds at the end side by side, near the asteroid, coloured by cluster (L21 Figs
-    4.2, 4.4)."""
+    """Draw the final grains of clouds side by side, near the asteroid, coloured by cluster (L21 Figs 4.2,
+    4.4)."""
     figure = empty(11.6, 4.2)
     axes = figure.subplots(1, len(runs))
     grains = [one.asteroid.grains for one in runs]
@@ -105,8 +109,10 @@ def asteroids(runs: Sequence[CloudRun]) -> Figure:
 
 
 def close_up(axis: Axes, state: Arrays, grains: Arrays, square: tuple[float, float, float]) -> None:
-    """Draw the grains of a state that are in a square around the centre of mass of some of them, coloured by
-    cluster."""
+    """Draw the grains of a state within a square, coloured by cluster.
+
+    The square is centred on the centre of mass of ``grains``.
+    """
     left, bottom, side = square
     centred, colours = moved(state, grains), cluster_colours(clusters_of(state))
     right_up = project(centred["position"])[:, :2] - (left, bottom)
@@ -115,7 +121,7 @@ def close_up(axis: Axes, state: Arrays, grains: Arrays, square: tuple[float, flo
 
 
 def moved(state: Arrays, grains: Arrays) -> Arrays:
-    """Return a state in which the centre of mass of some grains is the origin."""
+    """Return a state shifted so that the centre of mass of some grains is the origin."""
     centre = np.average(grains["position"], axis=0, weights=grains["mass"])
     return {**state, "position": state["position"] - centre}
 
@@ -145,7 +151,7 @@ def forces() -> Figure:
 
 
 def table(runs: Sequence[CloudRun]) -> str:
-    """Return what is measured of each cloud at the end as CSV."""
+    """Return the measures of each cloud at the end as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(

@@ -1,4 +1,4 @@
-"""What is measured of a cloud of grains and of the asteroid in it."""
+"""Measures of a cloud of grains and of the asteroid in it."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from tisim.analysis import (
 from tisim.scene.initial_state import Arrays
 
 GAP = 0.01
-"""Grains count as bound whose surfaces are at most so far apart, over the smallest diameter."""
+"""Largest gap between the surfaces of bound grains, in units of the smallest diameter."""
 CLUMP = 11
-"""A clump has more than ten grains."""
+"""Least number of grains in a clump: more than ten."""
 
 
 def clusters_of(state: Arrays) -> np.ndarray:
-    """Return the cluster that each grain is in, as contacts bind them; shape (n,)."""
+    """Return the cluster of each grain, as connected by contacts; shape (n,)."""
     radius = state["radius"]
     gap = GAP * 2 * float(radius.min())
     return labels(len(radius), contacts(state["position"], radius, gap))
 
 
 def body(cluster: np.ndarray, mass: np.ndarray) -> np.ndarray:
-    """Return which grains are in the heaviest cluster, the asteroid; shape (n,)."""
+    """Return a mask of the grains in the heaviest cluster, the asteroid; shape (n,)."""
     return np.asarray(cluster == np.bincount(cluster, mass).argmax())
 
 
@@ -45,8 +45,10 @@ def part(state: Arrays, some: np.ndarray) -> Arrays:
 
 
 def chain_length(state: Arrays) -> float:
-    """Return how many grains there are in a row in the chain that a grain is in, a mean over all grains but
-    the seed: those whose moments bind them head to tail; NaN without moments."""
+    """Return the mean number of grains along the chain of each grain, without the seed; NaN without moments.
+
+    A chain consists of grains whose moments bind them head to tail.
+    """
     radius = state["radius"]
     grains = part(state, radius == radius.min())
     if "moment" not in grains or not grains["moment"].any():
@@ -58,9 +60,13 @@ def chain_length(state: Arrays) -> float:
 
 @dataclass(frozen=True)
 class Gathering:
-    """How far a cloud has agglomerated: the part of all grains that are in the asteroid, and of the others
-    the parts that are in clusters of two or more and of more than ten, NaN where there are no others; and how
-    long chains are, in grains."""
+    """The progress of agglomeration in a cloud.
+
+    coalesced : fraction of all grains that are in the asteroid.
+    some, many : fractions of the other grains in clusters of two or more and of more than ten; NaN without
+    other grains.
+    chain : mean length of chains, in grains.
+    """
 
     coalesced: float
     some: float
@@ -69,10 +75,10 @@ class Gathering:
 
     @classmethod
     def of(cls, state: Arrays) -> Gathering:
-        """Return that of a state."""
+        """Return the progress of agglomeration in a state."""
         cluster = clusters_of(state)
         inside = body(cluster, state["mass"])
-        # One grain by itself is no asteroid.
+        # A single grain is not an asteroid.
         inside &= inside.sum() > 1
         others = cluster[~inside]
         some, many = (fraction_in_clusters(others, least) for least in (2, CLUMP))
@@ -80,7 +86,7 @@ class Gathering:
 
     @property
     def bound(self) -> float:
-        """Return the part of all grains that are in clusters of two or more."""
+        """Return the fraction of all grains that are in clusters of two or more."""
         return self.coalesced + (0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.some)
 
 
@@ -93,23 +99,23 @@ class Asteroid:
 
     @classmethod
     def of(cls, state: Arrays) -> Asteroid:
-        """Return the asteroid in a state, which has two grains or more."""
+        """Return the asteroid in a state; it must have at least two grains."""
         grains = part(state, body(clusters_of(state), state["mass"]))
         return cls(grains, bounding_ellipsoid(grains["position"], grains["radius"]))
 
     @property
     def number(self) -> int:
-        """Return how many grains it has."""
+        """Return the number of its grains."""
         return len(self.grains["mass"])
 
     @property
     def elongation(self) -> float:
-        """Return the longest axis over the shortest."""
+        """Return the longest axis divided by the shortest."""
         return float(self.ellipsoid.semi_axes[0] / self.ellipsoid.semi_axes[2])
 
     @property
     def flattening(self) -> float:
-        """Return its width across z over its height along z, by the second moments of its spheres."""
+        """Return its width across z divided by its height along z, from the second moments of its spheres."""
         mass, radius, place = (self.grains[name] for name in ("mass", "radius", "position"))
         away = place - np.average(place, axis=0, weights=mass)
         x, y, z = np.average(away**2 + radius[:, None] ** 2 / 5, axis=0, weights=mass)
@@ -122,12 +128,12 @@ class Asteroid:
 
     @property
     def density(self) -> float:
-        """Return its mass over that volume, kg/m^3."""
+        """Return its mass divided by that volume, kg/m^3."""
         return float(self.grains["mass"].sum()) / self.volume
 
     @property
     def magnetisation(self) -> float:
-        """Return the sum of moments over that volume, A/m."""
+        """Return the magnitude of the total moment divided by that volume, A/m."""
         return float(np.linalg.norm(self.grains["moment"].sum(axis=0))) / self.volume
 
     @property
@@ -151,8 +157,12 @@ def _momentum(grains: Arrays) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Conserved:
-    """What isolated grains conserve, or lose by contacts: momentum (kg m/s) and angular momentum (kg m^2/s),
-    over the sums of the magnitudes of their parts; kinetic energy and that of gravity, J."""
+    """Quantities that isolated grains conserve, or lose by contacts.
+
+    momentum, angular : momentum (kg m/s) and angular momentum (kg m^2/s).
+    momentum_sum, angular_sum : sums of the magnitudes of their parts.
+    kinetic, gravity : kinetic and gravitational energy, J.
+    """
 
     momentum: np.ndarray
     angular: np.ndarray
@@ -163,7 +173,7 @@ class Conserved:
 
     @classmethod
     def of(cls, state: Arrays) -> Conserved:
-        """Return those of a state."""
+        """Return the conserved quantities of a state."""
         mass, radius, velocity = state["mass"], state["radius"], state["velocity"]
         inside = 0.4 * mass * radius**2
         spins = (state["spin"] ** 2).sum(axis=1)
@@ -179,5 +189,5 @@ class Conserved:
 
     @property
     def energy(self) -> float:
-        """Return kinetic energy and that of gravity, J."""
+        """Return the sum of kinetic and gravitational energy, J."""
         return self.kinetic + self.gravity

@@ -1,38 +1,38 @@
-"""What L21 has of its clouds and asteroids: section 4.2, each number once."""
+"""Published values of L21 for its clouds and asteroids: section 4.2, each number once."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 NUMBER, SPACING, SEED_DIAMETER = 32_662, 2.0, 5.0
-"""Grains of the cloud, the distance of neighbours on its lattice and the diameter of the seed particle, m;
-section 4.2.1.4."""
-DIAMETERS = (0.5, 1.0)
-"""Those of grains, m; table 4.1."""
-DENSITY, YOUNG, POISSON, RESTITUTION, SURFACE_ENERGY, FRICTION = 3000.0, 1e6, 0.3, 0.1, 2.86e-3, 0.4
-"""kg/m^3, Pa, J/m^2 and ratios; table 4.1."""
-ROLLING_FRICTION, ROLLING_DAMPING, ROLLING_STIFFNESS = 0.8, 0.4, 10.0
-"""mu_r, gamma_r and k_r of table 4.1, which has no units; taken as those of ``rolling_sds``, N s/m
-and N/m."""
-MAGNETISATIONS = (0.0, 119.0, 1190.0)
-"""A/m; table 4.1."""
-TEMPERATURE = 8e20
-"""The temperature of the cloud at the start is this times the cube of a grain's diameter, K/m^3; section
+"""Number of grains of the cloud, spacing of its lattice and diameter of the seed particle, m; section
 4.2.1.4."""
+DIAMETERS = (0.5, 1.0)
+"""Diameters of the grains, m; table 4.1."""
+DENSITY, YOUNG, POISSON, RESTITUTION, SURFACE_ENERGY, FRICTION = 3000.0, 1e6, 0.3, 0.1, 2.86e-3, 0.4
+"""Material constants of the grains, in kg/m^3, Pa, J/m^2 or as ratios; table 4.1."""
+ROLLING_FRICTION, ROLLING_DAMPING, ROLLING_STIFFNESS = 0.8, 0.4, 10.0
+"""mu_r, gamma_r and k_r of table 4.1, which has no units; interpreted as the parameters of ``rolling_sds``, N
+s/m and N/m."""
+MAGNETISATIONS = (0.0, 119.0, 1190.0)
+"""Magnetisations of the grains, A/m; table 4.1."""
+TEMPERATURE = 8e20
+"""Initial temperature of the cloud divided by the cube of a grain's diameter, K/m^3; section 4.2.1.4."""
 SPIN_MEAN, SPIN_DEVIATION = 5e-5, 1e-4
-"""Spins of grains at the start have this mean and deviation, rad/s; table 4.1. Each component is taken so."""
+"""Mean and standard deviation of the initial spins of grains, rad/s; table 4.1. They apply to each
+component."""
 ROTATIONS = (500e-6, 1000e-6, 2000e-6)
 """Angular velocities of the cloud as they are printed, rad/s; section 4.2.1.4."""
 DURATION = 15_000.0
-"""s; section 4.2.2.1."""
+"""Simulated time, s; section 4.2.2.1."""
 CUTOFF = 6.0
-"""Dipoles act within three diameters, in radii; section 4.2.1.2."""
+"""Cut-off of the dipole interaction, in radii (three diameters); section 4.2.1.2."""
 GASPRA = 93.0
-"""The magnetisation of an asteroid that a spacecraft has met, A/m; section 4.6."""
+"""The magnetisation of Gaspra, an asteroid that a spacecraft has visited, A/m; section 4.6."""
 
 
 class BoundParts(NamedTuple):
-    """What part of the grains that are not in the asteroid are in clusters of two or more, and of more than
+    """Fractions of the grains outside the asteroid that are in clusters of two or more, and of more than
     ten."""
 
     some: float
@@ -44,7 +44,7 @@ BOUND = {
     119.0: BoundParts(0.145, 0.01),
     1190.0: BoundParts(0.89, 0.45),
 }
-"""By magnetisation (A/m), of grains of 50 cm at 15 000 s; section 4.2.2.1."""
+"""Fractions by magnetisation (A/m), for grains of 50 cm at 15 000 s; section 4.2.2.1."""
 
 AXES = {
     (0.5, 500e-6, 0.0): (9.1738, 8.8680, 8.2030),
@@ -59,4 +59,5 @@ AXES = {
     (1.0, 1000e-6, 1190.0): (25.9366, 25.1804, 24.1899),
 }
 """Axes (m) of the bounding ellipsoid by diameter (m), angular velocity (rad/s) and magnetisation (A/m); table
-4.2. As all grains would fill a ball of a radius of 9.5 m (0.5) or 19 m (1.0) to 60 %, they are half axes."""
+4.2. They are half axes, because all grains would fill 60 % of a ball with a radius of 9.5 m (0.5) or 19 m
+(1.0)."""

@@ -1,4 +1,4 @@
-"""Clouds that are looked at on their way: as one batch, of several magnetisations and starts."""
+"""Runs of clouds in one batch, with several magnetisations and starts, sampled at regular times."""
 
 from __future__ import annotations
 
@@ -21,16 +21,21 @@ from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 
 CLOUD_LOOKS = 25
-"""A cloud is looked at so many times after the start, at even intervals."""
+"""Number of samples of a cloud after the start, at equal intervals."""
 SEEDS = 3
-"""There are so many random starts of each magnetisation."""
+"""Number of random starts of each magnetisation."""
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class CloudRun:
-    """What became of a cloud: its magnetisation (A/m) in L21's cloud and in this copy's, and at some times
-    (s) how far it was agglomerated and what it conserved; the state of its grains at the end."""
+    """The results of a cloud.
+
+    magnetisation : of the grains in L21's cloud, A/m. scale : ratio of the copy's magnetisation to it.
+    scene : of the run. times : of the samples, s.
+    agglomerations, conserved : progress of agglomeration and conserved quantities at these times.
+    end : state of the grains at the end.
+    """
 
     magnetisation: float
     scale: float
@@ -46,12 +51,12 @@ class CloudRun:
         return Asteroid.of(self.end)
 
     def at(self, time: float) -> Gathering:
-        """Return how far it was agglomerated when it was looked at next to a time (s)."""
+        """Return the progress of agglomeration at the sample closest to a time (s)."""
         return self.agglomerations[int(np.abs(self.times - time).argmin())]
 
     @property
     def magnetised_part(self) -> float:
-        """Return the magnetisation of the asteroid over that of its grains."""
+        """Return the magnetisation of the asteroid divided by the magnetisation of its grains."""
         return self.asteroid.magnetisation / (self.scale * self.magnetisation)
 
 
@@ -61,9 +66,9 @@ def looked_at(
     look: Callable[[Arrays], T],
     progress: Progress = lambda part: None,
 ) -> tuple[list[list[T]], list[Arrays]]:
-    """Run scenes as one batch; return what is seen of each at some times (s), and the states at the end.
+    """Run scenes as one batch; return the samples of each at given times (s), and the states at the end.
 
-    RunError where one fails.
+    look : computes a sample from a state. RunError if a run fails.
     """
     seen: list[list[T]] = [[] for _ in scenes]
     with closing(Simulation(scenes[0], len(scenes))) as simulation:
@@ -84,9 +89,9 @@ def clouds(
     looks: int = CLOUD_LOOKS,
     **settings: Any,
 ) -> list[CloudRun]:
-    """Return what becomes of clouds of each magnetisation (A/m), each from some starts.
+    """Return the results of clouds of each magnetisation (A/m), with several starts each.
 
-    settings : those of ``scene``. progress : is told the part that is done, 0..1.
+    settings : of ``scene``. progress : receives the completed fraction, 0..1.
     """
     wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
     scenes = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]
@@ -102,7 +107,7 @@ def clouds(
 
 
 def of_all_magnetisations(size: str, sizes: Mapping[str, Size]) -> dict[str, Any]:
-    """Return the settings of a size that is run with each magnetisation; InputError where it has its own."""
+    """Return the settings of a size that is run with each magnetisation; InputError if it has a fixed one."""
     some = [name for name, one in sizes.items() if "magnetisation" not in one.scene]
     rule = f"one that is run with each magnetisation ({', '.join(some)})"
     must(size in some, "size", rule, size)

@@ -1,11 +1,10 @@
-"""A cloud of magnetised grains falls together and becomes a rubble pile (L21 section 4.2).
+"""A cloud of magnetised grains collapses and becomes a rubble pile (L21 section 4.2).
 
-Grains on a lattice in a ball have thermal velocities, spins, a rotation as a whole, and moments along random
-directions, with a seed particle in the middle. What holds the pile is their gravity, DMT cohesion and
-dipoles.
+Grains start on a lattice in a ball around a seed particle. They have thermal velocities, spins, a common
+rotation, and moments in random directions. Gravity, DMT cohesion and dipole forces hold the pile together.
 
-Departures from L21: fewer grains, of which the cloud is a copy of L21's (``scaling.py``); a smaller seed;
-dipoles over all pairs, without a cut-off; and a slower rotation, as a cloud that turns as L21 prints it flies
+Departures from L21: fewer grains, in a scaled copy of L21's cloud (``scaling.py``); a smaller seed; dipoles
+over all pairs, without a cut-off; and a slower rotation, because a cloud with the printed rotation flies
 apart.
 """
 
@@ -41,19 +40,20 @@ from tisim.effects import (
 from tisim.effects.base import Effect
 from tisim.steppers import FixedStep, Verlet
 
-TITLE = "Magnetised grains fall together into a rubble pile"
+TITLE = "Magnetised grains coalesce into a rubble pile"
 
 IMPACT = 0.02
-"""The speed of an impact, m/s, whose duration steps are parts of: that of a fall on L21's asteroid of grains
+"""Speed, m/s, of the impact whose duration sets the step: the speed of a fall onto L21's asteroid with grains
 of 100 cm."""
 STEPS_OF_IMPACT = 25.0
-"""A step is one of so many parts of that duration."""
+"""Number of steps in that duration."""
 ROTATION = 5e-5
-"""The angular velocity of the cloud, rad/s; with it the pile turns at a third of the critical spin."""
+"""The angular velocity of the cloud, rad/s; the pile then turns at a third of the critical spin."""
 DEFAULT: Mapping[str, Any] = {"number": 180, "seed_diameter": 2.0}
-"""A laptop's cloud; the seed has the mass of eight grains of 180, L21's that of 125 of 32 662."""
+"""A cloud that a laptop can run; its seed has the mass of 8 of 180 grains, L21's seed that of 125 of 32
+662."""
 SMALL: Mapping[str, Any] = {"number": 60, "seed_diameter": 1.4}
-"""A third of it, seed and all."""
+"""A third of the grains, with the same mass ratio of the seed."""
 
 LAW = Granular(
     normal=HertzMaterial(),
@@ -64,7 +64,7 @@ LAW = Granular(
 )
 
 SIZES = {
-    "default": Size("180 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's cloud", DEFAULT),
+    "default": Size("180 grains of 100 cm, magnetised to 1190 A/m, in a scaled copy of L21's cloud", DEFAULT),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
     "small": Size("60 grains, and a seed with the same share of the mass", SMALL),
     "l21": Size(
@@ -72,7 +72,7 @@ SIZES = {
         {"rotation": published.ROTATIONS[1], "tree": True, "duration": published.DURATION},
     ),
     "l21_50cm": Size(
-        "the same of grains of 50 cm",
+        "the same with grains of 50 cm",
         {
             "diameter": DIAMETERS[0], "rotation": published.ROTATIONS[1], "tree": True,
             "duration": published.DURATION,
@@ -82,8 +82,10 @@ SIZES = {
 
 
 def lattice_ball(number: int, spacing: float, clear: float = 0.0) -> np.ndarray:
-    """Return so many sites (m) of a simple cubic lattice that are nearest to its middle, ``clear``
-    (m) or more from there; shape (number, 3)."""
+    """Return the ``number`` sites (m) of a simple cubic lattice nearest to its middle; shape (number, 3).
+
+    Sites closer to the middle than ``clear`` (m) are left out.
+    """
     half = math.ceil((3 * (number + 1) / (4 * math.pi)) ** (1 / 3) + clear / spacing) + 1
     sites = np.indices((2 * half + 1,) * 3).reshape(3, -1).T - half
     squares = (sites**2).sum(axis=1)
@@ -93,13 +95,16 @@ def lattice_ball(number: int, spacing: float, clear: float = 0.0) -> np.ndarray:
 
 
 def scale_of(number: int, of: int = published.NUMBER) -> float:
-    """Return by what a cloud of so many grains is smaller than one of more, ``of``, on the same lattice."""
+    """Return the ratio of radii of a cloud of ``number`` grains and a cloud of ``of`` grains on the same
+    lattice."""
     return (number / of) ** (1 / 3)
 
 
 def thermal_speed(diameter: float, mass: np.ndarray) -> np.ndarray:
-    """Return the standard deviation (m/s) of each component of the velocity of some masses (kg) at L21's
-    temperature of grains of a diameter (m)."""
+    """Return the standard deviation (m/s) of each velocity component for given masses (kg).
+
+    The temperature is L21's for grains of a diameter (m).
+    """
     return np.sqrt(Boltzmann * published.TEMPERATURE * diameter**3 / mass)
 
 
@@ -107,7 +112,8 @@ def grain_cloud(
     number: int, diameter: float, spacing: float, scale: float, seed_diameter: float, rotation: float,
     seed: int,
 ) -> Particles:  # fmt: skip
-    """Return a cloud, the seed particle first; without one where its diameter is 0. Its momentum is 0."""
+    """Return a cloud, the seed particle first; there is no seed if its diameter is 0. The total momentum is
+    0."""
     clear = (seed_diameter + diameter) / 2 if seed_diameter else 0.0
     position = lattice_ball(number, spacing, clear)
     radius = np.full(number, diameter / 2)
@@ -126,13 +132,15 @@ def grain_cloud(
 
 
 def young(scale: float, softened: float) -> float:
-    """Return Young's modulus (Pa) of grains of a cloud of a ``scale``, over ``softened``."""
+    """Return Young's modulus (Pa) of the grains in a cloud of a ``scale``, divided by ``softened``."""
     return scale * scale * published.YOUNG / softened
 
 
 def rubble(scale: float, softened: float = 1.0) -> Material:
-    """Return the material of grains of a cloud of a ``scale``, stresses by its square; Young's modulus over
-    ``softened`` besides."""
+    """Return the material of the grains in a cloud of a ``scale``; stresses are multiplied by its square.
+
+    Young's modulus is also divided by ``softened``.
+    """
     stress = scale * scale
     return Material(
         young=young(scale, softened),
@@ -147,7 +155,7 @@ def rubble(scale: float, softened: float = 1.0) -> Material:
 
 
 def step(diameter: float, scale: float, softened: float = 1.0, parts: float = STEPS_OF_IMPACT) -> float:
-    """Return a step (s): one of so many parts of the time of an impact of two grains at scale * IMPACT."""
+    """Return a step (s): the duration of an impact of two grains at scale * IMPACT, divided by ``parts``."""
     mass = sphere_mass(diameter, DENSITY)
     modulus = young(scale, softened) / (2 * (1 - POISSON**2))
     lasts = hertz_duration(scale * IMPACT, diameter / 4, reduced(mass, mass), modulus)
@@ -155,8 +163,11 @@ def step(diameter: float, scale: float, softened: float = 1.0, parts: float = ST
 
 
 def rubble_laws(magnetisation: float, tree: bool) -> tuple[Effect, ...]:
-    """Return what grains of a magnetisation (A/m) do to each other: by a ``tree``, and dipoles within L21's
-    cut-off; or over all pairs, which takes no longer where these are few."""
+    """Return the interactions of grains with a magnetisation (A/m).
+
+    With ``tree``, gravity is computed by a tree and dipoles have L21's cut-off. Without it, both are sums
+    over all pairs, which is no slower for few grains.
+    """
     sums: tuple[Effect, ...]
     if tree:
         sums = (TreeGravity(), TruncatedDipoleDipole(cutoff=published.CUTOFF))
@@ -180,13 +191,15 @@ def scene(
     seed: int = 0,
     name: str = "coalescence",
 ) -> Scene:
-    """Return a cloud that falls together.
+    """Return a cloud that collapses.
 
-    number : of grains, beside the seed particle. diameter : m. magnetisation : that of L21's cloud, A/m.
-    rotation : of the cloud, rad/s. seed_diameter : m; 0 for no seed particle. spacing : of the lattice, m.
-    of : grains of the cloud of L21 of which it is a copy. duration : s.
-    tree : whether gravity is by a tree, and dipoles have L21's cut-off; else both are over all pairs.
-    softened : what Young's modulus is divided by. parts : of the time of an impact that a step is one of.
+    number : of grains, without the seed particle. diameter : of the grains, m.
+    magnetisation : of the grains in L21's cloud, A/m. rotation : of the cloud, rad/s.
+    seed_diameter : m; 0 for no seed particle. spacing : of the lattice, m.
+    of : number of grains in the cloud of L21 of which this is a copy. duration : s.
+    tree : whether gravity is computed by a tree and dipoles have L21's cut-off; otherwise both are over all
+    pairs.
+    softened : divisor of Young's modulus. parts : number of steps in the duration of an impact.
     """
     scale = scale_of(number, of)
     return Scene(

@@ -1,4 +1,5 @@
-"""Magnetic colloids so concentrated that they form chains, drawn to a fibre (B16 section 6.4.6)."""
+"""Magnetic colloids in a concentration at which they form chains, attracted to a fibre (B16 section
+6.4.6)."""
 
 from __future__ import annotations
 

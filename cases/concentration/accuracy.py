@@ -1,5 +1,5 @@
-"""The quantities whose accuracy ``tisim cost`` measures in concentrated samples: chains, and where particles
-are, over random starts."""
+"""Quantities whose accuracy ``tisim cost`` measures in concentrated samples: chain length and particle
+positions, over random starts."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from tisim.accuracy.quantity import usual
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Return how long chains are, and how far particles get; before some tenths of a second nothing is
-    caught."""
+    """Return the chain length and the displacements of the particles; capture begins only after some tenths
+    of a second."""
     return (
         Quantity("mean chain", lambda result: chain(result.state, result.state["moment"]), random=True),
         *usual(scene),

@@ -1,4 +1,4 @@
-"""Figures of the case concentration: chains, and captured fractions in time."""
+"""Figures of the case concentration: chains, and captured fractions over time."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from tisim.plotting.style import empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
 SNAPSHOT: dict[str, Any] = {"number": 125, "duration": 2e-3}
-"""Snapshots are of runs with these settings."""
+"""Settings of the runs for the snapshots."""
 CONCENTRATIONS = (0.005, 0.5, 2.0)
-"""The concentrations that have a curve, g/mL."""
+"""Concentrations of the curves, g/mL."""
 CURVE_DURATION = 0.6
 """The simulated time that curves span, s."""
 CURVE_REPEATS, CURVE_FRAMES = 2, 90
-"""A curve is the mean over so many repeats, and has so many points."""
+"""Number of repeats averaged for a curve, and number of its points."""
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """chains.png: the particles at the end, and mean chain length and captured part in time."""
+    """chains.png: the particles at the end, and mean chain length and captured fraction over time."""
     every = list(trajectory)
     last = every[-1].arrays
     if "moment" not in last:
@@ -56,7 +56,8 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 
 def snapshot(axis: Axes, state: Arrays) -> None:
-    """Particles as seen along y, to scale; white those that are single, coloured by chain the others."""
+    """Draw the particles as seen along y, to scale; single particles are white, the others coloured by
+    chain."""
     position, moment, radius = state["position"], state["moment"], float(state["radius"][0])
     chains = labels(len(position), head_to_tail(position, moment, 2 * radius))
     single = np.bincount(chains)[chains] == 1
@@ -75,7 +76,7 @@ def snapshot(axis: Axes, state: Arrays) -> None:
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """snapshots.png (B16 Fig. 6.12); captured.png, captured.csv (Fig. 6.13), for all whatever ``size`` is."""
+    """snapshots.png (B16 Fig. 6.12); captured.png, captured.csv (Fig. 6.13); for any ``size``."""
     keys = [(size, c) for c in (0.5, 2.0) for size in (25, 75)]
     scenes = [concentration.scene(nanometres=n, concentration=c, **SNAPSHOT) for n, c in keys]
     figure = empty(8.8, 8.4)
@@ -94,7 +95,8 @@ Curves = Mapping[tuple[float, float], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def captured(progress: Progress) -> Curves:
-    """Times (s), part that touched the cylinder and part held by it, by angle (degrees) and g/mL."""
+    """Return times (s), fraction touching the cylinder and fraction held by it, by angle (degrees) and
+    g/mL."""
     keys = [(angle, c) for angle in (0.0, 90.0) for c in CONCENTRATIONS]
     settings = {**CAPTURE, "duration": CURVE_DURATION}
     scenes = [
@@ -118,7 +120,7 @@ def captured(progress: Progress) -> Curves:
 
 
 def captured_figure(curves: Curves) -> Figure:
-    """Longitudinal and transverse side by side."""
+    """Draw the longitudinal and the transverse orientation side by side."""
     figure = empty(10.4, 4.4)
     axes = figure.subplots(1, 2, sharey=True)
     for axis, angle in zip(axes, (0.0, 90.0), strict=True):
@@ -137,7 +139,7 @@ def captured_figure(curves: Curves) -> Figure:
 
 
 def table(curves: Curves) -> str:
-    """Return the captured fractions in time as CSV."""
+    """Return the captured fractions over time as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["angle_deg", "g_per_mL", "time_s", "touched", "held"])

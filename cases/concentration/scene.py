@@ -1,17 +1,18 @@
-"""Magnetic colloids so concentrated that they form chains, drawn to a fibre (B16 section 6.4.6).
+"""Magnetic colloids in a concentration at which they form chains, attracted to a fibre (B16 section 6.4.6).
 
-Particles of B16 table 6.1 start in a cube 100 um beyond the end of a cylinder of L/D = 20, above its rim.
-Beside the pull of the cylinder they feel the dipole-dipole force of each other within 30 radii, Mie(30, 15)
-repulsion for hard spheres with eps = 100 k T, and, where the size asks for it, each other's flow.
+Particles of B16 table 6.1 start in a cube 100 um beyond the end of a cylinder of L/D = 20, above its rim. The
+forces on a particle are the pull of the cylinder, dipole-dipole forces within 30 radii, and Mie(30, 15)
+repulsion for hard spheres with eps = 100 k T. Some sizes include hydrodynamic interaction.
 
-The paper's side of the cube, cbrt(rho V_p / c), leaves out N; here it is cbrt(N rho V_p / c), in which N
-particles have the concentration c. It gives c in g/mL, and in the caption of Fig. 6.13 in mg/L; here it is
-g/mL. At 2 g/mL that is a volume fraction of 0.4; centres, not whole spheres, lie within the cube.
+The paper's side of the cube, cbrt(rho V_p / c), leaves out N; here it is cbrt(N rho V_p / c), so that N
+particles have the concentration c. The paper gives c in g/mL, and in the caption of Fig. 6.13 in mg/L; here
+it is g/mL. 2 g/mL is a volume fraction of 0.4. The centres of the spheres are inside the cube; the spheres
+may extend beyond it.
 
-Steps are as short as contacts ask for, not the cylinder: noise moves a particle by DIFFUSION radii in one,
-and forces by DRIFT. The distance of two of 75 nm that are bound then spreads by 0.03 of a diameter; it is
-0.008 with steps of a third of that, and 0.09 with three times as much, at which chains hold together all the
-same and are captured no later (``coarse``).
+Contacts limit the step, not the cylinder: in one step noise moves a particle by DIFFUSION radii, and forces
+by DRIFT radii. The distance of two bound particles of 75 nm then fluctuates by 0.03 of a diameter. With steps
+of a third it fluctuates by 0.008. With three times the step it is 0.09; the chains still hold together and
+are captured no later (``coarse``).
 """
 
 from __future__ import annotations
@@ -30,50 +31,52 @@ from tisim.steppers import Brownian, DriftLimit
 DENSITY = 5000.0
 """The density of particles, kg/m^3 (B16 section 6.4.6)."""
 ASPECT, DISTANCE, CUTOFF = 20.0, 100e-6, 30.0
-"""The cylinder's L/D; the way from its end to the cube, m; the cutoff of dipole forces, radii."""
+"""The cylinder's L/D; the distance from its end to the cube, m; the cut-off of dipole forces, radii."""
 WELL = 100 * Boltzmann * capture.TEMPERATURE
 """The depth eps of the Mie potential, J."""
 DRIFT, DIFFUSION = 0.05, 0.03
-"""Forces, and noise by its standard deviation, move a particle by so many radii in a step at most."""
+"""Largest displacement of a particle in a step, in radii: by forces, and by noise (standard deviation)."""
 FIELD_DIGITS = 5
-"""The field of the cylinder is tabulated to so many digits."""
+"""Number of digits in the table of the cylinder's field."""
 
 SIZES = {
     "default": Size("64 particles of 75 nm at 0.5 g/mL above a transverse cylinder, 10 ms", {}),
-    "25nm": Size("the same of 25 nm, which form no chains", {"nanometres": 25, "duration": 2e-3}),
+    "25nm": Size("the same with 25 nm, which form no chains, 2 ms", {"nanometres": 25, "duration": 2e-3}),
     "flow": Size(
-        "24 particles of 75 nm that feel each other's flow, until some are captured",
+        "24 particles of 75 nm with hydrodynamic interaction, until some are captured",
         {"number": 24, "hydrodynamics": "rotne-prager", "duration": 0.3, "coarse": 3.0},
     ),
     "paper": Size(
-        "500 of them, 1 s, as B16: days",
+        "500 of these, 1 s, as in B16; takes days",
         {"number": 500, "hydrodynamics": "rotne-prager", "duration": 1.0, "coarse": 3.0},
     ),
 }
 
 
 def side(number: int, radius: float, concentration: float) -> float:
-    """d = cbrt(N rho V_p / c) of the cube (m), for spheres of a radius (m) at c g/mL, 1000 kg/m^3."""
+    """Return the side of the cube (m), d = cbrt(N rho V_p / c), for spheres of a radius (m) at c g/mL, 1000
+    kg/m^3."""
     volume = 4 / 3 * np.pi * radius**3
     return float(np.cbrt(number * DENSITY * volume / (1e3 * concentration)))
 
 
 def coupling(nanometres: int) -> float:
-    """Gamma = mu_0 mu^2 / (2 pi d^3 k T), d the diameter (B16 Eq. 6.25)."""
+    """Return Gamma = mu_0 mu^2 / (2 pi d^3 k T), d the diameter (B16 Eq. 6.25)."""
     moment, diameter = capture.SATURATION_MOMENTS[nanometres], 2e-9 * nanometres
     return float(mu_0 * moment**2 / (2 * np.pi * diameter**3 * Boltzmann * capture.TEMPERATURE))
 
 
 def chain_length(nanometres: int, concentration: float) -> float:
-    """n = sqrt(phi e^(Gamma - 1)), phi = c / rho: particles of a chain in equilibrium (B16 Eq. 6.26)."""
+    """Return n = sqrt(phi e^(Gamma - 1)), phi = c / rho: particles of a chain in equilibrium (B16 Eq.
+    6.26)."""
     return float(np.sqrt(1e3 * concentration / DENSITY) * np.exp((coupling(nanometres) - 1) / 2))
 
 
 def longest(radius: float, coarse: float = 1.0) -> float:
-    """Step (s) in which a sphere of a radius (m) diffuses by ``coarse`` DIFFUSION radii.
+    """Return the step (s) in which a sphere of a radius (m) diffuses by ``coarse`` DIFFUSION radii.
 
-    What is at contact is not pushed far into the other before it feels that: with ``coarse`` of 5, 25 nm
-    particles at 2 g/mL soon lie so deep in each other that no step is short enough; with 3 they do not.
+    A longer step can push particles far into each other before the repulsion acts. With ``coarse`` of 5,
+    particles of 25 nm at 2 g/mL soon overlap so deeply that no step is short enough; with 3 they do not.
     """
     drag = 6 * np.pi * capture.VISCOSITY * radius
     return float((coarse * DIFFUSION * radius) ** 2 * drag / (2 * Boltzmann * capture.TEMPERATURE))
@@ -90,16 +93,16 @@ def scene(
     coarse: float = 1.0,
     seed: int = 0,
 ) -> Scene:
-    """Return a cube of particles at c g/mL, ``distance`` (m) beyond the end of a cylinder at an angle
-    (degrees).
+    """Return a cube of particles at c g/mL beyond the end of a cylinder at an angle (degrees) to the field.
 
-    coarse : noise and forces move a particle so many times as far in a step.
+    distance : between the cube and the end, m. coarse : factor on the displacements in a step by noise and
+    forces.
     """
     body = capture.fibre(capture.axis(angle), ASPECT)
     radius = nanometres * 1e-9
     half = side(number, radius, concentration) / 2
     axis = np.asarray(body.direction)
-    # Above the rim where it is nearest to the direction of the field.
+    # Above the point of the rim that is nearest to the direction of the field.
     outward = np.array([axis[2], 0.0, -axis[0]])
     centre = (body.length / 2 + distance + half) * axis + body.radius * outward
     low, high = centre - half - radius, centre + half + radius

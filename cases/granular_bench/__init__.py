@@ -1,4 +1,4 @@
-"""The tests of contacts that codes of grains are held to; a heap from a silo; calibration."""
+"""Standard tests of contacts in discrete element codes; a heap from a silo; calibration."""
 
 from __future__ import annotations
 

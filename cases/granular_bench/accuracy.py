@@ -1,5 +1,4 @@
-"""The quantities whose accuracy ``tisim cost`` measures in a draw-down test and in a bed, over random
-starts."""
+"""Quantities whose accuracy ``tisim cost`` measures in a draw-down test and in a bed, over random starts."""
 
 from __future__ import annotations
 
@@ -13,8 +12,8 @@ from tisim.operators import Passage
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths of grains are chaotic; what counts is what a laboratory would measure, and how deep they press
-    into each other."""
+    """Return the quantities that a laboratory would measure, and for a bed the largest overlap; the paths of
+    grains are chaotic."""
     if any(isinstance(effect, Passage) for effect in scene.effects):
         return (
             Quantity("discharge rate", discharge, random=True),

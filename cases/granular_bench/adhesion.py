@@ -1,6 +1,6 @@
-"""Two spheres that are drawn apart slowly, and what holds them: DMT, JKR and a liquid bridge.
+"""Two spheres that are drawn apart slowly, held by DMT adhesion, JKR adhesion or a liquid bridge.
 
-The spheres are so heavy that they go on as they began, whatever holds them.
+The spheres are so heavy that the adhesion does not change their speed.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from tisim.effects import DMT, JKR, CapillaryBridge, Effect, Granular, HertzMate
 from tisim.steppers import FixedStep, Verlet
 
 STICKY_RADIUS, STICKY_YOUNG, STICKY_POISSON = 1e-3, 1e7, 0.3
-"""m, Pa; of two equal spheres, whose R* is half of that."""
+"""Radius (m), Young's modulus (Pa) and Poisson's ratio of two equal spheres; R* is half the radius."""
 STICKY_MODULUS = STICKY_YOUNG / (2 * (1 - STICKY_POISSON**2))
 ENERGY = 0.05
 """Surface energy, J/m^2: half of the work of adhesion."""
 TENSION, ANGLE, VOLUME = 0.072, 0.4, 1e-12
 """The liquid's surface tension, N/m, contact angle, rad, and volume, m^3."""
 HELD_MASS = 1e9
-"""kg."""
+"""Mass of each sphere, kg."""
 PULL_LOOKS = 400
-"""So many steps, after each of which the force is looked at."""
+"""Number of steps; the force is sampled after each."""
 EFFECTS: dict[str, tuple[Effect, ...]] = {
     "dmt": (
         Granular(normal=HertzMaterial(), cohesion=DMT()),
@@ -39,24 +39,25 @@ EFFECTS: dict[str, tuple[Effect, ...]] = {
     ),
     "jkr": (Granular(normal=JKR()),),
 }
-"""What holds the two; the first two are of one structure."""
+"""The effects of each kind of adhesion; the first two have the same structure."""
 
 
 @dataclass(frozen=True)
 class Pull:
-    """A pull: overlaps (m, < 0 for a gap) and forces (N, < 0 where they pull), as two are drawn apart."""
+    """A pull: overlaps (m, < 0 for a gap) and forces (N, < 0 for attraction) while two spheres are drawn
+    apart."""
 
     overlap: np.ndarray
     force: np.ndarray
 
     @property
     def largest(self) -> float:
-        """Return the largest force that has held the two, N."""
+        """Return the largest attraction, N."""
         return float(-self.force.min())
 
     @property
     def ends(self) -> float:
-        """Return the gap (m) halfway between the last look at which something held and the one after."""
+        """Return the gap (m) halfway between the last sample with a force and the next one."""
         last = int(np.flatnonzero(self.force)[-1])
         return float(-(self.overlap[last] + self.overlap[last + 1]) / 2)
 
@@ -86,7 +87,7 @@ def drawn(name: str, begins: float, ends: float) -> Scene:
 
 
 def pulls(scenes: Sequence[Scene]) -> list[Pull]:
-    """Return what holds the spheres of some scenes of one structure, step by step."""
+    """Return the pulls of several scenes of one structure, sampled after each step."""
     seen: list[list[tuple[float, float]]] = [[] for _ in scenes]
     with closing(simulation_of(scenes)) as simulation:
         for _ in range(PULL_LOOKS):

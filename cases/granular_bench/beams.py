@@ -1,4 +1,4 @@
-"""A row of cemented spheres that is held at one end and loaded at the other: a beam that bends and breaks."""
+"""A row of cemented spheres, held at one end and loaded at the other: a beam that bends and breaks."""
 
 from __future__ import annotations
 
@@ -11,22 +11,26 @@ from tisim.sources import ElectricField
 from tisim.steppers import FixedStep, Verlet
 
 BEAD_RADIUS, BEAD_YOUNG, RATIO, STRENGTH, SHEAR_STRENGTH, BEAM_WIDTH = 0.01, 1e8, 2.0, 1e6, 8e5, 0.8
-"""m; of the cement: Pa, normal over shear stiffness, Pa, Pa, and its radius over that of the spheres."""
+"""Radius of the spheres, m. Of the cement: Young's modulus, Pa, ratio of normal to shear stiffness, tensile
+and shear strength, Pa, and its radius over the radius of the spheres."""
 BEAM_SIDE = 2 * BEAD_RADIUS
 CEMENT = BEAM_WIDTH * BEAD_RADIUS
 """The radius of the cement, m."""
 AREA, SECOND = np.pi * CEMENT**2, np.pi * CEMENT**4 / 4
 SPHERES = 6
-"""So many hang on one that is held."""
+"""Number of spheres in addition to the one that is held."""
 LOAD = 0.25
-"""N."""
+"""Load, N."""
 HELD_MASS, BEAD_MASS, DURATION = 1e9, 1e-2, 0.4
-"""kg, of the sphere that is held and of the others; s."""
+"""Mass of the held sphere and of the others, kg; duration, s."""
 
 
 def beam(load: float, spheres: int = SPHERES, rises: bool = False) -> Scene:
-    """Return a row of spheres along x, the last of which is pulled along y (N): from the start, or by a force
-    that rises slowly to that. The pull is that of an electric field on its charge."""
+    """Return a row of spheres along x with a load along y (N) on the last one.
+
+    The load is constant, or rises slowly to this value. It is the force of an electric field on the charge of
+    the last sphere.
+    """
     place = BEAM_SIDE * np.arange(spheres + 1)[:, None] * [1.0, 0.0, 0.0]
     mass, charge = np.full(spheres + 1, BEAD_MASS), np.zeros(spheres + 1)
     mass[0], charge[-1] = HELD_MASS, 1.0
@@ -54,13 +58,16 @@ def beam(load: float, spheres: int = SPHERES, rises: bool = False) -> Scene:
 
 
 def bends(load: float, spheres: int = SPHERES) -> tuple[float, float]:
-    """Return the deflection (m) of the end after Euler and Bernoulli; and that of a row of spheres, which
-    bends between them alone, 1/(4 n^2) less, and shears in each bond."""
+    """Return the deflection (m) of the end of an Euler-Bernoulli beam, and of a row of spheres.
+
+    The row bends only between its spheres, by 1/(4 n^2) less, and shears in each bond.
+    """
     smooth = beam_deflection(load, spheres * BEAM_SIDE, BEAD_YOUNG, SECOND)
     soft = BEAD_YOUNG / BEAM_SIDE / RATIO
     return smooth, smooth * (1 - 1 / (4 * spheres**2)) + spheres * load / (soft * AREA)
 
 
 def breaking_load(spheres: int = SPHERES) -> float:
-    """Return the load (N) at which the first bond breaks: sigma_c = P l r / I, l from the middle of it."""
+    """Return the load (N) at which the first bond breaks: sigma_c = P l r / I, l from the middle of that
+    bond."""
     return float(STRENGTH * SECOND / (CEMENT * (spheres - 0.5) * BEAM_SIDE))

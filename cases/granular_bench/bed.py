@@ -1,7 +1,7 @@
-"""A bed: stiff grains fall into a cup and come to rest, for ``tisim cost``, which softens them.
+"""A bed: stiff grains fall into a cup and come to rest; ``tisim cost`` softens the grains.
 
-What is asked of it is what a bed is asked for: how dense it is, how hard it pushes on the side of the cup,
-which goes by how friction is taken, and how deep grains press into each other.
+Its measured quantities are the density of the bed, the load on the side of the cup, which depends on the
+friction model, and the largest overlap of grains.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from tisim.geometry import CylindricalSurface, Plane
 from tisim.steppers import FixedStep, Verlet
 
 STIFF = 2e8
-"""Pa; glass has 5e10."""
+"""Young's modulus, Pa; glass has 5e10."""
 GRAINS = {"friction": 0.5, "rolling_friction": 0.1, "restitution": 0.5}
-"""What else its grains have."""
+"""The other properties of its grains."""
 IMPACT = 0.5
-"""The speed of an impact, m/s, whose duration steps are parts of: that of a fall from 13 mm."""
+"""Speed, m/s, of the impact whose duration sets the step: the speed of a fall from 13 mm."""
 SPARSE = 0.2
-"""The part of the space that grains fill at the start, before they fall."""
+"""Fraction of the space that is filled by grains at the start, before they fall."""
 STEPS_OF_IMPACT = 20.0
-"""A step is one of so many parts of that duration."""
+"""Number of steps in that duration."""
 MASS = DENSITY * np.pi / 6 * DIAMETER**3
-"""A grain of the mean size has this mass, kg."""
+"""Mass of a grain of the mean size, kg."""
 
 
 def impact_time(young: float) -> float:
-    """Return how long an elastic impact of two mean grains of a Young's modulus (Pa) lasts at IMPACT, s."""
+    """Return the duration of an elastic impact of two mean grains of a Young's modulus (Pa) at IMPACT, s."""
     modulus = young / (2 * (1 - POISSON**2))
     return float(hertz_duration(IMPACT, DIAMETER / 4, reduced(MASS, MASS), modulus))
 
 
 def linear_stiffness(young: float) -> float:
-    """Return the stiffness (N/m) of Hooke's spring whose impacts last as long as that one."""
+    """Return the stiffness (N/m) of a linear spring with the same duration of impact."""
     return reduced(MASS, MASS) * (np.pi / impact_time(young)) ** 2
 
 
@@ -60,15 +60,15 @@ def bed(
 ) -> Scene:
     """Return the scene of a bed.
 
-    number : of grains. cup : its radius, in diameters of a grain. duration : s. young : Pa. parts : of the
-    time of an impact that a step is one of.
+    number : of grains. cup : its radius, in diameters of a grain. duration : s. young : Pa.
+    parts : number of steps in the duration of an impact.
     """
     radius, height = cup * DIAMETER, number * DIAMETER / (6 * SPARSE * cup**2)
     material = grain_material(GRAINS, young)
     return Scene(
         name="granular_bench",
         particles=grains(number, radius, height),
-        # With a stiffness too, so that Hooke's law can be tried beside Hertz's.
+        # With a stiffness too, so that Hooke's law can be compared with Hertz's.
         materials={"grain": material.model_copy(update={"stiffness": three_digits(linear_stiffness(young))})},
         effects=(
             LAW,
@@ -86,7 +86,7 @@ def bed(
 
 
 def side_load(result: Result) -> float:
-    """Return how hard the grains push on the side of the cup at the end, over their weight."""
+    """Return the outward force of the grains on the side of the cup at the end, divided by their weight."""
     state = result.state
     outward = state["position"][:, :2] / np.linalg.norm(state["position"][:, :2], axis=1, keepdims=True)
     push = -float((state["side_loads"][:, :2] * outward).sum())
@@ -94,5 +94,5 @@ def side_load(result: Result) -> float:
 
 
 def centre_height(result: Result) -> float:
-    """Return the height of the centre of gravity at the end, m: how dense the bed is."""
+    """Return the height of the centre of mass at the end, m; it measures the density of the bed."""
     return float(np.average(result.state["position"][:, 2], weights=result.state["mass"]))

@@ -1,8 +1,7 @@
-"""Draw-down tests of grains that differ in one property, and of silos with other outlets, as one batch, each
-from several random starts.
+"""Draw-down tests of grains that differ in one property, and of silos with other outlets, as one batch.
 
-The rate of discharge is held against Beverloo's law, W = C rho_b sqrt(g) (D - k d)^(5/2), by a straight line
-through W^(2/5): its slope has C and where it meets 0 has k.
+Each is run from several random starts. The rate of discharge is compared with Beverloo's law, W = C rho_b
+sqrt(g) (D - k d)^(5/2), by a straight line through W^(2/5): its slope gives C and its zero gives k.
 """
 
 from __future__ import annotations
@@ -34,19 +33,22 @@ VALUES = {
     "restitution": (0.3, 0.5, 0.8),
     "outlet": (5.0, 6.0, 7.0, 8.0, 9.0),
 }
-"""What is varied alone: of NATURAL, and the outlet of the silo in diameters of a grain."""
+"""Values of the varied properties: those of NATURAL, and the outlet of the silo in diameters of a grain."""
 STARTS = 4
-"""Each is run from so many random starts."""
+"""Number of random starts of each."""
 SHOWN = (("rolling_friction", 0.0), ("rolling_friction", 0.2), ("rolling_friction", 0.4))
-"""These are drawn as they lie."""
+"""Beds that are drawn as pictures."""
 PACKED = 0.6
-"""The part of the space that grains in the silo fill, for the bulk density in Beverloo's law."""
+"""Packing fraction of the grains in the silo, for the bulk density in Beverloo's law."""
 COLOURS = ("#4477aa", "#cc6677", "#228833")
 
 
 @dataclass(frozen=True)
 class Bed:
-    """A bed has what was varied and to what, and its results, one for each start."""
+    """The results of a bed, one for each start.
+
+    what : name of the varied property. value : of this property.
+    """
 
     what: str
     value: float
@@ -54,33 +56,35 @@ class Bed:
 
     @property
     def angle(self) -> Mean:
-        """Return the angle of repose, degrees; not a number where a start leaves no heap."""
+        """Return the angle of repose, degrees; NaN if a start leaves no heap."""
         return Mean.of([repose(result) for result in self.results])
 
     @property
     def rates(self) -> np.ndarray:
-        """Return the discharge rate of each start, kg/s; not a number where an arch has closed the silo."""
+        """Return the discharge rate of each start, kg/s; NaN if an arch has closed the silo."""
         return np.array([discharge(result) for result in self.results])
 
     @property
     def flowing(self) -> int:
-        """Return in how many starts no arch closes the silo before its rate is known."""
+        """Return the number of starts in which no arch closes the silo before its rate is known."""
         return int(np.isfinite(self.rates).sum())
 
     def mean_rate(self, power: float = 1.0) -> Mean:
-        """Return the mean of a power of the discharge rates (kg/s) of starts that flow; without an interval
-        where one alone does."""
+        """Return the mean of a power of the discharge rates (kg/s) of the starts that flow.
+
+        It has no interval if only one start flows.
+        """
         rates = self.rates[np.isfinite(self.rates)]
         return Mean.of(rates**power) if len(rates) else Mean(np.nan, np.nan)
 
     @property
     def kept(self) -> Mean:
-        """Return how many grains stay on the disc."""
+        """Return the number of grains that stay on the disc."""
         return Mean.of([heap(result).sum() for result in self.results])
 
 
 def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
-    """Run the beds of VALUES as one batch, those that are alike once."""
+    """Run the beds of VALUES as one batch; identical ones are run once."""
     wanted = [(what, value) for what, values in VALUES.items() for value in values]
     scenes = [
         scene({**NATURAL, what: value}, seed, **size)
@@ -98,8 +102,11 @@ def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
 
 
 def beverloo_constants(found: Sequence[Bed]) -> tuple[Mean, Mean]:
-    """Return C and k of Beverloo's law, means of fits to the first, second, ... start of each outlet. Those
-    that an arch has closed are left out, and starts with which fewer than two outlets flow."""
+    """Return C and k of Beverloo's law, as means of fits to the first, second, ... start of each outlet.
+
+    Starts in which an arch has closed the silo are left out of a fit; fits with fewer than two flowing
+    outlets are left out.
+    """
     outlets = np.array([one.value for one in found])
     flows = ((rates, np.isfinite(rates)) for rates in np.array([one.rates for one in found]).T)
     fits = [beverloo_fit(outlets[open_], rates[open_]) for rates, open_ in flows if open_.sum() > 1]
@@ -116,7 +123,7 @@ def beverloo_fit(outlets: np.ndarray, rates: np.ndarray) -> tuple[float, float]:
 
 
 def bed_figure(found: Sequence[Bed]) -> Figure:
-    """Draw three heaps, what angle and rate depend on, and Beverloo's law."""
+    """Draw three heaps, the dependence of angle and rate on the properties, and Beverloo's law."""
     figure = empty(11.6, 7.2)
     (first, second, angles), (third, rates, law) = figure.subplots(2, 3)
     chosen = [next(one for one in found if (one.what, one.value) == key) for key in SHOWN]
@@ -149,13 +156,13 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
 
 
 def bars(axis: Axes, values: Sequence[float], means: Sequence[Mean], **style: Any) -> None:
-    """Draw means by what was varied, with their 95 % intervals."""
+    """Draw means and their 95 % intervals against the varied property."""
     numbers, halves = [one.value for one in means], [one.half for one in means]
     axis.errorbar(values, numbers, halves, ms=5, capsize=2, elinewidth=0.8, **style)
 
 
 def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
-    """Draw the rate to the power 2/5 by the outlet, and the line of Beverloo's law."""
+    """Draw the rate to the power 2/5 against the outlet, and the line of Beverloo's law."""
     constant, empty_part = beverloo_constants(found)
     outlets = [one.value for one in found]
     line = np.linspace(empty_part.value, max(outlets), 50)
@@ -172,8 +179,11 @@ def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
 
 
 def table(found: Sequence[Bed]) -> str:
-    """Return what was varied, the angle of repose, the discharge rate of the starts that flow, and the grains
-    of the heap, each with half of its 95 % interval, and how many starts flow, as CSV."""
+    """Return the results of all beds as CSV.
+
+    Columns are the varied property, the angle of repose, the discharge rate of the starts that flow and the
+    number of grains in the heap, each with half of its 95 % interval, and the number of starts that flow.
+    """
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     measured = ("angle_of_repose_degrees", "discharge_rate_kg_s", "grains_of_the_heap")

@@ -1,4 +1,4 @@
-"""The tests of single contacts that codes of discrete elements are held to, each beside its expectation."""
+"""Standard tests of single contacts in discrete element codes, each compared with its expected value."""
 
 from __future__ import annotations
 
@@ -28,28 +28,29 @@ from tisim.cases.runs import sound
 from tisim import Scene, run
 
 BOUND = 1e-3
-"""How far an impact in 800 steps may be off, over the speed at which two approach."""
+"""Largest error of an impact in 800 steps, relative to the approach speed."""
 HALVES = (0.25, 0.5)
-"""Twice at which the speed of what is let go is looked at, s: what springs have taken up by then is over."""
+"""Two times after release at which the speed is sampled, s; the springs are fully loaded by the first."""
 SHEARED_FRACTIONS, RATIO_BOUND = (0.52, 0.56, 0.58), 0.07
-"""The cells that are sheared have these solid fractions, and mu of each may be so far from that of glass
+"""Solid fractions of the sheared cells, and the largest difference between their mu and that of glass
 beads."""
 RISE_BOUND = 0.5
-"""How far the rise of mu from the slowest to the fastest of the cells may be short of that of glass beads, in
-parts of the latter: one mu for all cells has none. Of three starts it was 1.4, 1.6 and 2.0 times as large, so
-nothing is asked of how far it is above."""
+"""Largest shortfall of the rise of mu from the slowest to the fastest cell, as a fraction of the rise for
+glass beads. A constant mu has no rise. In three starts the rise was 1.4, 1.6 and 2.0 times as large, so there
+is no upper limit."""
 COARSE = 4000
-"""Steps of an impact in NumPy that a run is held against."""
+"""Number of steps of an impact in the NumPy reference."""
 
 
 def rebounds(impacts: Sequence[ParticleImpact]) -> list[Rebound]:
-    """Return what becomes of some impacts, run as one batch."""
+    """Return the rebounds of several impacts, run as one batch."""
     results = sound(run([impact.scene() for impact in impacts]))
     return [rebound(impact, result) for impact, result in zip(impacts, results, strict=True)]
 
 
 def check() -> Iterator[Check]:
-    """Yield the tests of Chung and Ooi (2011), friction, rolling and rest, adhesion, a beam, a shear cell."""
+    """Yield the tests of Chung and Ooi (2011), friction, rolling and rest, adhesion, a beam, and a shear
+    cell."""
     everything = [impact for test in particle_tests.TESTS.values() for impact in test]
     found = dict(zip(everything, rebounds(everything), strict=True))
     yield from normal_impacts(found)
@@ -61,7 +62,7 @@ def check() -> Iterator[Check]:
 
 
 def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
-    """Yield tests 1 to 3: Hertz's force, depth and time, the rebound, and coefficients of restitution."""
+    """Yield tests 1 to 3: Hertz's force, depth and duration, the rebound, and coefficients of restitution."""
     elastic = particle_tests.ELASTIC + particle_tests.ELASTIC_PLANE
     for impact, curve in zip(elastic, force_curves(elastic), strict=True):
         what = f"{impact.substance}, {'two spheres' if impact.partner == 'twin' else 'at a plane'}"
@@ -69,27 +70,29 @@ def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
         depth = float(hertz_depth(*impact.hertz))
         peak = float(hertz_force(depth, radius, modulus))
         yield Check(f"1, 2: largest force, {what} (N)", float(curve.force.max()), peak, BOUND * peak)
-        yield Check(f"1, 2: depth, {what} (m)", float(curve.overlap.max()), depth, BOUND * depth)
+        yield Check(f"1, 2: largest overlap, {what} (m)", float(curve.overlap.max()), depth, BOUND * depth)
         duration = impact.duration
         yield Check(f"1, 2: duration, {what} (s)", curve.lasted, duration, BOUND * duration)
         off = np.abs(curve.force - hertz_force(curve.overlap, radius, modulus)).max() / peak
-        yield Check(f"1, 2: force against overlap, {what}: off by", float(off), 0.0, 1e-9)
-        yield Check(f"1, 2: speed after over before, {what}", found[impact].restitution, 1.0, BOUND)
+        yield Check(f"1, 2: force against overlap, {what}: largest deviation", float(off), 0.0, 1e-9)
+        yield Check(f"1, 2: speed of rebound over approach, {what}", found[impact].restitution, 1.0, BOUND)
     for impact in particle_tests.DAMPED:
         name = f"3: restitution, {impact.substance}, e = {impact.restitution:g}"
         yield Check(name, found[impact].restitution, impact.restitution, BOUND)
 
 
 def slides_throughout(impact: ParticleImpact) -> bool:
-    """Return whether a surface is so fast that it slides through all of an impact, with a margin for a
-    sphere that is elastic."""
+    """Return whether the surface slides throughout an impact, with a margin for an elastic sphere."""
     speed = abs(impact.sideways - impact.radius * impact.spin) / impact.speed
     return bool(speed > 1.15 * sliding_limit(impact.friction, impact.restitution))
 
 
 def oblique_checks(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
-    """Yield tests 4 to 8: where the surface slides throughout against the closed form, for rigid spheres up
-    to half of the depth over the radius; at all angles and spins against the law in NumPy."""
+    """Yield tests 4 to 8: comparisons with the closed form and with the NumPy reference.
+
+    The closed form holds for rigid spheres whose surface slides throughout; deviations up to half of the
+    depth over the radius are allowed. The reference covers all angles and spins.
+    """
     for number in (4, 5, 6, 7, 8):
         impacts = particle_tests.TESTS[number]
         velocity, spin = oblique_impacts(impacts, COARSE)
@@ -99,17 +102,18 @@ def oblique_checks(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
         turning = np.array([found[impact].spin[1] for impact in impacts])
         off = float((np.abs(along - velocity) / scale).max())
         yield Check(
-            f"{number}: velocity sideways, {len(impacts)} impacts: off from NumPy by", off, 0.0, BOUND
+            f"{number}: tangential velocity, {len(impacts)} impacts: deviation from NumPy", off, 0.0, BOUND
         )
         off = float((np.abs(turning - spin) * radius / scale).max())
-        yield Check(f"{number}: R times spin, the same: off from NumPy by", off, 0.0, BOUND)
+        yield Check(f"{number}: R times spin, same impacts: deviation from NumPy", off, 0.0, BOUND)
         for substance in dict.fromkeys(impact.substance for impact in impacts):
             some = [one for one in impacts if one.substance == substance and slides_throughout(one)]
             yield from sliding_checks(number, [found[impact] for impact in some])
 
 
 def sliding_checks(number: int, sliding: Sequence[Rebound]) -> Iterator[Check]:
-    """Yield what spheres of a test that slide throughout gain and lose, over mu (1 + e) v and 5/2 of that."""
+    """Yield the velocity and spin changes of sliding spheres, divided by mu (1 + e) v and 5/2 of that over
+    R."""
     gains = []
     for one in sliding:
         impact = one.impact
@@ -118,29 +122,34 @@ def sliding_checks(number: int, sliding: Sequence[Rebound]) -> Iterator[Check]:
         pushed, turned = abs(one.velocity[0] - impact.sideways), abs(one.spin[1] - impact.spin)
         gains.append((pushed / change, turned / turn))
     (pushed, turned), impact = np.mean(gains, axis=0), sliding[0].impact
-    what = f"{number}: {len(gains)} impacts of {impact.substance} that slide"
+    what = f"{number}: {len(gains)} impacts of {impact.substance} with sliding"
     excess = friction_excess(impact.restitution)
-    yield Check(f"{what}: loss over mu (1 + e) v", pushed, excess, BOUND)
+    yield Check(f"{what}: velocity loss over mu (1 + e) v", pushed, excess, BOUND)
     lever = impact.depth / impact.radius
     yield Check(f"{what}: spin over 5/2 mu (1 + e) v/R", turned, excess, BOUND + lever / 2 * excess)
 
 
 def friction_excess(restitution: float) -> float:
-    """Return the sum of |N| over that of N in an impact: damping pulls before surfaces part, and Coulomb's
-    limit goes by the size of the force, pull or push. 1 where nothing is lost; by NumPy, at a plane."""
+    """Return the ratio of the sums of |N| and N over an impact, from the NumPy reference, at a plane.
+
+    Damping pulls before the surfaces separate, and Coulomb's limit uses the magnitude of the force, so the
+    ratio exceeds 1. It is 1 without damping.
+    """
     one = ParticleImpact("glass", 1.0, 1e-3, restitution, 0.01, sideways=1.0)
     ((velocity,), _) = oblique_impacts([one], COARSE)
     return float((1.0 - velocity) / sliding_impact(1e-3, 0.01, restitution, 1.0)[0])
 
 
 def last_states(*scenes: Scene) -> list[dict[str, np.ndarray]]:
-    """Return the states at the ends of some scenes."""
+    """Return the final states of several scenes."""
     return [by_id(result) for result in sound(run(list(scenes)))]
 
 
 def friction_and_rest() -> Iterator[Check]:
-    """Yield a sphere that slides and comes to roll, rolls and stops, on a slope, between two planes; and a
-    column at rest."""
+    """Yield the motions of a sphere and a column at rest.
+
+    The sphere slides and begins to roll, rolls and stops, lies on a slope, and lies between two planes.
+    """
     m = motions
     steep = [m.on_slope(part * 3.5 * m.FRICTION) for part in m.SLOPES]
     rough = [m.on_slope(part * m.ROLLING_FRICTION, m.ROLLING_FRICTION, t) for part in m.HOLDS for t in HALVES]
@@ -152,32 +161,36 @@ def friction_and_rest() -> Iterator[Check]:
 
     lever = m.SPHERE_RADIUS - m.sunk() / 2
     speed = m.SPEED / (1 + 0.4 * m.SPHERE_RADIUS**2 / lever**2)
-    yield Check("slides and comes to roll: speed over the first (5/7)", rolling["velocity"][0, 0] / m.SPEED,
+    yield Check("sliding, then rolling: final over initial speed (5/7)", rolling["velocity"][0, 0] / m.SPEED,
                 speed / m.SPEED, BOUND)  # fmt: skip
     slip = rolling["velocity"][0, 0] - lever * rolling["spin"][0, 1]
-    yield Check("the same: velocity of its surface, m/s", float(slip), 0.0, BOUND)
+    yield Check("sliding, then rolling: surface velocity, m/s", float(slip), 0.0, BOUND)
     away = sliding_way(lever)
-    yield Check("the same: way, m", rolling["position"][0, 0], away, BOUND * away)
+    yield Check("sliding, then rolling: distance, m", rolling["position"][0, 0], away, BOUND * away)
     held_back = m.ROLLING_FRICTION * m.G / (lever / m.SPHERE_RADIUS + 0.4 * m.SPHERE_RADIUS / lever)
     expected = m.ROLL_SPEED - held_back * m.stops_after() / 2
-    yield Check("rolls, held back by mu_r R m g: speed halfway, m/s", slowed["velocity"][0, 0], expected,
+    yield Check("rolling against mu_r R m g: speed at half time, m/s", slowed["velocity"][0, 0], expected,
                 BOUND * m.ROLL_SPEED)  # fmt: skip
-    yield Check("the same: speed at the end, m/s", float(np.abs(stopped["velocity"]).max()), 0.0, BOUND)
+    yield Check(
+        "rolling against mu_r R m g: final speed, m/s", float(np.abs(stopped["velocity"]).max()), 0.0, BOUND
+    )
     way = m.ROLL_SPEED**2 / (2 * held_back)
-    yield Check("the same: way, m", stopped["position"][0, 0], way, 3 * BOUND * way)
+    yield Check("rolling against mu_r R m g: distance, m", stopped["position"][0, 0], way, 3 * BOUND * way)
 
     weight = results[3].measures["walls_force_z"]
     yield Check("a column at rest: force on the floor, N", weight, -m.COLUMN * m.WEIGHT, 1e-6 * m.WEIGHT)
     height = m.column_height()
     sunk = (2 * m.COLUMN - 1) * m.SPHERE_RADIUS - height
-    yield Check("the same: height of the top one, m", lying["position"][-1, 2], height, BOUND * sunk)
-    yield Check("the same: fastest, m/s", float(np.abs(lying["velocity"]).max()), 0.0, 1e-6)
+    yield Check(
+        "a column at rest: height of the top sphere, m", lying["position"][-1, 2], height, BOUND * sunk
+    )
+    yield Check("a column at rest: largest speed, m/s", float(np.abs(lying["velocity"]).max()), 0.0, 1e-6)
 
     for part, one, state in zip(m.SLOPES, steep, others[:4], strict=True):
         gx, _, gz = one.gravity
         rolls_down = part < 1
         pull = gx / (1 + 0.4) if rolls_down else gx + m.FRICTION * gz
-        name = f"on a slope of {part:g} times 7/2 mu: speed, {'5/7 g sin' if rolls_down else 'it slides'}"
+        name = f"on a slope of {part:g} times 7/2 mu: speed, {'5/7 g sin' if rolls_down else 'sliding'}"
         yield Check(f"{name}, m/s", state["velocity"][0, 0], pull * one.duration, 3 * BOUND * gx)
     ends = [
         (state["velocity"][0, 0], result.time) for state, result in zip(others[4:], results[8:], strict=True)
@@ -199,7 +212,8 @@ def friction_and_rest() -> Iterator[Check]:
 
 
 def sliding_way(lever: float) -> float:
-    """Return how far a sphere gets (m) that slides first and then rolls, in twice the time it slides."""
+    """Return the distance (m) of a sphere that first slides and then rolls, after twice the time until it
+    rolls."""
     m = motions
     slows = m.FRICTION * m.G
     until = m.SPEED / (slows * (1 + 2.5 * lever**2 / m.SPHERE_RADIUS**2))
@@ -208,7 +222,7 @@ def sliding_way(lever: float) -> float:
 
 
 def pull_offs() -> Iterator[Check]:
-    """Yield what holds two spheres that are drawn apart: DMT and a liquid bridge, then JKR."""
+    """Yield the adhesion of two spheres that are drawn apart: DMT and a liquid bridge, then JKR."""
     a = adhesion
     radius, rupture = a.STICKY_RADIUS / 2, bridge_rupture(a.ANGLE, a.VOLUME)
     stretch = jkr_stretch(a.ENERGY, radius, a.STICKY_MODULUS)
@@ -218,38 +232,41 @@ def pull_offs() -> Iterator[Check]:
     yield Check("pull-off, DMT: 4 pi gamma R* (N)", touching.largest, expected, BOUND * expected)
     expected = jkr_pull_off(a.ENERGY, radius)
     yield Check("pull-off, JKR: 3 pi gamma R* (N)", jkr.largest, expected, BOUND * expected)
-    yield Check("the same: gap at which it ends (m)", jkr.ends, stretch, 5e-3 * stretch)
+    yield Check("JKR: gap at which the contact ends (m)", jkr.ends, stretch, 5e-3 * stretch)
     curve = np.array([jkr_force(x, a.ENERGY, radius, a.STICKY_MODULUS) for x in jkr.overlap[jkr.force != 0]])
     off = float(np.abs(jkr.force[jkr.force != 0] - curve).max() / expected)
-    yield Check("the same: force against overlap: off by", off, 0.0, 1e-6)
+    yield Check("JKR: force against overlap: largest deviation", off, 0.0, 1e-6)
     wet = bridge_force(-bridge.overlap, 2 * radius, a.TENSION, a.ANGLE, a.VOLUME)
     gaps = (bridge.overlap < 0) & (bridge.force != 0)
     off = float(np.abs(bridge.force[gaps] + wet[gaps]).max() / wet.max())
-    yield Check("a liquid bridge: pull against gap, Willett et al.: off by", off, 0.0, 1e-9)
-    yield Check("the same: gap at which it ruptures (m)", bridge.ends, rupture, 5e-3 * rupture)
+    yield Check("liquid bridge: force against gap, Willett et al.: deviation", off, 0.0, 1e-9)
+    yield Check("liquid bridge: gap at rupture (m)", bridge.ends, rupture, 5e-3 * rupture)
 
 
 def beam_checks() -> Iterator[Check]:
-    """Yield how far a row of cemented spheres bends, and below and above which load it breaks."""
+    """Yield the deflection of a row of cemented spheres, and whether it breaks below and above its breaking
+    load."""
     most = beams.breaking_load()
     scenes = [beams.beam(beams.LOAD), *(beams.beam(part * most, rises=True) for part in (0.97, 1.03))]
     bent, whole, broken = last_states(*scenes)
     smooth, discrete = beams.bends(beams.LOAD)
     end = bent["position"][-1, 1]
-    yield Check("cantilever of 6 spheres: P l^3/(3 E I) between and shear in bonds (m)", end, discrete,
+    yield Check("cantilever of 6 spheres: deflection by bending and shear (m)", end, discrete,
                 3e-3 * discrete)  # fmt: skip
-    yield Check("the same over Euler and Bernoulli's P l^3/(3 E I)", end / smooth, 1.0, 0.08)
+    yield Check("cantilever: deflection over Euler and Bernoulli's P l^3/(3 E I)", end / smooth, 1.0, 0.08)
     for part, state, bonds in ((0.97, whole, beams.SPHERES), (1.03, broken, beams.SPHERES - 1)):
         count = (state["parallel_bond_past"] != 0).any(axis=1).sum()
-        yield Check(f"the same at {part:g} of its breaking load: bonds", float(count), bonds, 0.0)
+        yield Check(f"cantilever at {part:g} of its breaking load: number of bonds", float(count), bonds, 0.0)
 
 
 def shear_checks() -> Iterator[Check]:
-    """Yield the stress ratio of cells that are sheared, and its rise with I, beside those of glass beads."""
+    """Yield the stress ratio of sheared cells and its rise with I, compared with glass beads."""
     beds = sheared_beds(SHEARED_FRACTIONS)
     expected = expected_ratio(np.array([bed.inertial_number for bed in beds]))
     for bed, ratio in zip(beds, expected, strict=True):
         name = f"plane shear: mu at I = {bed.inertial_number:.2f}, Jop et al."
         yield Check(name, bed.ratio, float(ratio), RATIO_BOUND)
     rise, line = beds[0].ratio - beds[-1].ratio, float(expected[0] - expected[-1])
-    yield Check("the same: its rise is short of theirs by", max(0.0, line - rise), 0.0, RISE_BOUND * line)
+    yield Check(
+        "plane shear: shortfall of the rise of mu, Jop et al.", max(0.0, line - rise), 0.0, RISE_BOUND * line
+    )

@@ -1,4 +1,4 @@
-"""The figure of the tests of single contacts: what is run as points, what is expected as lines."""
+"""The figure of the tests of single contacts: runs as points, expected values as lines."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ from tisim.plotting.style import empty, letters, plain
 PANEL_COLOURS = ("#4477aa", "#cc6677", "#228833", "#aa7733", "#882255")
 RIGID: dict[str, Any] = {"color": "0.55", "ls": "--", "lw": 1.1}
 LAW_LINE: dict[str, Any] = {"color": "0.2", "ls": "-", "lw": 0.9}
-"""Lines of rigid spheres, and of the law in NumPy or its closed form."""
+"""Line styles of rigid spheres, and of the NumPy reference or its closed form."""
 Found = Mapping[ParticleImpact, Rebound]
-"""What has become of impacts."""
+"""Rebounds by impact."""
 CURVE_POINTS = 1000
-"""So many steps has an impact of the curves."""
+"""Number of steps of an impact in the curves."""
 
 
 def contact_figure() -> Figure:
-    """Run the tests of single contacts, and draw them beside what is expected."""
+    """Run the tests of single contacts, and draw them with the expected values."""
     figure = empty(11.6, 10.6)
     panels = figure.subplots(3, 3)
     (force, damped, tangential), (spin, fine, spinning), (rolling, pull, beam) = panels
@@ -67,7 +67,7 @@ def contact_figure() -> Figure:
 
 
 def force_against_overlap(axis: Axes) -> None:
-    """Draw tests 1 and 2, beside Hertz."""
+    """Draw tests 1 and 2, with Hertz's law."""
     elastic = particle_tests.ELASTIC + particle_tests.ELASTIC_PLANE
     for k, (impact, curve) in enumerate(zip(elastic, force_curves(elastic, 24), strict=True)):
         overlap = np.linspace(0, impact.depth, 200)
@@ -81,7 +81,7 @@ def force_against_overlap(axis: Axes) -> None:
 
 
 def by_substance(impacts: Iterable[ParticleImpact], found: Found) -> dict[str, list[Rebound]]:
-    """Return the rebounds of some impacts by what spheres are made of."""
+    """Return the rebounds of several impacts by the substance of the spheres."""
     groups: dict[str, list[Rebound]] = {}
     for impact in impacts:
         groups.setdefault(impact.substance.removesuffix(" 2"), []).append(found[impact])
@@ -98,11 +98,12 @@ def restitution(axis: Axes, found: Found) -> None:
 
 
 def oblique(tangential: Axes, spin: Axes, found: Found) -> None:
-    """Draw test 4: what is left of the tangential velocity, and the spin, by the angle of incidence."""
+    """Draw test 4: the fraction of the tangential velocity that remains, and the spin, by the angle of
+    incidence."""
     angles = np.linspace(1.0, 89.0, 89)
     tangent, mu = np.tan(np.radians(angles)), particle_tests.OBLIQUE["friction"]
     e, radius = particle_tests.OBLIQUE["restitution"], particle_tests.OBLIQUE["radius"]
-    # Without elasticity a surface slides throughout, or its speed is 0 at the end.
+    # Without tangential elasticity a surface slides throughout, or its final speed is 0.
     loss = np.minimum(mu * (1 + e), 2 / 7 * tangent)
     tangential.plot(angles, 1 - loss / tangent, **RIGID, label="rigid spheres")
     down = particle_tests.OBLIQUE_SPEED * np.cos(np.radians(angles))
@@ -130,7 +131,8 @@ def oblique(tangential: Axes, spin: Axes, found: Found) -> None:
 
 
 def tangential_speeds(axis: Axes, found: Found) -> None:
-    """Draw test 5: the surface's speed after the impact, by that before, over mu times the normal one."""
+    """Draw test 5: the surface's speed after the impact against its speed before, over mu times the normal
+    speed."""
     slide = np.linspace(0.1, 14, 100)
     unit = particle_tests.FINE_FRICTION * particle_tests.FINE_SPEED
     axis.plot(slide, np.maximum(slide - 7, 0), **RIGID, label="rigid spheres")
@@ -147,7 +149,7 @@ def tangential_speeds(axis: Axes, found: Found) -> None:
 
 
 def spins(axis: Axes, found: Found) -> None:
-    """Draw tests 6 to 8: the tangential velocity that a spin becomes, over the normal one."""
+    """Draw tests 6 to 8: the tangential velocity that results from a spin, over the normal speed."""
     tests = particle_tests.SPINNING_PLANE + particle_tests.SPINNING_TWINS + particle_tests.UNEQUAL
     e, mu = particle_tests.SPINNING["restitution"], particle_tests.SPINNING["friction"]
     speed, radius = particle_tests.SPINNING["speed"], particle_tests.SPINNING["radius"]
@@ -169,7 +171,7 @@ def spins(axis: Axes, found: Found) -> None:
 
 
 def slide_to_roll(axis: Axes) -> None:
-    """Draw the speeds of a sphere that slides, until it rolls."""
+    """Draw the speeds of a sphere that slides until it rolls."""
     one, end = motions.slides(), motions.roll_begins()
     rows = []
     with closing(simulation_of([one.scene()])) as simulation:
@@ -188,7 +190,7 @@ def slide_to_roll(axis: Axes) -> None:
 
 
 def pull_against_gap(axis: Axes) -> None:
-    """Draw what holds two spheres that are drawn apart."""
+    """Draw the forces between two spheres that are drawn apart."""
     a = adhesion
     radius, rupture = a.STICKY_RADIUS / 2, bridge_rupture(a.ANGLE, a.VOLUME)
     stretch = jkr_stretch(a.ENERGY, radius, a.STICKY_MODULUS)

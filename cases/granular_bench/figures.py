@@ -19,7 +19,7 @@ from tisim.errors import must
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """contact_tests.png: the tests of single contacts; beds.png, beds.csv: heaps and silos; shear_cell.png,
     shear_cell.csv: mu(I)."""
-    must(size != BED, "size", "that of a draw-down test", size)
+    must(size != BED, "size", "one of a draw-down test", size)
     found = beds(progress, dict(size_named(size, SIZES).scene))
     sheared = sheared_beds(FRACTIONS)
     return {

@@ -1,8 +1,9 @@
-"""Impacts of a sphere with a rigid plane or with another sphere, as the eight tests of Chung and Ooi (2011).
+"""Impacts of a sphere with a rigid plane or with another sphere, as in the eight tests of Chung and Ooi
+(2011).
 
-All are worlds of one structure: two materials, a sphere or two, and a plane, which is out of the way where
-spheres meet. Along z, the line of centres, they approach; the sphere that is looked at moves along x and
-spins about y. Steps are a part of the time that the elastic impact takes after Hertz.
+All impacts are worlds of one structure: two materials, one or two spheres, and a plane, which is far away if
+two spheres collide. They approach along z, the line of centres; the observed sphere also moves along x and
+spins about y. Steps are a fraction of the duration of the elastic impact by Hertz.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from tisim.steppers import FixedStep, Verlet
 
 HERTZ_MINDLIN = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
 STEPS = 800
-"""A step is this part of the time of an elastic impact."""
+"""Number of steps in the duration of an elastic impact."""
 LASTS = 4
-"""So many times that is simulated: a damped impact takes longer."""
+"""Simulated time in units of that duration; damped impacts take longer."""
 STIFFER = 1e9
-"""A rigid plane has so many times the Young's modulus of the sphere."""
+"""Ratio of Young's moduli of a rigid plane and the sphere."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,9 @@ class ParticleImpact:
     """An impact of a sphere of a substance and a radius (m), which approaches at a speed (m/s).
 
     sideways : velocity along x, m/s. spin : about y, rad/s; the surface at the contact moves by -R spin along
-    x. partner : "plane", rigid; "twin", an equal sphere that approaches as fast, with the same spin; or
-    another at rest, five times as wide and a thousand times as dense, "large", or "large rigid".
+    x.
+    partner : "plane", rigid; "twin", an equal sphere that approaches at the same speed with the same spin; or
+    "large" or "large rigid", a sphere at rest, five times as wide and a thousand times as dense.
     """
 
     substance: str
@@ -50,7 +52,7 @@ class ParticleImpact:
 
     @property
     def other_radius(self) -> float:
-        """Return the radius of what it meets, m; infinite for a plane."""
+        """Return the radius of the partner, m; infinite for a plane."""
         return {"plane": np.inf, "twin": self.radius}.get(self.partner, 5 * self.radius)
 
     @property
@@ -60,7 +62,7 @@ class ParticleImpact:
 
     @property
     def mass_ratio(self) -> float:
-        """Return the mass of what it meets over its own; infinite for a plane."""
+        """Return the mass of the partner divided by the mass of the sphere; infinite for a plane."""
         return {"plane": np.inf, "twin": 1.0}.get(self.partner, 1000.0 * 5**3)
 
     @property
@@ -81,21 +83,21 @@ class ParticleImpact:
 
     @property
     def hertz(self) -> tuple[float, float, float, float]:
-        """Return the relative speed, R*, m* and E* that Hertz's impact depends on."""
+        """Return the arguments of Hertz's impact: the relative speed, R*, m* and E*."""
         return self.approach, reduced(self.radius, self.other_radius), self.mass * self.share, self.modulus
 
     @property
     def depth(self) -> float:
-        """Return the greatest overlap after Hertz, m."""
+        """Return the largest overlap by Hertz, m."""
         return float(hertz_depth(*self.hertz))
 
     @property
     def duration(self) -> float:
-        """Return the time of the elastic impact after Hertz, s."""
+        """Return the duration of the elastic impact by Hertz, s."""
         return float(hertz_duration(*self.hertz))
 
     def scene(self) -> Scene:
-        """Return the impact as a scene, which begins where surfaces are about to touch."""
+        """Return the impact as a scene, which begins just before the surfaces touch."""
         r, other = self.radius, self.other_radius
         substance = SUBSTANCES[self.substance]
         position, velocity, spin = [[0.0, 0.0, r]], [[self.sideways, 0.0, -self.speed]], [[0, self.spin, 0.0]]
@@ -128,7 +130,8 @@ class ParticleImpact:
 
 @dataclass(frozen=True)
 class Rebound:
-    """What an impact has become: velocity (m/s) and spin (rad/s) of the sphere, and those of the other."""
+    """The result of an impact: velocity (m/s) and spin (rad/s) of the sphere, and the velocity of its
+    partner."""
 
     impact: ParticleImpact
     velocity: np.ndarray
@@ -137,12 +140,12 @@ class Rebound:
 
     @property
     def restitution(self) -> float:
-        """Return the speed at which the two part over that at which they approached."""
+        """Return the speed of separation divided by the speed of approach."""
         return float((self.velocity - self.other_velocity)[2] / self.impact.approach)
 
     @property
     def tangential_restitution(self) -> float:
-        """Return what is left of the velocity sideways, its part of what was."""
+        """Return the velocity along x after the impact divided by the velocity before."""
         return float(self.velocity[0] / self.impact.sideways)
 
     @property
@@ -152,7 +155,7 @@ class Rebound:
 
 
 def simulation_of(scenes: Sequence[Scene]) -> Simulation:
-    """Return a simulation with a world for each of some scenes of one structure, loaded."""
+    """Return a loaded simulation with a world for each scene; the scenes must have one structure."""
     capacity = max(scene.capacity() for scene in scenes)
     simulation = Simulation(scenes[0], len(scenes), capacity)
     simulation.load(list(scenes))
@@ -166,7 +169,7 @@ def by_id(result: Result) -> dict[str, np.ndarray]:
 
 
 def rebound(impact: ParticleImpact, result: Result) -> Rebound:
-    """Return what has become of an impact."""
+    """Return the rebound of an impact from its result."""
     state = by_id(result)
     other = state["velocity"][1] if impact.partner != "plane" else np.zeros(3)
     return Rebound(impact, state["velocity"][0], state["spin"][0], other)
@@ -174,7 +177,8 @@ def rebound(impact: ParticleImpact, result: Result) -> Rebound:
 
 @dataclass(frozen=True)
 class ForceCurve:
-    """A force curve has overlaps (m) and forces (N) of an impact at times (s), and how long it lasted, s."""
+    """The force curve of an impact: overlaps (m) and forces (N) at times (s), and the duration of contact,
+    s."""
 
     time: np.ndarray
     overlap: np.ndarray
@@ -183,7 +187,7 @@ class ForceCurve:
 
 
 def force_curves(impacts: Sequence[ParticleImpact], every: int = 4) -> list[ForceCurve]:
-    """Return the force curves of some impacts, looked at after so many steps each."""
+    """Return the force curves of several impacts, sampled after every ``every`` steps."""
     seen: list[list[tuple[float, float, float]]] = [[] for _ in impacts]
     with closing(simulation_of([impact.scene() for impact in impacts])) as simulation:
         for _ in range(int(1.5 * STEPS) // every):
@@ -196,7 +200,7 @@ def force_curves(impacts: Sequence[ParticleImpact], every: int = 4) -> list[Forc
     curves = []
     for rows in seen:
         time, overlap, force = np.array(rows).T
-        # They fly apart at a constant speed then.
+        # The speed is constant after contact, so the end of contact follows by extrapolation.
         since = overlap[-1] / ((overlap[-1] - overlap[-2]) / (time[-1] - time[-2]))
         curves.append(ForceCurve(time, overlap, force, float(time[-1] - since)))
     return curves

@@ -1,6 +1,6 @@
-"""Measured quantities with their uncertainties, which a calibration is to meet, as a file has them.
+"""Measured quantities with their uncertainties, read from a file as the target of a calibration.
 
-The file is CSV with a heading, in any order, a line each:
+The file is CSV with a heading and one quantity on each line, in any order:
 
     quantity,value,uncertainty
     angle_of_repose,24.5,1.0
@@ -8,10 +8,10 @@ The file is CSV with a heading, in any order, a line each:
     rebound_ratio,0.36,0.02
     sliding_angle,22.0,1.0
 
-Angles are in degrees, a discharge rate in kg/s. A rebound ratio is the height to which a grain rebounds from
-a plate over that of its fall; at a sliding angle a block of grains begins to slide on a plate. The
-uncertainty is one standard deviation, of the measurement and of what a simulation of so few grains can
-resolve.
+Angles are in degrees, a discharge rate is in kg/s. A rebound ratio is the height to which a grain rebounds
+from a plate divided by the height of its fall. A sliding angle is the slope of a plate at which a block of
+grains begins to slide. The uncertainty is one standard deviation; it includes the measurement error and the
+scatter of a simulation with few grains.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from tisim.files import regular_file
 QUANTITY_UNITS = {
     "angle_of_repose": "degrees", "discharge_rate": "kg/s", "rebound_ratio": "", "sliding_angle": "degrees",
 }  # fmt: skip
-"""The quantities that may be measured, and their units."""
+"""The supported quantities and their units."""
 HEADING = ["quantity", "value", "uncertainty"]
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measurement is a value and its uncertainty, one standard deviation, in the unit of the quantity."""
+    """A measurement: a value and its uncertainty, one standard deviation, in the unit of the quantity."""
 
     value: float
     uncertainty: float
@@ -45,7 +45,7 @@ class Measurement:
         must(sound, "uncertainty", "finite and above 0", self.uncertainty)
 
     def misfit(self, simulated: float) -> float:
-        """Return how far a simulated value is from it, squared, in uncertainties."""
+        """Return the squared difference between a simulated value and the measurement, in uncertainties."""
         return ((simulated - self.value) / self.uncertainty) ** 2
 
 
@@ -54,8 +54,10 @@ Measured = Mapping[str, Measurement]
 
 
 def table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[str]]]:
-    """Return the heading of a CSV file, one of some of three cells, and its lines; InputError where it is no
-    such file."""
+    """Return the heading of a CSV file, which must be one of ``headings``, and its lines of three cells each.
+
+    InputError if it is not such a file.
+    """
     other = regular_file.irregular(path)
     must(other is None, str(path), "a CSV file that can be read", Words(other or ""))
     try:
@@ -75,15 +77,18 @@ def table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[st
 
 
 def read(path: Path) -> dict[str, Measurement]:
-    """Return the measurements of a CSV file; InputError where it is none, or there is nothing in it."""
+    """Return the measurements of a CSV file; InputError if it is not CSV or contains none."""
     return measurements(path, table(path, HEADING)[1], QUANTITY_UNITS)
 
 
 def measurements(
     path: Path, rows: Sequence[Sequence[str]], units: Mapping[str, str]
 ) -> dict[str, Measurement]:
-    """Return the measurements of the lines of a file below its HEADING, of the quantities that have
-    ``units``; InputError where one is none, or there are none."""
+    """Return the measurements in the lines of a file below its HEADING.
+
+    units : by the names of the supported quantities. InputError if a line is not a measurement, or if there
+    is none.
+    """
     measured: dict[str, Measurement] = {}
     for name, *numbers in rows:
         if name not in units:

@@ -1,4 +1,4 @@
-"""What a draw-down test measures: the angle of repose of the heap and the discharge rate."""
+"""Measures of a draw-down test: the angle of repose of the heap and the discharge rate."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tisim.geometry import Disc
 from tisim.operators import Passage
 
 FALLING = 0.1
-"""What is faster falls, m/s: from half a millimetre on."""
+"""Speed above which a grain counts as falling, m/s: it is reached after half a millimetre."""
 FLANK_PART = (0.15, 0.9)
-"""Between these parts of the disc's radius the flank of the heap is taken."""
+"""Range of the heap's flank for the fitted slope, as fractions of the disc's radius."""
 CLOSED = 0.1
-"""A silo is closed if nothing passes for this part of its run, in which some eighty grains pass the narrowest
-that flows."""
+"""Fraction of the run without passage after which a silo counts as closed; in this time, about eighty grains
+pass the narrowest outlet that flows."""
 FEWEST = 20
-"""A heap has a flank, and so an angle, if so many grains lie on it at least."""
+"""Least number of grains on the flank of a heap for which an angle is measured."""
 
 
 def disc(result: Result) -> Disc:
@@ -37,15 +37,18 @@ def floor(result: Result) -> float:
 
 
 def heap(result: Result) -> np.ndarray:
-    """Return which grains lie on the disc or on others that do, and do not fall onto them; shape (n,)."""
+    """Return a mask of the grains that lie on the disc or on other grains there, without falling ones; shape
+    (n,)."""
     height, bottom = result.state["position"][:, 2], floor(result)
     speed = np.linalg.norm(result.state["velocity"], axis=1)
     return (height > bottom) & (height < bottom / 4) & (speed < FALLING)
 
 
 def surface(position: np.ndarray, diameter: float) -> np.ndarray:
-    """Return which grains at some places (m), shape (n, 3), have none above them within half a diameter (m)
-    sideways; shape (n,)."""
+    """Return a mask of the grains with none above them within half a diameter (m) sideways; shape (n,).
+
+    position : m, shape (n, 3).
+    """
     pairs = cKDTree(position[:, :2]).query_pairs(0.5 * diameter, output_type="ndarray").reshape(-1, 2)
     covered = np.where(position[pairs[:, 0], 2] < position[pairs[:, 1], 2], pairs[:, 0], pairs[:, 1])
     free = np.ones(len(position), bool)
@@ -54,11 +57,11 @@ def surface(position: np.ndarray, diameter: float) -> np.ndarray:
 
 
 def repose(result: Result) -> float:
-    """Return the angle of repose of the heap, degrees: the slope of a straight line, by least squares,
-    through the grains of its surface between FLANK_PART of the disc's radius; NaN where there are few.
+    """Return the angle of repose of the heap, degrees; NaN if there are too few grains.
 
-    The foot of a heap that fills its disc is at the rim, so that this is right of smaller heaps than
-    ``tisim.analysis.angle_of_repose`` takes, which finds where a heap ends.
+    It is the slope of a straight line, fitted by least squares to the surface grains between FLANK_PART of
+    the disc's radius. The foot of a heap that fills its disc is at the rim, so this works for smaller heaps
+    than ``tisim.analysis.angle_of_repose``, which determines the end of the heap.
     """
     position = result.state["position"][heap(result)]
     away = np.hypot(*position[:, :2].T) / disc_radius(result)
@@ -72,13 +75,15 @@ def repose(result: Result) -> float:
 
 
 def discharge(result: Result) -> float:
-    """Return the discharge rate in steady flow, kg/s; not a number where an arch has closed the silo."""
+    """Return the discharge rate in steady flow, kg/s; NaN if an arch has closed the silo."""
     return result.measures["passage_rate"] if flowed(result) else float("nan")
 
 
 def flowed(result: Result) -> bool:
-    """Return whether a silo flows on until the mass has passed that its discharge rate is of, or to the end:
-    an arch has closed one through which nothing has passed for the last CLOSED of its run."""
+    """Return whether a silo flows until the mass for its discharge rate has passed, or to the end of the run.
+
+    A silo counts as closed by an arch if nothing has passed during the last CLOSED of its run.
+    """
     passage = next(one for one in result.scene.effects if isinstance(one, Passage))
     names = ("passed_mass", "passage_rate", "passage_begin_mass", "passage_begin_time")
     passed, rate, first_mass, first_time = (result.measures[name] for name in names)

@@ -1,10 +1,11 @@
-"""An oblique impact under the law of Hertz and Mindlin, integrated by NumPy alone, at any angle.
+"""An oblique impact under the law of Hertz and Mindlin, integrated with only NumPy, at any angle.
 
-What slides throughout has a closed form; what sticks on the way has none, and this is what it is held
-against. A sphere of mass m and radius R, with I = 2/5 m R^2, meets what is m* and R* to it:
+Impacts with sliding throughout have a closed form; impacts with sticking have none, and this reference is
+used for them. A sphere of mass m and radius R, with I = 2/5 m R^2, meets a partner with which its m* and R*
+are formed:
 
     m* dv_n/dt = -N,    N = 4/3 E* sqrt(R*) delta^1.5 + c sqrt(S_n m*) v_n,    S_n = 2 E* sqrt(R* delta)
-    F = T + c sqrt(S_t m*) u,    dT/dt = S_t u + T dln(S_t)/dt where eased,    |F| <= mu N,    S_t = 8 G* a
+    F = T + c sqrt(S_t m*) u,   dT/dt = S_t u + T dln(S_t)/dt if S_t falls,   |F| <= mu N,   S_t = 8 G* a
     m du/dt = -(F / share) (1 + 5 L^2 / (2 R^2)),    L = R - delta / 2
 """
 
@@ -17,7 +18,7 @@ from tisim.cases.granular_bench.impacts import ParticleImpact
 from tisim.cases.granular_bench.substances import SUBSTANCES
 
 PROFILE_POINTS = 20_000
-"""So many steps are taken in the time of an elastic impact."""
+"""Number of steps in the duration of an elastic impact."""
 
 
 def shear_modulus(impact: ParticleImpact) -> float:
@@ -30,8 +31,11 @@ def shear_modulus(impact: ParticleImpact) -> float:
 def oblique_impacts(
     impacts: Sequence[ParticleImpact], steps: int = PROFILE_POINTS
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the velocities along x (m/s) and the spins about y (rad/s) after some impacts with a plane or a
-    twin, shape (impacts,) each; in half steps of velocity, as many ``steps`` as an elastic impact takes."""
+    """Return the velocities along x (m/s) and the spins about y (rad/s) after impacts, shape (impacts,) each.
+
+    The partners are planes or twins. The integration is a leapfrog with ``steps`` in the duration of an
+    elastic impact.
+    """
     r, m, e, friction, vx, spin = (
         np.array([getattr(one, name) for one in impacts])
         for name in ("radius", "mass", "restitution", "friction", "sideways", "spin")
@@ -39,7 +43,7 @@ def oblique_impacts(
     speed, radius, mass, modulus = np.array([one.hertz for one in impacts]).T
     shear = np.array([shear_modulus(one) for one in impacts])
     dt = np.array([one.duration for one in impacts]) / steps
-    # Twins move and spin alike, each against the other's surface.
+    # Twins have the same motion and spin, so the surfaces slide past each other at twice the speed.
     both = np.array([2.0 if one.partner == "twin" else 1.0 for one in impacts])
     logarithm = np.log(e)
     loss = -2 * np.sqrt(5 / 6) * logarithm / np.hypot(logarithm, np.pi)

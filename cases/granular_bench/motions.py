@@ -1,7 +1,7 @@
-"""One sphere on a plane or between two, and a column of spheres: sliding, rolling, sticking and lying still.
+"""One sphere on a plane or between two, and a column of spheres: sliding, rolling, sticking and rest.
 
-All are worlds of one structure, under gravity: planes, Hertz and Mindlin with friction, and resistance to
-rolling (``rolling_epsd``), which may be 0.
+All are worlds of one structure under gravity: planes, Hertz and Mindlin contacts with friction, and rolling
+resistance (``rolling_epsd``), which may be 0.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ ROLLING = Granular(
     normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
 )
 SPHERE_RADIUS, DENSITY, SPHERE_YOUNG, SPHERE_POISSON, G = 5e-3, 2500.0, 1e7, 0.3, 9.81
-"""m, kg/m^3, Pa, and m/s^2."""
+"""Radius, m, density, kg/m^3, Young's modulus, Pa, Poisson's ratio, and gravity, m/s^2."""
 SPHERE_MASS = DENSITY * 4 / 3 * np.pi * SPHERE_RADIUS**3
 WEIGHT = SPHERE_MASS * G
 SPHERE_MODULUS = SPHERE_YOUNG / (2 * (1 - SPHERE_POISSON**2))
-"""E* of two alike, Pa."""
+"""E* of two equal spheres, Pa."""
 MOTION_DT = 2e-5
-"""s."""
+"""Step, s."""
 SPEED, FRICTION = 1.0, 0.3
-"""m/s; of a sphere that slides."""
+"""Initial speed, m/s, and friction of a sliding sphere."""
 ROLL_SPEED, ROLLING_FRICTION = 0.2, 0.05
-"""m/s; of a sphere that rolls and is held back."""
+"""Initial speed, m/s, and rolling friction of a rolling sphere."""
 PRESSED = 2e-5
-"""The overlap of a sphere with each of two planes that hold it, m."""
+"""The overlap of a sphere with each of the two planes that hold it, m."""
 PUSH = float(hertz_force(PRESSED, SPHERE_RADIUS, SPHERE_MODULUS))
 """The force of each of these planes, N."""
 COLUMN = 10
-"""So many spheres lie on top of each other."""
+"""Number of spheres in the column."""
 SLOPES = (0.3, 0.95, 1.05, 2.0)
-"""Slopes over that from which on a sphere slides, 7/2 mu."""
+"""Slopes, divided by the slope above which a sphere slides, 7/2 mu."""
 HOLDS = (0.98, 1.02)
-"""Loads over what sticking, or resistance to rolling, can carry."""
+"""Loads, divided by the largest load that sticking, or rolling resistance, can carry."""
 FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 SLOT = (
     ((0.0, 0.0, -SPHERE_RADIUS + PRESSED), (0.0, 0.0, 1.0)),
@@ -59,7 +59,8 @@ SLOT = (
 
 @dataclass(frozen=True)
 class SphereMotion:
-    """A motion: places (m), velocities (m/s), spins (rad/s), gravity (m/s^2), planes, and its time (s)."""
+    """A motion: positions (m), velocities (m/s), spins (rad/s), gravity (m/s^2), planes, and its duration
+    (s)."""
 
     position: Sequence[Sequence[float]]
     duration: float
@@ -97,22 +98,22 @@ class SphereMotion:
 
 
 def sunk(push: float = WEIGHT) -> float:
-    """Return the overlap (m) of a sphere with a plane that it is pressed on (N)."""
+    """Return the overlap (m) of a sphere with a plane under a load (N)."""
     return float(hertz_overlap(push, SPHERE_RADIUS, SPHERE_MODULUS))
 
 
 def slides() -> SphereMotion:
-    """A sphere slides on the floor, until it rolls."""
+    """Return a sphere that slides on the floor until it rolls."""
     return SphereMotion(((0.0, 0.0, SPHERE_RADIUS - sunk()),), 2 * roll_begins(), velocity=(SPEED, 0.0, 0.0))
 
 
 def roll_begins() -> float:
-    """Return when a rigid sphere that slides comes to roll, s: 2 v / (7 mu g)."""
+    """Return the time at which a rigid sliding sphere begins to roll, s: 2 v / (7 mu g)."""
     return 2 * SPEED / (7 * FRICTION * G)
 
 
 def rolls() -> SphereMotion:
-    """A sphere rolls, held back by a couple mu_r R m g."""
+    """Return a sphere that rolls against a resisting couple mu_r R m g."""
     spin = (0.0, ROLL_SPEED / (SPHERE_RADIUS - sunk() / 2), 0.0)
     return SphereMotion(
         ((0.0, 0.0, SPHERE_RADIUS - sunk()),), 1.2 * stops_after(), velocity=(ROLL_SPEED, 0.0, 0.0),
@@ -121,12 +122,12 @@ def rolls() -> SphereMotion:
 
 
 def stops_after() -> float:
-    """Return when a rigid sphere that rolls has stopped, s: with 5/7 mu_r g it becomes slower."""
+    """Return the time at which a rigid rolling sphere has stopped, s; its deceleration is 5/7 mu_r g."""
     return 7 * ROLL_SPEED / (5 * ROLLING_FRICTION * G)
 
 
 def on_slope(tangent: float, rolling_friction: float = 0.0, duration: float = 0.1) -> SphereMotion:
-    """A sphere is let go on a slope."""
+    """Return a sphere that is released on a slope."""
     cosine = 1 / np.hypot(1, tangent)
     gravity = (G * tangent * cosine, 0.0, -G * cosine)
     return SphereMotion(
@@ -136,7 +137,7 @@ def on_slope(tangent: float, rolling_friction: float = 0.0, duration: float = 0.
 
 
 def held(part: float, duration: float = 0.1) -> SphereMotion:
-    """A sphere between two planes is pulled along them by a part of 2 mu N."""
+    """Return a sphere between two planes that is pulled along them with a fraction of 2 mu N."""
     return SphereMotion(
         ((0.0, 0.0, 0.0),), duration, gravity=(-part * 2 * FRICTION * PUSH / SPHERE_MASS, 0.0, 0.0),
         planes=SLOT, restitution=0.3,
@@ -144,14 +145,14 @@ def held(part: float, duration: float = 0.1) -> SphereMotion:
 
 
 def column() -> SphereMotion:
-    """Spheres lie on top of each other, and begin where they just touch."""
+    """Return spheres on top of each other that just touch at the start."""
     return SphereMotion(
         [(0.0, 0.0, (2 * k + 1) * SPHERE_RADIUS) for k in range(COLUMN)], 1.2, restitution=0.1
     )
 
 
 def column_height() -> float:
-    """Return the height (m) of the top sphere's centre in a column at rest, overlaps after Hertz."""
+    """Return the height (m) of the top sphere's centre in a column at rest, with overlaps by Hertz."""
     depths = [sunk(COLUMN * WEIGHT)]
     depths += [
         float(hertz_overlap((COLUMN - k) * WEIGHT, SPHERE_RADIUS / 2, SPHERE_MODULUS))

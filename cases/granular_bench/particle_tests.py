@@ -1,10 +1,10 @@
-"""The eight tests of Chung and Ooi (2011) at the level of particle impacts: which impacts each is made of.
+"""The eight tests of Chung and Ooi (2011) for particle impacts, as lists of impacts.
 
 1 elastic, two equal spheres. 2 elastic, a sphere and a rigid plane. 3 other coefficients of restitution at
 the plane. 4 oblique, one speed at several angles to the plane. 5 oblique, one normal velocity and several
-tangential ones. 6 a sphere that spins at the plane. 7 two equal spheres that spin alike, so that their
-surfaces slide past each other. 8 a sphere that spins and one at rest that is five times as wide and a
-thousand times as dense, rigid or of the same stiffness.
+tangential ones. 6 a spinning sphere at the plane. 7 two equal spheres with the same spin, so that their
+surfaces slide past each other. 8 a spinning sphere and one at rest that is five times as wide and a thousand
+times as dense, rigid or of the same stiffness.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ RESTITUTIONS = (0.2, 0.4, 0.6, 0.8, 1.0)
 IMPACT_ANGLES = (2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 60.0, 70.0, 80.0, 85.0)
 """The angles of incidence of test 4 to the normal, degrees."""
 SLIDES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0)
-"""The tangential velocities of test 5 over mu times the normal one."""
+"""The tangential velocities of test 5 over mu times the normal velocity."""
 SPINS = (0.2, 0.5, 0.9, 1.3, 2.0, 3.0, 4.0, 5.0, 7.0, 9.0, 12.0, 16.0, 22.0)
 """The spins of tests 6 to 8, rad/s."""
 SPINNING: dict[str, Any] = {"radius": 0.1, "speed": 0.2, "restitution": 0.5, "friction": 0.4}
@@ -35,14 +35,14 @@ def oblique(substance: str, angle: float) -> ParticleImpact:
 
 
 def sideways(substance: str, slide: float) -> ParticleImpact:
-    """Return an impact of test 5, of a tangential velocity over mu times the normal one."""
+    """Return an impact of test 5; slide : tangential velocity over mu times the normal velocity."""
     return ParticleImpact(
         substance, 1e-5, FINE_SPEED, friction=FINE_FRICTION, sideways=slide * FINE_FRICTION * FINE_SPEED
     )
 
 
 def spinning(substance: str, spin: float, partner: str) -> ParticleImpact:
-    """Return an impact of tests 6, 7 and 8, of a spin (rad/s)."""
+    """Return an impact of tests 6, 7 and 8 with a spin (rad/s)."""
     return ParticleImpact(substance, spin=spin, partner=partner, **SPINNING)
 
 

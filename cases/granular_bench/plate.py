@@ -1,10 +1,10 @@
-"""Two tests of single grains on a plate beside the silo, of the same material: one grain falls, one is drawn.
+"""Two tests of single grains on a plate beside the silo, of the same material: a falling and a pulled grain.
 
-The first begins at the plate with the speed of a fall and rebounds; how high tells the restitution. The
-second lies on the plate and is drawn over it without turning, as a block of grains that are glued together
-slides: the force along the plate over that on it is the tangent of the angle at which such a block begins to
-slide, as Coulomb's law has one coefficient here. Neither comes near the grains of the silo, and both cost no
-time.
+The first grain begins at the plate with the speed of a fall and rebounds; the height of its rebound depends
+on the restitution. The second lies on the plate and is pulled over it without rotation, as a block of glued
+grains slides. The ratio of the forces along and normal to the plate is the tangent of the angle at which such
+a block begins to slide, because Coulomb's law here has one coefficient. Both grains stay away from the grains
+of the silo and add no computing time.
 """
 
 from __future__ import annotations
@@ -22,19 +22,20 @@ from tisim.geometry import Disc
 from tisim.operators import PeakHeight
 
 FALL = 1.0
-"""The speed at which the first grain comes to the plate, m/s: that of a fall from 51 mm."""
+"""The initial speed of the first grain at the plate, m/s: the speed of a fall from 51 mm."""
 DRAWN, DROPPED = 1, 2
-"""The groups of the grain that is drawn and of the one that falls."""
+"""The groups of the pulled grain and of the falling grain."""
 ASIDE, PLATE_RADIUS = 20.0, 15.0
-"""The plate's centre is so far from the silo or from the disc, and it has this radius; in diameters."""
+"""Distance of the plate's centre from the silo or the disc, and radius of the plate, in diameters."""
 WAY, FROM_MIDDLE = 20.0, 5.0
-"""The second grain is drawn so far, and each is so far from the middle of the plate; in diameters."""
+"""Distance over which the second grain is pulled, and distance of each grain from the middle of the plate, in
+diameters."""
 PRESSED_PART = 0.01
-"""The second grain overlaps the plate by this part of its radius."""
+"""Overlap of the second grain with the plate, as a fraction of its radius."""
 
 
 def scene_with_plate(design: Mapping[str, float] = NATURAL, seed: int = 0, **settings: Any) -> Scene:
-    """Return a draw-down test with a plate beside it; the arguments are those of ``scene``."""
+    """Return a draw-down test with a plate beside it; the arguments are the same as for ``scene``."""
     test = scene(design, seed, **settings)
     walls = next(one for one in test.effects if isinstance(one, Walls))
     d, radius = DIAMETER, DIAMETER / 2
@@ -71,14 +72,16 @@ def scene_with_plate(design: Mapping[str, float] = NATURAL, seed: int = 0, **set
 
 
 def rebound(result: Result) -> float:
-    """Return the height of the rebound over that of the fall."""
+    """Return the height of the rebound divided by the height of the fall."""
     (height,) = result.state["peak_height"][result.state["group"] == DROPPED]
     return float(height / (FALL**2 / (2 * STANDARD_GRAVITY)))
 
 
 def sliding(result: Result) -> float:
-    """Return the angle (degrees) at which a block slides: its tangent is what resists the drawing over what
-    presses on the plate."""
+    """Return the angle (degrees) at which a block slides.
+
+    Its tangent is the ratio of the resisting force and the normal force of the pulled grain.
+    """
     (mass,) = result.state["mass"][result.state["group"] == DRAWN]
     measures = result.measures
     presses = measures["drawn_force_z"] + mass * STANDARD_GRAVITY

@@ -1,11 +1,13 @@
-"""The inverse problem of granular_bench: which grains give what was measured of them?
+"""The inverse problem of granular_bench: find grains that reproduce the measured quantities.
 
-A design is the friction, the rolling friction and the restitution of the grains. A draw-down test is run of
-it, with single grains on a plate beside it, and the misfit is the mean of the squared distances from what was
-measured, in uncertainties: where it is below 1, all is met within them. Each of the three needs a quantity
-that tells it: the rebound tells the restitution, the sliding angle the friction, and then the heap and the
-rate of discharge the rolling friction. Where less was measured designs that meet it lie on a line or in a
-region, and what a search names the best is one of them; how far designs that meet it spread is reported.
+A design is the friction, the rolling friction and the restitution of the grains. Its simulation is a
+draw-down test with single grains on a plate beside it. The misfit is the mean squared difference between
+simulation and measurement, in units of the uncertainties; below 1, the measurements are met within them.
+
+Each of the three parameters needs a quantity that determines it: the rebound determines the restitution, the
+sliding angle the friction, and the heap and the discharge rate then the rolling friction. With fewer
+measurements, the designs that meet them lie on a line or in a region, and the best design of a search is one
+of them. The spread of the designs that meet the measurements is reported.
 """
 
 from __future__ import annotations
@@ -42,17 +44,17 @@ SIMULATED = {
     "rebound_ratio": rebound,
     "sliding_angle": sliding,
 }
-"""How each quantity is had of a run."""
+"""The function that computes each quantity from a result."""
 KNOWN = {"friction": 0.4, "rolling_friction": 0.27, "restitution": 0.6}
-"""The design that is to be found again where no file is given."""
+"""The design that a search must recover if no file is given."""
 UNCERTAINTIES = {
     "angle_of_repose": 2.0,
     "discharge_rate": 0.02,
     "rebound_ratio": 0.02,
     "sliding_angle": 1.0,
 }
-"""How well each quantity is taken to be known, in its unit: heap and rate as one run of a few hundred grains
-resolves them, the others as they are measured."""
+"""Assumed uncertainty of each quantity, in its unit: for heap and rate the scatter of one run with a few
+hundred grains, for the others a typical measurement error."""
 MEASURED = {
     "default": {
         "angle_of_repose": 25.9,
@@ -67,34 +69,34 @@ MEASURED = {
         "sliding_angle": 21.8,
     },
 }
-"""What KNOWN has, by size: means over some starts, which ``tests/benchmarks/draw_down.py`` prints."""
+"""Quantities of KNOWN, by size: means over several starts, which ``tests/benchmarks/draw_down.py`` prints."""
 EXAMPLES: Mapping[str, Measured] = {
     size: {name: Measurement(value, UNCERTAINTIES[name]) for name, value in values.items()}
     for size, values in MEASURED.items()
 }
-"""What is to be met where no file is given."""
-MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
+"""The target if no file is given."""
+MEANINGS = {"misfit": "mean squared difference from the measurements, in uncertainties"}
 
 
 def other_runs(design: Mapping[str, float], size: str, starts: int) -> list[Scene]:
-    """Return runs of a design from so many starts that are others than those of a search."""
+    """Return runs of a design from a number of held-out starts."""
     settings = size_named(size, SIZES).scene
     return [scene_with_plate(design, OTHER_STARTS + k, **settings) for k in range(starts)]
 
 
 def problem(size: str = "default", variant: str = "calibrate") -> Problem:
-    """Return the calibration to what KNOWN has."""
+    """Return the calibration to the quantities of KNOWN."""
     searched_size(size, SIZES)
     return calibration_to(EXAMPLES[size], size, variant)
 
 
 def calibration(size: str, variant: str, path: Path) -> Problem:
-    """Return the calibration to the measurements of a CSV file, as ``measured`` has it."""
+    """Return the calibration to the measurements in a CSV file; ``measured`` describes its format."""
     return calibration_to(read(path), size, variant)
 
 
 def calibration_to(measured: Measured, size: str = "default", variant: str = "calibrate") -> Problem:
-    """Return the calibration to what was measured."""
+    """Return the calibration to given measurements."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     settings = searched_size(size, SIZES).scene
     plain = {name: [one.value, one.uncertainty] for name, one in sorted(measured.items())}

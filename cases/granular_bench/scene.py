@@ -1,10 +1,10 @@
-"""A draw-down test: grains flow out of a silo through an orifice, onto a disc, on which a heap remains.
+"""A draw-down test: grains flow out of a silo through an orifice onto a disc, where they form a heap.
 
-One test gives an angle of repose and a discharge rate, which neither alone tell sliding from rolling friction
-(T. Roessler, C. Richter, A. Katterfeld and F. Will, Powder Technol. 343 (2019) 803, for tests of this kind).
-Grains begin loose in the silo and fall on its flat bottom; the rate is taken once they are a bed. What falls
-off the disc is taken out. Grains are softer than they are, as is done: what that changes,
-``tisim cost granular_bench`` tells of a bed of them.
+One test gives an angle of repose and a discharge rate. Neither quantity alone separates sliding from rolling
+friction (T. Roessler, C. Richter, A. Katterfeld and F. Will, Powder Technol. 343 (2019) 803, for tests of
+this kind). Grains start loose in the silo and fall on its flat bottom; the rate is measured once they have
+formed a bed. Grains that fall off the disc are removed. As usual, the grains are softer than real ones;
+``tisim cost granular_bench`` shows the effect of softening on a bed.
 """
 
 from __future__ import annotations
@@ -32,19 +32,20 @@ from tisim.steppers import FixedStep, Verlet
 TITLE = "Standard tests of contacts, a heap of grains from a silo, and their calibration"
 
 DIAMETER, SPREAD, DENSITY = 5e-3, 0.1, 2500.0
-"""The mean diameter of the grains, m, by which part radii differ from it, and their density, kg/m^3."""
+"""The mean diameter of the grains, m, the relative half-width of the radius distribution, and their density,
+kg/m^3."""
 YOUNG, POISSON = 2e6, 0.25
-"""Pa; softened, as is usual: glass has 5e10."""
+"""Young's modulus, Pa, and Poisson's ratio; softened as usual: glass has 5e10 Pa."""
 DT = 3e-5
 """The step, s."""
 LOOSE = 0.3
-"""The part of the space that grains fill at the start, before they fall."""
+"""Fraction of the space that is filled by grains at the start, before they fall."""
 STEADY_PART = (0.35, 0.75)
-"""Between these parts of the grains in the silo that have passed the orifice flow is taken as steady."""
+"""Range of steady flow, as fractions of the grains that have passed the orifice."""
 ORIGIN = (0.0, 0.0, 0.0)
 """The middle of the silo's bottom, m."""
 NATURAL = {"friction": 0.5, "rolling_friction": 0.2, "restitution": 0.5}
-"""The design of a case that is run as it is."""
+"""The design of a scene that is run without a search."""
 
 LAW = Granular(
     normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
@@ -56,21 +57,21 @@ SEARCH_SETTINGS = {
 }  # fmt: skip
 SMALL_SEARCH_SETTINGS = {
     **SEARCH_SETTINGS, "generations": 14,
-    # One heap of so few grains tells its angle to 2 degrees only, and what is best by few heaps is best by
-    # luck: fresh ones decide.
+    # One heap with so few grains determines its angle only to 2 degrees, and the best design over a few
+    # heaps is partly best by chance: held-out starts decide.
     "ensemble": {"min_starts": 4, "confirm": 12},
 }  # fmt: skip
 
 BED = "bed"
-"""The size of the case that is no draw-down test, but a bed of stiff grains in a cup (``bed.py``)."""
+"""The size that is not a draw-down test, but a bed of stiff grains in a cup (``bed.py``)."""
 SIZES = {
     "default": Size("a draw-down test of 1500 grains; a heap on a disc of 16 diameters", {}, SEARCH_SETTINGS),
     "large": Size(
-        "the same of 8000 grains; a heap on a disc of 32 diameters",
+        "the same with 8000 grains; a heap on a disc of 32 diameters",
         {"number": 8000, "silo": 10.0, "outlet": 8.0, "disc": 16.0, "drop": 16.0, "duration": 3.0},
     ),
     "small": Size(
-        "the same of 600 softer grains; a heap on a disc of 12 diameters",
+        "the same with 600 softer grains; a heap on a disc of 12 diameters",
         {
             "number": 600,
             "silo": 4.5,
@@ -93,7 +94,7 @@ def grain_material(design: Mapping[str, float], young: float = YOUNG) -> Materia
 
 
 def grains(number: int, radius: float, length: float) -> Cloud:
-    """Return so many grains at random places in an upright cylinder on the origin; lengths in m."""
+    """Return ``number`` grains at random positions in an upright cylinder on the origin; lengths in m."""
     d = DIAMETER
     sizes = UniformSizes(by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2)
     return Cloud(
@@ -117,14 +118,15 @@ def scene(
 ) -> Scene:
     """Return a draw-down test.
 
-    design : friction, rolling_friction and restitution of all contacts. number : of grains. silo, disc :
-    their radii; outlet : its diameter; drop : from the silo's bottom to the disc, all in diameters of a
-    grain. duration : s. young : Pa. dt : s.
+    design : friction, rolling_friction and restitution of all contacts. number : of grains.
+    silo, disc : their radii; outlet : its diameter; drop : from the silo's bottom to the disc, all in grain
+    diameters.
+    duration : s. young : Pa. dt : s.
     """
     d = DIAMETER
     hole, radius, floor = outlet * d / 2, silo * d, -drop * d
     height = number * d / (6 * LOOSE * silo**2)
-    # The flat bottom is a cone that is all but flat.
+    # The flat bottom is a cone with a very small slope.
     below = (0.0, 0.0, -1e-3 * d)
     total = number * DENSITY * np.pi / 6 * d**3
     return Scene(

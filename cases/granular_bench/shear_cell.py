@@ -1,11 +1,12 @@
-"""A shear cell: grains between two rough walls, one of which moves along, without gravity; its mu(I).
+"""A shear cell: grains between two rough walls, one of which moves along the flow, without gravity; its
+mu(I).
 
-Walls are grains that are glued at unlike heights; along and across the flow the cell is periodic. The gap is
-fixed once it is closed, so that each cell has its solid fraction; pressure and shear stress are those on the
-walls, means over time. The flow is told by one number, the inertial number I = gamma d sqrt(rho / P), of
-which stress ratio mu = tau / P and solid fraction are functions: GDR MiDi, Eur. Phys. J. E 14 (2004) 341;
+Walls consist of fixed grains at different heights; the cell is periodic along and across the flow. After
+closing, the gap is fixed, so each cell has its solid fraction. Pressure and shear stress are time averages of
+the forces on the walls. The flow depends on one number, the inertial number I = gamma d sqrt(rho / P); the
+stress ratio mu = tau / P and the solid fraction are functions of it: GDR MiDi, Eur. Phys. J. E 14 (2004) 341;
 F. da Cruz, S. Emam, M. Prochnow, J.-N. Roux and F. Chevoir, Phys. Rev. E 72 (2005) 021309. The shear rate is
-that of the middle of the gap: slip at the walls does not count.
+measured in the middle of the gap, so slip at the walls has no effect on it.
 """
 
 from __future__ import annotations
@@ -34,26 +35,26 @@ from tisim.steppers import FixedStep, Verlet
 
 SHEARED_LAW = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
 SHEARED = Material(young=1e7, poisson=POISSON, restitution=0.5, friction=0.5)
-"""What grains and walls are made of: pressures are below a thousandth of Young's modulus."""
+"""The material of grains and walls; pressures are below a thousandth of Young's modulus."""
 CELL_LENGTH, CELL_WIDTH = 8, 5
 """Sides of the cell along and across the flow, in diameters."""
 CELL_SIDES = (CELL_LENGTH * DIAMETER, CELL_WIDTH * DIAMETER)
 CELL_AREA = CELL_SIDES[0] * CELL_SIDES[1]
-"""m, m^2."""
+"""Sides of the cell, m, and its area, m^2."""
 LOOSE_FRACTION = 0.26
-"""The part of the space between the walls that grains fill before the gap is closed."""
+"""Fraction of the space between the walls that is filled by grains before the gap is closed."""
 SHEAR_RATE = 10.0
-"""The speed of the upper wall over the gap, 1/s."""
+"""The speed of the upper wall divided by the gap, 1/s."""
 CLOSING, STRAIN_BEFORE, STRAIN = 1.0, 2.0, 4.0
-"""Strains while the gap is closed, before measuring, and of the mean."""
+"""Strains during closing, before the measurement, and during the measurement."""
 SAMPLES = 80
-"""The mean is one of so many looks."""
+"""Number of samples in the mean."""
 SHEAR_DT = 2.4e-5
-"""A step of the sheared cells takes so long, s."""
+"""Step of the sheared cells, s."""
 MIDDLE = (0.25, 0.75)
-"""Between these parts of the gap the shear rate and the solid fraction are taken."""
+"""Range of the gap in which the shear rate and the solid fraction are measured, as fractions of it."""
 BINS = 12
-"""The profile across the gap is of so many bins."""
+"""Number of bins of the profile across the gap."""
 FRICTION_LIMITS, CROSSOVER = (0.38, 0.64), 0.279
 """mu_s, mu_2 and I_0 of glass beads."""
 
@@ -69,8 +70,12 @@ def expected_ratio(inertial: np.ndarray | float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ShearedBed:
-    """A sheared bed has means over time: the gap (m), pressure and shear stress (Pa), and profiles of the
-    velocity (m/s) over the height (m); and the state of its grains at the end."""
+    """The measures of a sheared bed.
+
+    gap : m. pressure, shear_stress : time averages, Pa. fraction : solid fraction in the middle.
+    height, velocity : profile of the time-averaged velocity (m/s) over the height (m). state : of its grains
+    at the end.
+    """
 
     gap: float
     pressure: float
@@ -87,7 +92,7 @@ class ShearedBed:
 
     @property
     def filled(self) -> np.ndarray:
-        """Return which bins of the profile grains are in."""
+        """Return a mask of the profile bins that contain grains."""
         return np.isfinite(self.velocity)
 
     @property
@@ -109,23 +114,25 @@ class ShearedBed:
 
 
 def gap_of(number: int, fraction: float) -> float:
-    """Return the distance (m) of the centres of the walls in which grains fill a fraction of what their own
-    halves leave."""
+    """Return the distance (m) between the centres of the walls at which grains fill a fraction of the space.
+
+    The space excludes the halves of the wall grains.
+    """
     volume = number * np.pi / 6 * DIAMETER**3 * (1 + SPREAD**2)
     return float(volume / (fraction * CELL_AREA) + DIAMETER)
 
 
 def rough_wall(height: float) -> np.ndarray:
-    """Return centres (m) of the grains of a wall around a height, in rows, up and down by a quarter of a
+    """Return centres (m) of the grains of a wall at a height, in rows, displaced by up to a quarter of a
     diameter."""
     x, y = np.meshgrid(np.arange(CELL_LENGTH) + 0.5, np.arange(CELL_WIDTH) + 0.5, indexing="ij")
-    # Parts of the golden ratio: no two neighbours are at the same height, and no row is like another.
+    # Multiples of the golden ratio: no two neighbours have the same height, and no two rows are equal.
     up = (np.arange(CELL_LENGTH * CELL_WIDTH) * (np.sqrt(5) - 1) / 2) % 1 - 0.5
     return np.column_stack([x.ravel() * DIAMETER, y.ravel() * DIAMETER, height + 0.5 * DIAMETER * up])
 
 
 def loose(number: int, gap: float, seed: int) -> Arrays:
-    """Return the state of grains at random places between two walls that are far apart."""
+    """Return the state of grains at random positions between two walls that are far apart."""
     d, clear = DIAMETER, 0.75 * DIAMETER
     sizes = UniformSizes(by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2)
     cloud = Cloud(number=number, grains=[GrainClass(sizes=sizes, density=DENSITY)])
@@ -153,7 +160,7 @@ def loose(number: int, gap: float, seed: int) -> Arrays:
 def cell(
     state: Arrays, velocity: tuple[float, float, float], duration: float, law: Granular = SHEARED_LAW
 ) -> Scene:
-    """Return the scene of a cell from a state on; the upper wall moves at a velocity (m/s)."""
+    """Return the scene of a cell from a given state; the upper wall moves at a velocity (m/s)."""
     order = np.argsort(state["id"]) if "id" in state else slice(None)
     core = {name: state[name][order] for name in ("position", "velocity", "radius", "mass")}
     more = {name: state[name][order] for name in ("group", "spin")}
@@ -184,9 +191,9 @@ def sheared_beds(
     law: Granular = SHEARED_LAW,
     progress: Callable[[float], object] = lambda part: None,
 ) -> list[ShearedBed]:
-    """Shear a cell for each of some solid fractions, all as one batch; return what is measured of them.
+    """Shear a cell for each of several solid fractions, all as one batch, and return their measures.
 
-    number : of grains that move freely. progress : is told the part that is done, 0..1. RunError where a cell
+    number : of grains that move freely. progress : receives the completed fraction, 0..1. RunError if a cell
     fails.
     """
     wide, gaps = gap_of(number, LOOSE_FRACTION), [gap_of(number, part) for part in fractions]
@@ -224,14 +231,14 @@ def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
 
 
 def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]], state: Arrays) -> ShearedBed:
-    """Return the means over some looks at a cell with a gap (m), and its state at the end."""
+    """Return the means over the samples of a cell with a gap (m), and its state at the end."""
     scalars, sums, numbers = (np.array(one) for one in zip(*looks, strict=True))
     pressing, dragging, fraction = scalars.mean(axis=0)
     edges = np.linspace(0.0, gap, BINS + 1)
     count = numbers.sum(axis=0)
-    # No grain comes to the middle of a wall.
+    # Grains cannot reach the middle of a wall.
     velocity = np.where(count > 0, sums.sum(axis=0) / np.maximum(count, 1), np.nan)
-    # Each stress is the mean of those on both walls.
+    # Each stress is the mean over both walls.
     return ShearedBed(
         gap=gap,
         pressure=pressing / (2 * CELL_AREA),

@@ -1,5 +1,5 @@
-"""The figure of the shear cell: its grains, profiles of the velocity, mu(I), and the solid fraction; and its
-table."""
+"""The figure and the table of the shear cell: its grains, velocity profiles, mu(I), and the solid
+fraction."""
 
 from __future__ import annotations
 
@@ -18,13 +18,16 @@ from tisim.plotting.cloud import common, corners, panel
 from tisim.plotting.style import TIME, empty, letters, plain
 
 FRACTIONS = (0.45, 0.49, 0.52, 0.54, 0.56, 0.57, 0.58)
-"""Solid fractions between the walls of the cells that are drawn."""
+"""Solid fractions between the walls of the drawn cells."""
 
 
 def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
-    """Draw what sheared beds have: the grains of the one in the middle, velocity by height, mu by the
-    inertial number beside what is published, and the solid fraction, which da Cruz and others (2005) found to
-    fall as the inertial number grows."""
+    """Draw the results of sheared beds.
+
+    The panels are the grains of the middle bed, velocity by height, mu by the inertial number with the
+    published law, and the solid fraction, which decreases with the inertial number (da Cruz and others,
+    2005).
+    """
     figure = empty(9.6, 8.0)
     (grains, profile), (ratio, fraction) = figure.subplots(2, 2)
     sheared_grains(grains, beds[len(beds) // 2])
@@ -68,8 +71,11 @@ def sheared_grains(axis: Axes, bed: ShearedBed) -> None:
 
 
 def shear_table(beds: Sequence[ShearedBed]) -> str:
-    """Return the inertial number, the stress ratio as run and as published, the solid fraction, the pressure
-    and the shear rate of each bed as CSV."""
+    """Return the results of all beds as CSV.
+
+    Columns are the inertial number, the stress ratio as run and as published, the solid fraction, the
+    pressure and the shear rate.
+    """
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(

@@ -1,4 +1,4 @@
-"""What the spheres of the tests of Chung and Ooi (2011) are made of."""
+"""The substances of the spheres in the tests of Chung and Ooi (2011)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ SOURCE = "Y. C. Chung and J. Y. Ooi, Granul. Matter 13 (2011) 643-656, doi 10.10
 
 @dataclass(frozen=True)
 class Substance:
-    """A substance has a Young's modulus (Pa), a Poisson's ratio and a density (kg/m^3)."""
+    """A substance: Young's modulus (Pa), Poisson's ratio and density (kg/m^3)."""
 
     young: float
     poisson: float
@@ -17,7 +17,7 @@ class Substance:
 
     @property
     def rigid_modulus(self) -> float:
-        """Return E* of a sphere of it at a rigid plane, E / (1 - nu^2), Pa."""
+        """Return E* of a sphere of this substance at a rigid plane, E / (1 - nu^2), Pa."""
         return self.young / (1 - self.poisson**2)
 
 
@@ -34,4 +34,4 @@ SUBSTANCES = {
     "nylon": Substance(2.5e9, 0.40, 1000.0),
     "copper": Substance(1.2e11, 0.35, 8900.0),
 }
-"""By name; Chung and Ooi have two alloys of aluminium, the second from test 4 on."""
+"""Substances by name; Chung and Ooi have two alloys of aluminium, the second in test 4 and later tests."""

@@ -1,5 +1,5 @@
-"""The quantities whose accuracy ``tisim cost`` measures in a sheared cell, over random starts: shear stress,
-and how deep grains overlap."""
+"""Quantities whose accuracy ``tisim cost`` measures in a sheared cell, over random starts: shear stress and
+largest overlap."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tisim.accuracy import Quantity
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths of grains are chaotic; what counts is the stress of the fluid."""
+    """Return the stress of the fluid and the largest overlap; the paths of single grains are chaotic."""
     return (
         Quantity("shear stress", shear_stress, random=True),
         Quantity("largest overlap", overlap, random=True),

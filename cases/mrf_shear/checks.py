@@ -1,4 +1,4 @@
-"""What the sheared cell must show: balances that hold exactly, and what L21 says of stress and chains."""
+"""Checks of the sheared cell: balances that hold exactly, and L21's findings on stress and chains."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from tisim import Result
 from tisim.analysis import Mean
 
 CHECK_STARTS = 3
-"""Each setting is run from so many starts."""
+"""Number of starts of each setting."""
 HALF_FIELD = published.FLUX / 2
 BALANCE = 0.1
-"""Forces on the two rafts balance to this part: free grains are dragged, and gain momentum."""
+"""Largest relative imbalance of the forces on the two rafts; it arises from the drag and the momentum of free
+grains."""
 
 YIELD_BOUNDS = (0.5, 2.0)
-"""A cell of seven diameters between rafts is to have the measured yield stress up to this factor."""
+"""Bounds of the ratio of simulated and measured yield stress, for a cell of seven diameters between rafts."""
 SAID = {
     "no resistance to rolling": "reduced most",
     "no cohesion": "slightly increased",
@@ -34,13 +35,13 @@ SAID = {
         *(one["33:67"] / one["00:100"] for one in (published.MEASURED_YIELD, published.SIMULATED_YIELD))
     ),
 }
-"""What L21 says of each variant."""
+"""L21's statement on each variant."""
 SATURATES = "iron that saturates"
-"""The variant that L21 does not try."""
+"""A variant that is not in L21."""
 
 
 def check() -> Iterator[Check | Claim | Shown]:
-    """Yield each number as it is known."""
+    """Yield each number when it is known."""
     yield from regime()
     rates = [{"rate": rate} for rate in RATES]
     settings = [
@@ -60,46 +61,46 @@ def check() -> Iterator[Check | Claim | Shown]:
 
 
 def balances(results: Sequence[Result]) -> Iterator[Check]:
-    """Yield that what drags one raft back drags the other as much: drag and inertia of what is between them
-    are little beside it."""
+    """Yield the balance of the forces on the rafts; drag and inertia of the grains between them are small."""
     forces = np.array([[raft_force(one, group)[0] for group in (LOWER, UPPER)] for one in results])
     off = forces.sum(axis=1) / np.abs(forces).sum(axis=1)
-    name = "forces on both rafts along the flow: sum over that of sizes, of the start where it is largest"
+    name = "forces on both rafts along the flow: sum over sum of magnitudes, largest of all starts"
     yield Check(name, float(np.abs(off).max()), 0.0, BALANCE)
 
 
 def chains(results: Sequence[Result]) -> Iterator[Claim]:
-    """Yield that grains are in chains along the field, which are several grains thick."""
+    """Yield that grains form chains along the field, which are several grains thick."""
     orders = [order(one.state, one.scene.domain) for one in results]
     name = "sheared chains: mean of (3 cos^2 - 1)/2 of contacts to the field"
     yield Claim(name, Mean.of([one.alignment for one in orders]), 0.0)
-    yield Claim("the same: contacts of a grain", Mean.of([one.contacts for one in orders]), 3.0, 6.0)
+    yield Claim("sheared chains: contacts of a grain", Mean.of([one.contacts for one in orders]), 3.0, 6.0)
 
 
 def as_magnetised(results: Sequence[Result]) -> Iterator[Shown]:
-    """Yield how deep grains overlap, and how much more than one by itself each is magnetised."""
-    yield Shown("the same: largest overlap over a radius", Mean.of([overlap(one) for one in results]))
-    name = "the same: moment of a grain over that of one by itself"
+    """Yield the largest overlap of grains, and their moment relative to a single grain in the field."""
+    yield Shown("sheared chains: largest overlap over a radius", Mean.of([overlap(one) for one in results]))
+    name = "sheared chains: moment of a grain over moment of a single one"
     yield Shown(name, Mean.of([magnetised_part(one) for one in results]))
 
 
 def flows(curve: Curve, whole: Sequence[Result], weak: Sequence[Result]) -> Iterator[Claim | Shown]:
-    """Yield the yield stress, that it is most of the stress, and how the stress grows with the field."""
+    """Yield the yield stress, its share of the total stress, and the growth of the stress with the field."""
     fit, measured = curve.bingham(), published.MEASURED_YIELD["00:100"]
     simulated, spread = published.SIMULATED_YIELD["00:100"], published.SEED_SPREAD
     theirs = f"{1e-3 * measured:g} measured; L21 {1e-3 * simulated:g}, by seed {spread:.1%}"
     yields = Mean(*(1e-3 * one for one in fit.yield_stress))
     yield Shown("Bingham yield stress at 0.6 T, kPa", yields, theirs)
-    name = f"Bingham yield stress at 0.6 T over that measured, {1e-3 * measured:g} kPa"
+    name = f"Bingham yield stress at 0.6 T over the measured {1e-3 * measured:g} kPa"
     yield Claim(name, Mean(*fit.yield_stress).over(Mean(measured, 0.0)), *YIELD_BOUNDS)
     viscous = Mean(*fit.plastic_viscosity).over(Mean(curve.values[-1] / curve.x[-1], 0.0))
-    yield Claim("the same: viscous part of the stress at the fastest rate", viscous, most=0.5)
-    yield Claim("stress at 0.6 T over that at 0.3 T", paired(whole, weak), 2.0, 6.0)
+    yield Claim("Bingham fit: viscous part of the stress at the highest rate", viscous, most=0.5)
+    yield Claim("stress at 0.6 T over stress at 0.3 T", paired(whole, weak), 2.0, 6.0)
 
 
 def compared(parts: Mapping[str, Sequence[Result]], whole: Sequence[Result]) -> Iterator[Claim | Shown]:
-    """Yield what each part of the model does to the stress, beside what L21 says of it (section 2.4.2)."""
+    """Yield the effect of each part of the model on the stress, with L21's statement on it (section
+    2.4.2)."""
     ratio = {name: paired(parts[name], whole) for name in (*SAID, SATURATES)}
     for name, says in SAID.items():
-        yield Shown(f"stress, {name}, over that of the whole model", ratio[name], f"L21: {says}")
-    yield Claim(f"stress, {SATURATES}, over that of the whole model", ratio[SATURATES], most=1.0)
+        yield Shown(f"stress, {name}, over stress of the whole model", ratio[name], f"L21: {says}")
+    yield Claim(f"stress, {SATURATES}, over stress of the whole model", ratio[SATURATES], most=1.0)

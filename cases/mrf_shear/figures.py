@@ -1,4 +1,4 @@
-"""Figures of the case mrf_shear: flow curve, stress by field and by part of the model; grains and chains."""
+"""Figures of the case mrf_shear: flow curve, stress by field and by part of the model, grains and chains."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tisim.plotting.cloud import corners, panel, view
 from tisim.plotting.style import empty, letters, plain, si
 
 STARTS = 3
-"""Each setting is run from so many starts."""
+"""Number of starts of each setting."""
 KILO = 1e3
 """A kilopascal, Pa."""
 
@@ -44,7 +44,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def stress_figure(curve: Curve, fields: Curve, parts: Mapping[str, Sequence[Result]]) -> Figure:
-    """Draw stress by shear rate with the fluid of Bingham that fits, by field, and by part of the model."""
+    """Draw stress by shear rate with the fitted Bingham fluid, by field, and by part of the model."""
     figure = empty(12.6, 3.9)
     rates, flux, bars = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
     fit = curve.bingham()
@@ -73,7 +73,7 @@ def stress_figure(curve: Curve, fields: Curve, parts: Mapping[str, Sequence[Resu
 
 
 def part_bars(axis: Axes, parts: Mapping[str, Sequence[Result]]) -> None:
-    """Draw the stress of each variant over that of the whole model, from the same starts."""
+    """Draw the ratio of stresses of each variant and the whole model, from the same starts."""
     names = list(parts)
     ratios = [paired(parts[name], parts[names[0]]) for name in names[1:]]
     place = np.arange(len(ratios))[::-1]
@@ -85,8 +85,10 @@ def part_bars(axis: Axes, parts: Mapping[str, Sequence[Result]]) -> None:
 
 
 def chain_figure(chained: Result, sheared: Result) -> Figure:
-    """Draw a cell as it begins, with its chains, and sheared, on one scale; with the contacts of a grain and
-    their order along the field, (3 cos^2 - 1)/2."""
+    """Draw a cell at the start, with its chains, and sheared, on one scale.
+
+    Titles give the contacts per grain and their order along the field, (3 cos^2 - 1)/2.
+    """
     figure = empty(12.0, 4.6, pad=0.1)
     states = (
         ("at the start", chained.start),

@@ -1,7 +1,7 @@
-"""The flow curve of a cell, the stress by field, and what each part of the model does to it; and their fits.
+"""The flow curve of a cell, the stress by field and by part of the model, and fits to them.
 
-The measurements and simulations beside which they are drawn are those of L21: their yield stresses, not their
-curves, which it has only as figures.
+They are drawn with the measured and simulated yield stresses of L21. L21's curves are only available as
+figures.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from tisim.effects import CARBONYL_IRON
 from tisim.engine.batches import Progress
 
 COMPARED = {"rate": RATES[-1]}
-"""Variants and fields are compared at the fastest of the rates, which is the quickest to run."""
+"""Variants and fields are compared at the highest shear rate, which takes the shortest time to run."""
 FLUXES = (0.1, 0.2, 0.3, 0.45, 0.6)
 """Flux densities of the sweep, T."""
 AS_PUBLISHED, MIXED = "as L21 has it", "a third of small grains"
-"""The model that variants are compared with, and the mixture among these; the small grains are a third by
+"""Names of the model with which variants are compared, and of the mixture; its small grains are a third by
 volume."""
 VARIATIONS: dict[str, Settings] = {
     AS_PUBLISHED: {},
@@ -38,12 +38,16 @@ VARIATIONS: dict[str, Settings] = {
     MIXED: {"grains": mixture(1 / 3)},
     "iron that saturates": {"saturation": CARBONYL_IRON.saturation},
 }
-"""The variants that L21 compares (section 2.4.2), a mixture, and grains that saturate, which L21 has not."""
+"""The variants that L21 compares (section 2.4.2), a mixture, and grains that saturate, which L21 does not
+have."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve has results of settings, each from several starts, and what was varied."""
+    """A curve: the results of settings, each from several starts, and the varied quantity.
+
+    x : values of the varied quantity. groups : results of each setting.
+    """
 
     x: np.ndarray
     groups: Sequence[Sequence[Result]]
@@ -60,26 +64,26 @@ class Curve:
 
     @property
     def values(self) -> np.ndarray:
-        """Return the means alone, Pa."""
+        """Return the mean shear stress of each setting without its interval, Pa."""
         return np.array([one.value for one in self.stresses])
 
     @property
     def halves(self) -> np.ndarray:
-        """Return half the widths of their intervals, Pa."""
+        """Return half the width of the interval of each mean, Pa."""
         return np.array([one.half for one in self.stresses])
 
     def bingham(self) -> BinghamFit:
-        """Return the mean over starts of the fluid of Bingham that fits the curve of each.
+        """Return the mean over starts of the Bingham fluid fitted to the curve of each start.
 
-        All settings begin from the same starts: their errors go together, and a fit to their means, to which
-        they are errors of their own, would not know how far off it is.
+        All settings have the same starts, so their errors are correlated. A fit to the means would treat
+        these errors as independent and give a wrong uncertainty.
         """
         viscosity = Mean.of([one.plastic_viscosity.value for one in self._fits])
         yields = Mean.of(self.yield_stresses())
         return BinghamFit(*(Estimate(one.value, one.half) for one in (yields, viscosity)))
 
     def yield_stresses(self) -> np.ndarray:
-        """Return the yield stress of the fluid of Bingham that fits the curve of each start, Pa."""
+        """Return the yield stress of the Bingham fluid fitted to the curve of each start, Pa."""
         return np.array([one.yield_stress.value for one in self._fits])
 
     @cached_property
@@ -87,19 +91,19 @@ class Curve:
         return [fit_bingham(self.x, start) for start in self.of_starts.T]
 
     def power(self) -> Mean:
-        """Return the mean over starts of the exponent of the power law that fits the curve of each."""
+        """Return the mean over starts of the exponent of the power law fitted to the curve of each start."""
         x = np.log(self.x)
         return Mean.of([np.polyfit(x, np.log(start), 1)[0] for start in self.of_starts.T])
 
 
 def flow_curve(starts: int, rates: Sequence[float] = RATES, progress: Progress | None = None) -> Curve:
-    """Return stress by shear rate; one world for each rate and start, all as one batch."""
+    """Return the stress by shear rate, with one world for each rate and start in one batch."""
     groups = cells([{"rate": rate} for rate in rates], starts, progress)
     return Curve(np.array([shear_rate(group[0]) for group in groups]), groups)
 
 
 def by_field(starts: int, fluxes: Sequence[float] = FLUXES, progress: Progress | None = None) -> Curve:
-    """Return stress by flux density."""
+    """Return the stress by flux density."""
     groups = cells([{**COMPARED, "flux": one} for one in fluxes], starts, progress)
     return Curve(np.array([flux(group[0]) for group in groups]), groups)
 
@@ -114,7 +118,7 @@ def by_part(
 
 
 def table(curve: Curve, heading: str) -> str:
-    """Return a curve as CSV: what was varied, the stress and half of its interval, and that of each start."""
+    """Return a curve as CSV: varied quantity, stress, half of its interval, and the stress of each start."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow([heading, "shear_stress_Pa", "half_interval_Pa", "of_each_start_Pa"])

@@ -1,4 +1,4 @@
-"""What a sheared cell measures: shear stress, how grains are ordered, and how much is magnetised."""
+"""Measures of a sheared cell: shear stress, order of the grains, and their magnetisation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tisim.scene.initial_state import Arrays
 from tisim.sources import CouetteFlow, MagneticField
 
 CHAINED = 0.05
-"""Grains are of one chain where the gap between surfaces is below this part of the mean radius."""
+"""Largest gap between the surfaces of grains in one chain, as a fraction of the mean radius."""
 
 
 def extent(domain: Domain) -> np.ndarray:
@@ -37,15 +37,19 @@ def area(result: Result) -> float:
 
 
 def shear_stress(result: Result) -> float:
-    """Return the shear stress, Pa: the mean over time of the force along x that holds the rafts back, over
-    their area, of both rafts (L21 Eq. 2.8, which takes the upper one)."""
+    """Return the shear stress, Pa: the time-averaged force along x that resists the rafts, over their area.
+
+    It is the mean over both rafts; L21 Eq. 2.8 uses the upper one.
+    """
     lower, upper = (raft_force(result, group) for group in (LOWER, UPPER))
     return float(lower[0] - upper[0]) / (2 * area(result))
 
 
 def raft_force(result: Result, group: int) -> np.ndarray:
-    """Return the mean over time of the force of the grains on a raft, N: without the drag of the oil, which
-    is none where the oil goes with the rafts, and steady where it is at rest."""
+    """Return the time-averaged force of the grains on a raft, N, without the drag of the oil.
+
+    The drag is zero if the oil moves with the rafts, and constant if the oil is at rest.
+    """
     state, effects = result.state, result.scene.effects
     own = state["group"] == group
     drag = next(one for one in effects if isinstance(one, StokesDrag))
@@ -58,7 +62,7 @@ def raft_force(result: Result, group: int) -> np.ndarray:
 
 
 def shear_rate(result: Result) -> float:
-    """Return the shear rate between the rafts, 1/s: that of the oil, were it not at rest."""
+    """Return the shear rate between the rafts, 1/s; the oil has the same rate unless it is at rest."""
     effects = result.scene.effects
     below, above = [one.planes[0].point[2] for one in effects if isinstance(one, JoinGroup)]
     groups = [one.motion for one in effects if isinstance(one, PrescribedMotion)]
@@ -68,11 +72,13 @@ def shear_rate(result: Result) -> float:
 
 @dataclass(frozen=True)
 class Order:
-    """An order has numbers of the chains in a cell, means over its grains.
+    """Measures of the chains in a cell, as means over its grains.
 
-    size : of the cluster that a grain is in, of all grains. length : extent of that cluster along its first
-    axis, over the height of the cell. breadth : grains side by side in it. alignment : of pairs that touch,
-    with the field: (3 cos^2 - 1)/2, 1 along it and 0 at random. contacts : of a grain.
+    size : of the cluster that contains a grain, relative to all grains.
+    length : extent of that cluster along its first axis, divided by the height of the cell.
+    breadth : grains side by side in it.
+    alignment : of touching pairs with the field: (3 cos^2 - 1)/2, 1 along it and 0 at random.
+    contacts : of a grain.
     """
 
     size: float
@@ -83,7 +89,7 @@ class Order:
 
 
 def order(state: Arrays, domain: Domain) -> Order:
-    """Return how the grains of a state in a cell are ordered."""
+    """Return the order of the grains of a state in a cell."""
     position, radius = state["position"], state["radius"]
     around = periodic_sides(domain)
     pairs = contacts(position, radius, CHAINED * float(radius.mean()), around)
@@ -100,7 +106,7 @@ def order(state: Arrays, domain: Domain) -> Order:
 
 
 def magnetised_part(result: Result) -> float:
-    """Return the mean moment of a grain at the end over that of one by itself in the field."""
+    """Return the mean moment of a grain at the end, divided by the moment of a single grain in the field."""
     volume = 4 / 3 * np.pi * result.state["radius"] ** 3
     moment = np.linalg.norm(result.state["moment"], axis=1)
     return float((moment / volume).mean()) / magnetisation(flux(result))
@@ -112,5 +118,5 @@ def flux(result: Result) -> float:
 
 
 def volume_fraction(result: Result) -> float:
-    """Return the part of the cell that grains fill."""
+    """Return the volume fraction of the grains in the cell."""
     return float((4 / 3 * np.pi * result.state["radius"] ** 3).sum() / extent(result.scene.domain).prod())

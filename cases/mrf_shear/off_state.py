@@ -1,9 +1,9 @@
 """The viscosity of the fluid without a field, by a law for dense suspensions.
 
-The cell itself does not tell it. Its oil is a given flow: it does not flow around grains, lubricate them or
-transmit stress, so that without a field grains go with their layer and rafts feel next to nothing, however
-many grains there are. So the law of Krieger and Dougherty is taken, in which size and mix of grains count
-through how densely they would pack, by the packing model of de Larrard.
+The cell itself cannot give it. Its oil is a prescribed flow, which does not flow around grains, lubricate
+them or transmit stress. Without a field, grains therefore move with their layer, and the force on the rafts
+is almost zero for any number of grains. The law of Krieger and Dougherty is used instead. Sizes and
+proportions of the grains enter through their maximum packing fraction, by the packing model of de Larrard.
 """
 
 from __future__ import annotations
@@ -14,21 +14,23 @@ import numpy as np
 from tisim.cases.mrf_shear import published
 
 RANDOM_PACKING = 0.64
-"""The part of the space that equal spheres fill in a random close packing."""
+"""Packing fraction of equal spheres in a random close packing."""
 INTRINSIC = 2.5
-"""Intrinsic viscosity of hard spheres, after Einstein."""
+"""Intrinsic viscosity of hard spheres, by Einstein."""
 
 
 def closest_packing(diameters: Sequence[float], parts: Sequence[float]) -> float:
-    """Return the largest volume fraction of a mixture of spheres; diameters in any unit, and the part of the
-    volume of each.
+    """Return the maximum packing fraction of a mixture of spheres.
+
+    diameters : in any unit. parts : share of each in the volume.
 
         phi_m = min over i of  beta / (1 - sum over larger j of (1 - beta + b beta (1 - 1/beta)) y_j
                                          - sum over smaller j of (1 - a) y_j)
         a = sqrt(1 - (1 - d_j/d_i)^1.02),    b = 1 - (1 - d_i/d_j)^1.5
 
-    beta is that of equal spheres, y_j the part of the volume. a says how small grains push large ones apart,
-    b how large ones are walls to small ones. Grains that are smaller than the holes fill them.
+    beta is the packing fraction of equal spheres, y_j the share of the volume. a describes how small grains
+    push large ones apart, b how large grains act as walls for small ones. Grains that are smaller than the
+    holes fill them.
 
     Source: F. de Larrard, Concrete Mixture Proportioning (1999), section 1.1.
     """
@@ -45,7 +47,8 @@ def closest_packing(diameters: Sequence[float], parts: Sequence[float]) -> float
 
 
 def relative_viscosity(fraction: float, closest: float) -> float:
-    """Return the viscosity of a suspension over that of its fluid; infinite from the closest packing on.
+    """Return the ratio of viscosities of a suspension and its fluid; infinite at closest packing and
+    above.
 
         eta_r = (1 - phi / phi_m)^(-2.5 phi_m)
 

@@ -1,9 +1,10 @@
-"""The inverse problem of mrf_shear: which fluid bears the most stress in a field, and flows easily without?
+"""The inverse problem of mrf_shear: find the fluid with the highest stress in a field and a low viscosity
+without it.
 
-A design is the share of small grains of the volume of all, the volume fraction of grains, and the field. More
-grains bear more, and thicken the fluid when the field is off; small grains among large ones fill holes. The
-stress is simulated, at one shear rate at which drag is small beside magnetic forces, so that it is all but
-the yield stress. The viscosity without field is that of ``off_state``, which is no simulation.
+A design is the volume share of the small grains, the volume fraction of all grains, and the field. More
+grains increase the stress, and also the viscosity when the field is off; small grains fill the holes among
+large ones. The stress is simulated at one shear rate, at which drag is small compared with magnetic forces,
+so it is close to the yield stress. The viscosity without field is computed by ``off_state``, not simulated.
 """
 
 from __future__ import annotations
@@ -31,17 +32,17 @@ GENES = (
     Gene("flux", "T", 0.2, 0.8),
 )
 BOUND = 24e-3
-"""A bounded off-state viscosity is at most so large, Pa s."""
+"""Largest off-state viscosity in the variant "bounded", Pa s."""
 WANTED = {
     "front": "the front of shear stress in the field and viscosity without it",
     "bounded": f"the highest shear stress of fluids of at most {1e3 * BOUND:g} mPa s without field",
-    "field": "the front of shear stress, viscosity without field, and the field that it takes",
+    "field": "the front of shear stress, viscosity without field, and field",
 }
-"""What each variant of the problem looks for."""
+"""The goal of each variant of the problem."""
 MEANINGS = {
     "stress": "shear stress in the field, the mean over a strain",
-    "viscosity": "viscosity without field, after Krieger and Dougherty",
-    "small": "share of the small grains of the volume of all",
+    "viscosity": "viscosity without field, by Krieger and Dougherty",
+    "small": "volume share of the small grains",
     "fraction": "volume fraction of the grains",
 }
 
@@ -52,21 +53,22 @@ def design_viscosity(small: float, fraction: float) -> float:
 
 
 def viscosity(result: Result) -> float:
-    """Return the viscosity without field of the fluid of a run, Pa s: by the sizes that it was asked for."""
+    """Return the viscosity without field of the fluid of a run, Pa s, from the nominal sizes of its
+    grains."""
     start = start_of(result)
     diameters = [2 * one.sizes.mean_radius() for one in start.grains]
     return off_state_viscosity(asked_fraction(result), diameters, [one.share for one in start.grains])
 
 
 def asked_fraction(result: Result) -> float:
-    """Return the volume fraction that the grains of a run would have in the mean over all starts."""
+    """Return the nominal volume fraction of the grains of a run: the mean over all starts."""
     start, volume = start_of(result), float(extent(result.scene.domain).prod())
     each = sum(one.share / one.density for one in start.grains) / sum(one.number() for one in start.grains)
     return start.count() * each / volume
 
 
 def start_of(result: Result) -> Cloud:
-    """Return what a cell starts with."""
+    """Return the initial particles of a cell."""
     particles = result.scene.particles
     assert isinstance(particles, Cloud)
     return particles
@@ -82,8 +84,11 @@ OBJECTIVES = {
 
 
 def problem(size: str = "default", variant: str = "front") -> Problem:
-    """Return the search for fluids; by variant the front of stress and viscosity, the highest stress at a
-    bounded viscosity, or the front of stress, viscosity and field."""
+    """Return the search for fluids of a variant.
+
+    The variants are the front of stress and viscosity, the highest stress at a bounded viscosity, and the
+    front of stress, viscosity and field.
+    """
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     settings = {**searched_size(size, SIZES).scene, **SEARCHED}
 
@@ -110,7 +115,7 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
 
 
 def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
-    """Return what else is known of the fluid of a design."""
+    """Return further properties of the fluid of a design."""
     return {
         "grains": float(len(result.state["radius"])),
         "volume fraction as drawn": volume_fraction(result),

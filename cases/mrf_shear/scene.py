@@ -1,11 +1,11 @@
-"""A magnetorheological fluid in a shear cell: iron grains in oil form chains along a field, and bear stress.
+"""A magnetorheological fluid in a shear cell: iron grains in oil form chains along a field, and resist shear.
 
-The cell is periodic along x and y. Grains begin at random places, and a field along z draws them into chains.
-Once they have formed, grains at the bottom and at the top are frozen into rafts, with which the oil and the
-chains are sheared along x. The shear stress is the mean force on the rafts over their area.
+The cell is periodic along x and y. Grains start at random positions, and a field along z makes them form
+chains. Then the grains at the bottom and at the top are frozen into rafts, which shear the oil and the chains
+along x. The shear stress is the mean force on the rafts divided by their area.
 
-It is the simulation of L21 chapter 2. What differs at the sizes that a laptop runs is in SIZES and in the
-page of the case.
+It is the simulation of L21 chapter 2. SIZES and the page of the case list the differences at the sizes for a
+laptop.
 """
 
 from __future__ import annotations
@@ -48,49 +48,51 @@ from tisim.steppers import FixedStep, Verlet
 TITLE = "A magnetorheological fluid in a shear cell: flow curve and yield stress"
 
 SUSCEPTIBILITY = CARBONYL_IRON.parameters()["susceptibility"]
-"""That of carbonyl iron, of which a sphere is magnetised as one without end, to 0.3 %."""
+"""Susceptibility of carbonyl iron; the magnetisation of a sphere is within 0.3 % of the limit of infinite
+susceptibility."""
 SIDES: Vector = (40 * MICRO, 40 * MICRO, 60 * MICRO)
 RAFT = 8 * MICRO
-"""The sides of the cell, and how much of its bottom and top becomes rafts, m."""
+"""The sides of the cell, and the thickness of its bottom and top layers that become rafts, m."""
 RATES = (2000.0, 5000.0, 10000.0)
 """The shear rates of a flow curve, 1/s."""
 BEFORE, STRAIN = 0.5, 1.0
-"""The stress is a mean from the first of these strains to the second."""
+"""The strains between which the stress is averaged."""
 MAGNETISING_TIME = 2 * published.CHAINS_FORM
-"""After so long rafts are frozen, s."""
+"""Time after which the rafts are frozen, s."""
 CUT = {"cutoff": 2.0, "gap": published.NEIGHBOUR_GAP}
-"""Up to where grains magnetise and attract each other: a gap between their surfaces."""
+"""Range of mutual magnetisation and attraction: a cut-off and a gap between surfaces."""
 REST: Vector = (0.0, 0.0, 0.0)
 """The oil at rest, m/s."""
 LOWER, UPPER = 1, 2
 """The groups of the rafts."""
 STEPS_OF_IMPACT = 40.0
-"""A step is one of so many parts of the time of an impact of the smallest grains at IMPACT."""
+"""Number of steps in the duration of an impact of the smallest grains at IMPACT."""
 IMPACT = 1.0
-"""m/s, about as fast as grains of 6.7 um meet that fields of 0.6 T draw together."""
+"""Speed of that impact, m/s: about the speed at which grains of 6.7 um collide in fields of 0.6 T."""
 
 
 SEARCHED: dict[str, Any] = {
     "rate": RATES[-1], "sides": (32 * MICRO, 32 * MICRO, 48 * MICRO), "raft": 7 * MICRO, "strain": 0.7,
     "before": 0.35,
 }  # fmt: skip
-"""What a search runs of each design: a smaller cell, for a shorter time."""
+"""Settings of the runs in a search: a smaller cell, for a shorter time."""
 SWEPT = {"effects.mutual_induced_moment.largest_change": 0.1}
-"""In a search a step sweeps on only where moments change by a tenth of the largest. That takes half of the
-time, and changes nothing that `tisim cost` shows of eight starts."""
+"""In a search, sweeps of the moments in a step continue only if moments change by more than a tenth of the
+largest. This halves the time and has no effect on the quantities that `tisim cost` shows over eight
+starts."""
 SEARCH_SETTINGS = {
     "generations": 9, "options": {"population": 8, "first": 12}, "ensemble": {"min_starts": 1, "confirm": 4},
 }  # fmt: skip
-"""A design has one start, and what is found is run again from four that no other has had."""
+"""Each design has one start, and the best designs are run again from four held-out starts."""
 LEPS: dict[str, Any] = {
     "sides": (published.CELL_SIDE,) * 3, "raft": published.RAFT_DEPTH, "rate": published.SHEAR_RATES[0],
     "magnetising": published.CHAINS_FORM, "dt": published.STEP, "strain": 0.93, "before": 0.7,
     "plates": False,
 }  # fmt: skip
-"""L21's own cell, open along the field, sheared at the first of its rates."""
+"""L21's own cell, open along the field, sheared at its highest rate."""
 SIZES = {
     "default": Size(
-        "183 grains of 6.7 um in a cell of 40 x 40 x 60 um, at 2000 1/s; a search has 32 x 32 x 48 um", {},
+        "183 grains of 6.7 um in a cell of 40 x 40 x 60 um, at 2000 1/s; a search uses 32 x 32 x 48 um", {},
         SEARCH_SETTINGS,
     ),
     "small": Size("94 grains in a cell of 32 x 32 x 48 um, at 10 000 1/s, for shorter strains", SEARCHED),
@@ -102,7 +104,7 @@ SIZES = {
         },
     ),
     "l21": Size(
-        "L21's own: a cube of 250 um, its mixture 00:100 by number, steps of 0.2 ns",
+        "L21's own cell: a cube of 250 um, its mixture 00:100 by number, steps of 0.2 ns",
         {**LEPS, "grains": magnetorheological(0.0)},
     ),
     "l21_volume": Size("the same, 00:100 by volume", {**LEPS, "grains": magnetorheological(0.0, "mass")}),
@@ -112,8 +114,8 @@ SIZES = {
 
 
 def impact_step(radius: float, young: float) -> float:
-    """Return a step (s) that is short beside the impact of two grains of a radius (m) and a Young's modulus
-    (Pa) at IMPACT, after Hertz."""
+    """Return a step (s) for grains of a radius (m) and a Young's modulus (Pa): a fraction of their impact at
+    IMPACT, by Hertz."""
     modulus = young / (2 * (1 - published.POISSON**2))
     mass = DENSITY * 2 / 3 * np.pi * radius**3
     lasts = 2.94 * (15 * mass / (16 * modulus * np.sqrt(radius / 2 * IMPACT))) ** 0.4
@@ -127,14 +129,17 @@ CONTACT = Granular(
     rolling=RollingEPSD(damping_ratio=published.ROLLING_DAMPING),
     cohesion=SJKR(),
 )
-"""The law of contact of L21 section 2.2.1."""
+"""The contact law of L21 section 2.2.1."""
 
 
 def iron(
     young: float, rolling: float, cohesion: float | None, friction: float = published.FRICTION
 ) -> Material:
-    """Return what grains are made of, by table 2.1 but for Young's modulus (Pa), the coefficients of rolling
-    and of sliding friction, and the cohesion energy density (J/m^3; None for a law without cohesion)."""
+    """Return the material of grains, with table 2.1 for the other properties.
+
+    young : Pa. rolling, friction : coefficients of rolling and of sliding friction.
+    cohesion : energy density, J/m^3; None for a law without cohesion.
+    """
     return Material(
         young=young,
         poisson=published.POISSON,
@@ -146,7 +151,8 @@ def iron(
 
 
 def smooth(young: float) -> Material:
-    """Return what the plates below and above are made of, along which grains slide freely; young : Pa."""
+    """Return the material of the plates below and above, on which grains slide without friction; young :
+    Pa."""
     return iron(young, 0.0, 0.0, friction=0.0)
 
 
@@ -172,13 +178,17 @@ def scene(
     """Return the scene of a cell.
 
     rate : of shear between the rafts, 1/s. flux : density of the field along z, T. fraction : of the volume
-    that grains fill. sides : of the cell; raft : how much of it is frozen below and above, m. magnetising :
-    time after which rafts are frozen, s. strain : at the end; before : at which the mean of the stress
-    begins. young : Pa. dt : s; unless given a part of the time of an impact of the smallest grains. rolling :
-    coefficient of rolling friction. cohesion : energy density, J/m^3. saturation : magnetisation at which
-    grains saturate, A/m; None where they do not, as L21's. still : whether the oil stays at rest. plates :
-    whether there are smooth ones below and above. All but the last of these, and whether grains saturate, are
-    values of one structure: cells that differ in them run as one batch.
+    that is filled by grains.
+    sides : of the cell, m. raft : thickness of the frozen layers below and above, m.
+    magnetising : time after which rafts are frozen, s.
+    strain : at the end. before : strain at which averaging of the stress begins. young : Pa.
+    dt : s; by default a fraction of the duration of an impact of the smallest grains.
+    rolling : coefficient of rolling friction. cohesion : energy density, J/m^3.
+    saturation : magnetisation at which grains saturate, A/m; None for no saturation, as in L21.
+    still : whether the oil stays at rest. plates : whether there are smooth plates below and above.
+
+    All of these except ``plates``, and whether grains saturate, are values of one structure: cells that
+    differ in them run as one batch.
     """
     ends = (Plane(point=(0.0, 0.0, 0.0)), Plane(point=(0.0, 0.0, sides[2]), normal=(0.0, 0.0, -1.0)))
     plate = {"plate": smooth(young)} if plates else {}
@@ -207,8 +217,10 @@ def scene(
 
 
 def induced(saturation: float | None) -> Effect:
-    """Return what magnetises grains, up to a saturation (A/m) where there is one; in one sweep a step, as in
-    L21 section 2.2.3."""
+    """Return the mutual magnetisation of grains, up to a saturation (A/m) if given.
+
+    The moments are updated by one sweep in each step, as in L21 section 2.2.3.
+    """
     if saturation is None:
         return MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, **CUT)
     return MutualFroehlichMoment(susceptibility=SUSCEPTIBILITY, saturation=saturation, sweeps=0, **CUT)
@@ -217,8 +229,11 @@ def induced(saturation: float | None) -> Effect:
 def sheared(
     rate: float, height: float, raft: float, begin: float, before: float, still: bool
 ) -> tuple[Effect, ...]:
-    """Return what shears a cell from a time ``begin`` (s) on, and observes the forces from a strain on; the
-    other arguments are those of ``scene``."""
+    """Return the effects that shear a cell from a time ``begin`` (s) and average the forces from the strain
+    ``before``.
+
+    The other arguments are the same as for ``scene``.
+    """
     bottom, top = raft, height - raft
     speed = rate * (top - bottom) / 2
     back, on = (-speed, 0.0, 0.0), (speed, 0.0, 0.0)

@@ -1,5 +1,5 @@
-"""The quantities whose accuracy ``tisim cost`` measures in a pile that is to be spun up: how it is packed,
-over random starts."""
+"""Quantities whose accuracy ``tisim cost`` measures in a pile before it is spun up: its density and the
+largest overlap, over random starts."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from tisim.accuracy import Quantity
 
 
 def density(result: Result) -> float:
-    """Return the density of the pile at the end, kg/m^3: the spin that it can bear goes by its root."""
+    """Return the density of the pile at the end, kg/m^3; its critical spin is proportional to the square
+    root."""
     return Asteroid.of(result.state).density
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths of grains are chaotic; what counts is the pile that they make."""
+    """Return the density and the largest overlap of the pile; the paths of single grains are chaotic."""
     return (
         Quantity("density", density, random=True),
         Quantity("largest overlap", overlap, random=True),

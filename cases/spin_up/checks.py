@@ -1,4 +1,5 @@
-"""What L21 finds of piles that are spun up, beside what piles of few grains show, and what holds exactly."""
+"""Checks of spun-up piles: findings of L21 that piles of few grains reproduce, and relations that hold
+exactly."""
 
 from __future__ import annotations
 
@@ -18,13 +19,14 @@ from tisim.cases.statistics import Claim, Shown
 from tisim.analysis import Mean
 
 ROUNDING = 1e-11
-"""Momenta may be off by so much of the sum of what the grains have."""
+"""Largest change of a momentum, relative to the sum of its magnitudes over the grains."""
 LATER = 0.5e6 * RATES[0]
-"""Piles break later where they do so by half a step of the spin, urad/s; no difference is no support."""
+"""Least difference in spin that counts as breaking later, urad/s: half a step; equality does not support the
+claim."""
 
 
 def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
-    """Yield what rules piles, and what must hold of them from some starts."""
+    """Yield the governing numbers of piles, and the checks of piles from several starts."""
     yield from regime()
     runs = spin_ups(seeds, **DEFAULT)
     yield from of_conservation(runs)
@@ -32,7 +34,7 @@ def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
 
 
 def of_conservation(runs: Sequence[SpinUp]) -> Iterator[Check]:
-    """Yield that the momentum of all grains stays 0, however they are turned."""
+    """Yield that the momentum of all grains stays 0 when they are spun up."""
     off = max(
         float(np.linalg.norm(c.momentum)) / c.momentum_sum
         for one in runs
@@ -42,26 +44,30 @@ def of_conservation(runs: Sequence[SpinUp]) -> Iterator[Check]:
 
 
 def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
-    """Yield at which spins piles deform and break, and how dense they are before."""
+    """Yield the spins at which piles deform and break, and their density before."""
     for m in MAGNETISATIONS:
         group = [one for one in runs if one.magnetisation == m]
         density = Mean.of([one.steps[0].asteroid.density for one in group])
         yield Shown(f"{m:g} A/m: density at rest, kg/m^3", density)
         critical = Mean.of([1e6 * critical_spin(one.steps[0].asteroid.density) for one in group])
-        yield Shown(f"{m:g} A/m: critical spin of that density, urad/s", critical)
+        yield Shown(f"{m:g} A/m: critical spin at this density, urad/s", critical)
         for name, theirs, value in (
             ("deforms", DEFORMATION[m], "deformation"), ("breaks", DISRUPTION[m], "disruption"),
         ):  # fmt: skip
             mean = Mean.of(at_least([getattr(one, value) for one in group]))
-            yield Shown(f"{m:g} A/m: {name} at, urad/s", mean, f"L21: {1e6 * theirs:.0f}")
+            yield Shown(f"{m:g} A/m: spin at which it {name}, urad/s", mean, f"L21: {1e6 * theirs:.0f}")
     plain, strong = (
         at_least([one.disruption for one in runs if one.magnetisation == m])
         for m in (MAGNETISATIONS[0], MAGNETISATIONS[-1])
     )
-    yield Claim("breaks at, 1190 less 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=LATER)
+    yield Claim(
+        "spin at which it breaks, 1190 minus 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=LATER
+    )
 
 
 def at_least(rates: Sequence[float]) -> np.ndarray:
-    """Return angular velocities in urad/s; what has not come about counts as if it did a step after the last,
-    so that means of these are lower bounds."""
+    """Return angular velocities in urad/s; NaN, for no event, counts as one step after the last.
+
+    Means of these values are therefore lower bounds.
+    """
     return 1e6 * np.nan_to_num(np.asarray(rates), nan=RATES[-1] + RATES[0])

@@ -1,4 +1,5 @@
-"""Figures of the case spin_up: shape, density and mass of piles against their spin, and the piles."""
+"""Figures of the case spin_up: shape, density and mass of piles against their spin, and pictures of the
+piles."""
 
 from __future__ import annotations
 
@@ -21,27 +22,30 @@ from tisim.plotting.cloud import directions, view
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 SHOWN = (0.0, 6e-4, 8e-4)
-"""Piles are drawn after these steps, rad/s."""
+"""Angular velocities after whose steps piles are drawn, rad/s."""
 WIDER = 2.6
-"""A picture is so many times as wide as the pile at rest."""
+"""Width of a picture, in units of the width of the pile at rest."""
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """spin_up.png: shape, density and mass against spin; piles.png: piles on the way; spin_up.csv: the
+    """spin_up.png: shape, density and mass against spin; piles.png: piles at several spins; spin_up.csv: the
     numbers."""
     runs = spin_ups(SEEDS, progress, **of_all_magnetisations(size, SIZES))
     return {"spin_up.png": against_spin(runs), "piles.png": piles(runs), "spin_up.csv": table(runs)}
 
 
 def measured(step: SpinStep) -> tuple[float, float, float]:
-    """Return the width over the height, the density (kg/m^3), and the part of the mass in the pile."""
+    """Return the width over the height, the density (kg/m^3), and the fraction of the mass in the pile."""
     asteroid = step.asteroid
     return asteroid.flattening, asteroid.density, step.held
 
 
 def against_spin(runs: Sequence[SpinUp]) -> Figure:
-    """Draw widths over heights, densities (L21 Fig. 4.11) and the mass that is left against the angular
-    velocity that a pile was given; thin lines are single piles, dotted ones where L21's are disrupted."""
+    """Draw width over height, density (L21 Fig. 4.11) and remaining mass against the imposed angular
+    velocity.
+
+    Thin lines are single piles; dotted lines mark the disruption of L21's piles.
+    """
     figure = empty(11.6, 3.6)
     axes = figure.subplots(1, 3)
     for m, colour in zip(MAGNETISATIONS, AXIS_COLOURS, strict=True):
@@ -70,7 +74,7 @@ def against_spin(runs: Sequence[SpinUp]) -> Figure:
 
 
 def piles(runs: Sequence[SpinUp]) -> Figure:
-    """Draw one pile of each magnetisation on its way, coloured by cluster (L21 Figs 4.7, 4.8, 4.10)."""
+    """Draw one pile of each magnetisation at several spins, coloured by cluster (L21 Figs 4.7, 4.8, 4.10)."""
     figure = empty(9.6, 9.6)
     axes = figure.subplots(len(MAGNETISATIONS), len(SHOWN))
     for row, m in zip(axes, MAGNETISATIONS, strict=True):
@@ -81,7 +85,7 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
         square = (left - room, bottom - room, WIDER * side)
         for axis, rate in zip(row, SHOWN, strict=True):
             step = run.at(rate)
-            # About the centre of all: around the largest part of what is disrupted, others are cut off.
+            # Centred on all grains: a view around the largest fragment would cut off other fragments.
             close_up(axis, step.state, step.state, square)
             axis.set_title(f"{m:g} A/m, {1e6 * step.rate:.0f} µrad/s")
     directions(axes[0, 0], square, NO_GRAVITY)
@@ -90,7 +94,7 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
 
 
 def table(runs: Sequence[SpinUp]) -> str:
-    """Return what is measured after each step of each pile as CSV."""
+    """Return the measures after each step of each pile as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(

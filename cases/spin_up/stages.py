@@ -1,4 +1,4 @@
-"""The stages of a spin-up: a pile settles, and is turned faster in steps, each held for a while."""
+"""The stages of a spin-up: a pile settles, and its spin is then increased in steps, each held for a while."""
 
 from __future__ import annotations
 
@@ -20,35 +20,37 @@ from tisim.engine.particle_state import ParticleState
 from tisim.scene.initial_state import Arrays
 
 RATES = tuple(1e-4 * k for k in range(1, 10))
-"""The angular velocities that a pile is given, one after the other, rad/s; section 4.3.1 of L21."""
+"""Successive angular velocities of the pile, rad/s; section 4.3.1 of L21."""
 QUICK = 4e-4
-"""Up to this one, rad/s, each is held for the shorter time."""
+"""Largest angular velocity that is held for the shorter time, rad/s."""
 HOLDS = (500.0, 3000.0)
-"""They are held for so long, s; L21 section 4.3.1."""
+"""The two hold times, s; L21 section 4.3.1."""
 LOST = 0.05
-"""A pile is disrupted where it has lost this part of all grains, or more. L21 gives no number."""
+"""Least fraction of all grains that a disrupted pile has lost. L21 gives no number."""
 DEFORMED = 1.1
-"""A pile is deformed where its width over its height has grown by this. L21 gives no number."""
+"""Least growth factor of the width over height of a deformed pile. L21 gives no number."""
 SEEDS = 3
-"""There are so many random starts of each magnetisation."""
+"""Number of random starts of each magnetisation."""
 
 
 @dataclass(frozen=True)
 class SpinStep:
-    """A step of a spin-up: the angular velocity that the pile was given (rad/s), and the state at its end.
-    Before the first it is 0."""
+    """A step of a spin-up: the imposed angular velocity (rad/s), and the state at its end.
+
+    The angular velocity is 0 for the state before the first step.
+    """
 
     rate: float
     state: Arrays
 
     @cached_property
     def asteroid(self) -> Asteroid:
-        """Return the pile, or the largest piece of it."""
+        """Return the pile, or its largest fragment."""
         return Asteroid.of(self.state)
 
     @property
     def held(self) -> float:
-        """Return the part of the mass of all grains that is in the pile."""
+        """Return the fraction of the mass of all grains that is in the pile."""
         inside = body(clusters_of(self.state), self.state["mass"])
         return float(self.state["mass"][inside].sum() / self.state["mass"].sum())
 
@@ -60,7 +62,11 @@ class SpinStep:
 
 @dataclass(frozen=True)
 class SpinUp:
-    """A spin-up of a pile of grains of a magnetisation (A/m; that of L21's pile) and a seed, step by step."""
+    """A spin-up of one pile, step by step.
+
+    magnetisation : of the grains in L21's pile, A/m. seed : of the start. steps : with the state before the
+    first.
+    """
 
     magnetisation: float
     seed: int
@@ -68,25 +74,26 @@ class SpinUp:
 
     @property
     def broken(self) -> np.ndarray:
-        """Return after which steps it has lost LOST or more of all grains since it had most; shape
+        """Return after which steps the pile has lost LOST or more of all grains since its largest mass; shape
         (steps,)."""
         held = np.array([step.held for step in self.steps])
-        # What has not come down yet at the start may still do so.
+        # The reference is the largest mass so far, because grains may still fall onto the pile after the
+        # start.
         return np.asarray(np.maximum.accumulate(held) - held >= LOST)
 
     @property
     def disruption(self) -> float:
-        """Return the first angular velocity (rad/s) that broke it; NaN where none did."""
+        """Return the first angular velocity (rad/s) that broke it; NaN if none did."""
         return self._first(self.broken)
 
     @property
     def deformation(self) -> float:
-        """Return the first angular velocity (rad/s) that deformed or broke it; NaN where none did."""
+        """Return the first angular velocity (rad/s) that deformed or broke it; NaN if none did."""
         shape = np.array([step.asteroid.flattening for step in self.steps])
         return self._first(self.broken | (shape >= DEFORMED * shape[0]))
 
     def at(self, rate: float) -> SpinStep:
-        """Return the step with the angular velocity that is nearest to one, rad/s."""
+        """Return the step whose angular velocity is nearest to ``rate``, rad/s."""
         return self.steps[int(np.abs([step.rate - rate for step in self.steps]).argmin())]
 
     def _first(self, happened: np.ndarray) -> float:
@@ -94,8 +101,11 @@ class SpinUp:
 
 
 def turn(state: ParticleState | Arrays, rate: float) -> None:
-    """Give the pile in a state an angular velocity (rad/s) about z as a whole: what it lacks is added to the
-    velocities and spins of its grains. Its momentum stays."""
+    """Set the angular velocity (rad/s) of the pile in a state about z, as a rigid rotation.
+
+    The difference from its present spin is added to the velocities and spins of its grains. Its momentum does
+    not change.
+    """
     arrays = {name: np.array(state[name]) for name in state}
     inside = body(clusters_of(arrays), arrays["mass"])
     grains = part(arrays, inside)
@@ -111,8 +121,10 @@ def turn(state: ParticleState | Arrays, rate: float) -> None:
 def stage_ends(
     settled: float, rates: Sequence[float] = RATES, holds: tuple[float, float] = HOLDS
 ) -> np.ndarray:
-    """Return when each step of a spin-up ends that begins when a pile has settled, all in s; shape
-    (steps,)."""
+    """Return the end of each step of a spin-up, s; shape (steps,).
+
+    settled : time at which the pile has settled and the first step begins, s.
+    """
     return settled + np.cumsum([holds[rate > QUICK * (1 + 1e-9)] for rate in rates])
 
 
@@ -124,11 +136,11 @@ def spin_ups(
     holds: tuple[float, float] = HOLDS,
     **settings: Any,
 ) -> list[SpinUp]:
-    """Spin up piles of each magnetisation (A/m), each from some starts, all as one batch.
+    """Spin up piles of each magnetisation (A/m), each from several starts, all as one batch.
 
-    rates : rad/s, rising. holds : how long each is held, s: up to QUICK, and beyond it. settings : those of
-    ``scene``; the pile settles for its duration. progress : is told the part that is done, 0..1. RunError
-    where one fails.
+    rates : rad/s, rising. holds : hold times up to QUICK and beyond it, s.
+    settings : of ``scene``; the pile settles for its duration.
+    progress : receives the completed fraction, 0..1. RunError if a run fails.
     """
     wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
     clouds = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]

@@ -1,5 +1,5 @@
-"""The quantities whose accuracy ``tisim cost`` measures in a valve, over random starts: how much still flows
-in the field, and how deep grains overlap."""
+"""Quantities whose accuracy ``tisim cost`` measures in a valve, over random starts: the flow rate in the
+field, and the largest overlap."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tisim.accuracy import Quantity
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths of grains are chaotic; what counts is what flows."""
+    """Return the flow rate and the largest overlap; the paths of single grains are chaotic."""
     return (
         Quantity("mass flow rate at the end", flow_rate, random=True),
         Quantity("largest overlap", overlap, random=True),

@@ -1,4 +1,5 @@
-"""What a valve must show: walls bear what drags grains, and what L21 says of jams, beside what is found."""
+"""Checks of a valve: the walls balance the drag on grains, and L21's findings on jams are compared with the
+results."""
 
 from __future__ import annotations
 
@@ -15,21 +16,21 @@ from tisim.cases.valve.studies import ValveRuns, by_throat
 from tisim.analysis import Mean
 
 STARTS = 6
-"""Each valve is run from so many starts; the narrow one, in the field and without one, from twice as many,
-and that of fine grains from half as many."""
+"""Number of starts of each valve. The narrow one has twice this number, with and without a field, and the one
+with fine grains has half of it."""
 BALANCE = 0.05
-"""Walls bear the drag on an arrested flow to this part."""
+"""Largest relative difference between the force on the walls and the drag on an arrested flow."""
 
 
 def check(starts: int = STARTS) -> Iterator[Check | Claim | Shown]:
-    """Yield each number as it is known."""
+    """Yield each number when it is known."""
     narrow, wide, fine, without = by_throat(starts)
     yield from flowing([narrow, wide, fine])
-    yield Shown(f"{without.name}: flow in the end over that before", left(without.flows))
+    yield Shown(f"{without.name}: flow at the end over flow before", left(without.flows))
     yield from arrested(narrow, without)
     yield going_on(wide, "L21: 40x does not jam")
     more = left(wide.flows).minus(left(narrow.flows))
-    yield Claim(f"{wide.name}: the same, less that of {narrow.name}", more, 0.0)
+    yield Claim(f"{wide.name}: flow left, minus flow left with {narrow.name}", more, 0.0)
     yield going_on(fine, "L21: fine grains yield")
 
 
@@ -38,7 +39,7 @@ def flowing(valves: Sequence[ValveRuns]) -> Iterator[Claim]:
     for valve in valves:
         parts = [flow.open_rate / unhindered(flow) for flow in valve.flows]
         yield Claim(
-            f"{valve.name}, before the field: flow over that of grains that go along",
+            f"{valve.name}, before the field: flow over flow of grains that move with the oil",
             Mean.of(parts),
             0.5,
             1.1,
@@ -46,27 +47,25 @@ def flowing(valves: Sequence[ValveRuns]) -> Iterator[Claim]:
 
 
 def unhindered(flow: Flow) -> float:
-    """Return the rate (kg/s) of the grains of a flow, were all to go with the oil."""
+    """Return the rate (kg/s) of a flow if all grains moved with the oil."""
     return unhindered_rate(flow.result.scene, float(flow.result.state["mass"].sum()))
 
 
 def arrested(valve: ValveRuns, without: ValveRuns) -> Iterator[Check | Claim | Shown]:
-    """Yield that a flow is arrested, what is left of it beside that without a field, and that the walls bear
-    the drag on it."""
+    """Yield that a flow is arrested, its remaining part compared with runs without a field, and the balance
+    of wall force and drag."""
     results = [flow.result for flow in valve.flows]
     yield Claim(f"{valve.name}: flow left in the field (L21: 20x, 30x jam)", left(valve.flows), most=ARRESTED)
-    name = "the same: over that of the same starts without a field, as late"
+    name = "the same over the flow of the same starts without a field, at the same time"
     yield Shown(name, left_of(valve.flows, without.flows))
     borne = np.array([held_pressure(one) / drag_pressure(one) for one in results])
     farthest = float(borne[np.abs(borne - 1).argmax()])
-    yield Check(
-        "the same: force on the walls over drag, of the start farthest from 1", farthest, 1.0, BALANCE
-    )
+    yield Check("arrested flow: force on the walls over drag, start farthest from 1", farthest, 1.0, BALANCE)
     pressures = [drag_pressure(one) / (GRADIENT * LENGTH) for one in results]
-    name = f"the same: drag over cross-section, over the {1e-3 * GRADIENT * LENGTH:.3g} kPa asked for"
+    name = f"arrested flow: drag over cross-section, over the nominal {1e-3 * GRADIENT * LENGTH:.3g} kPa"
     yield Claim(name, Mean.of(pressures), 0.8, 1.3)
 
 
 def going_on(valve: ValveRuns, says: str) -> Claim:
-    """Return that a flow goes on in the field."""
+    """Return the claim that a flow continues in the field."""
     return Claim(f"{valve.name}: flow left in the field ({says})", left(valve.flows), ARRESTED)

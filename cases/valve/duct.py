@@ -1,4 +1,4 @@
-"""The duct of a valve and its constriction: shape, walls, and the oil that is driven through it."""
+"""The duct of a valve and its constriction: shape, walls, and the oil that flows through it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tisim.packing import RandomInDuct
 from tisim.sources import ConstrictionFlow
 
 SLICES = 400
-"""Integrals over the duct are sums over so many slices of each of its parts."""
+"""Number of slices of each part of the duct in integrals."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Duct:
     """A round duct along z with a constriction in its middle, m.
 
     throat, bore : diameters of the constriction and of the duct. straight : length of the constriction.
-    taper : length of the cones before and after it. length : of all, after which the duct begins anew.
+    taper : length of the cones before and after it. length : of the whole duct, which is its period.
     """
 
     throat: float
@@ -37,7 +37,7 @@ class Duct:
         must(self.straight > 0, "length of the constriction", "above 0", self.straight)
         must(self.taper > 0, "length of a cone", "above 0", self.taper)
         least = self.straight + 2 * self.taper
-        rule = f"above {least:g} m, that of the constriction with its cones"
+        rule = f"above {least:g} m, the length of the constriction with its cones"
         must(self.length > least, "length of the duct", rule, self.length)
 
     @property
@@ -46,14 +46,15 @@ class Duct:
         return np.pi * self.bore**2 / 4
 
     def profile(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return places along the duct, from its lower end up, and its radius there, m."""
+        """Return positions along the duct, from its lower end up, and its radius there, m."""
         near, far = self.straight / 2, self.straight / 2 + self.taper
         wide, narrow = self.bore / 2, self.throat / 2
         place = np.array([-self.length / 2, -far, -near, near, far, self.length / 2])
         return place + self.length / 2, np.array([wide, wide, narrow, narrow, wide, wide])
 
     def depth(self, rho: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return how far places inside, at distances from the axis and along it (m), are from the wall, m."""
+        """Return the distance of points in the duct from the wall, m; rho, z : distances from the axis and
+        along it, m."""
         heights, radii = self.profile()
         corners, places = np.column_stack([radii, heights - self.length / 2]), np.column_stack([rho, z])
         nearest = np.full(len(places), np.inf)
@@ -63,15 +64,17 @@ class Duct:
         return nearest
 
     def filling(self) -> RandomInDuct:
-        """Return where grains begin: anywhere in the duct."""
+        """Return the initial placement of grains: anywhere in the duct."""
         heights, radii = self.profile()
         return RandomInDuct(
             centre=(0.0, 0.0, -self.length / 2), heights=tuple(heights.tolist()), radii=tuple(radii.tolist())
         )
 
     def walls(self) -> Walls:
-        """Return the walls; those of the duct reach a bore beyond both of its ends, so that they have no
-        rims where it begins anew."""
+        """Return the walls of the duct.
+
+        They extend one bore beyond both ends, so that they have no rims at the periodic boundary.
+        """
         near, far, end = self.straight / 2, self.straight / 2 + self.taper, self.length / 2 + self.bore
 
         def at(z: float) -> tuple[float, float, float]:
@@ -92,15 +95,19 @@ class Duct:
         )
 
     def oil(self, speed: float) -> ConstrictionFlow:
-        """Return the flow of the oil of a speed along the duct, m/s, that of L21: it is faster at once where
-        the constriction is straight."""
+        """Return the flow of the oil for a speed along the duct, m/s, as in L21.
+
+        The speed increases abruptly at the ends of the straight part of the constriction.
+        """
         return ConstrictionFlow(
             speed=speed, throat_radius=self.throat / 2, duct_radius=self.bore / 2, length=self.straight
         )
 
     def oil_speed(self, rho: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the speed of the oil over that along the duct at distances from the axis, and places along
-        it, m: what ``oil`` makes."""
+        """Return the speed of the oil relative to its speed along the duct, as in ``oil``.
+
+        rho, z : distances from the axis and along it, m.
+        """
         wide, narrow = self.bore / 2, self.throat / 2
         faster = np.where(np.abs(z) <= self.straight / 2, (wide / narrow) ** 2, 1.0)
         return np.where(rho <= narrow, faster, np.clip((wide - rho) / (wide - narrow), 0.0, 1.0))

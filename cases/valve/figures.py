@@ -1,4 +1,5 @@
-"""Figures of the case valve: flow rate by time, what is left of it by field, and grains in a cut."""
+"""Figures of the case valve: flow rate over time, its remaining part by field, and a cut through the
+grains."""
 
 from __future__ import annotations
 
@@ -20,19 +21,19 @@ from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain
 
 STARTS = 6
-"""Each setting is run from so many starts; but the narrow valve in the strongest field, and without one, from
-twice as many, and that of fine grains from half as many."""
+"""Number of starts of each setting. The narrow valve in the strongest field and without one has twice this
+number, and the one with fine grains has half of it."""
 COLOURS = ("#4477aa", "#cc6677", "#228833", "#aaaaaa")
-"""Those of the narrow and of the wide constriction, of fine grains, and without a field."""
+"""Colours of the narrow and of the wide constriction, of fine grains, and of runs without a field."""
 FASTEST = 0.6
-"""Colours of speed end at this part of the speed of the oil in the duct."""
+"""Upper end of the colour scale of speed, as a fraction of the speed of the oil in the duct."""
 MILLI = 1e-3
 """A millisecond, s, and a millimetre, m."""
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """flow.png, flow.csv: flow rate by time, by constriction and grain size, and what is left of it by field;
-    cut.png: grains in the field, by speed."""
+    """flow.png, flow.csv: flow rate over time, by constriction and grain size, and its remaining part by
+    field; cut.png: grains in the field, by speed."""
     must(size == "default", "size", "default, which is run", size)
     throats = by_throat(STARTS, progress_of_part(progress, 0, 2))
     fields = by_field(STARTS, progress_of_part(progress, 1, 2))
@@ -44,7 +45,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def flow_figure(throats: Sequence[ValveRuns], fields: Sequence[ValveRuns]) -> Figure:
-    """Draw flow rates by time, thin lines for starts, and what is left of them by field."""
+    """Draw flow rates over time, with thin lines for single starts, and their remaining part by field."""
     figure = empty(12.0, 4.0)
     rates, sweep = figure.subplots(1, 2)
     for valve, colour in zip(throats, COLOURS, strict=True):
@@ -72,8 +73,8 @@ def flow_figure(throats: Sequence[ValveRuns], fields: Sequence[ValveRuns]) -> Fi
 
 
 def cut_figure(valves: Sequence[ValveRuns]) -> Figure:
-    """Draw the grains along the plane of axis and field of the first start of each valve, at the end, by
-    speed."""
+    """Draw the grains in the plane of axis and field at the end, by speed, for the first start of each
+    valve."""
     figure = empty(3.3 * len(valves) + 0.8, 3.4, pad=0.1)
     axes = figure.subplots(1, len(valves), sharey=True)
     for axis, valve in zip(axes, valves, strict=True):
@@ -86,8 +87,8 @@ def cut_figure(valves: Sequence[ValveRuns]) -> Figure:
 
 
 def cut(axis: Axes, flow: Flow) -> EllipseCollection:
-    """Draw the walls, and the grains of a flow at its end that are at most a radius away from the plane of
-    axis and field; return the grains."""
+    """Draw the walls and the final grains within one radius of the plane of axis and field; return the
+    grains."""
     state, scene = flow.result.state, flow.result.scene
     duct, place = duct_of(scene), state["position"]
     near = np.flatnonzero(np.abs(place[:, 1]) <= state["radius"])
@@ -111,7 +112,7 @@ def cut(axis: Axes, flow: Flow) -> EllipseCollection:
 
 
 def table(valves: Sequence[ValveRuns]) -> str:
-    """Return what each start of each valve has come to, as CSV."""
+    """Return the results of each start of each valve as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(

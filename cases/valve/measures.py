@@ -1,4 +1,4 @@
-"""What is measured of a valve: its mass flow rate, the pressure that it holds, and clusters of grains."""
+"""Measures of a valve: its mass flow rate, the pressure on its walls, and clusters of grains."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ def oil_of(scene: Scene) -> ConstrictionFlow:
 
 
 def rate(mass: np.ndarray, velocity: np.ndarray, length: float) -> float:
-    """Return the mass flow rate (kg/s) along z, the mean over cross-sections of a duct of a length (m): the
-    momentum of the grains over the length. In steady flow it is that through the constriction.
+    """Return the mass flow rate (kg/s) along z: the momentum of the grains divided by the length (m) of the
+    duct.
 
+    It is the mean over cross-sections; in steady flow it equals the rate through the constriction.
     mass : kg, shape (n,). velocity : m/s, shape (n, 3).
     """
     return float(mass @ velocity[:, 2] / length)
@@ -47,8 +48,10 @@ def flow_rate(result: Result) -> float:
 
 
 def unhindered_rate(scene: Scene, mass: float) -> float:
-    """Return the mass flow rate (kg/s) of grains of a mass (kg) in all that go with the oil, evenly over the
-    duct."""
+    """Return the mass flow rate (kg/s) of grains of a total mass (kg) that move with the oil.
+
+    The grains are distributed evenly over the duct.
+    """
     duct = duct_of(scene)
     return mass * oil_of(scene).speed * duct.oil_through() / duct.filling().volume() / duct.length
 
@@ -63,14 +66,16 @@ def drag(result: Result) -> float:
 
 
 def drag_pressure(result: Result) -> float:
-    """Return the drag on all grains at the end over the cross-section of the duct, Pa: what L21 says is about
-    100 kPa where the flow is arrested."""
+    """Return the drag on all grains at the end divided by the cross-section of the duct, Pa.
+
+    L21 gives about 100 kPa for an arrested flow.
+    """
     return drag(result) / duct_of(result.scene).area
 
 
 def pressure_at_rest(scene: Scene) -> float:
-    """Return the drag on the grains of a scene, were they at rest and evenly over the duct, over the
-    cross-section, Pa."""
+    """Return the drag on grains at rest, evenly distributed over the duct, divided by its cross-section,
+    Pa."""
     cloud, duct = scene.particles, duct_of(scene)
     assert isinstance(cloud, Cloud)
     each = 6 * np.pi * published.OIL_VISCOSITY * mean_radius(cloud.grains) * oil_of(scene).speed
@@ -78,24 +83,25 @@ def pressure_at_rest(scene: Scene) -> float:
 
 
 def held_pressure(result: Result) -> float:
-    """Return the force of the grains on the walls along the duct at the end, over its cross-section, Pa."""
+    """Return the force of the grains on the walls along the duct at the end, divided by its cross-section,
+    Pa."""
     return result.measures["valve_force_z"] / duct_of(result.scene).area
 
 
 ARCH_ANGLE = 27.0
-"""An arch ends on the wall within this angle of the direction of the field, degrees: four grains in a row
-along the wall of a constriction four grains wide do not reach from side to side of it, nor seven where it is
-6.5 grains wide; five and eight do."""
+"""Largest angle between the field and the direction of an arch's wall contacts, degrees. A row of four grains
+along the wall does not count as an arch in a constriction four grains wide, nor does a row of seven in one
+6.5 grains wide; rows of five and eight do."""
 
 
 @dataclass(frozen=True)
 class Clusters:
     """The clusters of grains that touch.
 
-    largest : the part of all grains that are in the largest. bridged : whether grains within the cones and
-    the constriction that are bound to each other there touch the wall on opposite sides, within ARCH_ANGLE of
-    the direction of the field: an arch, a chain across, or many in a row along the wall. Valves that flow
-    have them, too.
+    largest : fraction of all grains in the largest cluster.
+    bridged : whether one cluster within the cones and the constriction touches the wall on opposite sides,
+    within ARCH_ANGLE of the direction of the field. It can be an arch, a chain across, or a long row along
+    the wall. Valves that flow have such clusters, too.
     """
 
     largest: float
@@ -109,7 +115,7 @@ def clusters(state: Arrays, scene: Scene) -> Clusters:
     size = np.bincount(labels(len(radius), pairs)).max()
     x, y, z = position.T
     inside = np.abs(z) <= duct.straight / 2 + duct.taper
-    # Bound to each other within the constriction alone.
+    # Connected within the constriction only.
     there = labels(len(radius), pairs[inside[pairs].all(axis=1)])
     aside = np.abs(y) < np.tan(np.radians(ARCH_ANGLE)) * np.abs(x)
     touches = inside & aside & (duct.depth(np.hypot(x, y), z) <= radius)
@@ -118,14 +124,15 @@ def clusters(state: Arrays, scene: Scene) -> Clusters:
 
 
 def attraction(radius: float, flux: float) -> float:
-    """Return the force (N) with which two grains of a radius (m) that touch along a field (T) attract each
-    other, with the moments of spheres without end of permeability that magnetise each other, 4/3 of 4 pi R^3
-    B / mu_0."""
+    """Return the attraction (N) of two grains of a radius (m) that touch along a field (T).
+
+    The moments are 4/3 of 4 pi R^3 B / mu_0, for spheres of infinite permeability that magnetise each other.
+    """
     return attraction_in_line(4 / 3 * 4 * np.pi * radius**3 * flux / mu_0, 2 * radius)
 
 
 def mason_number(scene: Scene, radius: float, flux: float) -> float:
-    """Return the drag on a grain at rest in the constriction over the attraction of two of them."""
+    """Return the drag on a grain at rest in the constriction divided by the attraction of two grains."""
     duct = duct_of(scene)
     speed = oil_of(scene).speed * (duct.bore / duct.throat) ** 2
     return float(6 * np.pi * published.OIL_VISCOSITY * radius * speed / attraction(radius, flux))

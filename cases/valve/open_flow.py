@@ -1,8 +1,8 @@
-"""What a pressure drives through a valve without a field, by laws for dense suspensions.
+"""The flow that a pressure drives through a valve without a field, by laws for dense suspensions.
 
-The simulation does not tell it: its oil is a given flow, which neither grains nor walls change. So it is that
-of Hagen and Poiseuille along a duct of slowly changing width, with the viscosity of Krieger and Dougherty.
-The size of grains does not count in it: that is what jams are about.
+The simulation cannot give it, because its oil is a prescribed flow that neither grains nor walls change. The
+flow is computed by the law of Hagen and Poiseuille for a duct of slowly changing width, with the viscosity of
+Krieger and Dougherty. It does not depend on the size of grains; only jams do.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from tisim.cases.valve.duct import Duct
 
 
 def resistance(duct: Duct) -> float:
-    """Return the hydraulic resistance of a duct over the viscosity, 1/m^3: 8/pi times the integral of
-    1/r^4, which from r_1 to r_2 along a cone of the length l is l (r_1^2 + r_1 r_2 + r_2^2) / (3 r_1^3
-    r_2^3)."""
+    """Return the hydraulic resistance of a duct divided by the viscosity, 1/m^3.
+
+    It is 8/pi times the integral of 1/r^4, which is l (r_1^2 + r_1 r_2 + r_2^2) / (3 r_1^3 r_2^3) along a
+    cone of the length l from r_1 to r_2.
+    """
     heights, radii = duct.profile()
     a, b = radii[:-1], radii[1:]
     parts = np.diff(heights) * (a * a + a * b + b * b) / (3 * a**3 * b**3)
@@ -29,5 +31,5 @@ def suspension_viscosity(fraction: float) -> float:
 
 
 def open_flow(duct: Duct, pressure: float, fraction: float) -> float:
-    """Return the volume flow rate without field, m^3/s, that a pressure (Pa) drives through a duct."""
+    """Return the volume flow rate, m^3/s, that a pressure (Pa) drives through a duct without a field."""
     return pressure / (suspension_viscosity(fraction) * resistance(duct))

@@ -1,10 +1,13 @@
-"""The inverse problem of valve: which constriction and grains jam in the least field, or never?
+"""The inverse problem of valve: find constrictions and grains that jam in the least field, or never jam.
 
-A design is the diameter of the constriction, that of the grains, and the field. A wide constriction lets more
-through while the field is off, and takes more field to jam. Whether it jams is simulated, from some starts,
-in a field that is on from the first. What flows without one is that of ``open_flow``, which is no simulation.
-From some starts a valve jams and from others not: a start that misses what is wanted counts as MISSED times
-the worst that there may be, so that of four starts none may, and a search sees how many do.
+A design is the diameter of the constriction, the diameter of the grains, and the field. A wide constriction
+has a larger flow without a field, and needs a stronger field to jam. The jam is simulated from several
+starts, in a field that is on from the beginning. The flow without a field is computed by ``open_flow``, not
+simulated.
+
+A valve may jam from some starts and not from others. A start that misses the goal counts as MISSED times the
+worst possible value. A design whose four starts include such a start is therefore worse than all designs
+without one, and a search sees how many starts miss the goal.
 """
 
 from __future__ import annotations
@@ -31,32 +34,32 @@ from tisim.sources import MagneticField
 
 VARIANTS = ("front", "field", "never")
 STRONGEST = 0.4
-"""The field may be so strong, T; L21 has 0.23, and 0.56 between inserts of iron (section 3.4.3)."""
+"""Upper limit of the field, T; L21 has 0.23, and 0.56 between inserts of iron (section 3.4.3)."""
 THROAT_GENE, DIAMETER_GENE = Gene("throat", "m", 3.5 * D, 6 * D), Gene("diameter", "m", 0.7 * D, D)
 FLUX_GENE = Gene("flux", "T", 0.02, STRONGEST)
 MISSED = 4.0
-"""A start that misses what is wanted counts as so many times the worst that there may be."""
+"""Factor on the worst possible value for a start that misses the goal."""
 MOST_ACROSS = THROAT_GENE.high / DIAMETER_GENE.low
-"""So many grains at most are side by side in a constriction."""
+"""Largest number of grains side by side in a constriction."""
 GENES = {
     "front": (THROAT_GENE, DIAMETER_GENE, FLUX_GENE),
     "field": (THROAT_GENE, DIAMETER_GENE, FLUX_GENE),
     "never": (THROAT_GENE, DIAMETER_GENE),
 }
 BOUND = 23.5e-9
-"""An open flow is to be at least so large where it is bounded, m^3/s: that of a constriction of 4.6 of L21's
-largest grains."""
+"""Least open flow in the variant "field", m^3/s: the flow of a constriction 4.6 of L21's largest grains
+wide."""
 WANTED = {
-    "front": "the front of the field that arrests the flow and of what flows without it",
-    "field": f"the least field that arrests the flow, of valves of {1e9 * BOUND:g} mm^3/s without",
-    "never": f"the fewest grains across a constriction that a field of {published.FLUX:g} T never arrests",
+    "front": "the front of arresting field and open flow",
+    "field": f"the least field that arrests the flow, for open flows of at least {1e9 * BOUND:g} mm^3/s",
+    "never": f"the narrowest constriction, in grains, that a field of {published.FLUX:g} T never arrests",
 }
-"""What each variant of the problem looks for."""
+"""The goal of each variant of the problem."""
 MEANINGS = {
     "field": f"flux density that arrests the flow; {MISSED * STRONGEST:g} T for a start in which it does not",
-    "open flow": "volume that flows without field, after Hagen, Poiseuille, Krieger and Dougherty; none "
+    "open flow": "volume flow without field, by Hagen, Poiseuille, Krieger and Dougherty; 0 "
     "for a start that is not arrested",
-    "width": "diameter of the constriction over that of the grains; "
+    "width": "diameter of the constriction over diameter of the grains; "
     f"{MISSED * MOST_ACROSS:.2g} for a start that is arrested",
     "throat": "diameter of the constriction",
     "diameter": "diameter of the grains",
@@ -64,13 +67,16 @@ MEANINGS = {
 
 
 def part_left(result: Result) -> float:
-    """Return the mass flow rate at the end over that of grains that go with the oil."""
+    """Return the mass flow rate at the end, divided by the rate of grains that move with the oil."""
     return flow_rate(result) / unhindered_rate(result.scene, float(result.state["mass"].sum()))
 
 
 def arrested(result: Result) -> bool:
-    """Return whether the flow is arrested at the end: less than ARRESTED of what goes with the oil flows, at
-    one instant, as there is no time without a field to compare with."""
+    """Return whether the flow is arrested at the end: its rate is below ARRESTED of the rate of grains that
+    move with the oil.
+
+    It is measured at one instant, because these runs have no time without a field for comparison.
+    """
     return part_left(result) < ARRESTED
 
 
@@ -80,30 +86,34 @@ def flux(result: Result) -> float:
 
 
 def width(result: Result) -> float:
-    """Return the diameter of the constriction over that of the grains."""
+    """Return the diameter of the constriction divided by the diameter of the grains."""
     return duct_of(result.scene).throat / (2 * float(result.state["radius"].mean()))
 
 
 def volume_rate(scene: Scene) -> float:
-    """Return the volume flow rate of a valve without field, m^3/s, at the pressure that is to jam it: that of
-    L21's gradient over its length."""
+    """Return the volume flow rate of a valve without field, m^3/s.
+
+    The pressure is the one that must be stopped: L21's gradient times the length of the duct.
+    """
     duct = duct_of(scene)
     return open_flow(duct, GRADIENT * duct.length, published.FRACTION)
 
 
 def arresting_field(result: Result) -> float:
-    """Return the field where it arrests the flow, T; MISSED of the strongest where it does not."""
+    """Return the field if it arrests the flow, T; otherwise MISSED times the strongest field."""
     return flux(result) if arrested(result) else MISSED * STRONGEST
 
 
 def arresting_flow(result: Result) -> float:
-    """Return what flows without the field where this arrests it, m^3/s; nothing where it does not."""
+    """Return the flow without the field if the field arrests it, m^3/s; otherwise 0."""
     return volume_rate(result.scene) if arrested(result) else 0.0
 
 
 def flowing_width(result: Result) -> float:
-    """Return how many grains are side by side in the constriction where the flow goes on; MISSED times the
-    most where it is arrested."""
+    """Return the number of grains side by side in the constriction if the flow continues.
+
+    If it is arrested, return MISSED times the largest number.
+    """
     return MISSED * MOST_ACROSS if arrested(result) else width(result)
 
 
@@ -116,8 +126,11 @@ OBJECTIVES = {
 
 
 def problem(size: str = "default", variant: str = "front") -> Problem:
-    """Return the search for valves; by variant the front of field and open flow, the least field at a bounded
-    open flow, or the narrowest that never jam."""
+    """Return the search for valves of a variant.
+
+    The variants are the front of field and open flow, the least field at a bounded open flow, and the
+    narrowest valve that never jams.
+    """
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     settings = {**searched_size(size, SIZES).scene, **SEARCHED}
 
@@ -148,7 +161,7 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
 
 
 def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
-    """Return what else is known of the valve of a design."""
+    """Return further properties of the valve of a design."""
     return {
         "grains": float(len(result.state["radius"])),
         "grains across the constriction": width(result),

@@ -1,4 +1,4 @@
-"""Runs of valves, and how much flowed when."""
+"""Runs of valves, with their flow rates over time."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from tisim.engine.batches import Progress
 from tisim.sources import MagneticField
 
 Settings = Mapping[str, Any]
-"""Settings are those of a scene that differ."""
+"""Settings of a scene that differ from the defaults."""
 FLOW_LOOKS = 100
-"""The flow rate is noted so many times in a run."""
+"""Number of samples of the flow rate in a run."""
 LATE = 0.2
-"""Flow rates without a field and in it are means over this last part of the time of either."""
+"""Fraction at the end of the time without a field, and of the time with it, over which flow rates are
+averaged."""
 ARRESTED = 0.05
-"""A flow is arrested where less than this part is left: of its own mean rate before the field, as a mean
-(``Flow.left``); and in a search, which has no time without a field, of the rate of grains that go with the
-oil, at the end (``problem.part_left``)."""
+"""Largest remaining fraction of the flow rate at which a flow counts as arrested. For ``Flow.left`` it is
+relative to the mean rate before the field. In a search, which has no time without a field, it is relative to
+the rate of grains that move with the oil, at the end (``problem.part_left``)."""
 
 
 class FlowSeries(Observer):
-    """The mass flow rate of each world is noted at equal times, FLOW_LOOKS in all of its duration.
+    """Records the mass flow rate of each world at FLOW_LOOKS equally spaced times.
 
     ``rows[w]`` are pairs of time (s) and rate (kg/s) of world w.
     """
@@ -51,7 +52,7 @@ class FlowSeries(Observer):
 
 @dataclass(frozen=True)
 class Flow:
-    """A flow has its result, and the mass flow rate (kg/s) at times (s)."""
+    """The result of a flow, with the mass flow rate (kg/s) at times (s)."""
 
     result: Result
     times: np.ndarray
@@ -59,7 +60,7 @@ class Flow:
 
     @property
     def switched(self) -> float:
-        """Return when the field was switched on, s."""
+        """Return the time at which the field is switched on, s."""
         return next(one for one in self.result.scene.effects if isinstance(one, MagneticField)).begin
 
     @property
@@ -74,7 +75,7 @@ class Flow:
 
     @property
     def left(self) -> float:
-        """Return the part of the flow rate that is left in the field."""
+        """Return the fraction of the flow rate that remains in the field."""
         return self.closed_rate / self.open_rate
 
     @property
@@ -83,13 +84,13 @@ class Flow:
         return self.left < ARRESTED
 
     def mean(self, begin: float, end: float) -> float:
-        """Return the mean rate over the last part of the time from ``begin`` to ``end``, s."""
+        """Return the mean rate over the last part LATE of the time from ``begin`` to ``end``, s."""
         chosen = (self.times > end - LATE * (end - begin)) & (self.times <= end)
         return float(self.rates[chosen].mean())
 
 
 def flows(scenes: Sequence[Scene], progress: Progress = lambda part: None) -> list[Flow]:
-    """Return the flows of scenes, run as one batch; RunError where one fails."""
+    """Return the flows of scenes, run as one batch; RunError if one fails."""
     simulation = Simulation(scenes[0], len(scenes), max(one.capacity() for one in scenes))
     simulation.load(list(scenes))
     series = FlowSeries(scenes)
@@ -101,11 +102,14 @@ def flows(scenes: Sequence[Scene], progress: Progress = lambda part: None) -> li
 
 
 def left(group: Sequence[Flow]) -> Mean:
-    """Return the part of the flow rate before the field that is left at the end, a mean over starts."""
+    """Return the fraction of the flow rate before the field that remains at the end, a mean over starts."""
     return Mean.of([one.left for one in group])
 
 
 def left_of(group: Sequence[Flow], without: Sequence[Flow]) -> Mean:
-    """Return the flow rate at the end over that of the same starts without a field, as late: a mean over
-    starts. A flow that slows down by itself does not count for the field."""
+    """Return the ratio of the final flow rates with and without a field, from the same starts: a mean over
+    starts.
+
+    It excludes slowing of the flow that is not caused by the field.
+    """
     return Mean.of([one.closed_rate / other.closed_rate for one, other in zip(group, without, strict=True)])

@@ -1,11 +1,11 @@
 """A valve of a magnetorheological fluid: a constriction that iron grains jam in a field (L21 section 3.4.4).
 
-Grains are dragged through a constriction of a round duct by oil whose velocity is given. After a while a
-field across the duct is switched on, which makes chains of them: they arrest, or yield and go on. The duct is
-periodic along the flow: what leaves it below comes in above.
+Oil with a prescribed velocity drags grains through a constriction of a round duct. After a while a field
+across the duct is switched on, and the grains form chains, which either arrest the flow or yield and flow on.
+The duct is periodic along the flow: grains that leave it below enter it above.
 
-It is the simulation of L21 section 3.4.4. What differs at the sizes that a laptop runs is in ``sizes`` and in
-the page of the case.
+It is the simulation of L21 section 3.4.4. ``sizes`` and the page of the case list the differences at the
+sizes for a laptop.
 """
 
 from __future__ import annotations
@@ -40,45 +40,51 @@ from tisim.steppers import FixedStep, Verlet
 TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"
 
 FLOWING, LASTING = 0.1e-3, 0.5e-3
-"""Grains flow so long without a field, and so long in it, s."""
+"""Durations of the flow without a field and with it, s."""
 CUTOFF = 4.4
-"""Grains magnetise and attract each other up to so many radii: as far, in diameters, as L21 has it in its
+"""Cut-off of magnetisation and attraction between grains, in radii. In diameters it equals the range in L21's
 cell (section 2.4.3), a gap of 8 um between grains of 6.7 um."""
 FIELD = 0.3
 """Flux density of the field, T."""
 SLOPE = 1.0
-"""Length of a cone of the constriction over how much narrower it is."""
+"""Length of a cone divided by the decrease of the radius along it."""
 CONTACT = Granular(
     normal=HertzMaterial(),
     damping=RestitutionDamping(),
     tangential=MindlinForce(),
     rolling=RollingEPSD(damping_ratio=shear.ROLLING_DAMPING),
 )
-"""The law of contact of L21 section 2.2.1, without cohesion."""
+"""The contact law of L21 section 2.2.1, without cohesion."""
 
 
 def duct(throat: float, bore: float, straight: float, slope: float, length: float) -> Duct:
-    """Return the duct of a valve; m, and the length of a cone over how much narrower it is."""
+    """Return the duct of a valve; lengths in m. slope : length of a cone divided by the decrease of the
+    radius."""
     return Duct(throat, bore, straight, slope * (bore - throat) / 2, length)
 
 
 def mean_radius(grains: Sequence[GrainClass]) -> float:
-    """Return the mean radius of the grains of a mixture, over their number, m."""
+    """Return the number-averaged mean radius of the grains of a mixture, m."""
     numbers = np.array([one.number() for one in grains])
     radii = np.array([one.sizes.mean_radius() for one in grains])
     return float(numbers @ radii / numbers.sum())
 
 
 def step(radius: float, young: float) -> float:
-    """Return a step (s) for grains of which the smallest have a radius (m), of a Young's modulus (Pa): that
-    of L21, which goes as the duration of an impact after Hertz, to two digits."""
+    """Return a step (s) for grains with a smallest radius (m) and a Young's modulus (Pa), to two digits.
+
+    It is L21's step, scaled like the duration of an impact by Hertz.
+    """
     smaller = 2 * radius / (VALVE_GRAINS[-1][0] * published.MICRO)
     return float(f"{published.STEP * smaller * (published.YOUNG / young) ** 0.4:.2g}")
 
 
 def speed_of(pressure: float, duct: Duct, grains: Sequence[GrainClass], fraction: float) -> float:
-    """Return the speed of the oil along the duct (m/s) at which the drag on grains at rest, evenly over the
-    duct, is that of a pressure (Pa) on its cross-section."""
+    """Return the speed of the oil along the duct (m/s) at which the drag equals a pressure (Pa) on its
+    cross-section.
+
+    The drag is that on grains at rest, evenly distributed over the duct.
+    """
     volume = duct.filling().volume()
     density = number_of(grains, fraction, volume) / volume
     drag = 6 * np.pi * published.OIL_VISCOSITY * mean_radius(grains) * density * duct.oil_through()
@@ -106,16 +112,20 @@ def scene(
     """Return the scene of a valve.
 
     throat, bore : diameters of the constriction and of the duct, m. grains : the mixture. flux : density of
-    the field along x, T. pressure : what the drag on grains at rest amounts to, Pa, by the gradient of L21
-    unless given; speed : of the oil along the duct in its place, m/s. fraction : of the volume that grains
-    fill. straight : length of the constriction, m, a quarter of its diameter unless given; slope : length of
-    the cones before and after it over how much narrower it is; length : of the duct, m. flowing, lasting :
-    how long grains flow without a field, and how long there is one, s. young : Pa. dt : s; unless given that
-    of L21 for grains of this size and modulus. friction : coefficient of sliding friction. All are values of
-    one structure: valves that differ in them run as one batch.
+    the field along x, T.
+    pressure : drag on grains at rest over the cross-section, Pa; by default from the gradient of L21.
+    speed : of the oil along the duct, m/s, instead of the pressure. fraction : of the volume that is filled
+    by grains.
+    straight : length of the constriction, m; by default a quarter of its diameter.
+    slope : length of the cones before and after it divided by the decrease of the radius. length : of the
+    duct, m.
+    flowing, lasting : durations without a field and with it, s. young : Pa.
+    dt : s; by default L21's step scaled to this size and modulus. friction : coefficient of sliding friction.
+
+    All are values of one structure: valves that differ in them run as one batch.
     """
     shape = duct(throat, bore, throat / 4 if straight is None else straight, slope, length)
-    must(pressure is None or speed is None, "pressure", "left out where the speed is given", pressure)
+    must(pressure is None or speed is None, "pressure", "left out if the speed is given", pressure)
     if speed is None:
         speed = speed_of(GRADIENT * length if pressure is None else pressure, shape, grains, fraction)
     half = (bore / 2, bore / 2, length / 2)
@@ -130,7 +140,7 @@ def scene(
         domain=Box(low=(-half[0], -half[1], -half[2]), high=half, periodic=(False, False, True)),
         effects=(
             MagneticField(constant=(flux, 0.0, 0.0), begin=flowing),
-            # One sweep a step, as L21 has it (section 2.2.3).
+            # One sweep a step, as in L21 (section 2.2.3).
             MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, cutoff=CUTOFF),
             TruncatedDipoleDipole(cutoff=CUTOFF),
             CONTACT,

@@ -1,4 +1,5 @@
-"""The sizes of the case: valves for a laptop, what a search runs, and those with the numbers of L21."""
+"""Sizes of the case valve: valves for a laptop, the valves of a search, and valves with the numbers of
+L21."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from tisim.cases.mrf_shear.grains import equal
 from tisim.cases.valve import published
 
 D = published.LARGEST
-"""Diameter of the coarse grains, m: that of the largest of L21."""
+"""Diameter of the coarse grains, m, equal to L21's largest."""
 FINE_DIAMETER = D / 2
 """Diameter of the fine grains, m."""
 COARSE, FINE_GRAINS = equal(D / 2, 1.0), equal(FINE_DIAMETER / 2, 1.0)
@@ -21,22 +22,23 @@ BORE, LENGTH = 8 * D, 8 * D
 """Diameter and length of the duct, m."""
 
 L21_BORE, L21_LENGTH = 3.2e-3, 0.9e-3
-"""Diameter of the duct of L21, m, which it does not state: an eighth of an inch, which leaves 0.4 mm of wall
-in a valve that is 4 mm wide (its table 3.1); and the length, in which its oil drags grains at rest with 90,
-117 and 141 kPa where the constriction is 20, 30 and 40 grains wide, around its 100 kPa."""
+"""Diameter of the duct of L21, m, and its length. L21 does not state the diameter; here it is an eighth of an
+inch, which leaves 0.4 mm of wall in a valve that is 4 mm wide (its table 3.1). With this length, its oil
+drags grains at rest with 90, 117 and 141 kPa in constrictions 20, 30 and 40 grains wide, close to its 100
+kPa."""
 GRADIENT = published.PRESSURE / L21_LENGTH
-"""The drag on grains at rest in a unit of volume of the duct, Pa/m: L21's 100 kPa over that length."""
+"""The drag on grains at rest per volume of the duct, Pa/m: L21's 100 kPa over that length."""
 
 SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 4e-4}
-"""What a search runs of each design: the field is on from the first."""
+"""Settings of the runs in a search: the field is on from the beginning."""
 SEARCH_SETTINGS = {
     "generations": 6, "options": {"population": 8, "first": 12}, "ensemble": {"min_starts": 4, "confirm": 8},
 }  # fmt: skip
-"""From one start some valves jam by luck, and a search would keep those."""
+"""With one start, some valves jam by chance, and a search would select those."""
 
 
 def l21(ratio: int, **more: Any) -> dict[str, Any]:
-    """Return the settings of L21's valve with a constriction of so many grains."""
+    """Return the settings of L21's valve with a constriction ``ratio`` grains wide."""
     throat = published.CONSTRICTIONS[ratio]
     return {
         "throat": throat, "bore": L21_BORE, "straight": throat / 4, "slope": 0.25, "length": L21_LENGTH,

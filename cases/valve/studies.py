@@ -1,4 +1,4 @@
-"""What is compared: constrictions, grain sizes and fields, each from several starts."""
+"""Comparisons of constrictions, grain sizes and fields, each from several starts."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from tisim.cases.valve.sizes import FINE_DIAMETER, THROATS, D
 from tisim.engine.batches import Progress
 
 FLUXES = (published.FLUX, 0.27)
-"""Flux densities beside FIELD, T."""
+"""Flux densities in addition to FIELD, T."""
 
 
 @dataclass(frozen=True)
 class ValveRuns:
-    """The runs of a valve are flows from several starts.
+    """The runs of a valve: flows from several starts.
 
     throat, diameter : of the constriction and of the grains, m. flux : flux density, T.
     """
@@ -32,19 +32,19 @@ class ValveRuns:
 
     @property
     def width(self) -> float:
-        """Return how many grains are side by side in the constriction."""
+        """Return the number of grains side by side in the constriction."""
         return self.throat / self.diameter
 
     @property
     def name(self) -> str:
-        """Return what it is, for people."""
+        """Return a readable name."""
         name = f"{self.width:.3g} grains of {1e6 * self.diameter:.3g} µm"
         return name if self.flux > 0 else f"{name}, no field"
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What valve is wanted: diameters of the constriction and of the grains, m, flux density, T, and how many
+    """A valve to run: diameters of the constriction and of the grains, m, flux density, T, and number of
     starts."""
 
     throat: float
@@ -60,7 +60,7 @@ class Wanted:
 
 
 def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return the runs of valves, all of them one batch."""
+    """Return the runs of valves, all in one batch."""
     done = flows([scene(**one) for each in wanted for one in each.settings()], progress)
     ends = np.cumsum([each.starts for each in wanted])
     return [
@@ -70,9 +70,13 @@ def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) ->
 
 
 def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
-    """Return coarse grains in each constriction, in the narrow one from twice as many starts; fine ones in
-    the narrow one, which are eight times as many, from half as many starts; and coarse ones there from the
-    same starts without a field."""
+    """Return the runs of the compared constrictions and grains.
+
+    They are, with the number of starts:
+    - coarse grains in the narrow constriction, 2 ``starts``, with a field and without one;
+    - coarse grains in the wide constriction, ``starts``;
+    - fine grains, with eight times the number, in the narrow constriction, ``starts`` / 2.
+    """
     narrow, wide = THROATS
     wanted = [
         Wanted(narrow, D, FIELD, 2 * starts),

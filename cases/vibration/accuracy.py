@@ -1,7 +1,7 @@
-"""The quantities whose accuracy ``tisim cost`` measures in the array of Z13: where its particles are, and its
-centre of gravity.
+"""Quantities whose accuracy ``tisim cost`` measures in the array of Z13: the positions of its particles, and
+its centre of gravity.
 
-The centre of gravity of any such array, and every particle that feels no other, follow
+The centre of gravity of any such array, and every particle without interaction, follow
 ``closed_forms.response``.
 """
 
@@ -22,7 +22,7 @@ from tisim.sources import ElectricField, MagneticField
 
 
 def centre(result: Result) -> np.ndarray:
-    """Displacement of the centre of gravity, m."""
+    """Return the displacement of the centre of gravity, m."""
     order = np.argsort(result.state["id"])
     return np.average(displacement(result), axis=0, weights=result.state["mass"][order])
 
@@ -34,10 +34,11 @@ def exact(result: Result) -> np.ndarray:
 
 
 def constants(scene: Scene) -> dict[str, float] | None:
-    """w, k_m, push and omega of ``response``; None where that does not describe the centre of gravity.
+    """Return w, k_m, push and omega of ``response``; None if that does not describe the centre of gravity.
 
-    It does where nothing but pair forces and PeakDisplacement is added to the array of Z13, in a constant
-    field along z and one along x that oscillates, and all particles, alike, begin at rest at their anchors.
+    It does if the scene adds only pair forces and PeakDisplacement to the array of Z13, with a constant
+    magnetic field along z and an oscillating electric field along x, and if all particles are equal and begin
+    at rest at their anchors.
     """
     single_effects = (e for e in scene.effects if not isinstance(e, PairForce | PeakDisplacement))
     have: dict[type, Any] = {type(effect): effect for effect in single_effects}
@@ -64,7 +65,7 @@ def _alike_at_rest(start: Arrays) -> bool:
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Return where every particle is, and where their centre of gravity."""
+    """Return the positions of all particles and of their centre of gravity."""
     described = constants(scene) is not None
     independent = described and not any(isinstance(effect, PairForce) for effect in scene.effects)
 

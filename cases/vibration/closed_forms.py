@@ -1,4 +1,4 @@
-"""Closed forms of a charged, tethered particle in uniform fields (Z13 section 3), by NumPy alone.
+"""Closed forms of a charged, tethered particle in uniform fields (Z13 section 3), with only NumPy.
 
 In the plane across B, along z, with w = q B/m and the field along x, z = x + i y obeys
 
@@ -16,9 +16,11 @@ Numbers = np.ndarray | float
 
 
 def response(t: Numbers, w: Numbers, k_m: Numbers, push: Numbers, omega: Numbers) -> np.ndarray:
-    """z = x + i y (m) from rest at the anchor, tethered alike along x and y, in E_0 sin(Omega t) along x.
+    """Return z = x + i y (m) from rest at the anchor, with equal tethers along x and y, in E_0 sin(Omega t)
+    along x.
 
-    What a cloud's centre of gravity does, as forces between its particles cancel. Not at resonance.
+    The centre of gravity of a cloud moves in the same way, because forces between its particles cancel. Not
+    valid at resonance.
     """
     root = np.sqrt(np.asarray(w, float) ** 2 / 4 + k_m)
     a, b = 1j * (-w / 2 + root), 1j * (-w / 2 - root)

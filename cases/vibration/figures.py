@@ -1,4 +1,4 @@
-"""Figures of the case vibration: of one run, and of many."""
+"""Figures of the case vibration: figures of one run, and of many runs."""
 
 from __future__ import annotations
 
@@ -29,16 +29,17 @@ from tisim.io.reader import Frames
 from tisim.plotting.style import empty, legend_above, letters, plain, quantity
 
 MIN_SPECTRUM_FRAMES = 9
-"""A spectrum takes at least so many frames."""
+"""Least number of frames for a spectrum."""
 FLOOR = 1e-4
-"""A spectrum is drawn down to this part of its highest line: below are side lobes of its window."""
+"""Lower end of the drawn spectrum, as a fraction of its highest line; the side lobes of the window are below
+it."""
 RUN_COLOUR, EXACT_COLOUR, MARK_COLOUR, OTHER_COLOUR = "#4477aa", "0.25", "#cc6677", "#228833"
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """response.png: the centre of gravity of a run in time, beside its closed form, and its spectrum.
+    """response.png: the centre of gravity of a run over time, with its closed form, and its spectrum.
 
-    None of a file with fewer frames than MIN_SPECTRUM_FRAMES, such as a result.h5.
+    Returns nothing for a file with fewer frames than MIN_SPECTRUM_FRAMES, such as a result.h5.
     """
     if len(trajectory) < MIN_SPECTRUM_FRAMES:
         return {}
@@ -62,7 +63,7 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 
 def spectrum(axis: Axes, history: CentreOfGravityHistory, parameters: Mapping[str, float] | None) -> None:
-    """Amplitudes of circular motion against its angular frequency, with the lines that are to be expected."""
+    """Draw amplitudes of circular motion against its angular frequency, with the expected lines."""
     omega, lines = history.spectrum()
     axis.semilogy(omega, lines, color=RUN_COLOUR, lw=1.4)
     reach = omega.max()
@@ -87,7 +88,8 @@ def spectrum(axis: Axes, history: CentreOfGravityHistory, parameters: Mapping[st
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """resonance.png, resonance.csv: the resonance curve and beats. Circles of the size's near field."""
+    """resonance.png, resonance.csv: the resonance curve and beats; circles show arrays with the near field of
+    the size."""
     settings = size_named(size, vibration.SIZES).scene
     near = str(settings.get("near_field", "printed"))
     ratios = np.linspace(0.04, 2.0, 99)
@@ -123,7 +125,7 @@ def table(*sweeps: tuple[str, Sweep]) -> str:
 def resonance_figure(
     slow: Sweep, fast: Sweep, arrays: Sweep, near: str, history: CentreOfGravityHistory
 ) -> Figure:
-    """Resonance curves over both resonances, beats beside their closed form, and their spectrum."""
+    """Draw resonance curves around both resonances, beats with their closed form, and their spectrum."""
     figure = empty(10.4, 8.4)
     (left, right), (below, lines) = figure.subplots(2, 2)
     parameters = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,

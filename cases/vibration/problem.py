@@ -1,8 +1,9 @@
-"""The inverse problem of vibration: the field and the binder that answer a given drive the most, or least.
+"""The inverse problem of vibration: find the field and the binder with the largest or the smallest response
+to a drive.
 
-The centre of gravity moves as one particle does (see ``scene``), so one particle is what is run. Where
-the answer must lie is known: a drive at Omega is in resonance with the fast or the slow motion when
-k/m = Omega^2 -+ w Omega, so the best designs lie on these two lines of the plane of B and k.
+The centre of gravity moves like one particle (see ``scene``), so each run has one particle. The solution is
+known: a drive at Omega is in resonance with the fast or the slow motion if k/m = Omega^2 -+ w Omega, so the
+best designs lie on these two lines of the plane of B and k.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from tisim import Result, Scene
 from tisim.errors import must
 
 VARIANTS = ("resonate", "avoid")
-"""The inverse problems: the largest response to a given drive, and the smallest."""
+"""The inverse problems: the largest and the smallest response to a given drive."""
 DRIVE = 0.8 * vibration.CYCLOTRON
 """Omega of Z13 figure 3(d), 1/s: far from resonance with the paper's field and binder."""
 DURATION = 0.2
@@ -31,13 +32,14 @@ GENES = (
     Gene("flux", "T", 0.2, 2.0),
     Gene("stiffness", "N/m", 1.0, 1000.0, "log"),
 )
-"""About the paper's 1 T, and from twice its 0.5 N/m on: sqrt(k/m) is 31 to 977 1/s."""
+"""The range of the flux includes the paper's 1 T; the stiffness begins at twice the paper's 0.5 N/m, and
+sqrt(k/m) is 31 to 977 1/s."""
 
-MEANING = "largest displacement of the centre of gravity; with a minus sign where the largest is wanted"
+MEANING = "largest displacement of the centre of gravity; with a minus sign if it is maximised"
 
 
 def scene(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> Scene:
-    """One particle with the field and the binder of a design. Nothing in it is random."""
+    """Return one particle with the field and the binder of a design. Nothing in it is random."""
     return vibration.scene(
         drive / vibration.CYCLOTRON, "none", duration, sites=1, error=1e-5,
         flux=design["flux"], stiffness=design["stiffness"], observed=True,
@@ -62,9 +64,10 @@ def nearest(design: Mapping[str, float], drive: float = DRIVE) -> float:
 
 
 def problem(size: str = "default", variant: str = "resonate") -> Problem:
-    """Return the field and binder that answer DRIVE the most ("resonate") or the least ("avoid") in DURATION.
+    """Return the search for the field and binder with the largest or the smallest response to DRIVE in
+    DURATION.
 
-    Of size "default" only: a search runs one particle.
+    The variants are "resonate" and "avoid". The only size is "default", because a search runs one particle.
     """
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     aim, sign = ("largest", -1e3) if variant == "resonate" else ("smallest", 1e3)
@@ -83,7 +86,7 @@ def problem(size: str = "default", variant: str = "resonate") -> Problem:
 
 
 def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
-    """Return the design's resonance beside the drive, and its response beside the closed form."""
+    """Return the design's resonances and the drive, and its response in the run and in closed form."""
     slow, fast = resonances(CHARGE * design["flux"] / MASS, design["stiffness"] / MASS)
     return {
         "drive frequency, 1/s": DRIVE,
@@ -91,5 +94,5 @@ def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
         "slow resonance of the design, 1/s": slow,
         "nearest resonance over drive": nearest(design) / DRIVE,
         "largest displacement, m": displacement(result),
-        "the same in closed form, m": closed_form(design),
+        "largest displacement in closed form, m": closed_form(design),
     }

@@ -1,9 +1,9 @@
 """The centre of gravity of the case vibration: its sweep over drive frequencies, its beats and its spectrum.
 
-Z13 shows eight drive frequencies Omega, over w = q B/m. Here as many as one likes run as the worlds of one
-batch, and each has an operator that keeps the largest displacement. With a tether along x and y there are two
-resonances, sqrt(w^2/4 + k/m) +- w/2: the fast one of Z13's figure 3(e), and a slow one, a drift about the
-anchor with a period of 12.6 s, of which Z13's runs are far too short to show anything.
+Z13 shows eight drive frequencies Omega, over w = q B/m. Here any number of them runs as the worlds of one
+batch, each with an operator that records the largest displacement. With a tether along x and y there are two
+resonances, sqrt(w^2/4 + k/m) +- w/2. The fast one is that in Z13's figure 3(e). The slow one is a drift about
+the anchor with a period of 12.6 s, for which Z13's runs are far too short.
 """
 
 from __future__ import annotations
@@ -29,14 +29,15 @@ from tisim.sources import ElectricField
 SLOW, FAST = resonances(CYCLOTRON, STIFFNESS / MASS)
 """The two resonances of the paper's particles, 1/s: 0.49974 and 955.429."""
 BEAT_DRIVE = 0.9
-"""The drive frequency of the beats over the fast resonance: the beats have a tenth of it, |Omega - FAST|."""
+"""The drive frequency of the beats divided by the fast resonance; the beat frequency |Omega - FAST| is a
+tenth of it."""
 
 
 def peak(t_end: float, w: float, k_m: float, push: float, omega: float) -> float:
-    """Largest |x + i y| (m) of the closed form up to a time, s.
+    """Return the largest |x + i y| (m) of the closed form up to a time, s.
 
-    Looked at 160 times a circle, which misses 2e-4 of its radius at most; and in 200,000 instants at most: in
-    so long a time, circles are far smaller than the drift that they go with.
+    It is sampled 160 times per circle, with an error of at most 2e-4 of the radius, but at most 200,000
+    times: in runs longer than that, the circles are far smaller than the drift.
     """
     circles = max(omega, resonances(w, k_m)[1]) * t_end / (2 * np.pi)
     times = np.linspace(0.0, t_end, min(256 + int(160 * circles), 200_000))
@@ -45,7 +46,8 @@ def peak(t_end: float, w: float, k_m: float, push: float, omega: float) -> float
 
 @dataclass(frozen=True)
 class Sweep:
-    """Largest displacements (m) within a time (s) at drive frequencies (1/s): as run, and in closed form."""
+    """Largest displacements (m) within a duration (s) at drive frequencies (1/s): as run, and in closed
+    form."""
 
     duration: float
     omega: np.ndarray
@@ -54,7 +56,7 @@ class Sweep:
 
     @classmethod
     def of(cls, scenes: Sequence[Scene], progress: Progress | None = None) -> Sweep:
-        """Run scenes with the operator PeakDisplacement, which differ in their drive frequency only."""
+        """Run scenes with the operator PeakDisplacement that differ only in their drive frequency."""
         results = sound(run(scenes, progress))
         omega = np.array([drive(scene) for scene in scenes])
         duration = scenes[0].duration
@@ -64,43 +66,48 @@ class Sweep:
 
     @property
     def deviation(self) -> float:
-        """Largest relative difference of the two."""
+        """Return the largest relative difference between run and closed form."""
         return float(np.abs(self.peaks / self.exact - 1).max())
 
     def top(self, above: float = 0.0) -> float:
-        """Drive frequency (1/s) of the largest response as run, of a parabola through the three largest."""
+        """Return the drive frequency (1/s) of the largest response as run, from a parabola through three
+        points.
+
+        The points are the largest response and its two neighbours.
+        """
         k = int(np.where(self.omega > above, self.peaks, 0.0)[:-1].argmax())
         return vertex(self.omega[k - 1 : k + 2], self.peaks[k - 1 : k + 2])
 
 
 def drive(scene: Scene) -> float:
-    """Omega of a scene of the case, 1/s."""
+    """Return Omega of a scene of the case, 1/s."""
     return next(effect.omega[0] for effect in scene.effects if isinstance(effect, ElectricField))
 
 
 def vertex(x: np.ndarray, y: np.ndarray) -> float:
-    """Return where the parabola through three points has its summit."""
+    """Return the position of the maximum of a parabola through three points."""
     a, b, _ = np.polyfit(x - x[1], y, 2)
     return float(x[1] - b / (2 * a))
 
 
 def fast_scenes(ratios: Iterable[float], near_field: str = "none", sites: int = 1) -> list[Scene]:
-    """About the fast resonance: 0.1 s, 15 of its periods."""
+    """Return scenes around the fast resonance: 0.1 s, 15 of its periods."""
     error = 1e-6 if sites == 1 else 1e-5
     return [vibration.scene(r, near_field, 0.1, sites, error, observed=True) for r in ratios]
 
 
 def slow_scenes(omega: Iterable[float]) -> list[Scene]:
-    """About the slow one: 60 s, 5 of its periods, in which a particle drifts through 9000 circles.
+    """Return scenes around the slow resonance: 60 s, 5 of its periods, in which a particle moves through 9000
+    circles.
 
-    In steps of a seventh of a circle, so that circles are only counted; the drift has errors of 1e-6.
+    A step is a seventh of a circle, so that circles are not resolved; the drift has errors of 1e-6.
     """
     return [vibration.scene(o / CYCLOTRON, "none", 60.0, 1, 1e-2, longest=1e-3, observed=True) for o in omega]
 
 
 @dataclass(frozen=True)
 class CentreOfGravityHistory:
-    """The centre of gravity in time (s, evenly): place z = x + i y (m), velocity (m/s)."""
+    """The centre of gravity at equally spaced times (s): position z = x + i y (m), velocity (m/s)."""
 
     time: np.ndarray
     place: np.ndarray
@@ -108,8 +115,10 @@ class CentreOfGravityHistory:
 
     @classmethod
     def of(cls, trajectory: Frames) -> CentreOfGravityHistory:
-        """Return the history of a trajectory at even times, between frames by the cubic of places and
-        velocities."""
+        """Return the history of a trajectory at equally spaced times.
+
+        Between frames it is the cubic interpolation of positions and velocities.
+        """
         series = history(trajectory)
         x, v = (a[:, 0] + 1j * a[:, 1] for a in (series.shift, series.drift))
         even = np.linspace(series.time[0], series.time[-1], len(series.time))
@@ -123,10 +132,11 @@ class CentreOfGravityHistory:
         return cls(even, place, slope / h)
 
     def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
-        """Angular frequencies (1/s, both signs: the sense of rotation) and amplitudes (m) of the place.
+        """Return angular frequencies (1/s, both signs: the sense of rotation) and amplitudes (m) of the
+        position.
 
-        They are |FFT| with the window of Blackman and Harris, whose side lobes are below 3e-5 of a line; a
-        line of amplitude A stands at A. Filled up with zeros, so that the curve is smooth.
+        They are |FFT| with the window of Blackman and Harris, whose side lobes are below 3e-5 of a line. A
+        line of amplitude A has the height A. The series is padded with zeros to make the curve smooth.
         """
         window = blackmanharris(len(self.time), sym=False)
         n = 8 * len(window)
@@ -136,10 +146,10 @@ class CentreOfGravityHistory:
         return omega[order], lines[order]
 
     def beat_period(self) -> float:
-        """Return the period of the speed, s: its square is A^2 + B^2 - 2 A B cos(|Omega - omega| t) for two
-        circles.
+        """Return the beat period of the speed, s.
 
-        It is that of the highest line of its spectrum below half of the fast resonance.
+        The square of the speed is A^2 + B^2 - 2 A B cos(|Omega - omega| t) for two circles. The period is
+        taken from the highest line of its spectrum below half of the fast resonance.
         """
         power = np.abs(self.velocity) ** 2
         n = 16 * len(power)
@@ -150,7 +160,8 @@ class CentreOfGravityHistory:
 
 
 def beats(periods: float = 6.0, frames_a_period: int = 20) -> CentreOfGravityHistory:
-    """One particle, driven at BEAT_DRIVE times the fast resonance for some beats."""
+    """Return the history of one particle that is driven at BEAT_DRIVE times the fast resonance for several
+    beats."""
     duration = periods * 2 * np.pi / (FAST * (1 - BEAT_DRIVE))
     driven = vibration.scene(BEAT_DRIVE * FAST / CYCLOTRON, "none", duration, sites=1, observed=True)
     count = int(frames_a_period * duration * FAST / (2 * np.pi))
@@ -158,7 +169,7 @@ def beats(periods: float = 6.0, frames_a_period: int = 20) -> CentreOfGravityHis
 
 
 def recorded(scene: Scene, count: int) -> CentreOfGravityHistory:
-    """Run a scene, and read so many frames of it."""
+    """Run a scene, and return its history from ``count`` frames."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "trajectory.h5"
         run(scene, record=Recording(path, frames=count))

@@ -1,16 +1,17 @@
 """Electromagnetically induced vibration of particles in a binder (Z13 section 4).
 
 Z13 is T. I. Zohdi, Electromagnetically-induced vibration in particulate-functionalized materials, J. Vib.
-Acoust. (2013), doi 10.1115/1.4023251. A cubic array of charged particles, each tethered to its place, in a
-constant magnetic field along z and an electric one that oscillates along x.
+Acoust. (2013), doi 10.1115/1.4023251. The scene is a cubic array of charged particles, each tethered to its
+initial position, in a constant magnetic field along z and an oscillating electric field along x.
 
-The near field that is printed is far from equilibrium: attraction and repulsion balance at alpha_2/alpha_1 =
-0.5 m, and neighbours are 1/30 m apart. It throws the array apart, and single paths are chaotic after some
-0.01 s. The centre of gravity does not care: forces between particles cancel, tether and Lorentz force are
-linear, so it follows ``closed_forms.response`` exactly. The size "equilibrium" has a near field in
-balance between neighbours. Particles that are alike in uniform fields move as one, so that it does nothing
-unless the start disturbs it: the frequencies of the near field, of which the paper speaks, are none of those
-of the centre of gravity.
+The printed near field is far from equilibrium: attraction and repulsion balance at alpha_2/alpha_1 = 0.5 m,
+but neighbours are 1/30 m apart. It throws the array apart, and single paths are chaotic after some 0.01 s.
+The centre of gravity is not affected: forces between particles cancel, and tether and Lorentz force are
+linear, so it follows ``closed_forms.response`` exactly.
+
+In the size "equilibrium" the near field between neighbours is balanced. Equal particles in uniform fields
+move together, so this near field has no effect unless the start is disturbed: the frequencies of the near
+field that the paper discusses do not occur in the centre of gravity.
 """
 
 from __future__ import annotations
@@ -47,19 +48,18 @@ SEARCH_SETTINGS = {
 }  # fmt: skip
 
 SIZES = {
-    "alone": Size(
-        "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}
-    ),
-    "default": Size("343 particles, the near field as printed, 0.005 s", {}, SEARCH_SETTINGS),
+    "alone": Size("343 particles without interaction, 0.05 s", {"near_field": "none", "duration": 0.05}),
+    "default": Size("343 particles, near field as printed, 0.005 s", {}, SEARCH_SETTINGS),
     "equilibrium": Size(
-        "343 particles, near field in balance with the six neighbours, 0.05 s",
+        "343 particles, near field in equilibrium with the six neighbours, 0.05 s",
         {"near_field": "equilibrium", "duration": 0.05},
     ),
 }
 
 
 def near_fields(name: str) -> tuple[NearField, ...]:
-    """None, the one printed, or one in equilibrium at the distance of neighbours and for them only."""
+    """Return no near field, the printed one, or one between neighbours only that is in equilibrium at their
+    distance."""
     if name == "none":
         return ()
     if name == "printed":
@@ -80,8 +80,11 @@ def scene(
     longest: float = 1e-4,
     observed: bool = False,
 ) -> Scene:
-    """Return the array, driven at Omega = ratio w, w that of the paper's B. ``error`` is asked of a step,
-    over the displacement in it. observed : keep the largest displacement of the centre of gravity."""
+    """Return the array, driven at Omega = ratio w, with w of the paper's B.
+
+    error : largest error of a step, relative to the displacement in it.
+    observed : whether the largest displacement of the centre of gravity is recorded.
+    """
     return Scene(
         name="vibration",
         particles=Cloud(

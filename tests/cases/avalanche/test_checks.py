@@ -52,14 +52,14 @@ def test_what_is_steeper_is_told_by_pairs_of_starts(staircases):
     flat = claims["5 mm, without a field: angle, degrees (L21: 37.2)"]
     assert flat.mean.value == pytest.approx(26.57, abs=1.0)
     # The heap is as high and half as long.
-    assert not claims["5 mm: volume over that without (L21: 1.09)"].ok
-    assert claims["5 mm: volume as magnetised over that as settled"].mean.value == pytest.approx(6.5 / 4)
-    assert claims["volume grows by more, 5 mm than 5 cm"].mean.value == pytest.approx(0.5)
-    alike = claims["without a field: 5 mm steeper than 5 cm by, degrees"]
+    assert not claims["5 mm: volume with field over volume without (L21: 1.09)"].ok
+    assert claims["5 mm: volume magnetised over volume settled"].mean.value == pytest.approx(6.5 / 4)
+    assert claims["growth of the volume, 5 mm minus 5 cm"].mean.value == pytest.approx(0.5)
+    alike = claims["without a field: angle of 5 mm minus 5 cm, degrees"]
     assert alike.value.value == pytest.approx(0.0, abs=0.1)
-    assert alike.beside == "0 of copies; L21: 5.9"
-    assert claims["5 mm, settled: factor of a sweep as it is made"].ok
-    assert claims["load on the walls over weight, at worst"].ok
+    assert alike.beside == "0 for scaled copies; L21: 5.9"
+    assert claims["5 mm, settled: growth factor of a relaxed sweep"].ok
+    assert claims["load on the walls over weight, largest deviation"].ok
 
 
 def test_figures_of_a_size_are_of_its_settings_and_have_each_slope(staircases, monkeypatch):

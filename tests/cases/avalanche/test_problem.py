@@ -26,7 +26,7 @@ WRONG = WRONG_ANGLES | {
     "falls back": (HEADING + "0,3,1\n1,2,1\n1,1,1\n2,0,1\n", "distance must be rising"),
     "flat": (
         HEADING + "0,0,1\n1,0,1\n2,0,1\n3,0,1\n",
-        "height must be finite and not below 0, and some",
+        "height must be finite and not below 0, with some",
     ),
     "too sure": (HEADING + "0,3,1\n1,2,1\n2,1,0\n3,0,1\n", "uncertainty must be finite and above 0"),
 }

@@ -40,9 +40,9 @@ RUNS = [
 
 def test_what_is_said_of_runs():
     claims = {claim.name: claim for claim in (*of_agglomeration(RUNS), *of_structure(RUNS))}
-    outside = claims["0 A/m: of grains outside, in clusters of two or more"]
+    outside = claims["0 A/m: fraction of outside grains in clusters of two or more"]
     assert (outside.value.value, outside.beside) == (1.0, "L21, 50 cm: 0.007")
-    assert claims["in clusters, 1190 less 0 A/m, of all grains"].mean.value == 0.0
+    assert claims["fraction of all grains in clusters, 1190 minus 0 A/m"].mean.value == 0.0
     assert claims["1190 A/m: longest axis over shortest"].beside == "L21: 1.07"
     ratio = RUNS[-1].asteroid.magnetisation / (0.5 * 1190.0)
     assert RUNS[-1].magnetised_part == pytest.approx(ratio)
@@ -57,21 +57,24 @@ def test_magnetised_grains_that_do_not_agglomerate_more_are_against_it(weak, str
     """Of 40 grains some are lost without magnetisation, or with it."""
     runs = [made(m, 18, seed, lost=strong if m > 1000 else weak) for m in MAGNETISATIONS for seed in (0, 1)]
     claims = {claim.name: claim for claim in (*of_agglomeration(runs), *of_structure(runs))}
-    for of in ("1190 less 0 A/m, of all grains", "of those outside, 1190 less 0 A/m"):
+    for of in (
+        "of all grains in clusters, 1190 minus 0 A/m",
+        "of outside grains in clusters, 1190 minus 0 A/m",
+    ):
         (claim,) = [one for name, one in claims.items() if of in name]
         assert claim.ok == (weak > strong)
     # The asteroids are the same.
-    assert not claims["density, 1190 less 0 A/m, kg/m^3"].ok
+    assert not claims["density, 1190 minus 0 A/m, kg/m^3"].ok
 
 
 def test_chains_are_told_by_magnetisation():
     """A block of two layers, whose grains are in rows of two along their moments, and pairs; then of four."""
-    shown = {item.name: item.value for item in of_agglomeration(RUNS) if "in a row" in item.name}
+    shown = {item.name: item.value for item in of_agglomeration(RUNS) if "chain length" in item.name}
     assert [one for one in shown if one.endswith("at the end")] == [
-        f"{m} A/m: grains in a row, head to tail, at the end" for m in (119, 1190)
+        f"{m} A/m: chain length in grains, at the end" for m in (119, 1190)
     ]
-    assert shown["119 A/m: grains in a row, head to tail, at the end"].value == 2.0
-    assert shown["1190 A/m: grains in a row, head to tail, at the end"].value == (36 * 4 + 4 * 2) / 40
+    assert shown["119 A/m: chain length in grains, at the end"].value == 2.0
+    assert shown["1190 A/m: chain length in grains, at the end"].value == (36 * 4 + 4 * 2) / 40
 
 
 def test_the_rotation_at_which_a_cloud_parts():
@@ -99,14 +102,14 @@ def test_the_regime_of_clouds():
     expected = mass * radius**2 * spin**2 / 5 / (0.6 * G * mass**2 / radius)
     assert rotation_over_gravity(spin, density) == pytest.approx(expected)
     for name, value in {
-        "100 cm, 1000 urad/s: over what parts the cloud": 4.27,
-        "100 cm, 1000 urad/s: energy over that of gravity": 6.1,
-        "50 cm, 1000 urad/s: energy over that of gravity": 49,
-        "50 cm, 2000 urad/s, as microdegrees: the same": 0.86,
+        "100 cm, 1000 urad/s: over critical spin of the cloud": 4.27,
+        "100 cm, 1000 urad/s: rotational over gravitational energy": 6.1,
+        "50 cm, 1000 urad/s: rotational over gravitational energy": 49,
+        "50 cm, 2000 urad/s, read as microdegrees: final over critical spin": 0.86,
         "100 cm: 2 K / |U| of the cloud": 0.41,
         # Above 2: its energy is above 0.
         "50 cm: 2 K / |U| of the cloud": 3.3,
-        "default: depth of an impact over a radius": 0.008,
+        "default: overlap of an impact over a radius": 0.008,
     }.items():
         assert shown[name] == pytest.approx(value, rel=0.03), name
 

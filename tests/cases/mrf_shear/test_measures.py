@@ -101,9 +101,9 @@ def test_the_regime():
     mass = 7860 * np.pi / 6 * (2 * R) ** 3
     assert force / mass * approach_time(0.6) ** 2 / 2 == pytest.approx(R)
     shown = {one.name: one.value for one in regime()}
-    assert shown["attraction of two in line that touch, uN"] == pytest.approx(1e6 * force)
+    assert shown["attraction of two touching grains in line, uN"] == pytest.approx(1e6 * force)
     assert shown["Mason number at 2000 1/s"] == pytest.approx(5.6e-4, rel=0.01)
-    assert shown["magnetisation of a grain by itself, MA/m"] == pytest.approx(1.43, rel=2e-3)
+    assert shown["magnetisation of a single grain, MA/m"] == pytest.approx(1.43, rel=2e-3)
 
 
 def test_how_much_grains_are_magnetised():

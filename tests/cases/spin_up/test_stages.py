@@ -99,7 +99,7 @@ def test_strong_piles_break_later_where_they_do_so_by_a_step(when, later):
         for m in (0.0, 119.0, 1190.0)
         for _ in range(2)
     ]
-    claims = [claim for claim in of_spins(runs) if "1190 less 0" in claim.name]
+    claims = [claim for claim in of_spins(runs) if "1190 minus 0" in claim.name]
     assert [claim.ok for claim in claims] == [later]
 
 
@@ -118,21 +118,21 @@ def test_figures_and_claims_of_some_runs():
     assert len(against_spin(runs).axes) == 3
     assert len(piles(runs).axes) == 9
     claims = {claim.name: claim for claim in of_spins(runs)}
-    assert claims["0 A/m: breaks at, urad/s"].value.value == pytest.approx(200.0)
-    assert claims["1190 A/m: deforms at, urad/s"].value.value == pytest.approx(100.0)
+    assert claims["0 A/m: spin at which it breaks, urad/s"].value.value == pytest.approx(200.0)
+    assert claims["1190 A/m: spin at which it deforms, urad/s"].value.value == pytest.approx(100.0)
     np.testing.assert_allclose(at_least([7e-4, np.nan]), [700.0, 1000.0])
-    assert claims["1190 A/m: deforms at, urad/s"].beside == "L21: 700"
-    later = claims["breaks at, 1190 less 0 A/m, urad/s (L21: 100)"]
+    assert claims["1190 A/m: spin at which it deforms, urad/s"].beside == "L21: 700"
+    later = claims["spin at which it breaks, 1190 minus 0 A/m, urad/s (L21: 100)"]
     assert (later.mean.value, later.ok) == (0.0, False)
 
 
 def test_the_regime_of_piles():
     shown = {item.name: item.value for item in regime()}
     assert shown["scale of the copy"] == pytest.approx((80 / 4088) ** (1 / 3))
-    assert shown["free fall, s"] == pytest.approx(2484, rel=1e-3)
+    assert shown["free-fall time, s"] == pytest.approx(2484, rel=1e-3)
     assert shown["step, s"] == pytest.approx(0.225, rel=5e-3)
-    assert shown["depth of an impact over a radius"] == pytest.approx(0.02, rel=0.03)
-    assert shown["overlap of two in line over a radius, 1190 A/m"] == pytest.approx(7e-4, rel=0.05)
+    assert shown["overlap of an impact over a radius"] == pytest.approx(0.02, rel=0.03)
+    assert shown["overlap of two grains in line over a radius, 1190 A/m"] == pytest.approx(7e-4, rel=0.05)
 
 
 @pytest.mark.slow

@@ -163,12 +163,15 @@ def test_the_mean_radius_is_that_over_the_number_of_grains():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"pressure": 1e4, "speed": 3.0}, "pressure must be left out where the speed is given; received 1"),
+        ({"pressure": 1e4, "speed": 3.0}, "pressure must be left out if the speed is given; received 1"),
         ({"dt": 0.0}, r"dt must be at least .*; received 0\.0"),
         ({"throat": 352 * UM}, r"constriction must be above 0 and below 0\.000352 m, the bore; received"),
         ({"straight": 0.0}, "length of the constriction must be above 0; received"),
         ({"slope": 0.0}, "length of a cone must be above 0; received"),
-        ({"length": 200 * UM}, r"length of the duct must be above 0\.00022 m, that of the constriction"),
+        (
+            {"length": 200 * UM},
+            r"length of the duct must be above 0\.00022 m, the length of the constriction",
+        ),
     ],
 )
 def test_what_is_no_valve_is_refused(settings, message):

@@ -61,17 +61,17 @@ def test_claims_are_of_the_valves_they_name(monkeypatch):
     parts = [(0.01 + 1e-4 * k) / (0.33 + 1e-3 * (k + 14)) for k in range(8)]
     (beside,) = [one for name, one in found.items() if "same starts without a field" in name]
     assert beside.value.value == pytest.approx(np.mean(parts))
-    (wider,) = [one for name, one in found.items() if "less that of" in name]
+    (wider,) = [one for name, one in found.items() if "minus flow left" in name]
     assert wider.mean.value == pytest.approx(0.33 + 9.5e-3 - (0.01 + 3.5e-4))
     assert wider.ok
     assert all(one.ok for name, one in found.items() if "40x" in name or "fine grains yield" in name)
-    without = next(one for name, one in found.items() if "no field" in name and "in the end" in name)
+    without = next(one for name, one in found.items() if "no field" in name and "at the end" in name)
     assert without.value.value == pytest.approx(0.33 + 1e-3 * 17.5)
     # Two that are alike show nothing.
     monkeypatch.setattr(
         checks, "by_throat", lambda starts: [studies.by_throat(starts)[k] for k in (0, 0, 2, 3)]
     )
-    assert not next(one for one in checks.check(4) if "less that of" in one.name).ok
+    assert not next(one for one in checks.check(4) if "minus flow left" in one.name).ok
 
 
 def test_the_start_farthest_from_balance_is_judged(monkeypatch):
