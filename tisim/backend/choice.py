@@ -40,10 +40,10 @@ def named() -> str:
 
 
 def automatic(there: Iterable[str], cpu: dict[str, str]) -> str:
-    """Return the best of the installed packages: the first whose LLVM knows the processor, else the one with
-    the newest LLVM.
+    """Return the one of the given packages to use: the first whose LLVM knows the processor, else the one
+    with the newest LLVM.
 
-    It is Taichi if none is installed.
+    It is Taichi if none is given.
     """
     known = [name for name in there if processor.knows(LLVM[name], cpu)]
     return known[0] if known else max(there, key=LLVM.__getitem__, default="taichi")

@@ -6,14 +6,14 @@ pair that holds the highest bid at both is resolved. The bid is the time since t
 events go first. Properties:
 
 - Exclusive: a particle has one highest bid, so pairs of one round share no particle, and each is a binary
-event as the laws define it. Momentum and mass are conserved pair by pair, hence in total.
+  event as the laws define it. Momentum and mass are conserved pair by pair, hence in total.
 - Complete: the waiting pair with the highest bid of all always wins, so every round resolves at least one
-pair, and each pair is resolved once; the rounds end.
+  pair, and each pair is resolved once; the rounds end.
 - Ordered: a pair waits until every earlier pair of either of its particles is resolved, and then uses the
-changed velocities, sizes and temperatures. The result equals the sequential resolution of the whole list,
-earliest first.
+  changed velocities, sizes and temperatures. The result equals the sequential resolution of the whole list,
+  earliest first.
 - Deterministic: bids are integers, compared by atomic maxima, which do not depend on order. Two pairs that
-share a particle never bid the same, as the sum of their indices breaks ties.
+  share a particle never bid the same, as the sum of their indices breaks ties.
 
 Simultaneous impacts are therefore also resolved one after another, and their result is the limit of
 successive impacts. It conserves momentum and never gains energy, but for e < 1 it may be less symmetric than

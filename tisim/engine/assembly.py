@@ -190,8 +190,8 @@ class Assembly:
             (contacts, "contact list", sudden),
             (self.pairs, "pair list", steady),
             (self.exported, "forces between chunks", steady),
-            (self.sort, "sorting by place", steady),
-            (slots, "slots of what is gone", "removals"),
+            (self.sort, "sorting by position", steady),
+            (slots, "slots of removed particles", "removals"),
         )
         self.buffers = (
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),

@@ -41,7 +41,7 @@ class CompiledWorlds:
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
         awake = schedule != "team" or self.runtime.device == "cpu"
-        must(awake, "schedule", "another than team, whose threads wait awake, but on a CPU", schedule)
+        must(awake, "schedule", "world or particle on this device, as team needs a CPU", schedule)
         self.trees: list[Tree] = []
         self._make(scene, worlds, capacity, schedule)
         self.setup_s = time.perf_counter() - began
@@ -74,7 +74,7 @@ class CompiledWorlds:
         self.trees += trees
 
     def _make_teams(self) -> None:
-        """Make a team of threads for each world, or one of a single thread for each thread."""
+        """Make the teams: several threads for a world, or single threads."""
         # Members of a team wait for each other in busy loops, so each needs its own core.
         threads = min(self.runtime.threads, runtime.cores())
         number = threads
@@ -120,8 +120,8 @@ class CompiledWorlds:
         then stay as they were.
         """
         before = self.assembly.sizes
-        rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean, and of {sizes.near}"
-        rows += " for events and step control, are needed, and there is no room for them"
+        rows = f"lists of {sizes.row} pairs for a particle, {sizes.mean} on average, and of {sizes.near}"
+        rows += " for events and step control do not fit in memory"
         try:
             memory.require_lists(self.assembly.list_bytes(sizes), self.assembly.list_bytes(before))
         except NoRoom as no:

@@ -140,9 +140,9 @@ class _Crowd:
         if len(first):
             i, j = sorted((int(first[0]), int(second[0])))
             number = len(np.union1d(first, second))
-            rule = f"another place for each particle, as effects.{law} holds them apart"
+            rule = f"a different place for each particle, as effects.{law} holds them apart"
             received = f"particles {i} and {j} both at {_place(self.position[i])}"
-            received += f", and {number} particles at places of others" if number > 2 else ""
+            received += f", and {number} particles in all share places" if number > 2 else ""
             raise InputError(f"particles.position must be {rule}; received {received}")
 
     def levels(self) -> list[np.ndarray]:
@@ -161,7 +161,7 @@ class _Crowd:
         remembers = next((law for law in laws if getattr(law, "memory", 0)), None)
         hard = any(isinstance(law, PairEvent) for law in laws)
         for members in self.levels():
-            # All spheres in one cell overlap: its diagonal is two of the smallest radii.
+            # All spheres in one cell overlap: its diagonal is twice the smallest radius.
             width = 2.0 * self.radius[members].min() / np.sqrt(3.0)
             with np.errstate(invalid="ignore"):
                 cells = np.floor((self.position[members] - self.low) / width).astype(np.int64)

@@ -52,7 +52,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         scene.stepper.control.suits_start(start["radius"], start["velocity"])
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
-        must(rest, "particles.velocity", "0 where particles are fixed", Words("one that moves"))
+        must(rest, "particles.velocity", "0 for fixed particles", Words("one that moves"))
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             check_field(f, start[f.name], n)
@@ -62,7 +62,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         effect.suits_start(start, scene)
     with np.errstate(over="ignore", invalid="ignore"):
         momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
-    must(bool(np.isfinite(momentum)), "particles.velocity", "of a momentum that is a number", float(momentum))
+    must(bool(np.isfinite(momentum)), "particles.velocity", "of a finite momentum", float(momentum))
     # If rounding is coarser than a radius, contacts cannot be found.
     farthest = np.abs(start["position"]).max(axis=1)
     coarse = np.spacing(farthest.astype(_real())) > start["radius"]
@@ -88,7 +88,7 @@ def check_held(scene: Scene, start: Arrays) -> None:
         must(bool((by <= 1).all()), "particles", rule, Words(f"one held by {by.max(initial=0)}"))
         for effect in scene.effects:
             where = f"quantities of grains of effects.{effect.label}"
-            rule = f"without {constraint.mark}, as effects.{constraint.label} holds no grains that are put in"
+            rule = f"without {constraint.mark}, as effects.{constraint.label} does not hold inserted grains"
             must(constraint.mark not in (effect.newcomers() or ()), where, rule, constraint.mark)
 
 
@@ -129,7 +129,7 @@ def check_sides(scene: Scene, start: Arrays) -> None:
         return
     reach = 2 * float(np.partition(radius, -2)[-2:].sum())
     narrow = np.array(scene.domain.imaged()) & (high - low < reach)
-    rule = f"at least {reach:g} m wide where it is periodic, twice the distance of its two largest in contact"
+    rule = f"at least {reach:g} m wide where it is periodic, twice the distance of its largest touching pair"
     must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
 
@@ -155,7 +155,7 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
         order = np.argsort(radius, kind="stable")
         reach = float((outlook[order[1:]] + radius[order[:-1]]).max())
         narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDED_SIDE) < reach)
-        rule = f"at least {2 * reach:g} m wide where it is periodic, twice as far as {laws} reaches"
+        rule = f"at least {2 * reach:g} m wide where it is periodic, twice the range over which {laws} acts"
         must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
 

@@ -124,7 +124,7 @@ class Monitor:
             failed = then["failed"][worlds]
             live["status"][worlds] = np.where(failed > 0, failed, WorldStatus.NOT_FINITE)
             # A world with an overflowed list continues with a longer list. During the replay lists are
-            # rebuilt at other times, so an overflow may appear in another world or not at all.
+            # rebuilt at other times, so they may overflow where they did not before, or not at all.
             again = failed == WorldStatus.LIST_OVERFLOW
             crowded = worlds[again | (overflowed & self._finite(then)[worlds])]
             ended = live["time"][crowded] >= live["end"][crowded]

@@ -34,12 +34,12 @@ class Observer:
     """Base class of observers.
 
     1. ``observe`` is called before the first step of a run, then about four times a second, whenever a world
-    has reached its pause, and after the last step; never within a step.
+       has reached its pause, and after the last step; never within a step.
     2. ``pause`` is called after ``observe``. A world waits at the end of the first step at or after the
-    earliest pause of all observers until all observers have been called. A time that the world has already
-    reached causes no pause.
+       earliest pause of all observers until all observers have been called. A time that the world has already
+       reached causes no pause.
     3. An observer may read anything of the simulation, save a checkpoint, or raise an exception to stop the
-    run between two steps. It must not run, load or restore the simulation.
+       run between two steps. It must not run, load or restore the simulation.
     4. The wall time of observers is not part of ``wall_s`` of a result.
     """
 

@@ -1,4 +1,4 @@
-"""Confidence intervals of a quantile, and of the mean squared distance between expectations and zero."""
+"""Confidence intervals of a quantile, and of the mean squared deviation from measured values."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ TERMS = 9
 def langevin_ratio(x):
     """Return L(x) / x with L(x) = coth x - 1/x, for x >= 0, and 1/3 at 0: to rounding, without overflow.
 
-    For x < 1, where coth x and 1/x cancel, it uses the continued fraction L(x) = x / (3 + x^2 / (5 + x^2 / (7
+    For x < 1, coth x and 1/x cancel, so it uses the continued fraction L(x) = x / (3 + x^2 / (5 + x^2 / (7
     + ...))), which has no cancellation (NIST Digital Library of Mathematical Functions, 10.33.1, for I_3/2 /
     I_1/2).
     """

@@ -63,10 +63,10 @@ def interval(
     Stat. Soc. B 54 (1992) 221-228. Two kinds of samples have their own rules:
 
     - If at most two different values are known, the interval is a binomial proportion by mid-P (H. O.
-    Lancaster, J. Am. Stat. Assoc. 56 (1961) 223-234). After twelve equal values the other one may have a
-    share of up to 0.22.
+      Lancaster, J. Am. Stat. Assoc. 56 (1961) 223-234). After twelve equal values the other one may have a
+      share of up to 0.22.
     - Equal values otherwise carry no information on the rarer values, which are assumed to lie anywhere
-    between the ends of ``support``.
+      between the ends of ``support``.
 
     support : values known to occur, for instance in other samples, or ends of the range.
     skewness : skewness to correct for, if it is known better than from these values (see
@@ -113,7 +113,7 @@ def shared_skewness(samples: Sequence[ArrayLike], others: Moments | None = None)
     ``others``, are therefore combined. The skewness of the distribution would correct too much for a small
     sample, whose deviation grows with its mean; samples of n values use 1 - 1.1 / sqrt(n) of it. This factor
     gives the most even coverage of the mean over normal, exponential, lognormal and chi-square noise and rare
-    events (tests/numerics/test_skewed.py). The result is at least the mean skewness of the samples
+    events (tests/numerics/test_skewed.py). Its magnitude is at least the mean skewness of the samples
     themselves.
 
     None for a single sample without ``others``.

@@ -148,7 +148,7 @@ class CountInCells(OfParticles):
         level = g.level(w, s.radius[w, i])
         c = g.cell_index(w, level, g.place(w, level, s.position[w, i]))
         g.cell_of[w, i] = c
-        # Counts are shifted by one cell, so that the prefix sum at a cell is where it begins.
+        # Counts are shifted by one cell, so that the prefix sum at a cell is its first place.
         g.rank[w, i] = next_number(g.cell_start, w, c + 1, ti.static(self.g.shared()))
 
 

@@ -28,7 +28,9 @@ def memory_fields(effect: PairForce) -> tuple[Field, ...]:
     if not effect.memory:
         return ()
     if not effect.short_ranged:
-        raise TypeError(f"{type(effect).__name__} must be short-ranged: pairs remember while they are near")
+        raise TypeError(
+            f"{type(effect).__name__} must be short-ranged: contact history is kept for listed pairs"
+        )
     name = effect.label
     return (
         Field(f"{name}_partners", "", 1, "keep", integer=True, slots=PARTNERS, default=NO_PARTNER),

@@ -36,9 +36,9 @@ class ListSizes:
     row : pairs that one particle lists for forces. mean : mean number of listed pairs for each particle of a
     world. near : pairs that one particle lists for events and step control.
 
-    Spheres of any sizes that only touch have fewer than 14.93 contacts on average, which makes half as many
-    pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339). For longer interaction ranges a list
-    grows when it overflows.
+    Spheres of any sizes that only touch have fewer than 14.93 contacts on average, which makes half this
+    number of pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339). For longer interaction
+    ranges a list grows when it overflows.
     """
 
     row: int = 16

@@ -1,7 +1,7 @@
 """Particles of large worlds are sorted in memory by position, so that neighbours are close in memory.
 
 Each world is sorted every SORT_EVERY steps from its first step on, by bricks of cells. In a dense bed a brick
-has about as many particles as a chunk of pairs, so few pairs belong to two chunks. The order depends on the
+has about the particle number of a chunk of pairs, so few pairs belong to two chunks. The order depends on the
 state of the world alone, so runs are bitwise reproducible: alone, in a batch or after a restart. The last
 digits of sums depend on this order. Output by particle, such as a Result, is in the order of ids, which is
 the order in the initial state.
@@ -22,7 +22,7 @@ from tisim.program.phases import Item, Repeat
 SORTED_FROM = 4096
 """Worlds of at least this many particles are sorted; in smaller ones all particles fit into the cache."""
 SORT_EVERY = 4096
-"""Steps between two sorts of a world; a sort takes about as long as some hundredth part of them."""
+"""Steps between two sorts of a world; they take some hundred times as long as the sort."""
 COLUMNS_AT_ONCE = 8
 """Numbers of a particle that are moved at once."""
 BRICK = 8

@@ -15,10 +15,10 @@ from tisim.state.status import NEVER, WorldStatus
 PATIENCE = 8
 """Largest number of steps launched before the progress of the worlds is read."""
 LOOK_COST = 2.0
-"""Cost of reading the progress of the worlds, in units of the launches of a step.
+"""Bound on the fraction of waiting worlds times the number of steps between two reads of their progress.
 
-The interval between reads is chosen so that launches which find their worlds waiting cost as much as the
-reads do. The factor is 2 because half of the waiting worlds have waited during the launches.
+Beyond it the progress is read more often. At this value launches that find their worlds waiting cost as
+much as a read: twice the launches of a step, during which on average half of the waiting worlds waited.
 """
 LOOKS_PER_QUESTION = 4
 """Number of reads after which a device with mapped pages is checked for its limit; the check takes a fraction

@@ -11,7 +11,7 @@ from tisim.state.state import State
 
 MANY = 1000
 """From this many particles on, items of unequal length are enough work for a launch (measured on 2 cores:
-launches cost a step 0.2 ms, as much as the pairs of 400 particles)."""
+launches cost a step 0.2 ms, the same as the pairs of 400 particles)."""
 
 
 class Phase:
@@ -21,7 +21,7 @@ class Phase:
     long : whether one item is enough work for a launch.
     light : whether a task otherwise has many items, on a CPU.
     others : number of other particles that an item loops over. It determines the choice of the schedule
-    (engine/schedule_choice.py) and how long a team waits for a thread.
+    (``choose`` in engine/compiled_worlds.py) and how long a team waits for a thread.
     """
 
     conditional: ClassVar[bool] = False

@@ -26,7 +26,7 @@ class RadixSort:
 
     def __init__(self, s: State, items: Phase, bits: int) -> None:
         self.s, self.items, self.capacity = s, items, items.extent
-        # With an even number of passes the result is in the half where the first pass began.
+        # With an even number of passes the result ends in the half in which the first pass began.
         self.passes = 2 * -(-bits // (2 * DIGIT_BITS))
         self.block = SORT_BLOCK.get(runtime.current().device, 64)
         self.blocks = -(-items.extent // self.block)
@@ -124,7 +124,7 @@ class CountDigits(OfDigitBlocks):
         a, number = self.sort, self.sort.number(w)
         if b == 0:
             a.start[w, 0] = 0
-        # Counts are shifted by one, so that each prefix sum is where the items of a digit begin.
+        # Counts are shifted by one, so that each prefix sum is the first place of the items of a digit.
         for digit in range(BASE):
             a.start[w, digit * number + b + 1] = 0
         for k in range(b * a.block, self.end(w, b)):

@@ -15,8 +15,8 @@ from tisim.program.phases import Phase
 from tisim.state.state import State
 
 LEAST_BLOCK = {"cpu": 4096}
-"""Least number of items of a block; 64 on other devices. Longer blocks are used to have as many items in a
-block as blocks."""
+"""Least number of items of a block; 64 on other devices. Blocks are longer if a world would otherwise have
+more blocks than a block has items."""
 
 
 @ti.data_oriented

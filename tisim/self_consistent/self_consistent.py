@@ -50,7 +50,7 @@ class SelfConsistentSolver(DerivedSolver):
 
     changes : the largest change of a particle in this sweep, the last one, and the one before.
     once : whether a step makes a single sweep as long as that suffices.
-    mixed : whether sweeps are mixed with the last one (sweep_mixing.py).
+    mixed : whether sweeps are mixed with the last one.
     """
 
     def __init__(
