@@ -16,8 +16,8 @@ from tisim.state.status import WorldStatus
 
 CONTACTS_PER_PARTICLE = 8
 """Capacity for overlapping pairs, per particle. Spheres of any sizes that only touch have fewer than 14.93
-contacts on average, which makes half this number of pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1
-(1994) 339)."""
+contacts on average, which makes half this number of pairs per particle (G. Kuperberg and O. Schramm, Math.
+Res. Lett. 1 (1994) 339)."""
 
 
 @ti.data_oriented

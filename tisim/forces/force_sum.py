@@ -171,7 +171,7 @@ class SumForces(PairSum):
 
     @ti.func
     def elapsed_time(self, w):
-        """Return the time (s) since the contact history was last updated."""
+        """Return the time (s) since contact history and particle memory were last updated."""
         s, now = self.s, self.s.occasion[w]
         none = now == Occasion.START or now == Occasion.AFTER_EVENTS
         step = ti.select(now == Occasion.AHEAD, s.step_ahead[w], s.dt[w])

@@ -1,10 +1,10 @@
 """Contact history of one law: values that touching pairs keep between steps, such as their sliding
 displacement.
 
-During a step the history is stored with the pair in the list. Between list rebuilds it is stored on the
-smaller particle of the pair (for equal sizes, on the particle of lower id), which has few larger neighbours,
-under the id of the other particle. It is therefore kept when lists are rebuilt, when indices change and after
-a restart, and moves in memory with its particle.
+During steps the history is kept with the pair in the list. Before a list is rebuilt, indices change or the
+state is read, it is stored on the smaller particle of the pair (for equal sizes, on the particle of lower
+id), which has few larger neighbours, under the id of the other particle. It is therefore kept when lists are
+rebuilt, when indices change and after a restart, and moves in memory with its particle.
 """
 
 from typing import Any

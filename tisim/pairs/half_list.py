@@ -37,8 +37,8 @@ class ListSizes:
     world. near : pairs that one particle lists for events and step control.
 
     Spheres of any sizes that only touch have fewer than 14.93 contacts on average, which makes half this
-    number of pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339). For longer interaction
-    ranges a list grows when it overflows.
+    number of pairs per particle (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339). For longer
+    interaction ranges a list grows when it overflows.
     """
 
     row: int = 16
