@@ -95,8 +95,7 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
 
 
 class ParameterTable:
-    """The parameter table has the parameters of every part of a scene, for every world: ``table[world,
-    slot]``."""
+    """The parameter table has the parameters of all parts of a scene and all worlds: ``table[world, slot]``."""
 
     def __init__(self, parts: Sequence[Component], worlds: int, real: Any) -> None:
         self.slots = sum(_slots(part) for part in parts)
