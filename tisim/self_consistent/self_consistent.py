@@ -8,8 +8,8 @@ the residual would be smallest if f were linear:
     x = f - theta (f - f_last),    theta = <r, r - r_last> / |r - r_last|^2
 
 Mixing converges also in cases in which plain sweeps overshoot. It would even return values if there is no
-solution: if the feedback through the other particles exceeds the value
-that causes it (an eigenvalue of f above 1), as in overlapping iron spheres. For f linear and symmetric in the inner product (the same from i to
+solution: if the feedback through the other particles exceeds the value that causes it (an eigenvalue of f
+above 1), as in overlapping iron spheres. For f linear and symmetric in the inner product (the same from i to
 j as from j to i), <x - x_last, r - r_last> / |x - x_last|^2 + 1 is a weighted mean of its eigenvalues. If it
 is above 1, so is one of the eigenvalues. A linear law then has no solution, and for a law that saturates
 plain sweeps continue to the stable solution.

@@ -95,7 +95,7 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
 
 
 class ParameterTable:
-    """The parameter table has the parameters of all parts of a scene and all worlds: ``table[world, slot]``."""
+    """The parameter table holds the parameters of all parts and all worlds: ``table[world, slot]``."""
 
     def __init__(self, parts: Sequence[Component], worlds: int, real: Any) -> None:
         self.slots = sum(_slots(part) for part in parts)
