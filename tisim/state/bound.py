@@ -18,9 +18,9 @@ class Bound(Generic[Part]):
     """A bound part gives kernels access to a part of a scene in the device memory of a batch of worlds.
 
     In a method decorated with ``ti.func``, ``self`` is the bound object. Each parameter is a function of the
-    world, ``self.hardness(w)``. Each list of parts is one object for all its rows: ``self.bodies.radius(w,
-    k)``. The values returned by ``connect`` of the part are attributes too. Any other attribute, such as an
-    option or a constant of the class, is taken from the data.
+    world, ``self.hardness(w)``. A list of parts is one object for all rows: ``self.bodies.radius(w, k)``. The
+    values returned by ``connect`` of the part are attributes too. Any other attribute, such as an option or a
+    constant of the class, is taken from the data.
 
     data : the part of the scene that was compiled; its parameter values differ from the loaded scenes.
     index : its index among the effects of the scene.
