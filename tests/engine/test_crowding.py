@@ -56,11 +56,13 @@ def refused(one):
 
 def test_grains_at_one_place_are_refused_by_name():
     """However many there are, in no time and little memory."""
-    rule = "particles.position must be another place for each particle, as effects.granular holds them apart"
+    rule = (
+        "particles.position must be a different place for each particle, as effects.granular holds them apart"
+    )
     one = start([[1, 0, 0], [0, 0, 0], [2, 0, 0], [0, 0, 0]])
     assert refused(one) == f"{rule}; received particles 1 and 3 both at (0, 0, 0) m"
     began = time.perf_counter()
-    assert refused(start(np.zeros((100_000, 3)))).endswith("and 100000 particles at places of others")
+    assert refused(start(np.zeros((100_000, 3)))).endswith("and 100000 particles in all share places")
     assert time.perf_counter() - began < 20
 
 

@@ -69,8 +69,8 @@ class OfStepper(Force):
     counters = ("rejections",)
 """
 SAID = {
-    "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be what Taichi can compile; .*'kk'",
-    "NotCalled": r"laws\.py, line 19, in NotCalled\.force, must be what Taichi can compile; .*bad operand",
+    "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be code that Taichi can compile; .*'kk'",
+    "NotCalled": r"laws\.py, line 19, in NotCalled\.force, must be code that Taichi can compile; .*bad op",
     "Undeclared": r"laws\.py, line 25, in Undeclared\.force, must be .*'charge' must be declared in",
     "Reads": r"^name of .* must be a name of no other use on a state; received 'read'$",
     "Again": r"^name of .* must be a name of no other use on a state; received 'status'$",
@@ -101,7 +101,7 @@ def test_on_the_command_line(own_file, capsys):
     with pytest.raises(SystemExit) as end:
         main(["run", "wrong.toml", "--plugin", "laws.py"])
     assert end.value.code == 2
-    assert "line 11, in UnknownName.force, must be what Taichi can compile" in " ".join(
+    assert "line 11, in UnknownName.force, must be code that Taichi can compile" in " ".join(
         capsys.readouterr().err.split()
     )
 

@@ -230,6 +230,6 @@ def test_grains_that_nothing_holds_apart_stop_their_world(monkeypatch):
     simulation.run()
     below, above = simulation.results()
     assert below.status.ok, below.status.reason
-    assert "effects.granular, at particle 0 (it is so where " in above.status.reason
+    assert "effects.granular, at particle 0 (this happens if " in above.status.reason
     assert "or no elastic force holds the cohesion there" in above.status.reason
     np.testing.assert_array_equal(above.state["position"], above.start["position"])

@@ -146,7 +146,7 @@ def test_what_is_fixed_is_at_rest_and_stays():
     body = MagneticCylinders(cylinders=[Cylinder(radius=1.0, length=2.0)])
     place, speed = [[3.0, 0, 0]], [[1.0, 0, 0]]
     moving = scene(place, speed, (body, Capture()), quantities={"fixed": [1]})
-    with pytest.raises(InputError, match=r"particles.velocity must be 0 where particles are fixed"):
+    with pytest.raises(InputError, match=r"particles.velocity must be 0 for fixed particles"):
         simulate([moving], capacity=1)
     with pytest.raises(InputError, match=r"effects.capture must be used without impact; received 'impact'"):
         scene(place, speed, (body, Capture(), Impact(hardness=1.0)))

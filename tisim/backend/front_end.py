@@ -1,13 +1,12 @@
-"""The front end of Taichi and of Quadrants is relieved of work that gives the same each time.
+"""Speed-ups of the front ends of Taichi and Quadrants, which otherwise repeat the same work many times.
 
-Where a class defines a function for kernels, both look up the line of the class in its file to learn that it
-is one, though the frame of the caller says so. Both look up the source of a function anew wherever it is
-called, and wrap each line of it and each text that shows a place in it, for an error that may come. Taichi
-1.7.4 makes that text anew each time. Quadrants 1.3 and 1.4 read each kernel twice, the first time to learn
-which parts of dataclasses it uses, and copy each function's tree to put names in place of those parts; no
-kernel of tisim has a dataclass. Together that is a third of the time to start a simulation whose kernels lie
-in the cache with Taichi, and two thirds with Quadrants. Here what is found is remembered, what changes
-nothing is left out, and errors say the same.
+When a class defines a function for kernels, both look up the line of the class in its file to recognize it,
+although the frame of the caller identifies it. Both look up the source of a function again at every call, and
+wrap each line of it and each text that shows a place in it, for possible errors. Taichi 1.7.4 makes that text
+again each time. Quadrants 1.3 and 1.4 read each kernel twice, the first time to find the parts of dataclasses
+it uses, and copy the syntax tree of each function to name these parts; no kernel of tisim has a dataclass.
+All this takes a third of the start of a simulation with cached kernels with Taichi, and two thirds with
+Quadrants. Here results are cached, work without effect is skipped, and error messages stay the same.
 """
 
 from __future__ import annotations
@@ -28,8 +27,11 @@ from typing import Any
 
 @contextmanager
 def quick_import() -> Iterator[None]:
-    """Have ``inspect.getframeinfo`` look up the line of a frame alone while ``taichi`` or ``quadrants`` is
-    imported. It searches all modules for the frame's, for each of some 200 functions that they define."""
+    """Speed up ``inspect.getframeinfo`` during the import of ``taichi`` or ``quadrants``: it only looks up
+    the line of a frame.
+
+    The original searches all modules for the frame's module, for each of some 200 functions that they define.
+    """
     thorough = inspect.getframeinfo
     inspect.getframeinfo = _line_of_frame  # type: ignore[assignment]
     try:
@@ -46,7 +48,7 @@ def _line_of_frame(frame: FrameType, context: int = 1) -> inspect.Traceback:
 
 
 def relieve(package: str) -> None:
-    """Let the front end of ``taichi`` or ``quadrants`` remember what it has found."""
+    """Make the front end of ``taichi`` or ``quadrants`` cache its look-ups."""
     kernels: Any = importlib.import_module(f"{package}.lang.kernel_impl")
     kernels._inside_class = _in_class_body
     texts: Any = importlib.import_module(f"{package}.lang.ast.ast_transformer_utils")
@@ -68,7 +70,7 @@ def relieve(package: str) -> None:
 
 
 def _where_there_are_parts(put_names: Callable[..., Any]) -> Callable[..., Any]:
-    """Return ``put_names``, called only for functions that have parts of dataclasses to put names for."""
+    """Return ``put_names``, called only for functions with parts of dataclasses."""
 
     @functools.wraps(put_names)
     def put(tree: Any, struct_locals: set[str]) -> Any:
@@ -78,8 +80,11 @@ def _where_there_are_parts(put_names: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _read_once(load: Callable[..., set[str] | None]) -> Callable[..., set[str] | None]:
-    """Return ``load``, which gives the parts of dataclasses that a kernel uses, or None where it has to be
-    read for them; it gives an empty set for a kernel of tisim that takes no dataclass."""
+    """Return ``load`` with a shortcut for kernels without dataclasses.
+
+    ``load`` returns the parts of dataclasses that a kernel uses, or None if the kernel must be read to find
+    them. The shortcut returns an empty set for a kernel of tisim that takes no dataclass.
+    """
 
     @functools.wraps(load)
     def loaded(kernel: Any, values: tuple[Any, ...], key: Any) -> set[str] | None:
@@ -95,8 +100,11 @@ def _read_once(load: Callable[..., set[str] | None]) -> Callable[..., set[str] |
 
 
 class ShortTextWrapper(TextWrapper):
-    """This wrapper does not take text into words that fits into one line: most lines of sources do, and twice
-    for each expression that took a twelfth of a process whose kernels lie in the cache."""
+    """A text wrapper that does not split text that fits into one line.
+
+    Most source lines fit, and splitting them twice for each expression took a twelfth of the time of a
+    process with cached kernels.
+    """
 
     def wrap(self, text: str) -> list[str]:
         if len(text) > self.width or not self._odd.isdisjoint(text):
@@ -109,23 +117,25 @@ class ShortTextWrapper(TextWrapper):
 
 _LINES = ShortTextWrapper(width=9999, tabsize=4)
 QUICK_TEXTS = SimpleNamespace(fill=lambda line, tabsize, width: _LINES.fill(line), dedent=textwrap.dedent)
-"""This stands for ``textwrap`` where sources are read, and makes no wrapper for each of their lines."""
+"""Replaces ``textwrap`` in the reading of sources, without a new wrapper for each line."""
 
 
 def _in_class_body(level_of_class_stackframe: int) -> bool:
-    """Return whether what is being decorated is defined in the body of a class; the frame at the level named
-    runs its ``class`` statement, and the one below it the body."""
+    """Return whether the decorated function is defined in the body of a class.
+
+    The frame at the given level runs the ``class`` statement, and the one below it the body.
+    """
     return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
 
 
 def _by_code(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return ``look_up`` with a memory, so that it is called once for all functions of one definition."""
+    """Return ``look_up`` with a cache: it is called once for all functions of one definition."""
     known: dict[tuple[CodeType, str], Any] = {}
 
     @functools.wraps(look_up)
     def remembered(function: Any) -> Any:
         code = function.__code__
-        # Codes of two files are equal where they do the same.
+        # Code objects of two files compare equal if they do the same.
         key = (code, code.co_filename)
         if key not in known:
             known[key] = look_up(function)
@@ -135,13 +145,13 @@ def _by_code(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def _by_place(describe: Callable[[Any, Any], str]) -> Callable[[Any, Any], str]:
-    """Return ``describe`` with a memory, so that it is called once for each place in a source."""
+    """Return ``describe`` with a cache: it is called once for each place in a source."""
     known: dict[tuple[Any, ...], str] = {}
 
     @functools.wraps(describe)
     def remembered(context: Any, node: Any) -> str:
         begin, end = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
-        # The lines as well: a file may have been edited and read again.
+        # The lines are part of the key, as a file may have been edited and read again.
         lines = tuple(context.src[node.lineno - 1 : node.end_lineno])
         place = (context.file, context.func.func.__name__, context.lineno_offset)
         key = (*place, lines, type(node), *begin, *end)

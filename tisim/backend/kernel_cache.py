@@ -1,9 +1,9 @@
-"""The compiled kernels that Taichi keeps on disk for the next process.
+"""The cache of compiled kernels that Taichi keeps on disk for later processes.
 
-Taichi 1.7.4 and Quadrants 1.3.3 read them with the first that they compile, and write them when they stop: at
-the end of a process, not when it is killed. Meanwhile they lock them by a file. Another process waits a
-quarter of a second for it, then warns, and compiles all or keeps nothing; a process that is killed meanwhile
-leaves the file behind. Processes of tisim wait for each other here instead.
+Taichi 1.7.4 and Quadrants 1.3.3 read it when they compile the first kernel, and write it when they stop: at
+the end of a process, but not if it is killed. Meanwhile they lock it by a file. Another process waits a
+quarter of a second for the lock, then warns, and compiles everything or stores nothing; a killed process
+leaves the file behind. Processes of tisim wait for each other in a queue instead.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ from tisim.files.atomic import locked
 from tisim.streams import say
 
 STALE = 60.0
-"""This time (s) is longer than any process holds a lock."""
+"""A time (s) longer than any process holds the lock."""
 LOCKS = {
     "taichi": ("TI_OFFLINE_CACHE_FILE_PATH", "ticache.lock"),
     "quadrants": ("QD_OFFLINE_CACHE_FILE_PATH", "kernel_compilation_manager/qdcache.lock"),
 }
-"""These are, for each package, the variable that names another folder for its kernels, and the lock in it."""
+"""For each package, the variable that names another cache folder, and the lock in the folder."""
 QUEUE = "tisim.lock"
-"""This is the file that processes of tisim queue at, in the same folder: the system frees it when one
+"""File in the cache folder that processes of tisim lock to queue; the system unlocks it when a process
 dies."""
 
 
 def lock() -> Path:
-    """Return the path of Taichi's lock, which is there while a process holds it."""
+    """Return the path of Taichi's lock file, which exists while a process holds the lock."""
     variable, name = LOCKS[BACKEND]
     return Path(os.environ.get(variable) or ti.lang.impl.default_cfg().offline_cache_file_path) / name
 
 
 def options() -> dict[str, str | bool]:
-    """Return the options of the compiler that name the folder for kernels; none where that is its own one.
+    """Return the compiler options that set the cache folder; none if the default folder can be used.
 
-    The compiler stops where it may not enter its folder. A process that may not gets a temporary one, which
-    is removed when the process ends, and keeps no kernels where it may not have that either.
+    The compiler stops if it cannot write to its folder. In that case the process gets a temporary folder that
+    is removed at its end. If that cannot be made either, no kernels are stored.
     """
     folder = lock().parent
     try:
@@ -56,12 +56,12 @@ def options() -> dict[str, str | bool]:
 
 @cache
 def _without(folder: Path, why: str) -> dict[str, str | bool]:
-    """Return the options of a process that may not use its folder for kernels, and say so."""
+    """Return the options of a process that cannot write to its cache folder, and print a notice."""
     say(
         f"compiled kernels are not kept for the next process: {folder} cannot be written ({why}); "
         "set HOME or XDG_CACHE_HOME to a folder that can"
     )
-    # The compiler warns of a variable whose option is given.
+    # The compiler warns if the variable is set and the option is given.
     os.environ.pop(LOCKS[BACKEND][0], None)
     try:
         return {"offline_cache_file_path": _temporary().name}
@@ -71,7 +71,8 @@ def _without(folder: Path, why: str) -> dict[str, str | bool]:
 
 @cache
 def _temporary() -> tempfile.TemporaryDirectory[str]:
-    """Return a folder that is removed when this process ends, but not when one forked from it does."""
+    """Return a temporary folder that is removed when this process ends, but not when a process forked from it
+    ends."""
     folder = tempfile.TemporaryDirectory(prefix="tisim-kernels-")
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=folder._finalizer.detach)  # type: ignore[attr-defined]
@@ -79,7 +80,7 @@ def _temporary() -> tempfile.TemporaryDirectory[str]:
 
 
 def unlock() -> None:
-    """Remove a lock that has been left behind. No error where that is not allowed: kernels are compiled."""
+    """Remove a stale lock. Without the permission nothing happens, and kernels are compiled."""
     with suppress(OSError):
         if time.time() - lock().stat().st_mtime > STALE:
             lock().unlink()
@@ -87,10 +88,9 @@ def unlock() -> None:
 
 @contextmanager
 def exclusive_access() -> Iterator[None]:
-    """Keep all other processes of tisim from reading or writing the kernels on disk, for as long as this
-    lasts.
+    """Keep all other processes of tisim from reading or writing the cache within this context.
 
-    Where the folder cannot be written, or the system has no locks, there is no waiting.
+    There is no waiting if the folder cannot be written, or if the system has no file locks.
     """
     with ExitStack() as stack:
         with suppress(OSError, InputError, RunError):

@@ -1,8 +1,8 @@
-"""Kernels that are launched again and again, such as those of a step.
+"""Fast launches of kernels that run again and again, such as the kernels of a step.
 
 Taichi 1.7.4 takes about 22 us of Python to launch a kernel of an object (2 cores of an Intel Xeon, Sapphire
-Rapids), most of them to find which compiled kernel the arguments ask for. Where these are whole numbers that
-is the same one each time, and to launch it takes 1 us. Quadrants looks it up in 4 us by itself.
+Rapids), mostly to find the compiled kernel for the types of the arguments. For integer arguments it is always
+the same one, and a direct launch takes 1 us. Quadrants itself finds it in 4 us.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from tisim.backend.taichi import ti
 
 
 class Launcher:
-    """A launcher calls a kernel of an object, whose arguments are whole numbers, and returns what it returns:
-    a whole number, or nothing.
+    """A launcher calls a kernel of an object with integer arguments, and returns its integer result, if it
+    has one.
 
-    The first call compiles it. As the kernel, it must not be called after Taichi has been started anew.
+    The first call compiles the kernel. Like the kernel, the launcher must not be called after Taichi has been
+    restarted.
     """
 
     def __init__(self, kernel: Callable[..., Any]) -> None:
@@ -33,7 +34,7 @@ class Launcher:
 
 
 def _direct(kernel: Any, arguments: tuple[int, ...]) -> Callable[..., Any]:
-    """Return what launches a kernel that Taichi has compiled for such arguments."""
+    """Return a function that launches a kernel compiled by Taichi for such arguments."""
     definition = kernel._primal
     program = ti.lang.impl.get_runtime().prog
     key = definition.ensure_compiled(kernel._kernel_owner, *arguments)

@@ -1,8 +1,8 @@
-"""Whether loops of kernels end where they should, on a device that may do otherwise.
+"""A test that kernel loops end correctly on a device.
 
-Mesa's software device for Vulkan ends them early in version 22.3, without a word: after 65535 rounds, and
-where threads of a block go through atomic operations unequally often, as it takes their memory barrier for
-one of the whole block. From version 25 on it does not.
+In version 22.3 Mesa's software device for Vulkan silently ends loops early: after 65535 rounds, and if
+threads of a block run atomic operations unequally often, because it treats their memory barrier as one of the
+whole block. Versions from 25 on are correct.
 """
 
 import numpy as np
@@ -10,12 +10,12 @@ import numpy as np
 from tisim.backend.taichi import ti
 
 COUNTED_THREADS, COUNTED_ROUNDS, LONG_LOOP = 256, 7, 70_000
-"""These are the numbers of threads, of rounds in which one of them adds while the others do not, and of
-rounds of a long loop."""
+"""Parameters of the test: number of threads, number of rounds in which one thread adds while the others do
+not, and length of the long loop."""
 
 
 def end_where_they_should() -> bool:
-    """Return whether loops end where they should."""
+    """Return whether loops end correctly."""
     counts = np.zeros(COUNTED_THREADS, np.int32)
     _count(COUNTED_ROUNDS, LONG_LOOP, counts)
     expected = np.where(np.arange(COUNTED_THREADS) < COUNTED_ROUNDS, 1, 0)

@@ -1,8 +1,8 @@
-"""Whether a process may go on to launch kernels on Mesa's software device for Vulkan.
+"""A check that a process may launch more kernels on Mesa's software device for Vulkan.
 
-There each loop of a kernel, whenever it is launched, takes a page of memory that is mapped by itself and is
-never given back (a set of descriptors, which Taichi does not free). Linux allows a process 65,530 mappings
-unless told otherwise, and beyond them the driver crashes.
+On this device each launched loop of a kernel maps a page of memory that is never freed (a descriptor set,
+which Taichi does not free). Linux allows a process 65,530 mappings by default, and beyond this number the
+driver crashes.
 """
 
 from pathlib import Path
@@ -11,11 +11,11 @@ from tisim.errors import RunError
 
 MAPPINGS, LIMIT = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
 FREE_MAPPINGS = 0.2
-"""This part of what is allowed is left for what is launched before anybody asks again."""
+"""Fraction of the allowed mappings reserved for launches before the next check."""
 
 
 def require_mappings() -> None:
-    """Raise RunError where a process on Linux has used up nearly all mappings."""
+    """Raise RunError on Linux if the process has used nearly all mappings."""
     if not LIMIT.exists():
         return
     limit, used = int(LIMIT.read_text()), MAPPINGS.read_bytes().count(b"\n")

@@ -1,4 +1,4 @@
-"""Device memory: fields that are made together, and go together."""
+"""Device memory, in trees of fields that are allocated and freed together."""
 
 from __future__ import annotations
 
@@ -16,34 +16,36 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.errors import RunError
 
 MAX_TREES = 480
-"""So many trees of fields may be in use at once; with more than 512, Taichi 1.7.4 and Quadrants 1.3.3
-crash."""
+"""Largest number of trees in use at once; with more than 512, Taichi 1.7.4 and Quadrants 1.3.3 crash."""
 
 MAX_TREES_PER_START = 300
-"""Taichi is started anew after so many trees: it never gives back the memory of compiled kernels, some
-hundred kB to each tree, and takes longer to compile the more there are."""
+"""Trees after which Taichi is restarted: it never frees the memory of compiled kernels, some hundred kB per
+tree, and compiles more slowly the more there are."""
 
 MOST_ENTRIES = 2**31 - 1
-"""A field has at most so many numbers: the kernel compiler counts them with 32 bits."""
+"""Largest number of entries of a field: the kernel compiler counts them with 32 bits."""
 
 LISTS_PART = 0.5
-"""Fields and lists of pairs together may take this part of the memory, where lists are to grow; copies of the
-fields and the compiler need the rest."""
+"""Fraction of the memory that fields and pair lists together may take when lists grow; copies of the fields
+and the compiler need the rest."""
 
 reclaimers: list[Callable[[], None]] = []
-"""These functions give back memory that is kept for later only."""
+"""Functions that free cached memory."""
 
 _tree_counts: Counter[int] = Counter()
-"""This counts the trees that have been made, by the start of Taichi."""
+"""Number of trees that have been made, for each start of Taichi."""
 _collecting: list[list[Tree]] = []
 _live: weakref.WeakSet[Tree] = weakref.WeakSet()
 _lost: deque[tuple[Any, int]] = deque()
-"""These are the trees whose owner has been forgotten without ``destroy``, each with the start of Taichi it
-belongs to. It is a list, as the garbage collector may come at any time and in any thread."""
+"""Trees whose owner was garbage-collected without ``destroy``, each with its start of Taichi. They are
+queued, as the garbage collector may run at any time and in any thread."""
 
 
 class NoRoom(RunError):
-    """There is no room for fields: ``what`` they need of it must be as ``rule`` says; it is ``received``."""
+    """There is not enough memory for fields.
+
+    what : the limited quantity. rule : the limit. received : the amount needed.
+    """
 
     def __init__(self, what: str, rule: str, received: str) -> None:
         self.what, self.rule, self.received = what, rule, received
@@ -51,7 +53,7 @@ class NoRoom(RunError):
 
 
 def require_lists(needed: int, instead_of: int) -> None:
-    """Raise NoRoom unless there is room for lists of so many bytes, in place of some that are there."""
+    """Raise NoRoom unless there is memory for lists of this many bytes in place of existing ones."""
     there = int(LISTS_PART * runtime.memory()) - (bytes_in_use() - instead_of)
     if needed > there:
         rule = f"within the {max(there, 0) / 1e9:.3g} GB that are left for lists of pairs"
@@ -59,7 +61,7 @@ def require_lists(needed: int, instead_of: int) -> None:
 
 
 def require_memory(needed: int) -> None:
-    """Raise NoRoom unless this machine has so many bytes of memory."""
+    """Raise NoRoom unless this process may have this many bytes of memory."""
     there = runtime.memory()
     if needed > there:
         rule = f"within the {there / 1e9:.0f} GB that this process may have"
@@ -72,9 +74,9 @@ def _require_entries(longest: int) -> None:
 
 
 class Tree:
-    """A tree is fields that have been placed in one builder, in device memory from now on.
+    """A tree holds the fields of one builder in device memory.
 
-    NoRoom is raised where there is none for them, RunError where too many are in use.
+    It raises NoRoom if there is not enough memory, and RunError if too many trees are in use.
     """
 
     @in_taichi_thread
@@ -87,7 +89,7 @@ class Tree:
         except NoRoom:
             builder.abandon()
             raise
-        # Whatever comes next: a builder that has not been finalised is a fault of every later kernel.
+        # Finalised in any case: an unfinished builder would break every later kernel.
         tree = builder.finalize()
         self.generation = runtime.generation()
         self._forget = weakref.finalize(self, _lost.append, (tree, self.generation))
@@ -105,19 +107,18 @@ class Tree:
 
     @property
     def alive(self) -> bool:
-        """Return whether the memory is there: not destroyed, nor gone with a Taichi that has been started
-        anew."""
+        """Return whether the memory still exists: it has not been freed, nor lost in a restart of Taichi."""
         return self._forget.alive and self.generation == runtime.generation()
 
     @in_taichi_thread
     def destroy(self) -> None:
-        """Give the memory back. Nothing is done where it has gone already."""
+        """Free the memory, unless this has been done already."""
         self._forget()
         _release_lost()
 
 
 def in_use() -> set[Tree]:
-    """Return all trees whose memory is there."""
+    """Return all trees whose memory still exists."""
     return {tree for tree in _live if tree.alive}
 
 
@@ -128,7 +129,8 @@ def bytes_in_use() -> int:
 
 @contextmanager
 def collected() -> Iterator[list[Tree]]:
-    """Yield the trees that are made meanwhile, in a list; where anything is raised, they are gone."""
+    """Yield a list of the trees that are made in this context; if an exception is raised, they are
+    destroyed."""
     trees: list[Tree] = []
     _collecting.append(trees)
     try:
@@ -147,13 +149,13 @@ def tree_count() -> int:
 
 
 def needs_restart() -> bool:
-    """Return whether so many trees have been made that Taichi should be started anew."""
+    """Return whether enough trees have been made that Taichi should be restarted."""
     return _tree_counts[runtime.generation()] >= MAX_TREES_PER_START
 
 
 @in_taichi_thread
 def reclaim() -> None:
-    """Give back what nobody uses: what is kept for later, and what has been forgotten, but not collected."""
+    """Free unused memory: cached objects, and forgotten trees that are not garbage-collected yet."""
     for give_back in reclaimers:
         give_back()
     gc.collect()
@@ -162,20 +164,21 @@ def reclaim() -> None:
 
 @in_taichi_thread
 def renew() -> None:
-    """Start Taichi anew, unless a tree is in use."""
+    """Restart Taichi, unless a tree is in use."""
     if not in_use():
-        # What has been forgotten, but not yet collected, would keep alive all that this is to give back.
+        # Forgotten objects that are not collected yet would keep the memory alive.
         gc.collect()
         runtime.restart()
 
 
 def _release_lost() -> None:
-    """Destroy what has been forgotten."""
+    """Destroy the trees in the queue."""
     while _lost:
         tree, generation = _lost.popleft()
         if generation == runtime.generation():
-            # Taichi must have seen fields that no kernel has used before they go, or it stumbles over them.
+            # Synchronize first: Taichi fails if it frees fields that no kernel has used and that it has not
+            # seen.
             ti.sync()
-            # Not tree.destroy(), which has every kernel of all other trees compiled again, too.
+            # Not tree.destroy(), which would have every kernel of all other trees compiled again.
             tree.ptr.destroy_snode_tree(tree.prog)
             tree.destroyed = True

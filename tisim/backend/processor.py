@@ -23,17 +23,17 @@ FIRST_LLVM = {
 LLVM, llvm/lib/TargetParser/Host.cpp and release notes of 12 to 19.
 """
 KNOWN_LONG_SINCE = {"AuthenticAMD": (25, 0x5F), "GenuineIntel": (6, 167)}
-"""The last family and model of each vendor before those of the table: LLVM 12 knows all up to it."""
+"""The last family and model of each vendor before the table; LLVM 12 knows all up to it."""
 OLDEST = 12
-"""No backend has an LLVM older than this one."""
+"""The oldest LLVM of any backend."""
 
 
 def processor() -> dict[str, str]:
-    """Return the entries of the first processor in /proc/cpuinfo; its name alone where that file cannot be
+    """Return the entries of the first processor in /proc/cpuinfo, or only its name if that file cannot be
     read."""
     entries: dict[str, str] = {}
     try:
-        # Not the whole file: the kernel asks each of some hundred cores for its part.
+        # Not the whole file, as the kernel collects the entries of each core, which may be hundreds.
         with Path("/proc/cpuinfo").open() as lines:
             for line in lines:
                 if not line.strip():
@@ -48,8 +48,8 @@ def processor() -> dict[str, str]:
 def first_llvm(cpu: dict[str, str]) -> tuple[str, int | None]:
     """Return LLVM's name of a processor, and the major version of the first LLVM that knows it.
 
-    The name is empty where the table has none. The version is None for a processor that is newer than the
-    table, or of another maker: no LLVM is known to know it.
+    The name is empty if the table has none. The version is None for a processor that is newer than the table
+    or of another vendor, for which no LLVM version is known.
     """
     try:
         vendor, family, model = cpu["vendor_id"], int(cpu["cpu family"]), int(cpu["model"])

@@ -1,4 +1,5 @@
-"""The one place that starts Taichi: device, precision, threads, arithmetic. Nothing starts it at import."""
+"""The only module that starts Taichi, with device, precision, threads and arithmetic. An import starts
+nothing."""
 
 from __future__ import annotations
 
@@ -19,24 +20,24 @@ from tisim.errors import InputError, RunError, is_whole, must
 
 DEVICES = ("cpu", "cuda", "vulkan")
 LEAST_ADDRESS_SPACE = 10**9
-"""No kernel compiler starts in an address space of so few bytes."""
+"""With a smaller address space (bytes) no kernel compiler starts."""
 PRECISIONS = ("f64", "f32")
 ARITHMETICS = ("strict", "fast")
 THREADS = 1024
-"""Taichi is asked for at most so many threads; it makes them all, whether there are cores for them or not."""
+"""Largest number of threads; Taichi creates all of them, even if there are fewer cores."""
 
 
 @dataclass(frozen=True)
 class Runtime:
-    """A runtime says where and how kernels run.
+    """A runtime has the settings for running kernels.
 
     device : "cpu", "cuda" or "vulkan".
-    precision : "f64" or "f32"; the type of every floating-point particle field and parameter.
-        Time is f64 whatever the precision.
+    precision : "f64" or "f32"; the type of every floating-point particle field and parameter. Time is f64 in
+    either case.
     threads : CPU threads, >= 1.
-    arithmetic : "strict", where the same scene gives the same bits; or "fast", where compilers may regroup
-        sums, fuse products with them and take reciprocals and roots by estimates and Newton's method. What
-        is not a number, or infinite, is reported in both.
+    arithmetic : "strict": the same scene gives bitwise equal results. "fast": compilers may regroup sums,
+    fuse them with products, and compute reciprocals and roots by estimates and Newton's method. NaN and
+    infinite values are reported in both.
     """
 
     device: str = "cpu"
@@ -62,28 +63,31 @@ class Runtime:
 
     @property
     def settings(self) -> dict[str, str]:
-        """Return what decides the last bits of a result beside the scene: precision, kind of device and
-        arithmetic."""
+        """Return the settings, apart from the scene, that determine the last bits of a result: precision,
+        kind of device and arithmetic."""
         return {"precision": self.precision, "device": self.device, "arithmetic": self.arithmetic}
 
     @property
     def described(self) -> dict[str, str]:
-        """Return what a run ran on: the settings, and CPU threads, which change no bit."""
+        """Return the settings of a run for its result, with the CPU threads, which do not change any bit."""
         return {**self.settings, **({"threads": str(self.threads)} if self.device == "cpu" else {})}
 
 
 turn = threading.RLock()
-"""This lock is held by ``tisim.run``, studies of accuracy and searches in this process, each from its start
-to its end, and while settings change: calls of several threads take turns, and one that is made from within
-another, such as from its progress, goes ahead."""
+"""Lock held by ``tisim.run``, accuracy studies and searches from start to end, and while settings change.
+Calls of several threads wait for each other; a nested call, for example from a progress function, proceeds.
+"""
 
 _current: Runtime | None = None
 _generation = 0
 
 
 def _after_fork() -> None:
-    """Let go, in a child, of the turn of a thread of the parent, and never take Taichi's program apart there:
-    at the end of the process it would wait for its threads, which the child does not have, for ever."""
+    """Prepare a forked child process.
+
+    The lock of a thread of the parent is replaced. Taichi's program is never destroyed in the child: at exit
+    it would wait forever for threads that the child does not have.
+    """
     global turn
     turn = threading.RLock()
     if _current is not None:
@@ -100,8 +104,10 @@ def cores() -> int:
 
 
 def memory() -> int:
-    """Return the memory that this process may have, bytes: that of this machine, or less where there is a
-    limit; where the system does not say, as much as a number of bytes can be."""
+    """Return the memory available to this process, bytes: the memory of the machine, or a lower limit.
+
+    If the system does not report it, the largest possible number is returned.
+    """
     try:
         there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
@@ -112,13 +118,14 @@ def memory() -> int:
 def init(
     device: str = "cpu", precision: str = "f64", threads: int = 0, arithmetic: str = "strict"
 ) -> Runtime:
-    """Start Taichi with these settings, or keep it as it is when they have not changed.
+    """Start Taichi with these settings, or keep it running if they have not changed.
 
     threads : CPU threads; 0 for all cores. arithmetic : "strict" or "fast"; see ``Runtime``.
-    Raises InputError when a setting is unknown or the device is absent. A change of settings waits until
+
+    Raises InputError if a setting is unknown or the device is absent. A change of settings waits until
     ``tisim.run``, ``tisim.accuracy.study`` and ``tisim.optimize.run`` in other threads have returned. It
-    invalidates every Simulation made before; those say so when used. Raises RunError in a process that was
-    forked from one where Taichi had been started.
+    invalidates every Simulation made before; using one of these raises an error. Raises RunError in a process
+    that was forked from one in which Taichi had been started.
     """
     require_own_process()
     requested = Runtime(device, precision, threads or cores(), arithmetic)
@@ -135,12 +142,12 @@ def _start(requested: Runtime) -> None:
     if not _generation:
         atexit.register(_stop)
     if surroundings.address_space() < LEAST_ADDRESS_SPACE:
-        # Where threads get no stacks, Quadrants waits for them without end.
+        # If threads cannot get their stacks, Quadrants waits for them forever.
         raise _too_little_memory()
-    # Whether it starts or not, what ran before has stopped.
+    # The previous Taichi has stopped, even if the start fails.
     _current, _generation = None, _generation + 1
     try:
-        # Taichi announces the device on standard output, where results go.
+        # Taichi prints the device to standard output, which is used for results.
         with (
             surroundings.existing_folder(),
             kernel_cache.exclusive_access(),
@@ -150,13 +157,14 @@ def _start(requested: Runtime) -> None:
                 arch=getattr(ti, requested.device),
                 default_fp=requested.real,
                 cpu_max_num_threads=requested.threads,
-                # Its flags for LLVM: sums regrouped and fused, no infinity, no sign of zero. NaN stays NaN.
+                # LLVM flags: sums are regrouped and fused, infinities and the sign of zero ignored. NaN stays
+                # NaN.
                 fast_math=requested.arithmetic == "fast",
                 enable_fallback=False,
-                # With it, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes three
-                # times as long to compile; LLVM optimises the same code afterwards.
+                # With this pass, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes
+                # three times as long to compile; LLVM optimises the same code afterwards.
                 cfg_optimization=False,
-                # A step of many phases is unrolled on purpose, without a warning.
+                # A step of many phases is unrolled on purpose; this avoids the warning.
                 unrolling_limit=0,
                 **kernel_cache.options(),
             )
@@ -184,11 +192,11 @@ def _too_little_memory() -> RunError:
 
 @ti.kernel
 def _compile_first():
-    """Do nothing: with the first kernel that it compiles, Taichi reads those on the disk."""
+    """Do nothing; when Taichi compiles its first kernel, it reads the cache on disk."""
 
 
 def _stop() -> None:
-    """Stop Taichi at the end of the process, which has it write down what it has compiled."""
+    """Stop Taichi at the end of the process, so that it writes the compiled kernels to disk."""
     if forked():
         return
     with kernel_cache.exclusive_access():
@@ -196,26 +204,27 @@ def _stop() -> None:
 
 
 def restart() -> None:
-    """Start Taichi anew with the same settings: whatever was compiled or stored is gone, and its memory."""
+    """Restart Taichi with the same settings; all compiled kernels, fields and memory are freed."""
     _start(current())
 
 
 def current() -> Runtime:
-    """Return the running settings; start the defaults (cpu, f64, all cores) on first use; see ``init``."""
+    """Return the current settings; start Taichi with the defaults (cpu, f64, all cores) on first use; see
+    ``init``."""
     require_own_process()
     return _current or init()
 
 
 def precision() -> str:
-    """Return the precision that runs, or by default will; unlike ``current`` it starts nothing."""
+    """Return the current precision, or the default one; unlike ``current`` this starts nothing."""
     return _current.precision if _current else Runtime.precision
 
 
 def generation() -> int:
-    """Return the number of starts: compiled objects of an earlier generation must not be touched."""
+    """Return the number of starts of Taichi; compiled objects of an earlier start must not be used."""
     return _generation
 
 
 def backend() -> str:
-    """Return name and version of the kernel compiler."""
+    """Return the name and version of the kernel compiler."""
     return f"{BACKEND} {'.'.join(str(part) for part in ti.__version__[:3])}"

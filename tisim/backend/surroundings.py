@@ -1,9 +1,9 @@
-"""The surroundings of the process are made fit for the kernel compiler before it is loaded.
+"""Preparation of the process environment before the kernel compiler is imported.
 
-Taichi 1.7.4 and Quadrants 1.3.3 end the process where HOME is not set. They take options from variables of
-the environment, such as TI_ARCH or QD_DEBUG, which go before those that tisim gives, and end the process or
-raise where they make no sense. They ask for the working directory, which may have been removed; and Taichi
-for the locale, which may be one that Python does not know.
+Taichi 1.7.4 and Quadrants 1.3.3 end the process if HOME is not set. They take options from environment
+variables such as TI_ARCH or QD_DEBUG, which override the options of tisim, and end the process or raise
+errors for invalid values. They query the working directory, which may have been removed, and Taichi queries
+the locale, which may be unknown to Python.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ except ImportError:
 from tisim.streams import fill_standard_descriptors
 
 OPTION_PREFIXES = ("TI_", "QD_", "TAICHI_", "QUADRANTS_", "_QD_", "ENABLE_TAICHI_", "ENABLE_QUADRANTS_")
-"""Variables of these names are options of the compilers. They are removed from the environment of the
-process, as tisim has options of its own for what they set."""
+"""Prefixes of variables that are options of the compilers. They are removed from the environment, as tisim
+has its own options for these settings."""
 COMPILERS = ("TI", "QD")
 KEPT = {
     "TI_OFFLINE_CACHE_FILE_PATH": None,
@@ -35,15 +35,15 @@ KEPT = {
     "QD_OFFLINE_CACHE": ("0", "1"),
     "TI_ADVANCED_OPTIMIZATION": ("0", "1"),
 }
-"""Options that stay, with the values that they take (None for any): where compiled kernels are kept, whether
-they are, and whether Taichi takes longer for code that may be quicker. No result depends on them. Without its
-passes Quadrants, up to 1.4, compiles some kernels to code that does nothing."""
+"""Options that are kept, with their allowed values (None for any): the folder of the kernel cache, whether
+kernels are cached, and whether Taichi spends more time on optimization. They do not affect results. Without
+its optimization passes Quadrants, up to 1.4, compiles some kernels to code that does nothing."""
 SET = {"SKIP_VERSION_CHECK": "ON", "LOG_LEVEL": "warn"}
-"""Options that are set: no call over the network for the newest version, and no announcements."""
+"""Options that are set: no query over the network for the newest version, and no announcements."""
 
 
 def prepare() -> None:
-    """Make the process fit for the import of a compiler; it is called once, before that."""
+    """Prepare the process for the import of a compiler; called once, before it."""
     fill_standard_descriptors()
     _replace_options()
     _name_cache_folder()
@@ -52,7 +52,8 @@ def prepare() -> None:
 
 
 def _replace_options() -> None:
-    """Remove the compilers' options from the environment but those that stay, and set those of tisim."""
+    """Remove the compilers' options from the environment, except the kept ones, and set the options of
+    tisim."""
     for name in [name for name in os.environ if name.startswith(OPTION_PREFIXES)]:
         allowed = KEPT.get(name, ())
         if allowed is not None and os.environ[name] not in allowed:
@@ -64,9 +65,9 @@ def _replace_options() -> None:
 
 
 def _name_cache_folder() -> None:
-    """Name the folder for caches where HOME does not lead to it: that of the user's entry of the system.
+    """Set the cache folder if HOME does not give one, from the home folder of the user in the system.
 
-    The compilers look at XDG_CACHE_HOME first. A path that is empty or not absolute counts as none.
+    The compilers read XDG_CACHE_HOME first. A path that is empty or not absolute is ignored.
     """
     if not Path(os.environ.get("XDG_CACHE_HOME", "")).is_absolute():
         os.environ.pop("XDG_CACHE_HOME", None)
@@ -75,7 +76,7 @@ def _name_cache_folder() -> None:
 
 
 def _name_locale() -> None:
-    """Name the plain locale where the environment names one that Python has never heard of."""
+    """Set the plain locale if Python does not know the locale of the environment."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         try:
@@ -85,9 +86,9 @@ def _name_locale() -> None:
 
 
 def _name_temporary_folder() -> None:
-    """Name the null device as the folder for temporary files where there is none.
+    """Set the null device as the folder for temporary files if there is none.
 
-    Packages that the compilers import ask for its name; whoever makes a file in it is told that it cannot.
+    Packages that the compilers import ask for the name of the folder; creating a file in it gives an error.
     """
     try:
         tempfile.gettempdir()
@@ -96,7 +97,7 @@ def _name_temporary_folder() -> None:
 
 
 def _home() -> Path:
-    """Return the home folder of the user by the system; a folder that cannot be where it knows of none."""
+    """Return the home folder of the user from the system, or a path that cannot exist if there is none."""
     try:
         import pwd
 
@@ -106,21 +107,23 @@ def _home() -> Path:
 
 
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
-"""The folder of Linux that has the limits of containers and of batch systems."""
+"""Folder on Linux with the limits of containers and batch systems."""
 NO_LIMIT = 2**62
-"""Control groups of version 1 say a number of bytes above this where there is no limit."""
+"""Control groups of version 1 without a limit report a number of bytes above this."""
 
 
 def address_space() -> int:
-    """Return the limit of the address space of this process (ulimit -v), bytes; ``sys.maxsize`` where there
-    is none."""
+    """Return the limit of the address space of this process (ulimit -v), bytes; ``sys.maxsize`` if there is
+    none."""
     most = -1 if resource is None else resource.getrlimit(resource.RLIMIT_AS)[0]
     return most if most >= 0 else sys.maxsize
 
 
 def memory_limit() -> int:
-    """Return the memory that this process may have, bytes, whatever the machine has: the limit of its address
-    space (ulimit -v) or of its control group; ``sys.maxsize`` where there is none."""
+    """Return the memory limit of this process, bytes; ``sys.maxsize`` if there is none.
+
+    It is the limit of its address space (ulimit -v) or of its control group, for any memory of the machine.
+    """
     limits = [address_space()]
     try:
         groups = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
@@ -135,7 +138,7 @@ def memory_limit() -> int:
 
 
 def _group_limits(root: Path, path: str, name: str) -> Iterator[int]:
-    """Yield the limits of a control group and of those that it is in; in a container its own is the root."""
+    """Yield the limits of a control group and of its parents; in a container its own group is the root."""
     group = Path(path.lstrip("/"))
     for folder in (group, *group.parents):
         try:
@@ -148,7 +151,7 @@ def _group_limits(root: Path, path: str, name: str) -> Iterator[int]:
 
 @contextmanager
 def existing_folder() -> Iterator[None]:
-    """Work in the root folder within this context where the working directory has been removed."""
+    """Work in the root folder within this context if the working directory has been removed."""
     try:
         Path.cwd()
     except FileNotFoundError:

@@ -1,6 +1,6 @@
-"""The only import of Taichi, or of its maintained fork Quadrants (``choice.py`` says which).
+"""The only import of Taichi, or of its maintained fork Quadrants (``choice.py`` selects one).
 
-Everything else writes ``from tisim.backend.taichi import ti``. Only what both packages offer is used.
+All other modules use ``from tisim.backend.taichi import ti``, and only features that both packages have.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import warnings
 from tisim.backend import choice, front_end, surroundings
 
 BACKEND = choice.chosen()
-"""This package compiles the kernels: ``"taichi"`` or ``"quadrants"``."""
+"""The package that compiles the kernels: ``"taichi"`` or ``"quadrants"``."""
 
 surroundings.prepare()
 with front_end.quick_import(), warnings.catch_warnings():
-    # Taichi 1.7.4 imports with deprecations of newer Pythons; they are not ours to mend.
+    # The import of Taichi 1.7.4 gives deprecation warnings in newer Pythons, which are not tisim's.
     warnings.simplefilter("ignore", DeprecationWarning)
     warnings.simplefilter("ignore", SyntaxWarning)
     if BACKEND == "quadrants":
@@ -31,12 +31,12 @@ class _Probe:
 
 
 DEVICE_FUNCTION: type = type(_Probe.__dict__["function"])
-"""This is the type of a method decorated with ``ti.func`` (the packages differ); validated models let it
-pass."""
+"""Type of a method decorated with ``ti.func``, which differs between the packages; validated models accept
+it."""
 
 
 def is_device_function(value: object) -> bool:
-    """Return whether this is a function decorated with ``ti.func``."""
+    """Return whether a value is a function decorated with ``ti.func``."""
     return bool(getattr(value, f"_is_{ti.__name__}_function", False))
 
 

@@ -1,14 +1,14 @@
-"""The one thread in which Taichi runs, whoever calls.
+"""All calls of Taichi run in one dedicated thread.
 
-Taichi belongs to the thread that has started it: another cannot make fields, and once another has compiled
-a kernel, the first cannot destroy fields any more. Starting it also makes the thread, and all that this one
-starts, take subnormal numbers (below 2.3e-308 in f64) for 0. So Taichi has a thread of its own. Whoever
-calls keeps the arithmetic of IEEE 754, threads that call at once take turns, and Ctrl-C reaches the caller
-while a kernel runs; the kernel then ends by itself, before anything that is asked for later begins.
+Taichi is bound to the thread that started it. Other threads cannot make fields, and once another thread has
+compiled a kernel, the first one cannot destroy fields any more. Starting Taichi also sets this thread, and
+all threads that it starts, to treat subnormal numbers (below 2.3e-308 in f64) as 0. Taichi therefore has a
+thread of its own. The calling thread keeps IEEE 754 arithmetic, simultaneous calls wait for each other, and
+Ctrl-C reaches the caller while a kernel runs; the kernel then completes before any later request begins.
 
-A process that is forked has none of the threads of the one that it comes from. Where this one had been at
-work there, Taichi cannot be used in the child: its own threads are gone as well, and its locks may be held by
-one of them for ever. Where it had not, the child gets a thread of its own.
+A forked process has none of the threads of its parent. If the parent had used Taichi, the child cannot use
+it: Taichi's own threads are missing too, and a missing thread may hold its locks forever. Otherwise the child
+gets a dedicated thread of its own.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _here = threading.local()
 
 
 _started = False
-"""Whether this process, or one that it was forked from, has used the thread."""
+"""Whether this process, or a process that it was forked from, has used the thread."""
 _forked = False
 """Whether the thread was lost when this process was forked."""
 
@@ -62,7 +62,7 @@ def forked() -> bool:
 
 
 def require_own_process() -> None:
-    """Raise RunError where Taichi had been used in the process that this one was forked from."""
+    """Raise RunError if Taichi had been used in the process that this one was forked from."""
     if _forked:
         raise RunError(
             "tisim has been started in the process that this one was forked from, and cannot run here; "
@@ -71,10 +71,10 @@ def require_own_process() -> None:
 
 
 def in_taichi_thread(function: Callable[P, R]) -> Callable[P, R]:
-    """Return a function that runs in Taichi's thread, and returns or raises in the caller's what it does
-    there. It raises RunError in a process that was forked from one where Taichi had been used.
+    """Return a function that runs in Taichi's thread, and passes its result or exception to the caller.
 
-    Whatever makes, fills, reads or destroys fields, or calls a kernel, must be in such a function.
+    It raises RunError in a process that was forked from one in which Taichi had been used. Every function
+    that makes, fills, reads or destroys fields, or calls a kernel, must be wrapped in this way.
     """
 
     @functools.wraps(function)
@@ -86,7 +86,7 @@ def in_taichi_thread(function: Callable[P, R]) -> Callable[P, R]:
         try:
             return future.result()
         finally:
-            # Where the wait was broken off: what has not begun does not begin.
+            # If the wait was interrupted, a call that has not begun is cancelled.
             future.cancel()
 
     return call

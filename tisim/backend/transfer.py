@@ -1,7 +1,7 @@
-"""Copies between fields and arrays, of many fields by one kernel.
+"""Copies between fields and arrays, with one kernel for many fields.
 
-Taichi's own copies are a kernel for each field and direction, and a kernel takes some 50 ms to compile: a
-simulation of two particles spent ten times as long on them as on the kernels of its steps.
+Taichi's own copies are a kernel for each field and direction, and a kernel takes some 50 ms to compile. In a
+simulation of two particles they took ten times as long as the kernels of its steps.
 """
 
 import math
@@ -15,7 +15,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 
 UNROLL_LIMIT = 32
-"""A loop may have so many entries for Taichi to unroll it without a warning."""
+"""Largest number of entries that Taichi unrolls without a warning."""
 TYPES = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32, ti.i64: np.int64}
 
 
@@ -25,7 +25,7 @@ def _divide(entries: tuple[Any, ...]) -> tuple[tuple[Any, ...], ...]:
 
 @ti.data_oriented
 class Exchange:
-    """An exchange makes the copies of some fields, scalar or of vectors, by their names."""
+    """An exchange copies a set of fields, scalars or vectors, by name."""
 
     def __init__(self, columns: Mapping[str, Any]) -> None:
         kinds, sizes, placed = list(TYPES), dict.fromkeys(TYPES, 0), []
@@ -45,7 +45,7 @@ class Exchange:
         self.groups = tuple((shape, _divide(entries)) for shape, entries in groups)
 
     def _buffers(self) -> tuple[np.ndarray, ...]:
-        """Return one array for each type. None of them may be empty."""
+        """Return one array for each type; no array may be empty."""
         return tuple(np.empty(max(1, self.sizes[dtype]), kind) for dtype, kind in TYPES.items())
 
     def _views(self, buffers: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
@@ -73,7 +73,7 @@ class Exchange:
 
     @ti.func
     def _at(self, shape: ti.template(), where):  # type: ignore[valid-type]
-        """Return the place of an entry in an array of this shape."""
+        """Return the index of an entry in a flat array of this shape."""
         at = where[0]
         for axis in ti.static(range(1, len(shape))):
             at = at * shape[axis] + where[axis]
@@ -88,7 +88,7 @@ class Exchange:
         i32: ti.types.ndarray(),  # type: ignore[valid-type]
         i64: ti.types.ndarray(),  # type: ignore[valid-type]
     ):
-        """Copy from the fields to the arrays where ``reads``, else from the arrays to the fields."""
+        """Copy from the fields to the arrays if ``reads``, else from the arrays to the fields."""
         for group in ti.static(self.groups):
             for where in ti.grouped(group[1][0][0][1]):
                 at = self._at(group[0], where)

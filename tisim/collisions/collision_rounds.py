@@ -1,23 +1,23 @@
-"""Sudden events between pairs, such as impacts, many at once: in parallel, deterministic, conservative.
+"""Sudden events between pairs, such as impacts: many at once, in parallel, deterministic, conservative.
 
-A step that has moved the particles is surveyed for pairs in contact, which go into a list with the time
-since their event fell due. They are then resolved in rounds. In a round every waiting pair bids for both
-its particles, and a pair that holds the highest bid at both is resolved. The bid is the time since the
-event fell due, so earlier events go first. Why this is right:
+After a step has moved the particles, pairs in contact are entered into a list with the time since their event
+fell due. They are then resolved in rounds. In a round every waiting pair bids for both its particles, and a
+pair that holds the highest bid at both is resolved. The bid is the time since the event fell due, so earlier
+events go first. Properties:
 
 - Exclusive: a particle has one highest bid, so pairs of one round share no particle, and each is a binary
-  event as the laws define it. Momentum and mass are conserved pair by pair, hence in all.
+  event as the laws define it. Momentum and mass are conserved pair by pair, hence in total.
 - Complete: the waiting pair with the highest bid of all always wins, so every round resolves at least one
   pair, and each pair is resolved once; the rounds end.
-- Ordered: a pair waits until every earlier pair of either of its particles is resolved, and then sees what
-  those have done to velocity, size and temperature. The outcome is that of resolving the whole list one
-  after another, earliest first.
+- Ordered: a pair waits until every earlier pair of either of its particles is resolved, and then uses the
+  changed velocities, sizes and temperatures. The result equals the sequential resolution of the whole list,
+  earliest first.
 - Deterministic: bids are integers, compared by atomic maxima, which do not depend on order. Two pairs that
   share a particle never bid the same, as the sum of their indices breaks ties.
 
-Impacts in the same instant are therefore resolved one after another too, and their outcome is the limit of
-impacts that follow each other. It keeps momentum and never gains energy, but where e < 1 it need not be as
-symmetric as the grains were: see docs/agglomeration.md.
+Simultaneous impacts are therefore also resolved one after another, and their result is the limit of
+successive impacts. It conserves momentum and never gains energy, but for e < 1 it may be less symmetric than
+the grains were: see docs/agglomeration.md.
 """
 
 from tisim.backend.taichi import ti
@@ -38,7 +38,7 @@ class PerContact(Phase):
 
 
 class OpenContacts(PerContact):
-    """This phase forgets earlier bids."""
+    """This phase clears the bids of the previous round."""
 
     @ti.func
     def run(self, w, k):

@@ -1,4 +1,4 @@
-"""The pairs of a step in which something falls due: a list, and the survey of near pairs that fills it."""
+"""The list of the pairs with an event in this step, and the search of near pairs that fills it."""
 
 from typing import Any
 
@@ -15,14 +15,14 @@ from tisim.state.state import State
 from tisim.state.status import WorldStatus
 
 CONTACTS_PER_PARTICLE = 8
-"""There is room for this many pairs that overlap, for each particle. Spheres that only touch, of any sizes,
-touch fewer than 14.93 others in the mean, and make half as many pairs (G. Kuperberg and O. Schramm, Math.
+"""Capacity for overlapping pairs, per particle. Spheres of any sizes that only touch have fewer than 14.93
+contacts on average, which makes half this number of pairs per particle (G. Kuperberg and O. Schramm, Math.
 Res. Lett. 1 (1994) 339)."""
 
 
 @ti.data_oriented
 class ContactList:
-    """A contact list holds the pairs of this step in which something falls due."""
+    """A contact list holds the pairs with an event in this step."""
 
     def __init__(self, s: State, domain: Bound[Domain], events: tuple[Bound[PairEvent], ...]) -> None:
         self.s, self.domain, self.events = s, domain, events
@@ -48,7 +48,7 @@ class ContactList:
         c = ti.atomic_add(self.size[w], 1)
         if c < self.capacity:
             self.first[w, c], self.second[w, c] = i, j
-            # The bits of a positive f32 are ordered as its value; the low half breaks ties.
+            # The bits of a positive f32 have the same order as its value; the low half breaks ties.
             order = ti.cast(ti.bit_cast(ti.cast(due, ti.f32), ti.i32), ti.i64)
             self.bid[w, c] = ((order + 1) << 31) + i + j
             self.waiting[w] += 1
@@ -57,19 +57,19 @@ class ContactList:
 
     @ti.func
     def count_overlaps(self, w, overlaps):
-        """Count pairs of a particle that overlap; stop a world in which there are too many."""
+        """Add the overlapping pairs of a particle to the count; stop a world with too many."""
         if ti.atomic_add(self.overlaps[w], overlaps) + overlaps > CONTACTS_PER_PARTICLE * self.s.count[w]:
             self.overflow(w)
 
     @ti.func
     def overflow(self, w):
-        """Stop a world, and name no failing particle: whose pair is one too many is up to the order of
+        """Stop a world without a failing particle: the pair that overflows depends on the order of
         threads."""
         ti.atomic_max(self.s.failed[w], WorldStatus.CONTACT_OVERFLOW)
 
 
 class ClearContacts(Phase):
-    """This phase empties the list before a survey: a step that has failed has left it as it was."""
+    """This phase empties the list before a search, as a failed step does not clear it."""
 
     def __init__(self, contacts: ContactList) -> None:
         self.c = contacts
@@ -82,9 +82,10 @@ class ClearContacts(Phase):
 
 
 class FindContacts(OnOccasion, PerParticle):
-    """This phase looks at every near pair: it enters those in contact, and asks the control about all.
+    """This phase visits every near pair: it enters pairs in contact, and passes all pairs to the step
+    control.
 
-    After events it looks for the control only: those in contact have been dealt with.
+    After events it serves the step control only, as the contacts have been resolved.
     """
 
     def __init__(self, near: NearList, contacts: ContactList, control: Bound[Any]) -> None:
@@ -94,7 +95,7 @@ class FindContacts(OnOccasion, PerParticle):
 
     @ti.func
     def enter(self, w, i, j, separation):
-        """Enter a pair in which something falls due; return 1 when it overlaps."""
+        """Enter a pair if it has an event; return 1 if it overlaps."""
         due = ti.cast(-1.0, self.s.real)
         for event in ti.static(self.contacts.events):
             due = ti.max(due, event.contact(self.s, w, i, j, separation))
@@ -111,7 +112,7 @@ class FindContacts(OnOccasion, PerParticle):
         for k in range(near.offered(w, i, listed)):
             j = near.candidate(w, i, k, listed)
             leads = near.leads(w, i, j)
-            # A list has each pair once; of all pairs each is its first one's.
+            # A list has each pair once; without a list the leading particle takes the pair.
             if leads or listed:
                 a, b = ti.select(leads, i, j), ti.select(leads, j, i)
                 d = near.domain.separation(w, s.position[w, a], s.position[w, b], s.time[w])

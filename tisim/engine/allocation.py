@@ -16,20 +16,19 @@ from tisim.state.parameter_table import ParameterTable
 from tisim.state.state import State
 
 COPIES = 3
-"""The fields of particles are in memory so many times: on the device, for what is asked for, and to go back
-to."""
+"""Copies of every particle field in memory: one on the device, one for reading and one for going back."""
 
 
 def parts(scene: Scene) -> list[Any]:
-    """Return what a scene has parameters in, in the order of the table."""
+    """Return the parts of a scene that have parameters, in the order of the parameter table."""
     return [*scene.acting(), scene.domain, scene.stepper, scene.stepper.control]
 
 
 class Allocation:
-    """An allocation is the state of worlds of the structure of a scene, the table of their parameters, and
-    the parts of a step.
+    """An allocation holds the state of a batch of worlds, their parameter table and the parts of a step.
 
-    It must be made in the thread of Taichi. It raises NoRoom where there is none for it.
+    All worlds have the structure of the scene. An allocation must be made in the Taichi thread. It raises
+    NoRoom if the memory does not suffice.
     """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
@@ -38,11 +37,11 @@ class Allocation:
             declared(*asked, what) for what in ("counters", "world_quantities", "clocks", "flags", "totals")
         )
         fields = resolve_fields(needed_fields(*asked))
-        # Before anything is compiled: a vector for a number would end the process.
+        # Checked before compilation: a vector in place of a number would end the process.
         for effect in scene.effects:
             check_newcomers(fields, effect)
         real = 8 if runtime.current().precision == "f64" else 4
-        # Before anything is placed: the compiler cannot refuse what is too much for it.
+        # Checked before allocation: the compiler cannot refuse a request that is too large.
         require_memory(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
         self._trees: list[Tree] = []
         kept = (*quantities, *clocks)
@@ -54,9 +53,9 @@ class Allocation:
         self.assemble(ListSizes())
 
     def assemble(self, sizes: ListSizes) -> None:
-        """Put a step together, with lists of these sizes; the memory of the one before is given back.
+        """Put a step together with lists of these sizes, and free the memory of the previous step.
 
-        Raise NoRoom where there is none for them.
+        Raise NoRoom if there is not enough memory for the lists.
         """
         for tree in self._trees:
             tree.destroy()

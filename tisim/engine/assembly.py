@@ -51,7 +51,7 @@ INTEGER = 4
 
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
-    """Return what a scene of these needs beyond the core -> the part that needs it, in order."""
+    """Return the fields that a scene needs beyond the core fields, in order -> the part that needs each."""
     needed: list[tuple[str | Field, str]] = []
     if any(isinstance(effect, Force | PairForce) for effect in effects):
         needed.append((FORCE, "forces"))
@@ -74,8 +74,8 @@ def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[st
     """Return the names of the ``counters``, ``world_quantities``, ``clocks``, ``flags`` or ``totals`` that
     the parts of a scene declare, each once.
 
-    Effects may share one; one of theirs that the stepper declares too is there twice, for ``check_names`` to
-    refuse.
+    Effects may share a name. A name that both an effect and the stepper declare appears twice, and
+    ``check_names`` refuses it.
     """
     shared = [name for effect in effects for name in effect.keeps(what)]
     own = [name for part in (stepper, stepper.control) for name in getattr(part, what, ())]
@@ -83,23 +83,23 @@ def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[st
 
 
 def measured(effects: Sequence[Effect]) -> dict[str, str]:
-    """Return the units of all that effects of a scene measure, by name."""
+    """Return the units of all measures of the effects of a scene, by name."""
     return {name: unit for effect in effects for name, unit in effect.measured().items()}
 
 
 def picks_pairs(effects: Sequence[Effect], stepper: Stepper) -> bool:
-    """Return whether all sums over pairs are over listed ones."""
+    """Return whether every pair sum of the scene runs over listed pairs."""
     pairwise = [effect for effect in effects if isinstance(effect, PairForce | SelfConsistentQuantity)]
     return bool(pairwise) and not stepper.all_pairs and all(effect.short_ranged for effect in pairwise)
 
 
 class Assembly:
-    """An assembly is what a step of a scene consists of.
+    """An assembly holds the items of a step of a scene.
 
-    step : the items of a step. first : those that prepare the first one.
-    sort : sorts particles in memory between steps, where that is worth it.
+    step : the items of a step. first : the items that prepare the first step.
+    sort : sorts particles in memory between steps; None if sorting does not pay.
     failure_attribution : finds the force that has stopped a world.
-    buffers : what has been allocated beside the state.
+    buffers : memory allocated in addition to the state.
     """
 
     def __init__(
@@ -125,8 +125,8 @@ class Assembly:
         for law in effects.of(LongRange):
             law.sum = law.data.long_range_sum(law, s, domain)
         self.long_range = {law.data.label: law.sum for law in effects.of(LongRange)}
-        # Trial states are summed by the same phases, so that these are compiled once. Those of what particles
-        # give each other are part of its sweeps.
+        # Trial states use the same long-range phases, so these are compiled once. The long-range sums of
+        # self-consistent quantities are part of their sweeps.
         final = (law.sum for law in effects.of(LongRange) if not isinstance(law.data, SelfConsistentQuantity))
         self._long_range_items = tuple(item for one in final for item in one.phases())
         for effect in effects:
@@ -157,7 +157,7 @@ class Assembly:
         known = (FirstStep(s, control),) if isinstance(control.data, FixedStep) and context.forced else ()
         keepers = tuple(e for e in effects if e.data.offers("end_step") and e.data.keeps("world_quantities"))
         ends = (EndStep(s, keepers),) if keepers else ()
-        # What stands here as it does in the step is compiled once.
+        # Items that are the same objects as in the step are compiled once.
         items, again = fuse(own.items, forces)
         begin = (*begin_constraints(s, effects.of(Constraint)), *known)
         step, first = [*items, *ends], [*begin, *lists, *derived]
@@ -180,7 +180,7 @@ class Assembly:
                 step += [*lists, EnterAfterEvents(s), *anew, Enter(s, Occasion.STEP)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
-        # Events tell pairs apart by index.
+        # Events tell pairs apart by index, so particles must not move in memory.
         ordered = events or not all(one.data.any_order for one in acting(operators))
         sorts = s.records and not ordered and s.capacity >= spatial_sort.SORTED_FROM
         self.sort = SpatialSort(self.pairs, self.lists) if sorts and self.pairs and self.lists else None
@@ -190,8 +190,8 @@ class Assembly:
             (contacts, "contact list", sudden),
             (self.pairs, "pair list", steady),
             (self.exported, "forces between chunks", steady),
-            (self.sort, "sorting by place", steady),
-            (slots, "slots of what is gone", "removals"),
+            (self.sort, "sorting by position", steady),
+            (slots, "slots of removed particles", "removals"),
         )
         self.buffers = (
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),
@@ -202,7 +202,7 @@ class Assembly:
         )
 
     def crowding(self, w: int) -> str:
-        """Return in words which particle of a world, whose lists have overflowed, has how many near it."""
+        """Return a text that names a particle with overflowed lists, and the number of particles near it."""
         s, lists = self.s, self.lists
         longest = [int(one.longest.to_numpy()[w]) for one in lists.rows()] if lists else [0]
         who = int(s.read("failing_particle")[w])
@@ -212,7 +212,7 @@ class Assembly:
         return f"particle {who} {where}, one of those that have up to {max(longest)} others near them"
 
     def list_bytes(self, sizes: ListSizes) -> int:
-        """Return the device memory (bytes) of the lists of pairs, were they of these sizes."""
+        """Return the device memory (bytes) that pair lists of these sizes would take."""
         s, each = self.s, 0
         if self.lists and self.lists.near:
             each += INTEGER * sizes.near
@@ -230,7 +230,7 @@ class Assembly:
                 yield Buffer(one, f"sweeps of {quantity.quantity}", quantity.label)
 
     def _listed(self, laws: tuple[Bound[Any], ...], sizes: ListSizes) -> PairChunks:
-        """Return the pairs of these laws, and set what each law remembers of them."""
+        """Return the listed pairs of these laws, and give each law its contact history."""
         memories = []
         for law in laws:
             if isinstance(law.data, PairForce) and memory_fields(law.data):
@@ -243,9 +243,9 @@ class Assembly:
         return pairs
 
     def _advance(self, force_sum: SumForces, pairs: tuple[Item, ...]) -> tuple[Item, ...]:
-        """Bring up to date what pairs and particles remember, where there is anything.
+        """Return the items that update the contact history and the memory of single particles after a trial.
 
-        Of pairs that are listed at the end of the step: the last trial state need not be so near to it.
+        They use the pairs listed at the end of the step, as the last trial state may lie farther from it.
         """
         items: list[Item] = []
         if self.pairs and self.pairs.memories and self.exported:
@@ -255,14 +255,14 @@ class Assembly:
         return tuple(items)
 
     def _derived(self, trial: bool = False) -> tuple[Item, ...]:
-        """Return the items that set derived quantities, then those that make long-range sums."""
+        """Return the items that set derived quantities, then the items of the long-range sums."""
         items = tuple(item for part in self.derived_solvers for item in part.phases(trial))
         return (*items, *self._long_range_items)
 
     def _forces(self, total: SumForces) -> tuple[Item, ...]:
-        """Return the items that sum the forces, where there are any."""
+        """Return the items that sum the forces, if the scene has any."""
         return sum_phases(total, self.exported) if self.effects.of(Force, PairForce) else ()
 
     def _sees(self) -> tuple[Any, ...]:
-        """Return what a sum of forces is made of."""
+        """Return the arguments of a force sum."""
         return self.s, self.domain, self.effects, self.pairs, self.derived_solvers

@@ -1,4 +1,4 @@
-"""Many scenes, a batch of worlds at a time, on compiled simulations that are kept for the next ones."""
+"""Many scenes run as batches of worlds on compiled simulations, which are kept for later scenes."""
 
 from __future__ import annotations
 
@@ -23,32 +23,34 @@ if TYPE_CHECKING:
 
 
 BATCH_PARTICLES = 300_000
-"""All worlds of a batch have this many particles at most, which bounds its memory to some hundred MB."""
+"""Largest number of particles in all worlds of a batch; it bounds the memory to some hundred MB."""
 IDLE_SIMULATIONS = 8
 """At most this many compiled simulations are kept for later calls."""
 SPARE, WASTE = 4096, 8
-"""A kept simulation serves where it has room for at most so many particles, or so many times what is needed:
-all of its room is loaded and looked at."""
+"""A kept simulation is reused only if its total room is at most SPARE particles, or WASTE times the room
+needed, because all of its room is loaded and checked."""
 FEW_WORLDS = 8
-"""A small scene is compiled for so many worlds, as what one world of it shows is often asked of a few."""
+"""A small scene is compiled for this many worlds, because a few more worlds of it are often run later."""
 
 Progress = Callable[[float], None]
 
 
 def progress_of_part(progress: Progress, finished_parts: int, parts: int) -> Progress:
-    """Return the function that reports the progress of one of several equal parts as that of the whole.
+    """Return a function that converts the progress of one of several equal parts to overall progress.
 
-    finished_parts : how many of the ``parts`` are over already.
+    finished_parts : number of the ``parts`` that are already finished.
     """
     return lambda fraction: progress((finished_parts + fraction) / parts)
 
 
 class Batches:
-    """Batches make results of scenes: those of one structure (effects, options, domain, stepper) run side by
-    side.
+    """Batches runs scenes and yields their results; scenes of one structure (effects, options, domain,
+    stepper) run side by side.
 
-    limit : the largest number of worlds of a batch. A world is yielded when it has ended, while others go on,
-    so that whoever keeps results loses little when stopped.
+    limit : the largest number of worlds of a batch.
+
+    A world is yielded when it has ended, while the others continue. A caller that stores results therefore
+    loses little when it is stopped.
     """
 
     def __init__(self, limit: int = 256) -> None:
@@ -64,11 +66,11 @@ class Batches:
         strict: bool = True,
         trajectory: Trajectory | None = None,
     ) -> Iterator[tuple[int, Result]]:
-        """Yield (index into scenes, Result) as worlds end, after those whose start cannot be made.
+        """Yield (index into scenes, Result) as worlds end; scenes without a valid initial state come first.
 
-        progress : called with the finished fraction of this call, 0..1. strict : raise the InputError of a
-        start that cannot be made; otherwise it becomes a failed Result. trajectory : made for these scenes;
-        records them.
+        progress : called with the finished fraction of this call, 0..1.
+        strict : raise the InputError of an invalid initial state; otherwise it becomes a failed Result.
+        trajectory : made for these scenes; records them.
         """
         starts: dict[int, Arrays] = {}
         groups: dict[Any, list[int]] = {}
@@ -77,7 +79,7 @@ class Batches:
             for index, scene in enumerate(scenes):
                 try:
                     start = scene.start()
-                    # Before anything is compiled, and so that a search goes on without it.
+                    # Checked before anything is compiled, so that a search can go on without this scene.
                     check_places(scene, start)
                 except InputError as error:
                     if strict:
@@ -107,7 +109,7 @@ class Batches:
 
     @contextmanager
     def _simulation(self, scenes: Sequence[Scene]) -> Iterator[Simulation]:
-        """Yield a compiled simulation for scenes of one structure, which nobody else uses meanwhile."""
+        """Yield a compiled simulation for scenes of one structure, reserved for this caller meanwhile."""
         capacity = max(scene.capacity() for scene in scenes)
         worlds = max(1, min(len(scenes), self.limit, BATCH_PARTICLES // capacity))
         simulation = self._reusable(scenes[0].structure(), worlds, capacity)
@@ -127,8 +129,7 @@ class Batches:
                 each.close()
 
     def _reusable(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
-        """Return the smallest idle simulation that serves, taken out of the idle ones; None where none
-        does."""
+        """Take the smallest suitable simulation out of the idle ones; return None if none is suitable."""
         most = max(SPARE, WASTE * worlds * capacity)
         with _lock:
             self._idle = [each for each in self._idle if each.s.alive]
@@ -147,7 +148,7 @@ class Batches:
             return best
 
     def close(self) -> None:
-        """Give the device memory back, of all that does not run."""
+        """Free the device memory of all idle simulations."""
         with _lock:
             old, self._idle = self._idle, []
         for each in old:
@@ -155,29 +156,29 @@ class Batches:
 
 
 _lock = threading.Lock()
-"""This lock is held while a simulation changes hands."""
+"""Held while a simulation is taken from or returned to the idle ones."""
 _all: weakref.WeakSet[Batches] = weakref.WeakSet()
 
 
 def rounded(number: int) -> int:
-    """Return the next number up whose binary digits are all 0 after the first three.
+    """Round a number up to the next one whose binary digits are all 0 after the first three.
 
-    A size is compiled in: so scenes of like sizes share what is compiled, in this process and in those that
-    find it on the disk.
+    Sizes are compiled in. With rounded sizes, scenes of similar size share compiled kernels, within a process
+    and through the cache on disk.
     """
     unit = 1 << max(0, number.bit_length() - 3)
     return -(-number // unit) * unit
 
 
 def _restart_taichi() -> None:
-    """Start Taichi anew where it has grown, and nothing would be lost but simulations that are kept idle."""
+    """Restart Taichi if its memory has grown and only idle simulations would be lost."""
     if memory.needs_restart():
         _close_if_nothing_runs()
         memory.renew()
 
 
 def _close_if_nothing_runs() -> None:
-    """Close the simulations that all Batches keep idle, unless something else is in use."""
+    """Close the idle simulations of all Batches, unless other memory is in use."""
     with _lock:
         idle = [each for batches in _all for each in batches._idle]
         needed = not memory.in_use() <= {tree for each in idle for tree in each.trees}
@@ -186,7 +187,7 @@ def _close_if_nothing_runs() -> None:
 
 
 def _close_idle() -> None:
-    """Give the memory back of what all Batches keep idle."""
+    """Free the memory of all idle simulations of all Batches."""
     for batches in list(_all):
         batches.close()
 
@@ -210,14 +211,18 @@ def run(
 def run(
     scenes: Scene | Sequence[Scene], progress: Progress | None = None, record: Recording | None = None
 ) -> Result | list[Result]:
-    """Run a scene, or many as one batch; return its Result, or theirs in order.
+    """Run one scene, or many as one batch; return its Result, or a list of Results in order.
 
-    progress : called about four times a second with the finished fraction, 0..1. record : a trajectory to
-    write, such as ``Recording("flow.h5", frames=100)``; it does not change the results.
-    What has been compiled is kept for later calls. A world's result is the same bits alone or in a batch.
-    Several threads may call at once: each waits for its turn. ``progress`` may call this in turn.
-    Raises InputError when a start cannot be made or lacks what an effect needs. A run that fails on its way
-    returns a Result, whose ``status`` says so: who does not read that is warned (see Result).
+    progress : called about four times a second with the finished fraction, 0..1.
+    record : a trajectory to write, such as ``Recording("flow.h5", frames=100)``; it does not change the
+    results.
+
+    Compiled simulations are kept for later calls. The result of a world is bitwise the same alone and in a
+    batch. Several threads may call at once; each waits for its turn. ``progress`` may itself call ``run``.
+
+    Raises InputError if an initial state cannot be made or lacks a quantity that an effect needs. A run that
+    fails later returns a Result whose ``status`` gives the reason; a caller that does not read it gets a
+    warning (see Result).
     """
     if isinstance(scenes, Scene):
         return run([scenes], progress, record)[0]

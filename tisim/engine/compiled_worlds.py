@@ -30,15 +30,18 @@ from tisim.state.status import NEVER, WorldStatus
 
 
 class CompiledWorlds:
-    """Compiled worlds are fields and kernels for the structure of a scene, a number of worlds and a capacity
-    of particles. They know neither scenes nor results."""
+    """Compiled worlds are the fields and kernels for one scene structure, a number of worlds and a particle
+    capacity.
+
+    They do not know about scenes or results.
+    """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> None:
         began = time.perf_counter()
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
         awake = schedule != "team" or self.runtime.device == "cpu"
-        must(awake, "schedule", "another than team, whose threads wait awake, but on a CPU", schedule)
+        must(awake, "schedule", "world or particle on this device, as team needs a CPU", schedule)
         self.trees: list[Tree] = []
         self._make(scene, worlds, capacity, schedule)
         self.setup_s = time.perf_counter() - began
@@ -49,7 +52,7 @@ class CompiledWorlds:
         try:
             self._allocate(scene, worlds, capacity)
         except NoRoom:
-            # Once more, without what is only kept for later.
+            # Try again after freeing cached memory.
             memory.reclaim()
             try:
                 self._allocate(scene, worlds, capacity)
@@ -71,8 +74,8 @@ class CompiledWorlds:
         self.trees += trees
 
     def _make_teams(self) -> None:
-        """Make a team for each world, or for each thread."""
-        # Who waits for others awake has a core.
+        """Make the teams: several threads for a world, or single threads."""
+        # Members of a team wait for each other in busy loops, so each needs its own core.
         threads = min(self.runtime.threads, runtime.cores())
         number = threads
         if self.schedule == "team":
@@ -101,24 +104,24 @@ class CompiledWorlds:
 
     @property
     def assembly(self) -> Assembly:
-        """Return what a step consists of."""
+        """Return the items of a step."""
         return self.allocation.assembly
 
     def list_sizes(self) -> ListSizes:
-        """Return sizes in which the lists of pairs last made would have room."""
+        """Return sizes that would have held the pair lists as last made."""
         lists = self.assembly.lists
         return lists.wanted(self.assembly.sizes) if lists else ListSizes()
 
     @in_taichi_thread
     def grow_lists(self, sizes: ListSizes) -> None:
-        """Make lists of pairs of these sizes, and compile the step anew for them.
+        """Make pair lists of these sizes, and compile the step again for them.
 
-        Raise RunError where there is no room for them, which is asked before any is made; lists are then as
-        they were.
+        Raise RunError if there is not enough memory. This is checked before any list is made, and the lists
+        then stay as they were.
         """
         before = self.assembly.sizes
-        rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean, and of {sizes.near}"
-        rows += " for events and step control, are needed, and there is no room for them"
+        rows = f"lists of {sizes.row} pairs for a particle, {sizes.mean} on average, and of {sizes.near}"
+        rows += " for events and step control do not fit in memory"
         try:
             memory.require_lists(self.assembly.list_bytes(sizes), self.assembly.list_bytes(before))
         except NoRoom as no:
@@ -129,7 +132,7 @@ class CompiledWorlds:
             try:
                 self._assemble(sizes)
             except NoRoom:
-                # Once more, without what is only kept for later.
+                # Try again after freeing cached memory.
                 memory.reclaim()
                 self._assemble(sizes)
         except RunError as full:
@@ -142,24 +145,24 @@ class CompiledWorlds:
     def _assemble(self, sizes: ListSizes) -> None:
         with collected() as trees:
             self.allocation.assemble(sizes)
-        # Those of the lists before have been destroyed.
+        # The fields of the previous lists have been destroyed.
         self.trees = [tree for tree in self.trees if tree.alive] + trees
         self._compile()
 
     def put(self, image: Mapping[str, np.ndarray]) -> None:
-        """Put all worlds where they were when ``s.image()`` was made of them."""
-        # One that has failed may have been in the middle of a step.
+        """Put all worlds back into the state of an image made by ``s.image()``."""
+        # A world that failed may have stopped in the middle of a step.
         self.s.fill({**image, "occasion": Occasion.STEP})
         self.forget_lists()
 
     def forget_lists(self) -> None:
-        """Have pair lists made anew before they are used again."""
+        """Have pair lists rebuilt before their next use."""
         if self.assembly.lists is not None:
             self.assembly.lists.forget()
 
     def advance(self, steps: int) -> None:
-        """Take at most ``steps`` steps of every running world; large ones are sorted first, where it is their
-        turn."""
+        """Take at most ``steps`` steps in every running world; large worlds are first sorted in memory if
+        that is due."""
         if self.sort:
             self.sort.advance(1)
         self.program.advance(steps)
@@ -167,44 +170,48 @@ class CompiledWorlds:
     @cached_property
     @in_taichi_thread
     def finite_check(self) -> FiniteCheck:
-        """Return what asks on the device whether all is finite, made when it is first asked for."""
+        """Return the check on the device that all quantities are finite, made at first use."""
         with collected() as trees:
             check = FiniteCheck(self.s)
         self.trees += trees
         return check
 
     def close(self) -> None:
-        """Give the device memory back. Whatever is asked of it later is a RunError, but for closing."""
+        """Free the device memory. Any later use except closing again raises RunError."""
         for tree in self.trees:
             tree.destroy()
 
 
 TEAM_FROM = 2000
-"""Worlds with the work of so many particles are shared by threads, where there are more of these than worlds.
-With 8000 grains two threads are faster than one (docs/performance.md), with 500 slower. There is a member of
-a team for each half of it."""
+"""Several threads share a world from this work (in particles) on, if there are more threads than worlds.
+
+Two threads are faster than one with 8000 grains (docs/performance.md) and slower with 500. A team has one
+member for each half of this number.
+"""
 OTHERS_OF_ONE = 40
-"""Going through so many others takes as long as the rest of a step of a particle: a grain takes some 80 ns,
-the force between two charges or dipoles 1 to 2 ns."""
+"""Number of pair partners whose computation takes as long as the rest of a step of one particle.
+
+The step of a grain takes some 80 ns, the force between two charges or dipoles 1 to 2 ns.
+"""
 
 
 def work_of(step: tuple[Item, ...], s: State) -> int:
-    """Return the work of a world in a step, by what it has room for: so many particles that feel those near
-    them alone have it."""
-    # Some stand there twice, and run once.
+    """Return the work of one step of a world at full capacity, in particles with short-ranged forces only."""
+    # Some phases appear twice in the step but run once.
     others = sum(phase.extent * phase.others for phase in {phase for phase, _ in nested(step)})
     return s.capacity + others // OTHERS_OF_ONE
 
 
 def members(step: tuple[Item, ...], s: State, threads: int) -> int:
-    """Return how many of so many threads may share a world: more would wait for each other."""
+    """Return the largest number of threads for a world; more would mostly wait for each other."""
     return min(threads, max(2, 2 * work_of(step, s) // TEAM_FROM))
 
 
 def choose(step: tuple[Item, ...], s: State, runtime: Runtime) -> str:
-    """Return the schedule on which worlds take a step in the least time."""
+    """Return the schedule with the shortest time per step."""
     if runtime.device != "cpu" or any(phase.long for phase, _ in nested(step)):
         return "particle"
-    # A thread for each world is best; fewer are shared, where that is worth waiting for each other.
+    # One thread for each world is best. Fewer worlds are shared by threads if their work outweighs the
+    # waiting.
     many = s.worlds >= runtime.threads
     return "world" if many or work_of(step, s) < TEAM_FROM else "team"

@@ -1,7 +1,8 @@
-"""Starts whose particles lie in each other: those that cannot be run are refused, others warned of.
+"""Overlaps in initial states: states that cannot be run are refused, deep overlaps give a warning.
 
-A start may have any number of particles at one place, so nothing here takes more memory than a few columns of
-them: the first checks count particles in cells that are so small that all in one overlap.
+An initial state may have any number of particles at one place, so the checks use little memory: a few columns
+of the particles. The first check counts particles in cells that are so small that all particles of one cell
+overlap.
 """
 
 from __future__ import annotations
@@ -24,23 +25,23 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
 PAIR_BYTES = 32
-"""A listed pair takes at least so much memory."""
+"""Least memory of a listed pair, bytes."""
 DEEP = 0.5
-"""Overlaps are deep from this part of the smaller radius on."""
+"""An overlap is deep from this fraction of the smaller radius on."""
 SUSPECT = 3
-"""From so many particles in one cell on it is counted how many one of them overlaps."""
+"""From this many particles in one cell on, the overlaps of one of them are counted."""
 SAMPLE = 64
-"""Where many overlap their pairs are estimated by so many particles."""
+"""Number of particles in the sample from which overlapping pairs are estimated if there are many."""
 MOST_PAIRS = 2_000_000
 """Above this number, overlapping pairs are counted but not examined one by one."""
 MOST_NEAR = 1000
-"""A skin by which a particle lists more others than this, in lists of more than MOST_PAIRS, is refused: going
-through such lists takes longer than any list lasts."""
+"""A skin is refused if it gives a particle more listed neighbours than this and more than MOST_PAIRS pairs in
+all: scanning such lists takes longer than a list lasts."""
 
 
 class Deep(NamedTuple):
-    """The deepest overlap of a start: what lies in what, over the smaller radius, and how many such there
-    are."""
+    """The deepest overlap of an initial state: its depth over the smaller radius, a text that names the two,
+    and the number of deep overlaps."""
 
     part: float
     what: str
@@ -48,9 +49,12 @@ class Deep(NamedTuple):
 
 
 def check_places(scene: Scene, start: Arrays) -> list[Deep]:
-    """Raise InputError where spheres that the scene holds apart are at one place, or one of them overlaps
-    more than there is room for, or where the skin of the scene takes in too many; else return the deepest
-    overlaps of spheres and in walls."""
+    """Check the overlaps of an initial state; return the deepest overlap of two spheres and the deepest with
+    each wall.
+
+    Raise InputError if spheres with a contact law coincide, if one overlaps more others than the contact
+    history can store, or if the skin of the scene takes in too many neighbours.
+    """
     check_skin(scene, start)
     laws = _holding(scene)
     if not laws or not len(start["mass"]):
@@ -59,7 +63,7 @@ def check_places(scene: Scene, start: Arrays) -> list[Deep]:
 
 
 def check_skin(scene: Scene, start: Arrays) -> None:
-    """Raise InputError where lists of pairs with the skin of the scene would be of no use."""
+    """Raise InputError if the skin of the scene would make the pair lists useless."""
     lists = any(isinstance(effect, Pairwise) and effect.short_ranged for effect in scene.effects)
     if scene.skin is None or not lists or not len(start["mass"]):
         return
@@ -73,8 +77,11 @@ def check_skin(scene: Scene, start: Arrays) -> None:
 
 
 def warn_of_overlaps(found: Sequence[Sequence[Deep]]) -> None:
-    """Warn, once for all scenes, of spheres that overlap by half of the smaller radius, and of those that lie
-    in walls or behind them; ``found`` in each scene."""
+    """Warn once, for all scenes, of spheres that overlap by half of the smaller radius and of spheres in or
+    behind walls.
+
+    found : the deep overlaps of each scene.
+    """
     deep = [one for of_scene in found for one in of_scene]
     if deep:
         worst = max(deep, key=lambda one: one.part)
@@ -86,7 +93,7 @@ def warn_of_overlaps(found: Sequence[Sequence[Deep]]) -> None:
 
 
 def _holding(scene: Scene) -> list[Any]:
-    """Return the effects of a scene that hold spheres apart which touch."""
+    """Return the effects of a scene that hold touching spheres apart."""
     solid = [effect for effect in scene.effects if isinstance(effect, Pairwise) and effect.solid]
     return solid + [effect for effect in scene.effects if isinstance(effect, PairEvent) and effect.hard]
 
@@ -96,7 +103,7 @@ def _place(position: np.ndarray) -> str:
 
 
 class _Crowd:
-    """A crowd is the spheres of a start, with the bodies that they are of and the box in which they are."""
+    """A crowd is the spheres of an initial state, with their rigid bodies and the box around them."""
 
     def __init__(self, scene: Scene, start: Arrays) -> None:
         real = np.float64 if runtime.current().precision == "f64" else np.float32
@@ -110,20 +117,19 @@ class _Crowd:
             self.low, self.side = low, np.where(scene.domain.imaged(), high - low, 0.0)
 
     def nearest(self, apart: np.ndarray) -> np.ndarray:
-        """Return the shortest of the vectors (m) between particles, across joined faces where there are
-        any."""
+        """Return the minimum-image vectors (m) between particles, across joined faces if there are any."""
         sides = np.where(self.side > 0, self.side, np.inf)
         return apart - np.rint(apart / sides) * self.side
 
     def joined(self, i: Any, j: Any) -> np.ndarray:
-        """Return which pairs are of one rigid body, within which they are not held apart."""
+        """Return which pairs belong to one rigid body; contact laws do not act within a body."""
         joined: np.ndarray = np.zeros(np.broadcast(i, j).shape, bool)
         for body in self.bodies:
             joined |= (body[i] == body[j]) & (body[i] >= 0)
         return joined
 
     def check_coincident(self, law: str) -> None:
-        """Raise InputError where two are at one place."""
+        """Raise InputError if two particles are at one place."""
         if not (np.diff(np.sort(self.position[:, 0])) == 0).any():
             return
         order = np.lexsort(self.position.T)
@@ -134,13 +140,14 @@ class _Crowd:
         if len(first):
             i, j = sorted((int(first[0]), int(second[0])))
             number = len(np.union1d(first, second))
-            rule = f"another place for each particle, as effects.{law} holds them apart"
+            rule = f"a different place for each particle, as effects.{law} holds them apart"
             received = f"particles {i} and {j} both at {_place(self.position[i])}"
-            received += f", and {number} particles at places of others" if number > 2 else ""
+            received += f", and {number} particles in all share places" if number > 2 else ""
             raise InputError(f"particles.position must be {rule}; received {received}")
 
     def levels(self) -> list[np.ndarray]:
-        """Return the indices of the spheres of each level, with radii up to twice the smallest of it."""
+        """Return the indices of the spheres of each level; within a level radii differ by less than a factor
+        2."""
         smallest = self.radius.min()
         if self.radius.max() < 2 * smallest:
             return [np.arange(self.number)]
@@ -148,13 +155,13 @@ class _Crowd:
         return [np.flatnonzero(level == one) for one in np.unique(level)]
 
     def check_overlaps(self, laws: Sequence[Any]) -> None:
-        """Raise InputError where a particle overlaps more others than a law remembers of it, or where more
-        pairs overlap than there is room for."""
+        """Raise InputError if a particle overlaps more others than its contact history can store, or if more
+        pairs overlap than the lists can hold."""
         self.pairs = 0
         remembers = next((law for law in laws if getattr(law, "memory", 0)), None)
         hard = any(isinstance(law, PairEvent) for law in laws)
         for members in self.levels():
-            # All in one cell overlap, as it is no wider than two of the smallest from corner to corner.
+            # All spheres in one cell overlap: its diagonal is twice the smallest radius.
             width = 2.0 * self.radius[members].min() / np.sqrt(3.0)
             with np.errstate(invalid="ignore"):
                 cells = np.floor((self.position[members] - self.low) / width).astype(np.int64)
@@ -174,18 +181,18 @@ class _Crowd:
             each = float(np.mean([self.overlapped(int(i))[0] for i in sample]))
             self.pairs += int(0.5 * each * len(members))
             if self.pairs * PAIR_BYTES > LISTS_PART * runtime.memory():
-                rule = "so far apart that lists of those that overlap find room in memory"
+                rule = "so far apart that the lists of overlapping pairs fit in memory"
                 received = f"about {self.pairs} pairs, and {where}"
                 raise InputError(f"particles must be {rule}; received {received}")
-            # Twice as many, as it is an estimate; of fewer a kernel counts all.
+            # A factor 2 allows for the error of the estimate; below it a kernel counts the pairs exactly.
             if hard and self.pairs > 2 * CONTACTS_PER_PARTICLE * self.number:
                 rule = f"so far apart that at most {CONTACTS_PER_PARTICLE} pairs overlap for each of them"
                 received = f"about {self.pairs} pairs, and {where}"
                 raise InputError(f"particles must be {rule}; received {received}")
 
     def overlapped(self, i: int, skin: float = 0.0) -> tuple[int, int]:
-        """Return how many others particle i overlaps, or has within a skin (m) around it, and how many of
-        these are larger or follow it."""
+        """Return the number of others that particle i overlaps or has within a skin (m), and how many of
+        these are larger or, at equal size, have a higher index."""
         apart = self.nearest(self.position - self.position[i])
         others = np.arange(self.number)
         near = (apart**2).sum(axis=1) < (self.radius + self.radius[i] + skin) ** 2
@@ -194,16 +201,16 @@ class _Crowd:
         return int(near.sum()), int((near & above).sum())
 
     def tree(self, members: np.ndarray) -> cKDTree:
-        """Return a tree of some of them, which sees across joined faces."""
+        """Return a search tree of some spheres that accounts for joined faces."""
         place = self.position[members] - self.low
-        # A remainder may round up to the whole side.
+        # A remainder may round up to the full side.
         inside = np.mod(place, np.where(self.side > 0, self.side, 1.0))
         inside = np.where(inside >= self.side, 0.0, inside)
         place = np.where(self.side > 0, inside, place)
         return cKDTree(place, boxsize=self.side if self.side.any() else None)
 
     def deep_pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pairs that overlap deeply, shape (pairs, 2), and how deep (m)."""
+        """Return the pairs that overlap deeply, shape (pairs, 2), and the overlaps (m)."""
         found: list[np.ndarray] = []
         levels = self.levels()
         trees = [self.tree(members) for members in levels]
@@ -225,12 +232,12 @@ class _Crowd:
 
 
 def _overlaps(scene: Scene, start: Arrays, laws: Sequence[Any]) -> list[Deep]:
-    """Return the deepest overlap of two spheres, where any is deep; raise InputError where there are too
-    many."""
+    """Return the deepest overlap of two spheres, if any is deep; raise InputError if there are too many
+    overlaps."""
     crowd = _Crowd(scene, start)
     if crowd.number < 2:
         return []
-    # Where there cannot be many pairs all are looked at at once: those that are refused are among them.
+    # With few particles all pairs are searched at once; the refused ones are among the deep pairs.
     few = crowd.number**2 <= MOST_PAIRS
     pairs, overlap = crowd.deep_pairs() if few else (None, None)
     if pairs is None or len(pairs):
@@ -250,7 +257,7 @@ def _overlaps(scene: Scene, start: Arrays, laws: Sequence[Any]) -> list[Deep]:
 
 
 def _in_walls(scene: Scene, start: Arrays) -> list[Deep]:
-    """Return the deepest overlap of a sphere with each wall of a scene, where any is deep."""
+    """Return the deepest overlap of a sphere with each wall of a scene, if it is deep."""
     found = []
     for wall in scene.effects:
         if isinstance(wall, Walls):

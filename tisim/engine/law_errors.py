@@ -1,7 +1,7 @@
-"""A law that cannot be compiled is reported in one line, which names the line of its author's file.
+"""Compiler errors of user laws are reported in one line, which names the file and the line of the fault.
 
-Taichi compiles a law when a scene is first run, and shows every place from the loop of a step down to the
-fault.
+Taichi compiles a law when a scene is first run. Its own message lists every call from the loop of a step down
+to the fault.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from tisim.errors import InputError
 PACKAGE = Path(__file__).parents[1]
 PLACE = re.compile(r'File "(.+?)", line (\d+), in (\w+):')
 NO_SOURCE = re.compile(r"Cannot find source code for Object: <function (?:.*<locals>\.)?([\w.]+)")
-"""A compiler says this of a function that was typed in, or read from standard input or a command line."""
+"""Compiler message for a function that was typed at a prompt or read from standard input or the command line.
+"""
 
 
 @contextmanager
 def in_a_line() -> Iterator[None]:
-    """Raise InputError, naming file and line, where a law outside of this package cannot be compiled."""
+    """Raise InputError with file and line if a law from outside this package cannot be compiled."""
     try:
         yield
     except InputError:
@@ -38,11 +39,11 @@ def in_a_line() -> Iterator[None]:
             raise
         what = " ".join(message.strip().splitlines()[-1].split())
         where = f"{file}, line {line}, in {_owner(file, int(line))}{function},"
-        raise InputError(f"{where} must be what Taichi can compile; received {what}") from error
+        raise InputError(f"{where} must be code that Taichi can compile; received {what}") from error
 
 
 def _owner(file: str, line: int) -> str:
-    """Return the class that a line of a file stands in, and a dot; nothing outside of one."""
+    """Return the name of the class around a line of a file, followed by a dot; empty outside classes."""
     classes = [
         node.name
         for node in ast.walk(ast.parse(Path(file).read_text(encoding="utf-8")))

@@ -1,4 +1,4 @@
-"""What a start must be for a scene, and how it is laid out in the memory of a batch."""
+"""Checks of initial states, and their layout in the memory of a batch."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from tisim.state.fields import CORE, SHARED, Field
 from tisim.state.status import NO_ONE, WorldStatus
 
 ROUNDED_SIDE = 1e-6
-"""By this part a law may reach farther than half a side, as single precision rounds."""
+"""A law may exceed half a side of the box by this fraction, to allow for rounding in single precision."""
 LEAST_ERRORS = {"f32": 1e-6, "f64": 2e-15}
-"""The least relative errors that steps may be asked for: some eight times by which positions are rounded."""
+"""The least relative errors that may be requested of a stepper: about eight times the rounding of positions.
+"""
 
 
 def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
-    """Raise InputError unless the start gives what the scene needs and no more, of the right shape, in its
-    domain.
+    """Raise InputError unless an initial state has the fields that the scene needs and no others, of the
+    right shape, with positions in the domain.
 
-    A quantity that effects share, such as temperature, may be given to a scene that has no use for it.
+    A quantity that effects share, such as temperature, is accepted even if the scene does not use it.
     """
     low, high = scene.domain.bounds()
     if low is not None:
@@ -51,7 +52,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         scene.stepper.control.suits_start(start["radius"], start["velocity"])
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
-        must(rest, "particles.velocity", "0 where particles are fixed", Words("one that moves"))
+        must(rest, "particles.velocity", "0 for fixed particles", Words("one that moves"))
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             check_field(f, start[f.name], n)
@@ -61,8 +62,8 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         effect.suits_start(start, scene)
     with np.errstate(over="ignore", invalid="ignore"):
         momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
-    must(bool(np.isfinite(momentum)), "particles.velocity", "of a momentum that is a number", float(momentum))
-    # Where rounding is coarser than a particle, it is not known what it touches.
+    must(bool(np.isfinite(momentum)), "particles.velocity", "of a finite momentum", float(momentum))
+    # If rounding is coarser than a radius, contacts cannot be found.
     farthest = np.abs(start["position"]).max(axis=1)
     coarse = np.spacing(farthest.astype(_real())) > start["radius"]
     worst = float(farthest[coarse][0]) if coarse.any() else 0.0
@@ -71,11 +72,12 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
 
 
 def check_held(scene: Scene, start: Arrays) -> None:
-    """Raise InputError where two constraints hold one particle, or hold one that is put in later."""
+    """Raise InputError if two constraints hold the same particle, or if a constraint holds an inserted
+    particle."""
     constraints = [effect for effect in scene.effects if isinstance(effect, Constraint)]
     by = np.zeros(len(start["mass"]), int)
     for constraint in constraints:
-        # What comes later may be all that there is of a kind.
+        # All held particles may be inserted later.
         later = any(effect.gives(constraint) for effect in scene.effects)
         if constraint.mark in start or not later:
             held = constraint.held(start, scene.domain)
@@ -86,13 +88,13 @@ def check_held(scene: Scene, start: Arrays) -> None:
         must(bool((by <= 1).all()), "particles", rule, Words(f"one held by {by.max(initial=0)}"))
         for effect in scene.effects:
             where = f"quantities of grains of effects.{effect.label}"
-            rule = f"without {constraint.mark}, as effects.{constraint.label} holds no grains that are put in"
+            rule = f"without {constraint.mark}, as effects.{constraint.label} does not hold inserted grains"
             must(constraint.mark not in (effect.newcomers() or ()), where, rule, constraint.mark)
 
 
 def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
-    """Raise InputError unless particles that an effect adds are given what the scene needs, and no more, of
-    the shape and the range that a start must have."""
+    """Raise InputError unless the particles that an effect inserts have the fields that the scene needs and
+    no others, with the shape and range required of an initial state."""
     given = effect.newcomers()
     if given is None:
         return
@@ -109,13 +111,14 @@ def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
 
 
 def radii(scene: Scene, start: Arrays) -> np.ndarray:
-    """Return the radii (m) of the particles of a start, then of the largest that may be put in later."""
+    """Return the radii (m) of an initial state, then those of the largest insertable particles."""
     later = (effect.largest_newcomers()["radius"] for effect in scene.acting())
     return np.concatenate([start["radius"], *later])
 
 
 def check_sides(scene: Scene, start: Arrays) -> None:
-    """Raise InputError where one could touch another and its image at once: it sees the nearest alone."""
+    """Raise InputError if a particle could touch another one and its periodic image at once; only the nearest
+    image is considered."""
     low, high = scene.domain.bounds()
     near = any(
         isinstance(effect, PairEvent) or (isinstance(effect, Pairwise) and effect.short_ranged)
@@ -126,16 +129,18 @@ def check_sides(scene: Scene, start: Arrays) -> None:
         return
     reach = 2 * float(np.partition(radius, -2)[-2:].sum())
     narrow = np.array(scene.domain.imaged()) & (high - low < reach)
-    rule = f"at least {reach:g} m wide where it is periodic, twice what two of its particles that touch take"
+    rule = f"at least {reach:g} m wide where it is periodic, twice the distance of its largest touching pair"
     must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
 
 def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairChunks | None) -> None:
-    """Raise InputError where a law reaches farther than half a side of a box in which each particle sees the
-    nearest image of another alone: the force of the next one would be missing.
+    """Raise InputError if the range of a law exceeds half a side of a periodic box.
 
-    pairs : as they are listed at the start. Of two the larger says how far beyond the surface of the other
-    laws reach.
+    Each particle interacts with the nearest image of another one only; beyond half a side the force of the
+    next image would be missing.
+
+    pairs : the pair lists at the initial state. The larger particle of a pair determines the range of the
+    laws beyond the surface of the smaller one.
     """
     if pairs is None or not pairs.half_list.laws or not any(scenes[0].domain.imaged()):
         return
@@ -150,25 +155,27 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
         order = np.argsort(radius, kind="stable")
         reach = float((outlook[order[1:]] + radius[order[:-1]]).max())
         narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDED_SIDE) < reach)
-        rule = f"at least {2 * reach:g} m wide where it is periodic, twice as far as {laws} reaches"
+        rule = f"at least {2 * reach:g} m wide where it is periodic, twice the range over which {laws} acts"
         must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
 
 def check_rounding(scene: Scene) -> None:
-    """Raise InputError where the stepper is asked for errors that the precision of the run does not hold."""
+    """Raise InputError if the stepper is asked for errors below the rounding of the precision in use."""
     precision = runtime.current().precision
     for name, error in scene.stepper.control.asked().items():
         where, received, least = f"stepper.control.{name}", error, LEAST_ERRORS[precision]
         if "stepper" not in scene.model_fields_set:
-            # The stepper was chosen for it, in proportion.
+            # The stepper was chosen automatically, with errors in proportion to the accuracy of the scene.
             where, received, least = "scene.accuracy", scene.accuracy, scene.accuracy / error * least
         rule = f"at least {least:.3g} in {precision}, which rounds positions by {np.finfo(_real()).eps:.1e}"
         must(error > 0.999 * LEAST_ERRORS[precision], where, rule, received)
 
 
 def check_field(f: Field, values: np.ndarray, n: int, where: str = "particles") -> None:
-    """Raise InputError unless values of n particles, given at ``where``, have the shape and the range of a
-    field."""
+    """Raise InputError unless the values of n particles have the shape and the range of a field.
+
+    where : the path of the values in error messages.
+    """
     label = f"{where}.{f.name}"
     must(values.shape == f.shape(n), label, f"of shape {f.shape(n)}", values.shape)
     if f.integer:
@@ -180,10 +187,10 @@ def check_field(f: Field, values: np.ndarray, n: int, where: str = "particles") 
         rounded = values.astype(_real())
     unrepresentable, least = ~np.isfinite(rounded), float(np.finfo(_real()).tiny)
     if f.name == "mass":
-        # Kernels flush smaller numbers to zero, and no mass is what marks a particle as gone.
+        # Kernels flush smaller numbers to zero, and mass 0 marks a removed particle.
         unrepresentable |= rounded < least
     if f.name == "radius":
-        # Volumes are its cube.
+        # Volumes are the cube of the radius.
         unrepresentable |= (rounded < least ** (1 / 3)) | (rounded > float(np.finfo(_real()).max) ** (1 / 3))
     if unrepresentable.any():
         rule = f"within the range of {runtime.current().precision}"
@@ -198,7 +205,7 @@ def _real() -> type:
 
 
 def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> np.ndarray:
-    """Return a field of all worlds: what each start says of it, else its default; ids count from 0."""
+    """Return a field of all worlds: the values of each initial state or the default; ids count from 0."""
     copied, number = (f.default, 0) if isinstance(f.default, str) else (None, f.default or 0)
     kind = np.int32 if f.integer else np.float64 if f.double else _real()
     column: np.ndarray = np.full(f.shape(worlds, capacity), number, dtype=kind)
@@ -210,7 +217,7 @@ def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> 
 
 
 def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int) -> dict[str, Any]:
-    """Return what is not 0 of the worlds' own quantities at a start, by name; worlds without a scene have
+    """Return the initial values of world quantities that are not 0, by name; worlds without a scene have
     ended."""
     empty = worlds - len(scenes)
     counts = np.array([len(start["mass"]) for start in starts] + [0] * empty)
@@ -237,8 +244,11 @@ def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int
 
 
 def volume(scene: Scene, start: Arrays) -> float:
-    """Return the volume (m^3) of the domain; along axes without joined faces, of the box around the
-    particles; where there are none, around one of the largest that may be put in."""
+    """Return the volume (m^3) of the domain.
+
+    Along axes without joined faces the extent is the extent of the particles. A scene without particles uses
+    one of the largest particles that may be inserted.
+    """
     place, radius = start["position"], start["radius"]
     if not len(place):
         place, later = np.zeros((1, 3)), radii(scene, start)

@@ -1,4 +1,4 @@
-"""Monitors ask whether every quantity is finite, and keep the last good state of every world."""
+"""Monitors check that every quantity is finite, and keep the last good state of every world."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ REASONS: dict[int, str] = {
     WorldStatus.NOT_FINITE: "a quantity is not finite",
     WorldStatus.OUT_OF_ROOM: "more particles than there is room for",
     WorldStatus.CONTACT_OVERFLOW: "more simultaneous contacts than there is room for",
-    WorldStatus.NOT_CONVERGED: "a quantity that particles give each other does not converge",
+    WorldStatus.NOT_CONVERGED: "the iteration of a self-consistent quantity does not converge",
     WorldStatus.POSITION_LOST: "a step so long or so fast that rounding loses the place in the box",
     WorldStatus.STEP_TOO_SHORT: "the implicit equations of a step cannot be solved even at the shortest step",
-    WorldStatus.FORCE_TOO_STEEP: "a force so strong that it asks for a step shorter than the shortest",
+    WorldStatus.FORCE_TOO_STEEP: "a force so strong that it requires a step shorter than the shortest",
     WorldStatus.NOT_POSITIVE_DEFINITE: "the diffusion matrix is not positive definite",
     WorldStatus.STEP_TOO_LONG: "a step too long for the forces, whose critical time step is 2/omega",
     WorldStatus.LIST_OVERFLOW: "more near pairs than their list has room for",
@@ -35,20 +35,23 @@ REASONS: dict[int, str] = {
 
 
 LARGE = 4096
-"""From this many particles of all worlds on it takes longer to copy them than to ask a kernel about them."""
+"""From this total number of particles on, a check by a kernel is faster than copying the particles."""
 
 
 class Monitor:
-    """A monitor holds the last good state of a loaded batch, and what has gone wrong in it.
+    """A monitor holds the last good state of a loaded batch and the faults found in it.
 
-    last_good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look
-        between two steps; those of the last good step, where a world has failed.
-    faults : world -> (time found, s; what is wrong).
+    last_good : arrays by field name, with ``time`` (s) and ``count``, of all worlds, as of the last check
+    between two steps; for a failed world, as of its last good step.
+    faults : world -> (time of the fault in s, description).
     """
 
     def __init__(self, simulation: Simulation, image: Image | None = None) -> None:
-        """Begin to watch. ``image`` : where the simulation has been put, or where it was before the step
-        under way, when that is not its start."""
+        """Begin to monitor a simulation.
+
+        image : the state that the simulation was set to, or its state before the step under way; None at the
+        initial state.
+        """
         self.simulation, self.s = simulation, simulation.s
         self.replay = Replay(simulation, image)
         names = (*self._names(), "time", "count")
@@ -59,12 +62,13 @@ class Monitor:
         self.faults: dict[int, tuple[float, str]] = {}
         large = self.s.worlds * self.s.capacity >= LARGE
         self.finite_check = simulation.finite_check if large else None
-        # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
+        # Particles with individual clocks are synchronized only at some checks, so the good state is copied
+        # at each.
         self.shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
 
     @property
     def last_good(self) -> Image:
-        """Read what is good from the device, where it has gone on since."""
+        """Return the last good state, after reading from the device the worlds that have advanced since."""
         if self._outdated.any():
             outdated, self._outdated = self._outdated, np.zeros_like(self._outdated)
             now = self.s.snapshot(self._last_good)
@@ -73,7 +77,7 @@ class Monitor:
         return self._last_good
 
     def check_worlds(self) -> None:
-        """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
+        """Stop worlds with a fault at their last good step; record the states of the others as good."""
         lazy = self.finite_check is not None and self.shared_clock
         now = self.s.snapshot(self.s.columns) if lazy else self._snapshot()
         finite = (
@@ -81,7 +85,7 @@ class Monitor:
             if self.finite_check is None
             else (now["failed"] == 0) & self.finite_check.finite_worlds()
         )
-        # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
+        # A failed world restored from a checkpoint has a good state, and its status says that it failed.
         wrong = ~finite | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
         known = ~wrong & (now["underway"] == 0)
         if lazy:
@@ -103,8 +107,10 @@ class Monitor:
         return tuple(f.name for f in self.s.reported)
 
     def _stop(self, worlds: np.ndarray) -> None:
-        """Put worlds that have failed where they were last good, from where a step fails again: so a
-        checkpoint holds that too, and why they have failed is found once more when it is restored."""
+        """Put failed worlds back to their last good step, from which a step fails again.
+
+        A checkpoint then stores that state, and the cause of the failure is found again after a restore.
+        """
         live, sizes = self.s.image(), self.simulation.list_sizes()
         goals, overflowed = live["goal"].copy(), live["failed"][worlds] == WorldStatus.LIST_OVERFLOW
         try:
@@ -117,8 +123,8 @@ class Monitor:
                 values[worlds] = good[name][worlds]
             failed = then["failed"][worlds]
             live["status"][worlds] = np.where(failed > 0, failed, WorldStatus.NOT_FINITE)
-            # Nothing is wrong with a world whose list is too short: it goes on with a longer one. On the way
-            # there once more lists are made at other times, and may overflow where none did, or not at all.
+            # A world with an overflowed list continues with a longer list. During the replay lists are
+            # rebuilt at other times, so they may overflow where they did not before, or not at all.
             again = failed == WorldStatus.LIST_OVERFLOW
             crowded = worlds[again | (overflowed & self._finite(then)[worlds])]
             ended = live["time"][crowded] >= live["end"][crowded]
@@ -137,8 +143,7 @@ class Monitor:
             self._grow(crowded, sizes, then)
 
     def _grow(self, crowded: np.ndarray, sizes: ListSizes, then: Image) -> None:
-        """Make lists longer for crowded worlds, which go on with them; where there is no room these have
-        failed."""
+        """Lengthen the lists of crowded worlds, which then continue; without enough memory they fail."""
         try:
             self.simulation.grow_lists(sizes)
         except RunError as full:
@@ -152,20 +157,21 @@ class Monitor:
                 self.faults[w] = float(then["time"][w]), f"{REASONS[WorldStatus.LIST_OVERFLOW]}{who}: {full}"
 
     def _not_finite(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
-        """Yield each quantity with the live particles, (worlds, capacity), of which it is not finite."""
+        """Yield each quantity with a mask of the live particles, (worlds, capacity), for which it is not
+        finite."""
         live = np.arange(self.s.capacity) < now["count"][:, None]
         for f in self.s.reported:
             yield f.name, live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
 
     def _finite(self, now: Image) -> np.ndarray:
-        """Return whether no step has failed and every quantity is finite, by world."""
+        """Return for each world whether no step has failed and every quantity is finite."""
         finite = now["failed"] == 0
         for _, broken in self._not_finite(now):
             finite &= ~broken.any(axis=1)
         return finite
 
     def status(self, w: int, now: Image) -> Status:
-        """Return how a world has ended, or that it runs; ``now`` has ``status`` and ``ending_effect``."""
+        """Return whether and how a world has ended; ``now`` has ``status`` and ``ending_effect``."""
         if w in self.faults:
             when, why = self.faults[w]
             return Status(
@@ -178,10 +184,11 @@ class Monitor:
         return Status(code == WorldStatus.ENDED, REASONS[code])
 
     def _fault(self, w: int, then: Image, longest: float) -> str:
-        """Return what is wrong with a world: what the kernels have recorded of it, or what is not finite.
+        """Describe the fault of a world: the failure recorded by the kernels, or the quantity that is not
+        finite.
 
-        longest : the step (s) up to which the force that has stopped it would be finite; 0 where there is
-        none.
+        longest : the longest step (s) for which the force that stopped the world would be finite; 0 if
+        unknown.
         """
         code = int(then["failed"][w])
         if code == 0:
@@ -204,21 +211,21 @@ class Monitor:
             effect = scene.effects[failing_effect]
             reason += f", by effects.{effect.label}"
             stops = effect.may_stop(scene.effects, scene.domain) if code == WorldStatus.NOT_FINITE else ""
-            where = f" (it is so where {stops})" if stops else ""
+            where = f" (this happens if {stops})" if stops else ""
             if 0.0 < longest < 0.999 * then["dt"][w]:
-                where += f"; the step is {then['dt'][w]:.4g} s, and at most {longest:.3g} s would do there"
+                where += f"; the step is {then['dt'][w]:.4g} s, and the force is finite up to {longest:.3g} s"
         return f"{reason}{where}" if who == NO_ONE else f"{reason}, at particle {who}{where}"
 
     def _outrun(self, w: int, then: Image) -> str:
-        """Return which particle of a world moves too far in a step, and below which length it does not."""
+        """Name the particle of a world that moves too far in a step, and the step below which it does not."""
         n, dt = int(then["count"][w]), float(then["dt"][w])
-        # The square of a speed above 1e154 m/s overflows; its largest component is near enough.
+        # The square of a speed above 1e154 m/s overflows, so the largest component is used.
         speed = np.abs(then["velocity"][w, :n] - then["frame"][w]).max(axis=1)
         if speed.max() < 1e150:
             speed = np.linalg.norm(then["velocity"][w, :n] - then["frame"][w], axis=1)
         who, smallest = int(np.argmax(speed)), float(then["radius"][w, :n].min())
-        moved = f"particle {then['id'][w][who]} moves by {speed[who] * dt:.3g} m beside the others"
+        moved = f"particle {then['id'][w][who]} moves by {speed[who] * dt:.3g} m relative to the others"
         passed = f"{moved} in {dt:.4g} s, and the smallest radius is {smallest:.3g} m"
         if speed[who] == 0.0:
             return passed
-        return f"{passed}; it must be below {smallest / speed[who]:.3g} s, and far shorter where they touch"
+        return f"{passed}; it must be below {smallest / speed[who]:.3g} s, and far shorter if particles touch"

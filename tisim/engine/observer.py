@@ -1,6 +1,7 @@
-"""What looks at a run from outside, between its steps: the recorder of a trajectory, a checkpoint now and
-then, a progress bar, a script's own function. Observers are given to ``Simulation.run``; they do not change a
-result.
+"""Observers look at a run between its steps: trajectory recorders, periodic checkpoints, progress bars,
+functions of a script.
+
+They are passed to ``Simulation.run`` and do not change its results.
 """
 
 from __future__ import annotations
@@ -18,31 +19,33 @@ if TYPE_CHECKING:
 
 
 EARLY_FRACTION = 1e-9
-"""What is due may come early by this fraction of an interval, so that rounding of times costs no step."""
+"""An observation may be early by this fraction of an interval, so that rounding of times costs no extra step.
+"""
 
 
 def next_due(time: float, interval: float) -> float:
-    """Return the first time (s) after this one, s, at which what comes at equal intervals (s) is due."""
+    """Return the first multiple of an interval (s) after a time (s)."""
     due = (np.floor(time / interval + EARLY_FRACTION) + 1 - EARLY_FRACTION) * interval
-    # At intervals that numbers of this size do not resolve it is due at once.
+    # If the interval is below the resolution of the time, the next observation is due at once.
     return float(due) if time < due < np.inf else float(np.nextafter(time, np.inf))
 
 
 class Observer:
-    """This is the contract of an observer.
+    """Base class of observers.
 
     1. ``observe`` is called before the first step of a run, then about four times a second, whenever a world
-       has come to its pause, and after the last step; never within a step.
-    2. ``pause`` is asked after that. A world waits at the end of the first step at or after its pause, the
-       earliest of all observers', until all have looked. A time that the world has reached is no pause.
-    3. An observer may read whatever a simulation has, save a checkpoint, or raise to stop the run between two
-       steps; it runs, loads and restores nothing.
-    4. The wall time that it takes is no part of a result's ``wall_s``.
+       has reached its pause, and after the last step; never within a step.
+    2. ``pause`` is called after ``observe``. A world waits at the end of the first step at or after the
+       earliest pause of all observers until all observers have been called. A time that the world has already
+       reached causes no pause.
+    3. An observer may read anything of the simulation, save a checkpoint, or raise an exception to stop the
+       run between two steps. It must not run, load or restore the simulation.
+    4. The wall time of observers is not part of ``wall_s`` of a result.
     """
 
     def pause(self, simulation: Simulation) -> float | np.ndarray:
-        """Return when worlds are to wait for this observer next, s: one number for all, or one for each that
-        is loaded; never by default."""
+        """Return the time (s) at which worlds next wait for this observer: one number for all worlds, or one
+        for each loaded world; by default never."""
         return np.inf
 
     def observe(self, simulation: Simulation) -> None:
@@ -51,11 +54,11 @@ class Observer:
 
 
 Observing = Observer | Callable[["Simulation"], object]
-"""An observer, or a plain function of the simulation, may look at a run; no world waits for a function."""
+"""An observer, or a plain function of the simulation; worlds do not pause for a function."""
 
 
 class Callback(Observer):
-    """A callback lets a plain function be an observer."""
+    """A callback makes an observer of a plain function."""
 
     def __init__(self, function: Callable[[Simulation], object]) -> None:
         self.function = function
@@ -65,7 +68,7 @@ class Callback(Observer):
 
 
 class Observers:
-    """These are all observers of a run, as one."""
+    """All observers of a run, called together."""
 
     def __init__(self, observers: Sequence[Observing]) -> None:
         """Raise InputError unless each of them is an Observer or a function."""
@@ -76,12 +79,12 @@ class Observers:
         self.members = [one if isinstance(one, Observer) else Callback(one) for one in observers]
 
     def observe(self, simulation: Simulation) -> None:
-        """Have all look, in the order given."""
+        """Call all observers, in the order given."""
         for member in self.members:
             member.observe(simulation)
 
     def pauses(self, simulation: Simulation, until: float) -> np.ndarray:
-        """Return when each world waits next, s, shape (worlds,): at ``until``, or before it for an
+        """Return the time (s) of the next pause of each world, shape (worlds,): ``until``, or earlier for an
         observer."""
         pauses = np.full(simulation.worlds, until)
         n = len(simulation.scenes)
@@ -96,14 +99,14 @@ class Observers:
 
 
 class MeasureSeries(Observer):
-    """A time series holds what each world counts and measures, at the first step in each interval.
+    """A time series records the counters and measures of each world at the first step in each interval.
 
     ``series[w]`` are arrays by name for world w: ``time`` (s), ``particles``, each counter of a result's
     ``work``, such as ``outflow``, and each of its ``measures``, such as ``outflow_mass`` or ``lid_force_z``.
     """
 
     def __init__(self, interval: float) -> None:
-        """interval : s of simulated time."""
+        """interval : simulated time between entries, s."""
         must(is_number(interval) and interval > 0, "interval", "a number of s above 0", interval)
         self.interval = interval
         self._rows: list[list[dict[str, float]]] = []

@@ -21,17 +21,18 @@ if TYPE_CHECKING:
 
 
 class ParticleState(Mapping[str, np.ndarray]):
-    """A particle state holds the live particles of a loaded world: arrays of shape (n,) or (n, 3), SI, by the
-    names of its fields.
+    """A particle state gives access to the live particles of a loaded world: arrays of shape (n,) or (n, 3),
+    SI, by field name.
 
-    The arrays are those of a Result at this moment, and are not writeable: ``state["velocity"] = 2.0 *
-    state["velocity"]`` writes. What is written must be finite and what a start may be, for the particles that
-    there are; ``id``, forces and derived quantities follow from the rest. Then pair lists are made anew, and
-    derived quantities and forces are summed as at a start. Time, counters, other worlds, and what an implicit
-    stepper goes on with, such as the length of its next step, stay as they are.
+    The arrays equal those of a Result at this moment and are read-only; assignment writes:
+    ``state["velocity"] = 2.0 * state["velocity"]``. Written values must be finite and valid as an initial
+    state of the present particles. ``id``, forces and derived quantities cannot be written, as they follow
+    from the rest. After a write pair lists are rebuilt, and derived quantities and forces are computed as at
+    the beginning of a run. Time, counters, other worlds and the internal state of an implicit stepper, such
+    as its next step size, do not change.
 
-    A world that has been written to is not what its scene describes: its Result says what was written and
-    when under ``settings["edited"]``; ``Result.start`` stays what was loaded.
+    The scene does not describe such an edited world completely. Its Result lists each written field and the
+    time under ``settings["edited"]``; ``Result.start`` stays the loaded initial state.
     """
 
     def __init__(self, simulation: Simulation, world: int) -> None:
@@ -39,7 +40,7 @@ class ParticleState(Mapping[str, np.ndarray]):
 
     @property
     def time(self) -> float:
-        """Return the time (s) that the world has come to."""
+        """Return the current time (s) of the world."""
         return float(self._simulation.monitor.last_good["time"][self._world])
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -82,7 +83,7 @@ class ParticleState(Mapping[str, np.ndarray]):
 
 
 def _numbers(name: str, values: Any, whole: bool) -> np.ndarray:
-    """Return an array of floats; raise InputError unless these are numbers."""
+    """Convert values to an array of floats; raise InputError if they are not numbers."""
     try:
         array = np.asarray(values)
     except ValueError:
@@ -94,7 +95,7 @@ def _numbers(name: str, values: Any, whole: bool) -> np.ndarray:
 
 
 def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None:
-    """Write a quantity of a world that is between two steps, and what follows from it."""
+    """Write a quantity of a world between two steps, and recompute everything that depends on it."""
     s = simulation.s
     now, before = s.image(), simulation.monitor.replay.whole()
     status, goal, pauses = now["status"].copy(), now["goal"].copy(), s.read("pause_time")
@@ -107,7 +108,7 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
         Words("one whose step is under way"),
     )
     now[name][w, simulation.in_order(w, now)] = values
-    # As at a start, of this world alone.
+    # Reset as at the beginning of a run, for this world only.
     for quantity, start in (("approach_time", np.inf), ("fastest", 0.0), ("events", 0)):
         now[quantity][w] = start
     now["status"][:], now["status"][w], now["goal"][:] = WorldStatus.ENDED, WorldStatus.RUNNING, NEVER
@@ -126,7 +127,7 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
 
 
 def _begin_again(simulation: Simulation, now: Mapping[str, np.ndarray]) -> None:
-    """Put the worlds where they are, with all that the next step of those that run takes."""
+    """Set the worlds to an image, and prepare the next step of the running ones."""
     simulation.put(now)
     simulation.s.write("pause_time", np.inf)
     if simulation.first.items:

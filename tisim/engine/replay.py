@@ -1,15 +1,16 @@
-"""The last good step of worlds that have failed, found by running them once more.
+"""The last good step of failed worlds is found by running them again.
 
-Whether all is finite is asked now and then only, between many steps, and a failing step can leave its work
-half done. But a run has the same bits again, so worlds go back to a time at which all of their state is
-known, and from there by bisection to the last step after which they were good: all that have failed at once,
-each to its own. That takes no longer than about twice the way from there to the failure did, and what is
-found does not depend on when anybody looked, nor on what else is in the batch.
+Whether all quantities are finite is checked only now and then, many steps apart, and a failing step can leave
+its work half done. Runs are bitwise reproducible, so failed worlds return to a time at which their full state
+is known. Bisection from there finds the last step after which each world was good, for all failed worlds at
+once. This takes at most about twice as long as the original run from that time to the failure. The result
+depends neither on when the checks were made nor on the other worlds of the batch.
 
-Particles that do not feel each other have no state in common but at the end of an interval of their longest
-step (steppers/intervals.py), which is a step here. One in which a particle fails is made once more, and cut
-where the last good step of that particle ended: the others go as far, in a last step that is cut short. There
-the world is known, and from there it must fail again, or the interval's beginning is what is good.
+Particles without mutual interaction share a common time only at the ends of the intervals of their longest
+step (steppers/intervals.py), and such an interval counts as a step here. An interval in which a particle
+fails is repeated and cut at the end of the last good step of that particle; the last steps of the other
+particles are shortened to end there. The state at the cut is used if the world fails again from it; otherwise
+the beginning of the interval is the last good state.
 """
 
 from __future__ import annotations
@@ -28,30 +29,30 @@ if TYPE_CHECKING:
 
 Image = dict[str, np.ndarray]
 EVERY = 10.0
-"""This wall time (s) passes at least between images of the whole state, from which worlds can go on."""
+"""Least wall time (s) between images of the full state, from which worlds can be replayed."""
 IMAGES = 0.05
-"""At most this part of the time goes into making images: one of a million grains takes seconds."""
+"""At most this fraction of the time is spent on images; one image of a million grains takes seconds."""
 
 
 class Replay:
-    """A replay runs the worlds of a loaded simulation once more, from an image of them or from their start.
+    """A replay runs the worlds of a loaded simulation again, from an image or from their initial state.
 
-    base : the image, of every world between two steps; None for the start, of which none is made, as most
-        runs are short and none fails.
+    base : image of every world between two steps; None for the initial state. No image is made of the initial
+    state, as most runs are short and do not fail.
     """
 
     def __init__(self, simulation: Simulation, base: Image | None) -> None:
         self.simulation, self.base, self.saved_at, self.pause = simulation, base, time.perf_counter(), EVERY
 
     def save_image(self) -> None:
-        """Make the image anew, where that is due; every world that runs must be good."""
+        """Make a new image if it is due; every running world must be good."""
         began = time.perf_counter()
         if began - self.saved_at > self.pause:
             self.base, self.saved_at = self.whole(), time.perf_counter()
             self.pause = max(EVERY, (self.saved_at - began) / IMAGES)
 
     def whole(self) -> Image:
-        """Return an image of worlds as they are, or as they were, where a step is under way."""
+        """Return an image of all worlds; a world within a step appears as it was before that step."""
         image = self.simulation.s.image()
         waiting = image["underway"] > 0
         if waiting.any():
@@ -66,18 +67,18 @@ class Replay:
         return image
 
     def last_good(self, worlds: np.ndarray, sound: Callable[[Image], np.ndarray]) -> Image:
-        """Bring worlds to where they fail, and the others nowhere; return an image that has their last good
-        steps.
+        """Advance failed worlds to their failure, leave the others in place, and return an image of the last
+        good steps.
 
-        worlds : indices. sound : whether all is well, for each world of an image. A world in which something
-        is wrong from the start is left there.
+        worlds : indices. sound : returns for each world of an image whether it is good. A world with a fault
+        in its initial state is left there.
         """
         last, pauses = self.simulation.s.read("steps"), self.simulation.s.read("pause_time")
-        # Nobody waits for them on the way.
+        # There are no pauses during a replay.
         self.simulation.s.write("pause_time", np.inf)
         good = self._rewind()
         going = worlds[sound(good)[worlds]]
-        # How many steps are good, from the highest binary digit of that number to the lowest.
+        # Find the number of good steps, from its highest binary digit to the lowest.
         jump = 1 << int((last - good["steps"])[going].max(initial=0)).bit_length()
         while jump > 1:
             jump //= 2
@@ -92,7 +93,7 @@ class Replay:
         return good
 
     def _cut_step(self, good: Image, going: np.ndarray, sound: Callable[[Image], np.ndarray]) -> None:
-        """Go as far into the step that fails as all was well, where from there it fails again."""
+        """Advance into the failing step up to the cut, if the world fails again from there."""
         cut = self._image_after(good, going, 1)["cut"]
         part = going[cut[going] > 0]
         if len(part) == 0:
@@ -113,7 +114,7 @@ class Replay:
         return self.simulation.s.image()
 
     def _image_after(self, image: Image, worlds: np.ndarray, steps: int) -> Image:
-        """Return what an image becomes when only these worlds take a number of steps."""
+        """Return the image after a number of steps of these worlds only."""
         image["status"][:] = WorldStatus.ENDED
         image["status"][worlds] = WorldStatus.RUNNING
         image["goal"] = image["steps"] + steps

@@ -1,4 +1,4 @@
-"""Compile once, load many, run: a batch of worlds of one structure."""
+"""Simulation: compile once, load many scenes of one structure, run them as a batch of worlds."""
 
 from __future__ import annotations
 
@@ -24,18 +24,20 @@ from tisim.scene.scene import Scene
 from tisim.state.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
-"""The first is the wall time (s) between looks at progress, at Ctrl-C and at whether every quantity is
-finite; the second is the number of steps of all particles together before the first look."""
+"""CHUNK_SECONDS is the wall time (s) between two checks of progress, of Ctrl-C and of finite quantities;
+FIRST is the total number of particle steps before the first check."""
 
 SCHEDULES = ("world", "team", "particle")
 
 
 class Simulation(CompiledWorlds):
-    """A simulation is compiled for the structure of a scene, a number of worlds and a capacity of particles.
+    """A simulation is compiled for a scene structure, a number of worlds and a particle capacity.
 
-    scene : any scene of the structure; its values do not matter here.
+    scene : any scene of the structure; its parameter values do not matter here.
     schedule : "world", "team" or "particle" (see program.py), or None to choose by device and work.
-    Loading and running other scenes of the same structure compiles nothing. It is for one thread at a time.
+
+    Loading and running other scenes of the same structure compiles nothing. A simulation must be used by one
+    thread at a time.
     """
 
     def __init__(
@@ -55,11 +57,11 @@ class Simulation(CompiledWorlds):
         return f"Simulation({room}, loaded: {names or 'none'})"
 
     def load(self, scenes: Scene | Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
-        """Put one scene in each of the first worlds, or one in the first; the others stay empty. Nothing is
-        compiled.
+        """Load one scene into each of the first worlds; the other worlds stay empty. Nothing is compiled.
 
-        starts : ``particles.arrays`` of each scene, where the caller has made them already.
-        Raises InputError when a scene is of another structure, or larger than the capacity.
+        starts : ``particles.arrays`` of each scene, if the caller has made them already.
+
+        Raises InputError if a scene has another structure or exceeds the capacity.
         """
         self.s.check()
         scenes = [scenes] if isinstance(scenes, Scene) else scenes
@@ -88,31 +90,30 @@ class Simulation(CompiledWorlds):
         try:
             check_reach(self.scenes, self.starts, self.assembly.pairs)
         except InputError:
-            # Nothing is loaded then.
+            # Nothing stays loaded.
             self.scenes = []
             raise
         self.monitor = Monitor(self)
-        # A start can fail already: more contacts than there is room for, an infinite force.
+        # The initial state can fail already: too many contacts, an infinite force.
         self.monitor.check_worlds()
-        # An effect that does not name its measures is found out now, not at the end.
+        # An effect that does not name its measures is detected now, not at the end.
         self.measures([0])
 
     @property
     def state(self) -> ParticleState:
-        """Return the particles of the one world that is loaded, to be read and written by name between runs,
-        SI."""
+        """Return the particles of the single loaded world, readable and writable by name between runs, SI."""
         self._check_loaded()
         must(len(self.scenes) == 1, "simulation", "of one world (or ask states[w])", len(self.scenes))
         return self.states[0]
 
     @property
     def states(self) -> list[ParticleState]:
-        """Return the particles of each loaded world, in order, to be read and written by name between runs,
+        """Return the particles of each loaded world, in order, readable and writable by name between runs,
         SI."""
         return [ParticleState(self, w) for w in range(len(self.scenes))]
 
     def begin(self) -> None:
-        """Put every world at its start, with all that its first step takes."""
+        """Set every world to its initial state, and prepare the first step."""
         self._begin()
         while (overflowed := self.s.read("failed") == WorldStatus.LIST_OVERFLOW).any():
             try:
@@ -121,14 +122,14 @@ class Simulation(CompiledWorlds):
                 crowded = np.flatnonzero(overflowed)[0]
                 who = self.assembly.crowding(crowded)
                 self.scenes = []
-                rule = "so far apart that lists of those within reach of each other find room"
+                rule = "so far apart that the lists of interacting pairs fit in memory"
                 raise InputError(f"particles must be {rule}; received {who}: {full}") from None
             self._begin()
 
     def _begin(self) -> None:
         self.s.fill({f.name: laid_out(f, self.starts, self.worlds, self.s.capacity) for f in self.s.fields})
-        # What worlds wait for, and how they look for pairs, is asked of them by others, and stays; a goal in
-        # steps is that of the run before, and would keep them from their first forces.
+        # Pause times and the choice of pair search are set from outside and stay. A goal in steps left from
+        # the previous run is cleared, as it would prevent the first forces.
         asked = ("pause_time", "listed_above")
         cleared = dict.fromkeys((name for name in self.s.columns if name not in asked), 0)
         self.s.fill({**cleared, "goal": NEVER, **world_columns(self.scenes, self.starts, self.worlds)})
@@ -142,11 +143,13 @@ class Simulation(CompiledWorlds):
         steps: int | None = None,
         observers: Sequence[Observing] = (),
     ) -> None:
-        """Run every world to its end, or for a part of the way; the next call goes on from there.
+        """Run every world to its end, or part of the way; the next call continues from there.
 
-        until : s of simulated time; a world stops at the end of the first step at or after it. steps : at
-        most so many more steps of each world. observers : what looks at the run on its way (see Observer),
-        such as a function of this simulation. The steps, and so all bits, are those of a run in one go.
+        until : simulated time, s; a world stops at the end of the first step at or after it.
+        steps : largest number of further steps of each world.
+        observers : observers of the run (see Observer), or functions of this simulation.
+
+        A run in parts takes bitwise the same steps as a single run.
         """
         for _ in self.chunks(until, steps, observers):
             pass
@@ -157,7 +160,7 @@ class Simulation(CompiledWorlds):
         steps: int | None = None,
         observers: Sequence[Observing] = (),
     ) -> Iterator[None]:
-        """Run as ``run`` does, a part at a time: yields wherever observers have looked, first before the
+        """Run as ``run`` does, one part at a time; yields after each call of the observers, first before the
         first step."""
         self.s.check()
         self._check_loaded()
@@ -168,7 +171,7 @@ class Simulation(CompiledWorlds):
         self.s.write("goal", NEVER if steps is None else self.s.read("steps") + steps)
         all_observers.observe(self)
         yield
-        # Short enough to be heard from soon, long enough that looking costs little.
+        # A chunk is short enough for prompt progress reports, and long enough that checks cost little.
         chunk = max(8, FIRST // (self.worlds * self.s.capacity))
         pauses_on_device = self.s.read("pause_time")
         while self.is_running(stop):
@@ -179,7 +182,7 @@ class Simulation(CompiledWorlds):
             began, compiled = time.perf_counter(), self.setup_s
             self.advance(chunk)
             self.monitor.check_worlds()
-            # Steps may have been compiled anew, for longer lists.
+            # Steps may have been compiled again for longer lists; that time is not counted.
             seconds = time.perf_counter() - began - (self.setup_s - compiled)
             self.wall_s += seconds
             if seconds < CHUNK_SECONDS / 2:
@@ -190,32 +193,34 @@ class Simulation(CompiledWorlds):
             yield
 
     def in_order(self, w: int, good: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the indices of the live particles of a world, in the order in which they are shown: that of
-        ids where they are sorted in memory, else that of memory."""
+        """Return the indices of the live particles of a world in output order: by id if particles are sorted
+        in memory, else in memory order."""
         n = int(good["count"][w])
         return np.argsort(good["id"][w, :n]) if self.sort else np.arange(n)
 
     def is_running(self, until: float = np.inf) -> bool:
-        """Return whether a world still has steps to take before it comes to ``until`` (s) or to its goal."""
+        """Return whether any world still has steps to take before ``until`` (s) or its goal."""
         now = self.s.snapshot(("status", "steps", "goal", "time"))
         going = (now["status"] == WorldStatus.RUNNING) & (now["steps"] < now["goal"])
         return bool((going & (now["time"] < until)).any())
 
     def fraction(self) -> float:
-        """Return the part of the work that is done, the mean over worlds; 1 for a world that has failed."""
+        """Return the finished fraction of the work, the mean over worlds; 1 for a world that has failed."""
         ended = self.s.read("status")[: len(self.scenes)] != WorldStatus.RUNNING
         return float(np.where(ended, 1.0, self.simulated()).mean())
 
     def simulated(self) -> np.ndarray:
-        """Return the part of its time that each loaded world has simulated, shape (worlds,)."""
+        """Return the simulated fraction of the duration of each loaded world, shape (worlds,)."""
         n = len(self.scenes)
         now = self.s.snapshot(("time", "reached", "end"))
         parts: np.ndarray = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
         return parts
 
     def remaining_steps(self) -> float:
-        """Return the steps before the world that has most of them, if they go on as long as its last one;
-        those that it takes at least where there was none."""
+        """Return the largest number of remaining steps of any world, estimated from its last step size.
+
+        Before the first step, the smallest number of steps that the stepper takes is used.
+        """
         n = len(self.scenes)
         running = self.s.read("status")[:n] == WorldStatus.RUNNING
         remaining, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
@@ -224,12 +229,12 @@ class Simulation(CompiledWorlds):
         return float(np.where(running, np.ceil(steps), 0.0).max())
 
     def ended(self) -> list[int]:
-        """Return the loaded worlds that run no more, for good or ill."""
+        """Return the loaded worlds that have ended or failed."""
         status = self.s.read("status")[: len(self.scenes)]
         return [int(w) for w in np.flatnonzero(status != WorldStatus.RUNNING)]
 
     def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
-        """Return what has become of the loaded worlds: of those asked for, or of all, in order."""
+        """Return the results of the loaded worlds, in order: all, or the given ones."""
         self._check_loaded()
         now, good = self.s.snapshot(self.s.columns), self.monitor.last_good
         counts = {name: now[name] for name in self.s.counters}
@@ -254,7 +259,7 @@ class Simulation(CompiledWorlds):
         return results
 
     def measures(self, worlds: Sequence[int]) -> list[dict[str, float]]:
-        """Return what effects measure in each of these loaded worlds, by name, where it has come to."""
+        """Return the current measures of these loaded worlds, by name."""
         quantities = [name for effect in self.scenes[0].effects for name in effect.keeps("world_quantities")]
         now, measures = self.s.snapshot(quantities), []
         for w in worlds:
@@ -277,13 +282,14 @@ class Simulation(CompiledWorlds):
         must(len(self.scenes) > 0, "simulation", "loaded with a scene before that", Words("none"))
 
     def _edited(self, w: int) -> dict[str, str]:
-        """Return what has been written to a world besides its scene."""
+        """Return the setting that lists the quantities written to a world during its run."""
         return {"edited": "; ".join(self.edits[w])} if self.edits[w] else {}
 
     def checkpoint(self, path: str | Path) -> None:
-        """Write where all worlds are to a file, in place of any before; raise RunError when the disk is full.
+        """Write the state of all worlds to a file and replace any existing file; raise RunError if the disk
+        is full.
 
-        A simulation of the same scenes goes on from there to the same bits (``restore``).
+        A simulation of the same scenes continues from it with bitwise the same results (``restore``).
         """
         from tisim.io import checkpoint
 
@@ -291,10 +297,10 @@ class Simulation(CompiledWorlds):
         checkpoint.save(self, path)
 
     def restore(self, path: str | Path) -> None:
-        """Go back, or on, to where a checkpoint of the same scenes, which are loaded, was written.
+        """Return to the state in a checkpoint; the scenes of the checkpoint must be loaded.
 
-        Raise InputError when the file is none, is cut short or damaged, or is of other scenes, another
-        precision or another capacity; everything is then as it was.
+        Raise InputError if the file is not a checkpoint, is truncated or damaged, or belongs to other scenes,
+        another precision or another capacity; the simulation then does not change.
         """
         from tisim.io import checkpoint
 

@@ -1,4 +1,4 @@
-"""Quantities of particles that are set before forces are summed (``DerivedQuantity``)."""
+"""Particle quantities that are set before forces are summed (``DerivedQuantity``)."""
 
 from typing import Any
 
@@ -37,8 +37,8 @@ def _same(vector):
 
 @ti.data_oriented
 class DerivedSolver:
-    """A derived solver sets a quantity that follows from what a particle is and where: it needs nothing of
-    the others, and no memory."""
+    """A derived solver sets a quantity that depends only on the state of its particle, not on other particles
+    or earlier values."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect = s, effect
@@ -55,14 +55,14 @@ class DerivedSolver:
     def phases(self, trial: bool = False) -> tuple[Item, ...]:
         """Return the phases that set the quantity.
 
-        trial : whether in a state that may be far from any solution; what is not finite is then left to the
-        forces to show.
+        trial : whether for a trial state, which may be far from any solution; values that are not finite are
+        then detected in the forces.
         """
         return (SetDerived(self, trial),)
 
     @ti.func
     def set(self, s, w, i, t):
-        """Set the quantity of particle i, as the particle is in s."""
+        """Set the quantity of particle i from its state in s."""
         nothing = self.unpacked(ti.Vector.zero(self.s.real, self.components))
         self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 

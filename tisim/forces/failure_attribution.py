@@ -1,6 +1,6 @@
-"""Which force it was that stopped a world: asked afterwards, by a kernel that is compiled only then.
+"""Identify the force that stopped a world, after the failure, by a kernel that is compiled only then.
 
-In the kernels of a step the laws of all forces would stand once more for it, and take as long to compile.
+Inside the kernels of a step this would repeat the laws of all forces and double their compile time.
 """
 
 import numpy as np
@@ -12,21 +12,23 @@ from tisim.numerics.ieee import finite
 from tisim.state.status import ASKED
 
 HALVINGS = 40
-"""The longest step that a law can follow is found in so many halvings of what it may be."""
+"""Number of halvings in the search for the longest step with a finite force."""
 
 
 @ti.data_oriented
 class FailureAttribution:
-    """A failure attribution names the force that has stopped each world of a batch that failed by one."""
+    """A failure attribution names, for each world stopped by a force, the effect of that force."""
 
     def __init__(self, forces: SumForces) -> None:
         self.s, self.forces = forces.s, forces
 
     @in_taichi_thread
     def name_failing_effect(self) -> np.ndarray:
-        """Name the effect whose force on the failing particle is largest, or not finite, where it was when
-        asked. Return, for each world, the longest step (s) in which that force would be finite; 0 where
-        there is none, or no force has stopped it."""
+        """Name the effect whose force on the failing particle is the largest or not finite.
+
+        Return for each world the longest step (s) for which that force would be finite; 0 if there is none,
+        or if no force has stopped the world.
+        """
         longest = np.zeros(self.s.worlds)
         self._name(longest)
         return longest
@@ -42,8 +44,11 @@ class FailureAttribution:
 
     @ti.func
     def force_by_other(self, effect: ti.template(), w, i, j, t, dt):  # type: ignore[valid-type]
-        """Return what j does to i by one law at the end of a step of dt (s), given what they have stored of
-        each other; nothing where both are of one rigid body, within which it does not act."""
+        """Return the load that j exerts on i by one law at the end of a step of dt (s), with their stored
+        contact history.
+
+        It is zero within a rigid body if the law does not act there.
+        """
         s = self.s
         d = self.forces.domain.separation(w, s.position[w, i], s.position[w, j], t)
         first, second, sign = i, j, ti.cast(1.0, s.real)
@@ -62,8 +67,12 @@ class FailureAttribution:
 
     @ti.func
     def find_failing_effect(self, w, i, t):
-        """Return the index of the effect whose force on i is largest, or not finite, or is set to nothing
-        finite; and the longest step (s) at the end of which its force would be finite."""
+        """Return the effect at fault for particle i, and the longest step (s) for which its force would be
+        finite.
+
+        The effect is given by its index. Its force on i is the largest or not finite, or its derived quantity
+        is not finite.
+        """
         s, dt, index = self.s, self.forces.elapsed_time(w), -1
         low, high = 0.0 * dt, dt
         for k in range(1 + HALVINGS):

@@ -1,4 +1,4 @@
-"""Force and torque on every particle."""
+"""The sum of forces and torques on every particle."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
 
 
 def turning(effects: Sequence[Effect]) -> bool:
-    """Return whether any of these exerts torques."""
+    """Return whether any of these effects exerts torques."""
     return any(effect.turns(effects) for effect in effects if isinstance(effect, Force | PairForce))
 
 
 class SumForces(PairSum):
-    """This phase sets force[w, i] to the sum of the scene's forces on i: single, all pairs, near pairs; each
-    in a fixed order.
+    """This phase sets force[w, i] to the sum of the forces of the scene on i, in a fixed order: external
+    forces, all pairs, listed pairs.
 
-    Where an effect of the scene exerts torques these are summed along with it: one vector of six, the load. A
-    particle that is ``fixed``, where the scene has that field, takes none. Where the scene has the field
-    ``virial`` nine more are summed: the half of i in that of its pairs. What pairs remember advances with the
-    sum.
+    If an effect exerts torques, force and torque are summed as one vector of six, the load. A particle that
+    is ``fixed``, in a scene with this field, gets no load. In a scene with the field ``virial``, nine more
+    components are summed: the half of the pair virial that belongs to i. The sum also updates the contact
+    history.
 
-    trial : whether the state is one that may be given up. commits : whether what pairs remember may be
-    brought up to date with it.
+    trial : whether the state is a trial state that may be rejected.
+    commits : whether this sum may update the contact history.
     """
 
     trial: ClassVar[bool] = False
@@ -57,8 +57,8 @@ class SumForces(PairSum):
         self.has_fixed = any(field.name == "fixed" for field in s.fields)
         self.loads = Loads(s, self.turning)
         self.components = self.loads.components
-        # A listed pair comes to a force, torques on both, how far apart they are where that is of use, and
-        # what each law has it remember.
+        # Values of a listed pair: force, torques on both particles, the separation if it is needed, and the
+        # history of each law.
         self.separation_begin = 9 if self.turning else 3
         self.remembers = any(
             effect.data.offers("load" if isinstance(effect.data, Force) else "interaction")
@@ -82,14 +82,14 @@ class SumForces(PairSum):
 
     @ti.func
     def single_particle(self, w, i, t):
-        """Set the force on i, at a time of its own, where particles do not feel each other."""
+        """Set the force on i at its own time, for particles that do not interact."""
         for solver in ti.static(self.derived_solvers):
             solver.set(self.s, w, i, t)
         self.loads.write(self.s, w, i, self.external_load(w, i, t))
 
     @ti.func
     def external_load(self, w, i, t):
-        """Return the sum of the forces on i that no other particle exerts, with their torques."""
+        """Return the sum of the external forces on i, with their torques."""
         s = self.s
         total = self.loads.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
         if self.is_free(w, i):
@@ -128,14 +128,16 @@ class SumForces(PairSum):
 
     @ti.func
     def interaction(self, law: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
-        """Return force, torques and new memory of one law between listed pair m; nothing where the two are of
-        one rigid body, within which it does not act."""
+        """Return force, torques and new contact history of one law for listed pair m.
+
+        All are zero within a rigid body if the law does not act there.
+        """
         past = self.past(law, w, m)
         force, torque_i, torque_j, memory = law.interaction(
             self.s, w, i, j, separation, distance, past, self.elapsed_time(w), t
         )
         if ti.static(self.half_list.within_bodies and not law.within_bodies):
-            # What a law returns of two that lie in each other need not be finite.
+            # For overlapping particles of a body the results of a law may not be finite.
             apart = not self.half_list.joined(w, i, j)
             force, torque_i = ti.select(apart, force, 0.0), ti.select(apart, torque_i, 0.0)
             torque_j, memory = ti.select(apart, torque_j, 0.0), ti.select(apart, memory, 0.0)
@@ -143,7 +145,7 @@ class SumForces(PairSum):
 
     @ti.func
     def past(self, law: ti.template(), w, m):  # type: ignore[valid-type]
-        """Return what listed pair m remembers of one law; one 0 where that is nothing."""
+        """Return the contact history of listed pair m for one law; a single 0 if it has none."""
         past = ti.Vector.zero(self.s.real, max(1, law.memory))
         if ti.static(law.memory > 0):
             past = law.past.read(w, m)
@@ -169,7 +171,7 @@ class SumForces(PairSum):
 
     @ti.func
     def elapsed_time(self, w):
-        """Return the time (s) since what particles remember was last brought up to date."""
+        """Return the time (s) since contact history and particle memory were last updated."""
         s, now = self.s, self.s.occasion[w]
         none = now == Occasion.START or now == Occasion.AFTER_EVENTS
         step = ti.select(now == Occasion.AHEAD, s.step_ahead[w], s.dt[w])
@@ -177,7 +179,7 @@ class SumForces(PairSum):
 
     @ti.func
     def updates_memory(self, w):
-        """Return whether what particles remember is brought up to date with this sum."""
+        """Return whether this sum updates the contact history."""
         updates = False
         if ti.static(self.commits):
             occasion = self.s.occasion[w]
@@ -202,13 +204,13 @@ class SumForces(PairSum):
     def check(self, w, i, total):
         if not finite(total.norm_sqr()):
             if self.s.occasion[w] == Occasion.AHEAD:
-                # The law at fault is found by a sum over the step.
+                # The sum that finds the law at fault uses this step.
                 self.s.dt[w] = self.s.step_ahead[w]
             self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
     @ti.func
     def load_by(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
-        """Return the force on i by one law that no other particle exerts, with its torque."""
+        """Return the external force on i by one law, with its torque."""
         force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.updates_memory(w))
         return self.loads.wrench(force, torque)
 
@@ -227,8 +229,8 @@ class SumForces(PairSum):
 
 
 class SumTrialForces(SumForces):
-    """This phase sums the forces of a trial state, which may be one that is to be given up: whatever is not
-    finite may stay."""
+    """This phase sums the forces of a trial state that may be rejected; values that are not finite cause no
+    failure."""
 
     trial, commits = True, False
 

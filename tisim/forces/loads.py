@@ -1,5 +1,7 @@
-"""What the forces on a particle come to: a force, a torque where effects turn particles, and its half of the
-virial where a scene asks for it; side by side in one vector, so that they are summed together."""
+"""The load on a particle: force, torque if effects turn particles, and the virial if the scene has it.
+
+All components are in one vector, so that they are summed together.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +16,18 @@ if TYPE_CHECKING:
 FORCE = Field("force", "N", 3, "sum")
 TORQUE = Field("torque", "N m", 3, "sum")
 VIRIAL = Field("virial", "J", 1, "keep", slots=9)
-"""This is the half of a particle in the virial of its pairs: xx, xy, xz, yx, ... zz."""
+"""Half of the virial of the pairs of a particle: xx, xy, xz, yx, ... zz."""
 
 
 @ti.data_oriented
 class Loads:
-    """Loads are what the forces on each particle are summed up to; they are read from a state and written to
-    one.
+    """Loads define the components of the summed forces, and read and write them in a state.
 
-    A loop over particles that do not feel each other has a state of its own: ``read`` and ``write`` are given
-    the state at hand.
+    A loop over particles that do not interact has a state of its own, so ``read`` and ``write`` take the
+    state as an argument.
 
-    turning : whether there are torques. virial : whether there is a virial. size : how many values a force
-    with its torque is. components : how many all of them are.
+    turning : whether there are torques. virial : whether there is a virial.
+    size : number of components of a force with its torque. components : number of all components.
     """
 
     def __init__(self, s: State, turning: bool) -> None:
@@ -37,8 +38,8 @@ class Loads:
 
     @ti.func
     def load_and_virial(self, load, separation):
-        """Return a load by another particle, which is at ``separation`` (m), with the half of its virial that
-        is of the one it acts on."""
+        """Return a load exerted by a particle at ``separation`` (m), with the half of its virial that belongs
+        to the loaded particle."""
         total = ti.Vector.zero(self.real, self.components)
         for k in ti.static(range(self.size)):
             total[k] = load[k]
@@ -48,7 +49,7 @@ class Loads:
 
     @ti.func
     def write(self, s, w, i, total):
-        """Set what the forces on i come to: not by +=, which would be atomic."""
+        """Set the load on i by assignment; += would be atomic."""
         for k in ti.static(range(3)):
             s.force[w, i][k] = total[k]
             if ti.static(self.turning):
@@ -59,7 +60,7 @@ class Loads:
 
     @ti.func
     def read(self, s, w, i):
-        """Return what the forces on i have come to."""
+        """Return the load on i."""
         load = self.wrench(s.force[w, i], s.force[w, i])
         if ti.static(self.turning):
             load = self.wrench(s.force[w, i], s.torque[w, i])

@@ -1,8 +1,8 @@
-"""Sine and cosine in f64, of additions and multiplications alone.
+"""Sine and cosine in f64, by additions and multiplications only.
 
-Devices without these functions get them from here, with the same bits on each; the error is below 1 unit
-in the last place over the whole range. An argument beyond ``EXACT_TURNS`` is reduced with as many digits of
-2/pi as it takes (M. H. Payne and R. N. Hanek, ACM SIGNUM Newsletter 18 (1983) 19).
+Devices without these functions use these versions, which give the same bits on each device; the error is
+below 1 unit in the last place over the whole range. An argument beyond ``EXACT_TURNS`` is reduced with as
+many digits of 2/pi as necessary (M. H. Payne and R. N. Hanek, ACM SIGNUM Newsletter 18 (1983) 19).
 """
 
 from fractions import Fraction
@@ -15,9 +15,9 @@ SINE_TAIL = tuple((-1) ** k / factorial(2 * k + 1) for k in range(1, 10))
 COSINE_TAIL = tuple((-1) ** k / factorial(2 * k) for k in range(2, 10))
 """SINE_TAIL and COSINE_TAIL are the coefficients of (sin(x) - x)/x^3 and (cos x - 1 + x^2/2)/x^4 in x^2."""
 EXACT_TURNS = 2.0**20
-"""An argument up to here is so few quarter turns that their product with one of the ``PARTS`` is exact."""
+"""Up to this argument the product of the number of quarter turns with each of the ``PARTS`` is exact."""
 WINDOW = 7
-"""The product of an argument with 2/pi takes so many words of 32 digits."""
+"""Number of 32-bit words in the product of an argument with 2/pi."""
 
 
 def _arctan_of_inverse(n: int, digits: int) -> int:
@@ -39,11 +39,11 @@ INVERSE_WORDS = (
         for k in range(1, 31 + WINDOW)
     ),
 )
-"""These are the words of 32 digits of 2/pi after the point, and before them some of nothing."""
+"""The 32-bit words of 2/pi after the binary point, preceded by some words of zeros."""
 
 
 def _parts() -> tuple[float, ...]:
-    """Return pi/2 as a sum: three numbers of 33 digits each, and the rest."""
+    """Return pi/2 as a sum: three numbers of 33 bits each, and the rest."""
     parts, left = [], Fraction(QUARTER_TURN, 1 << DIGITS_OF_PI)
     for k in range(1, 4):
         unit = 33 * k - 1
@@ -59,7 +59,8 @@ QUARTER_TURN_LOWER = float(Fraction(QUARTER_TURN, 1 << DIGITS_OF_PI) - Fraction(
 
 @ti.func
 def reduced(x):
-    """Return x less a whole number of quarter turns, as a sum of two numbers, and that number modulo 4."""
+    """Return x minus the nearest multiple of a quarter turn, as a sum of two numbers, and the number of
+    quarter turns modulo 4."""
     n = ti.floor(x * ti.f64(1.0 / QUARTER_TURN_UPPER) + ti.f64(0.5))
     r, rest = x - n * ti.f64(PARTS[0]), ti.f64(0.0)
     for part in ti.static(PARTS[1:]):
@@ -81,7 +82,8 @@ def inverse_word(k):
 def reduced_far(x):
     """Return the same as ``reduced`` for a finite |x| above 2^20.
 
-    |x| = m 2^e with a whole m. Of 2/pi it takes the words that matter: those before give whole turns.
+    |x| = m 2^e with an integer m. Only the words of 2/pi that matter are used: earlier words give whole
+    turns.
     """
     number = ti.bit_cast(ti.abs(x), ti.i64)
     m = (number & ti.i64(2**52 - 1)) | ti.i64(2**52)
@@ -93,7 +95,7 @@ def reduced_far(x):
     factor = ti.Vector.zero(ti.u64, 3)
     factor[0], factor[1] = lower & mask, (lower >> word_digits) + (upper & mask)
     factor[2] = upper >> word_digits
-    # The last word first.
+    # The words are stored with the last one first.
     words, product = ti.Vector.zero(ti.u64, WINDOW), ti.Vector.zero(ti.u64, WINDOW + 1)
     for place in range(begin + WINDOW):
         for k in ti.static(range(WINDOW - 1, 0, -1)):
@@ -107,7 +109,7 @@ def reduced_far(x):
     for k in ti.static(range(WINDOW)):
         product[k + 1] += product[k] >> word_digits
         product[k] &= mask
-    # Of the first word, two digits are quarters of a turn, rounded to the nearest.
+    # Two bits of the first word are quarter turns, rounded to the nearest.
     first = ti.cast(product[WINDOW - 1], ti.i64) + ti.i64(2**29)
     n, r = (
         ti.cast(first >> ti.i64(30), ti.i32) & 3,
@@ -143,7 +145,7 @@ def sine_of_turned(x, quarters):
         if (n & 1) == 0:
             result = upper + (rest + fine * square * series(square, ti.static(SINE_TAIL)))
         else:
-            # The square of the upper digits is exact, and so is what is left of 1.
+            # The square of the upper digits is exact, and so is 1 minus it.
             middle = ti.f64(0.5) * upper * upper
             most = upper_digits(middle)
             lost = (middle - most) + ti.f64(0.5) * rest * (upper + fine)
@@ -157,7 +159,7 @@ def sine_of_turned(x, quarters):
 def sin(x):
     """Return sin x; f64."""
     result = ti.cast(x, ti.f64)
-    # What is so small is its own sine: -0 too.
+    # An argument this small equals its sine, including -0.
     if not (ti.abs(result) < ti.f64(2.0**-27)):
         result = sine_of_turned(result, 0)
     return result

@@ -1,8 +1,8 @@
 """Exponential, logarithm, power, sine and cosine in kernels, on every device.
 
-The compilers for CPU and CUDA have them for f64. That for Vulkan has none: there they are the ones of this
-package, in f64 whatever the precision, and rounded to it. Laws call these in place of ``ti.exp`` and the
-like, of one number at a time; a law that does not works on CPU and CUDA.
+The compilers for CPU and CUDA have them in f64. The compiler for Vulkan has none, and uses the functions of
+this package, computed in f64 and rounded to the precision in use. Laws must call these in place of ``ti.exp``
+and the like, for one number at a time; a law that does not works on CPU and CUDA only.
 """
 
 from typing import Any
@@ -12,18 +12,18 @@ from tisim.backend.taichi import ti
 from tisim.numerics import circular, exponential
 
 COMPLETE = ("cpu", "cuda")
-"""The compilers for these devices have the functions for f64."""
+"""Devices whose compilers have the functions in f64."""
 
 
 def choose(own: Any, native: Any) -> Any:
-    """Return the function that the device which runs takes, of two that do the same."""
+    """Return one of two equivalent functions, for the current device."""
     return native if runtime.current().device in COMPLETE else own
 
 
 @ti.func
 def exp(x):
     """Return e^x."""
-    # What is assigned to it is rounded to the type of x.
+    # Assignment to result rounds the value to the type of x.
     result = x
     result = ti.static(choose(exponential.exp, ti.exp))(x)
     return result
@@ -39,7 +39,7 @@ def log(x):
 
 @ti.func
 def pow(x, y):
-    """Return x^y, of the type that both together have."""
+    """Return x^y, in the common type of both."""
     result = x * y
     result = ti.static(choose(exponential.pow, ti.pow))(x, y)
     return result

@@ -1,4 +1,4 @@
-"""The complementary error function in kernels, of additions, multiplications and one division."""
+"""The complementary error function in kernels, by additions, multiplications and one division."""
 
 from tisim.backend.taichi import ti
 
@@ -29,18 +29,18 @@ CHEBYSHEV = (
     1.5779847481027191e-15,
     -2.6374642632649086e-16,
 )
-"""These are the coefficients of erfcx(x)/t in Chebyshev polynomials of 2 t - 1, with t = 2 / (2 + x), by
-interpolation in their zeros. The next ones are below rounding."""
+"""Coefficients of erfcx(x)/t in Chebyshev polynomials of 2 t - 1, with t = 2 / (2 + x), from interpolation at
+their zeros. Further coefficients are below rounding."""
 
 
 @ti.func
 def erfcx(x):
-    """Return exp(x^2) erfc(x) for x >= 0: to 2e-15 of it in f64, and to rounding in f32.
+    """Return exp(x^2) erfc(x) for x >= 0, with a relative error of 2e-15 in f64, and of rounding in f32.
 
-    It falls from 1 to 1 / (sqrt(pi) x) without underflow; erfc(x) is exp(-x^2) times that.
+    It falls from 1 to 1 / (sqrt(pi) x) without underflow; erfc(x) is exp(-x^2) times this value.
 
-    Source: the variable is that of W. H. Press, S. A. Teukolsky, W. T. Vetterling, B. P. Flannery, Numerical
-    Recipes (2007), section 6.2.2; sums are those of C. W. Clenshaw, Math. Tables Aids Comput. 9 (1955) 118.
+    Source: W. H. Press, S. A. Teukolsky, W. T. Vetterling, B. P. Flannery, Numerical Recipes (2007), section
+    6.2.2, for the variable; C. W. Clenshaw, Math. Tables Aids Comput. 9 (1955) 118, for the sums.
     """
     t = 2.0 / (2.0 + x)
     y, last, before = 4.0 * t - 2.0, 0.0 * x, 0.0 * x

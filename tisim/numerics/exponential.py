@@ -1,7 +1,7 @@
-"""Exponential, logarithm and power in f64, of additions, multiplications and divisions alone.
+"""Exponential, logarithm and power in f64, by additions, multiplications and divisions only.
 
-Devices without these functions get them from here, with the same bits on each. They are rounded once, from
-some 65 binary digits: the error is below 1 unit in the last place over the whole range.
+Devices without these functions use these versions, which give the same bits on each device. They are rounded
+once, from some 65 bits: the error is below 1 unit in the last place over the whole range.
 """
 
 from fractions import Fraction
@@ -11,30 +11,30 @@ from tisim.backend.taichi import ti
 from tisim.numerics.double_double import exact_product, exact_sum, series, upper_digits
 
 LN_2 = Fraction(0xB17217F7D1CF79ABC9E3B39803F2F6AF40F343267298B62D8A0D175B8BAAFA2B, 2**256)
-"""ln 2 to 256 binary digits."""
+"""ln 2 to 256 bits."""
 LN_2_UPPER = float(Fraction(int(LN_2 * 2**38), 2**38))
-"""It has 38 digits: its product with a number of up to 2^15 is exact."""
+"""ln 2 to 38 bits; its product with a number of up to 2^15 is exact."""
 LN_2_LOWER = float(LN_2 - Fraction(LN_2_UPPER))
 THIRD = 1.0 / 3.0
 THIRD_REST = float(Fraction(1, 3) - Fraction(THIRD))
 ARTANH_TAIL = tuple(1.0 / k for k in range(5, 28, 2))
-"""These are the coefficients of artanh(x)/x in x^2, from that of x^4 on."""
+"""Coefficients of artanh(x)/x in x^2, from x^4 on."""
 EXP_TAIL = tuple(1.0 / factorial(k) for k in range(2, 15))
-"""These are the coefficients of exp(x), from that of x^2 on."""
+"""Coefficients of exp(x), from x^2 on."""
 ROOT_HALF_BITS = 0x3FE6A09E667F3BCD
-"""These are the bits of sqrt(1/2)."""
+"""The bits of sqrt(1/2)."""
 SMALLEST_NORMAL = 2.0**-1022
 MOST_EXPONENT = 800.0
-"""exp of this number is infinity, and of its negative 0."""
+"""exp of this number is infinity, and exp of its negative is 0."""
 MOST_POWER = 2.0**65
-"""Whatever differs from 1 is infinity or 0 to this power."""
+"""Any number other than 1 to this power is infinity or 0."""
 
 
 @ti.func
 def log_parts(x):
-    """Return ln x as a sum of two numbers, of a finite x > 0.
+    """Return ln x as a sum of two numbers, for a finite x > 0.
 
-    x = m 2^e with m next to 1, and ln m = 2 artanh((m - 1)/(m + 1)).
+    x = m 2^e with m near 1, and ln m = 2 artanh((m - 1)/(m + 1)).
     """
     lift = x < ti.f64(SMALLEST_NORMAL)
     number = ti.bit_cast(ti.select(lift, x * ti.f64(2.0**54), x), ti.i64)
@@ -43,7 +43,7 @@ def log_parts(x):
     e = ti.cast(octave, ti.f64) - ti.select(lift, ti.f64(54.0), ti.f64(0.0))
     below, above = m - ti.f64(1.0), m + ti.f64(1.0)
     z = upper_digits(below / above)
-    # below = z (m + 1) + what is left, to all digits: z has few, and so has the 1.
+    # below = z (m + 1) + left, computed without rounding error, as z and 1 have few digits.
     upper, lower = upper_digits(m), m - upper_digits(m)
     left = ((below - z) - z * upper) - z * lower
     z_rest = left / above
@@ -67,7 +67,7 @@ def exp_of_parts(x, rest):
     r, r_rest = exact_sum(x - k * ti.f64(LN_2_UPPER), rest - k * ti.f64(LN_2_LOWER))
     fine = r + r_rest
     value = ti.f64(1.0) + (r + (r_rest + fine * fine * series(fine, ti.static(EXP_TAIL))))
-    # In two factors: 2^k by itself may be beyond the range where the result is not.
+    # Two factors, as 2^k alone may be out of range although the result is not.
     octaves = ti.cast(k, ti.i64)
     first = octaves >> ti.i64(1)
     for exponent in ti.static(range(2)):
@@ -88,7 +88,7 @@ def exp(x):
 
 @ti.func
 def log(x):
-    """Return ln x, f64: -inf at 0, and no number below."""
+    """Return ln x, f64: -inf at 0, and NaN below."""
     result = ti.cast(x, ti.f64)
     if result > ti.f64(0.0) and result < ti.f64(ti.math.inf):
         value, rest = log_parts(result)
@@ -102,7 +102,7 @@ def log(x):
 
 @ti.func
 def pow(x, y):
-    """Return x^y, f64, as C and IEEE 754 define it: no number for x < 0 unless y is whole."""
+    """Return x^y, f64, as C and IEEE 754 define it: NaN for x < 0 unless y is an integer."""
     base, power = ti.cast(x, ti.f64), ti.cast(y, ti.f64)
     infinity, zero, result = ti.f64(ti.math.inf), ti.f64(0.0), ti.f64(1.0)
     size, most_power = ti.abs(base), ti.abs(power)

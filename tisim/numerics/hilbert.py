@@ -1,21 +1,21 @@
-"""Places along Hilbert's curve, which leads through all cells of a cube from one to a neighbour each time."""
+"""Index of a cell along Hilbert's curve, which visits all cells of a cube and always moves to a neighbour."""
 
 from tisim.backend.taichi import ti
 
 CURVE_BITS = 16
-"""The cube that the curve leads through has 2^CURVE_BITS cells along each edge."""
+"""The cube has 2^CURVE_BITS cells along each edge."""
 
 
 @ti.func
 def hilbert_index(cell):
-    """Return the place along the curve, i64, of a cell, given its index along each axis, below 2^CURVE_BITS.
+    """Return the index (i64) of a cell along the curve, given its index along each axis, below 2^CURVE_BITS.
 
-    Any stretch of the curve is one piece of space, and about as wide along all axes.
+    Any stretch of the curve covers a connected region of about equal width along all axes.
 
     Source: J. Skilling, AIP Conf. Proc. 707 (2004) 381.
     """
     x = cell
-    # From the highest bit down: turns of the cubes within cubes are undone.
+    # From the highest bit down, undo the rotations of the nested cubes.
     for bit in range(CURVE_BITS - 1):
         q = 1 << (CURVE_BITS - 1 - bit)
         low = q - 1
@@ -26,7 +26,7 @@ def hilbert_index(cell):
                 swapped = (x[0] ^ x[a]) & low
                 x[0] ^= swapped
                 x[a] ^= swapped
-    # Gray code of the three together.
+    # Gray code of the three indices.
     x[1] ^= x[0]
     x[2] ^= x[1]
     flips = 0

@@ -1,24 +1,24 @@
-"""What IEEE 754 says of numbers that are not finite and of rounding, in both arithmetics.
+"""IEEE 754 behaviour for non-finite numbers and rounding, in both arithmetics.
 
-In fast arithmetic compilers take it that nothing is infinite, and regroup sums as if numbers were not
-rounded; NaN stays NaN. Drivers of Vulkan regroup them in either: Mesa's takes (a + b) - a for b. Where that
-must not be taken, a number passes through integers here.
+In fast arithmetic compilers assume that no number is infinite, and regroup sums as if numbers were not
+rounded; NaN stays NaN. Vulkan drivers regroup sums in both arithmetics: Mesa's replaces (a + b) - a by b. To
+prevent this, the functions here pass a number through integers.
 """
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 
 INFINITE_BITS, SIZE_BITS = 0x7FF0000000000000, 0x7FFFFFFFFFFFFFFF
-"""These are the bits of infinity as an f64 number, and those of any such number that are not its sign."""
+"""The bits of infinity as an f64 number, and the mask of all bits except the sign."""
 
 
 def far_away() -> float:
-    """Return a distance (m) beyond all others, whose square the precision that runs still holds."""
+    """Return a distance (m) beyond all others, whose square the precision in use can represent."""
     return 1e150 if runtime.current().precision == "f64" else 1e18
 
 
 def is_fast() -> bool:
-    """Return whether the arithmetic that runs is the fast one."""
+    """Return whether fast arithmetic is in use."""
     return runtime.current().arithmetic == "fast"
 
 
@@ -35,9 +35,10 @@ def finite(x):
 
 @ti.func
 def infinity(count):
-    """Return infinity (f64). count : an integer >= 0 that is read from a field.
+    """Return infinity (f64).
 
-    A constant would not do in fast arithmetic: what compilers find to be infinite may become anything.
+    count : an integer >= 0 that is read from a field. In fast arithmetic a constant would not work: compilers
+    may replace a value known to be infinite by anything.
     """
     number = ti.cast(ti.math.inf, ti.f64)
     if ti.static(is_fast()):
@@ -47,8 +48,11 @@ def infinity(count):
 
 @ti.func
 def rounded(x, count):
-    """Return an f64 number as it is, rounded, so that no sum that it is part of is regrouped with those that
-    it enters. count : an integer >= 0 that is read from a field."""
+    """Return an f64 number unchanged, but rounded at this point, so that its sum is not regrouped with later
+    sums.
+
+    count : an integer >= 0 that is read from a field.
+    """
     number = x
     if ti.static(regroups()):
         number = ti.bit_cast(ti.bit_cast(x, ti.i64) ^ (ti.cast(count, ti.i64) >> 63), ti.f64)
@@ -57,8 +61,10 @@ def rounded(x, count):
 
 @ti.func
 def compensated_sum(total, term, carry, count):
-    """Return a sum (f64) with one term more, and its rounding error, which is carried along (W. Kahan 1965).
-    count : as of ``rounded``."""
+    """Return a sum (f64) with one more term, and its rounding error for the next call (W. Kahan 1965).
+
+    count : see ``rounded``.
+    """
     step = term - carry
     new = rounded(total + step, count)
     return new, rounded(new - total, count) - step
@@ -66,11 +72,13 @@ def compensated_sum(total, term, carry, count):
 
 @ti.func
 def rounded_vector(x, unit):
-    """Return three numbers of the precision that runs as they are, rounded; see ``rounded``. unit : a number
-    of that precision between -1 and 1 that is read from a field."""
+    """Return three numbers of the precision in use unchanged, but rounded at this point; see ``rounded``.
+
+    unit : a number of that precision between -1 and 1 that is read from a field.
+    """
     numbers = x
     if ti.static(regroups() and runtime.current().precision == "f64"):
-        # The highest bit of the exponent is that of numbers from 2 on.
+        # The highest bit of the exponent is set only in numbers from 2 on.
         nothing = (ti.bit_cast(unit, ti.i64) >> 62) & ti.i64(1)
         for k in ti.static(range(3)):
             numbers[k] = ti.bit_cast(ti.bit_cast(x[k], ti.i64) ^ nothing, ti.f64)
@@ -83,7 +91,7 @@ def rounded_vector(x, unit):
 
 @ti.func
 def same(a, b):
-    """Return for each of three numbers of the precision that runs whether their bits are the same."""
+    """Return for each of three numbers of the precision in use whether their bits are equal."""
     return ti.Vector([ti.cast(_bits(a[k]) == _bits(b[k]), ti.i32) for k in range(3)])
 
 

@@ -1,4 +1,4 @@
-"""Confidence intervals of a quantile, and of the squared distance of means from what was measured."""
+"""Confidence intervals of a quantile, and of the mean squared deviation from measured values."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from tisim.numerics.statistics import CONFIDENCE
 Array = NDArray[np.float64]
 
 _NODES = (np.arange(64) + 0.5) / 64
-"""Probabilities at which the distribution of an estimated variance is taken."""
+"""Probabilities at which the distribution of an estimated variance is sampled."""
 _FAR = 1e4
-"""Squared distance, in variances of the means, beyond which its root is as good as Student's."""
+"""Squared distance, in variances of the means, beyond which Student's t is used for the distance itself."""
 
 
 def of_quantile(values: ArrayLike, share: float, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return the ends of the interval of a quantile of independent values, shape (n,).
+    """Return the confidence interval of a quantile of independent values, shape (n,).
 
-    The ends are order statistics, interpolated so that the confidence is met (J. Nyblom, Statist. Probab.
-    Lett. 14 (1992) 129-131). NaN in place of an end for which there are too few values.
+    The ends are order statistics, interpolated to the requested confidence (J. Nyblom, Statist. Probab. Lett.
+    14 (1992) 129-131). An end for which there are too few values is NaN.
     """
     ordered = np.sort(np.asarray(values, dtype=float))
     return _low_end(ordered, share, confidence), -_low_end(-ordered[::-1], 1.0 - share, confidence)
 
 
 def fewest_of_quantile(share: float, confidence: float = CONFIDENCE) -> int:
-    """Return how many values an interval of a quantile needs to have both ends."""
+    """Return the number of values from which the interval of a quantile has both ends."""
     return math.ceil(math.log(0.5 - confidence / 2) / math.log(max(share, 1.0 - share)))
 
 
 def _low_end(ordered: Array, share: float, confidence: float) -> float:
     n, wanted = len(ordered), 0.5 + confidence / 2
-    below = binom.sf(np.arange(n), n, share)  # that the (r+1)-th value is below the quantile
+    below = binom.sf(np.arange(n), n, share)  # probability that the (r+1)-th value is below the quantile
     if n == 0 or below[0] < wanted:
         return math.nan
     k = int(np.flatnonzero(below >= wanted)[-1])
@@ -50,12 +50,14 @@ def _low_end(ordered: Array, share: float, confidence: float) -> float:
 
 
 def of_squared_distance(off: ArrayLike, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return the ends of the interval of |mu|^2 / K, the mean of the squares of K expectations.
+    """Return the confidence interval of |mu|^2 / K, the mean of the squares of K expectations mu.
 
-    off : shape (n, K), n > 1 independent values with the expectations mu. |mean|^2 is taken for c times a
-    noncentral chi^2 of nu degrees of freedom, c and nu being those of its first two moments
-    (F. E. Satterthwaite, Biometrics Bull. 2 (1946) 110-114). c is itself an estimate, of n - 1 degrees of
-    freedom or more, over which the distribution is averaged: for one quantity the result is Student's.
+    off : shape (n, K), n > 1 independent values with the expectations mu.
+
+    |mean|^2 is approximated by c times a noncentral chi^2 with nu degrees of freedom; c and nu follow from
+    its first two moments (F. E. Satterthwaite, Biometrics Bull. 2 (1946) 110-114). As c is itself an
+    estimate, with n - 1 or more degrees of freedom, the distribution is averaged over c; for one quantity the
+    result is Student's interval.
     """
     sample = np.asarray(off, dtype=float)
     n, count = sample.shape

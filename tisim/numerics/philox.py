@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.numerics import elementary
 
 PHILOX_ROUNDS = 10
-"""Philox4x32-10 mixes the counter and the key so many times."""
+"""Number of mixing rounds of Philox4x32-10."""
 Words = ti.types.vector(4, ti.u32)
 
 
@@ -36,9 +36,9 @@ def philox(counter, key_low, key_high):
 
 @ti.func
 def bits(seed, stream, particle, step, draw=0):
-    """Return four random words for a particle at a step. ``stream`` keeps uses apart; ``draw`` counts within
-    a step.
+    """Return four random words for a particle at a step.
 
+    stream : separates different uses. draw : counts the draws within a step.
     seed and step are 64-bit, the others 32-bit.
     """
     s, n = ti.cast(seed, ti.u64), ti.cast(step, ti.u64)
@@ -55,11 +55,11 @@ def bits(seed, stream, particle, step, draw=0):
 
 @ti.func
 def uniform(words):
-    """Return two numbers in (0, 1) with 53 random bits each, from four words; f64 whatever the precision."""
+    """Return two numbers in (0, 1) with 53 random bits each, from four words; always f64."""
     first = ti.cast(words[0] >> ti.u32(5), ti.f64) * 67108864.0 + ti.cast(words[1] >> ti.u32(6), ti.f64)
     second = ti.cast(words[2] >> ti.u32(5), ti.f64) * 67108864.0 + ti.cast(words[3] >> ti.u32(6), ti.f64)
     scale = ti.cast(1.0 / 9007199254740992.0, ti.f64)
-    # Half a unit more than the largest rounds up to 1.
+    # Limited, as the largest number plus half a unit would round up to 1.
     most = ti.cast(9007199254740992.0, ti.f64) - 1.0
     return ti.Vector([ti.min(first + 0.5, most) * scale, ti.min(second + 0.5, most) * scale], dt=ti.f64)
 
@@ -75,11 +75,11 @@ def normal(words):
 
 LOG_2, QUARTER, ROOT = log(2), pi / 2, sqrt(0.5)
 ROOT_BITS = 0x3FE6A09E667F3BCD
-"""These are the bits of ROOT as an f64 number."""
+"""The bits of ROOT as an f64 number."""
 ARTANH = tuple(1 / k for k in range(1, 14, 2))
 COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(7))
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(6))
-"""ARTANH, COSINE and SINE are the coefficients of the series of artanh(x)/x, cos x and sin(x)/x in x^2."""
+"""Coefficients of the series of artanh(x)/x, cos x and sin(x)/x in x^2."""
 
 
 @ti.func
@@ -93,10 +93,10 @@ def _series(x, coefficients: ti.template()):  # type: ignore[valid-type]
 
 @ti.func
 def _length(word):
-    """Return sqrt(-2 ln u) of u = (word + 1/2)/2^32: the length of a vector of two normal numbers, to some 11
+    """Return sqrt(-2 ln u) of u = (word + 1/2)/2^32, the length of a vector of two normal numbers, to some 11
     digits.
 
-    u = m 2^e with m next to 1, and ln m = 2 artanh((m - 1)/(m + 1)): what compilers vectorise.
+    u = m 2^e with m near 1, and ln m = 2 artanh((m - 1)/(m + 1)), which compilers can vectorise.
     """
     number = ti.bit_cast(ti.cast(word, ti.f64) + 0.5, ti.i64)
     e = (number - ti.i64(ROOT_BITS)) >> ti.i64(52)
@@ -110,7 +110,7 @@ def _length(word):
 def _direction(word):
     """Return a point on the unit circle, to some 11 digits: in the first quadrant by 30 bits, then two signs.
 
-    cos and sin of pi/4 + x by the series of x.
+    cos and sin of pi/4 + x are computed by the series in x.
     """
     x = (ti.cast(word >> ti.u32(2), ti.f64) + 0.5) * ti.cast(QUARTER / 2**30, ti.f64)
     x -= ti.cast(QUARTER / 2, ti.f64)
@@ -124,7 +124,7 @@ def _direction(word):
 def normals(words):
     """Return four independent standard normal numbers (f64) from four words, of 32 random bits each.
 
-    They cost a fraction of those of ``normal``; none is larger than 6.8, which one in 1e11 should be.
+    They cost a fraction of ``normal``. None is larger than 6.8, which one in 1e11 would exceed.
     """
     a, b = _length(words[0]) * _direction(words[1]), _length(words[2]) * _direction(words[3])
     return ti.Vector([a[0], a[1], b[0], b[1]], dt=ti.f64)

@@ -4,14 +4,13 @@ from tisim.backend.taichi import ti
 from tisim.numerics import elementary
 
 Exponent = int | float
-"""This is the type of an exponent of an effect: an option, not a parameter per world. It is compiled in, and
-the same for a whole batch."""
+"""Type of an exponent of an effect. It is an option that is compiled in, the same for a whole batch, and not
+a parameter per world."""
 
 
 @ti.func
 def power(x, exponent: ti.template()):  # type: ignore[valid-type]
-    """Return x ** exponent for x > 0, by products where the exponent is whole, which cost a fraction of a
-    pow."""
+    """Return x ** exponent for x > 0; an integer exponent uses products, which cost a fraction of a pow."""
     result = x
     if ti.static(float(exponent).is_integer()):
         result = whole_power(x, ti.static(int(exponent)))
@@ -32,7 +31,7 @@ def whole_power(x, exponent: ti.template()):  # type: ignore[valid-type]
     for bit in ti.static(range(abs(exponent).bit_length())):
         if ti.static(bit > 0):
             square *= square
-        # The first factor is taken as it is: compilers must not leave out a product with one.
+        # The first factor is assigned: compilers must not have to remove a product with one.
         if ti.static(abs(exponent) >> bit & 1):
             if ti.static(abs(exponent) & ((1 << bit) - 1)):
                 result *= square

@@ -14,10 +14,10 @@ def rotated(q, v):
 
 @ti.func
 def turned(v, turn):
-    """Return a vector turned about an axis, given the axis times the angle (rad).
+    """Return a vector rotated about an axis, given the axis times the angle (rad).
 
-    It is v + 2 (w u x v + u x (u x v)) / |q|^2 with q = (w, u), in double precision, f64: in single precision
-    lengths would grow or shrink, turn after turn, by what its factors are rounded by.
+    It is v + 2 (w u x v + u x (u x v)) / |q|^2 with q = (w, u), in f64: in single precision lengths would
+    drift with every rotation by the rounding of the factors.
     """
     half, r = 0.5 * ti.cast(turn, ti.f64), ti.cast(v, ti.f64)
     angle = half.norm()
@@ -30,8 +30,11 @@ def turned(v, turn):
 
 @ti.func
 def brought(v, before, after):
-    """Return a vector that is fixed in a body whose orientation was one quaternion and is another: turned by
-    ``after`` times ``before`` to the minus one, of length 1 or nearly so; in f64, as ``turned``."""
+    """Return a body-fixed vector after its body has turned from one orientation to another, both quaternions.
+
+    It is rotated by ``after`` times the inverse of ``before``, of length 1 or nearly so; in f64, as
+    ``turned``.
+    """
     q, r = product(ti.cast(after, ti.f64), conjugate(ti.cast(before, ti.f64))), ti.cast(v, ti.f64)
     u = ti.Vector([q[1], q[2], q[3]])
     twice = 2.0 / q.norm_sqr() * u.cross(r)
@@ -40,13 +43,13 @@ def brought(v, before, after):
 
 @ti.func
 def conjugate(q):
-    """Return the quaternion of the rotation back."""
+    """Return the quaternion of the inverse rotation."""
     return ti.Vector([q[0], -q[1], -q[2], -q[3]])
 
 
 @ti.func
 def product(p, q):
-    """Return the quaternion of the rotation q, then p (W. R. Hamilton, 1844)."""
+    """Return the quaternion of rotation q followed by p (W. R. Hamilton, 1844)."""
     u, v = ti.Vector([p[1], p[2], p[3]]), ti.Vector([q[1], q[2], q[3]])
     w = p[0] * q[0] - u.dot(v)
     r = p[0] * v + q[0] * u + u.cross(v)
@@ -55,7 +58,7 @@ def product(p, q):
 
 @ti.func
 def random_orientation(u, v, w):
-    """Return a rotation drawn evenly from all, by three numbers in 0..1.
+    """Return a uniformly distributed random rotation from three numbers in 0..1.
 
     Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992) 124.
     """

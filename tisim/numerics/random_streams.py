@@ -1,16 +1,15 @@
-"""The streams of random numbers: every use of ``philox.bits`` has one of its own.
+"""The streams of random numbers; every use of ``philox.bits`` has its own stream.
 
-Two uses of one seed that shared a stream would draw the same numbers. A stream is a number below 2^32.
+Two uses of one seed with the same stream would draw the same numbers. A stream is a number below 2^32.
 """
 
 BROWNIAN_MOTION = 1
-"""The thermal noise of Brownian steppers draws from this stream."""
+"""Stream of the thermal noise of Brownian steppers."""
 SEQUENTIAL_ADDITION = 0x52534100
-"""Random sequential addition draws the places that it tries from this stream."""
+"""Stream of the trial positions of random sequential addition."""
 GRAIN_SIZES = 0x47524149
-"""The sizes of the grains of a start are drawn from this stream."""
+"""Stream of the grain sizes of an initial state."""
 MOMENTS = 0x4D4F4D45
-"""The directions of the moments of permanent magnets are drawn from this stream."""
+"""Stream of the moment directions of permanent magnets."""
 INSERTION = 0x494E5300
-"""Insertions draw grains and the places that they try from this stream and, by index in the scene, from those
-after it."""
+"""First of the streams of the insertion trials, one for each insertion by index in the scene."""

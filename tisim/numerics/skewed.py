@@ -19,8 +19,7 @@ from tisim.numerics.statistics import CONFIDENCE
 
 @dataclass(frozen=True)
 class Moments:
-    """Second and third central moments of the noise of values, without bias, and how many values these are
-    from."""
+    """Unbiased second and third central moments of the noise of values, and the number of values."""
 
     second: float
     third: float
@@ -28,7 +27,7 @@ class Moments:
 
     @property
     def skewness(self) -> float:
-        """The skewness; 0 where all values are equal."""
+        """The skewness; 0 if all values are equal."""
         return self.third / self.second**1.5 if self.second > 0 else 0.0
 
     def __add__(self, other: Moments) -> Moments:
@@ -40,8 +39,11 @@ class Moments:
 
     @classmethod
     def of(cls, values: ArrayLike) -> Moments:
-        """Return those of independent values, three or more: Fisher's k-statistics (M. G. Kendall and A.
-        Stuart, The Advanced Theory of Statistics, vol. 1, 4th ed. (1977), section 12.9)."""
+        """Return the moments of three or more independent values.
+
+        They are Fisher's k-statistics (M. G. Kendall and A. Stuart, The Advanced Theory of Statistics, vol.
+        1, 4th ed. (1977), section 12.9).
+        """
         sample = np.asarray(values, dtype=float)
         n = len(sample)
         off = sample - sample.mean()
@@ -55,21 +57,23 @@ def interval(
     skewness: float | None = None,
     confidence: float = CONFIDENCE,
 ) -> tuple[float, float]:
-    """Return the ends of the confidence interval of the mean of independent values, shape (n,).
+    """Return the confidence interval of the mean of independent values, shape (n,).
 
-    Student's t, corrected for the skewness of the values by the cubic transformation of P. Hall, J. R. Stat.
-    Soc. B 54 (1992) 221-228. Two kinds of values have a rule of their own:
+    It is Student's t, corrected for the skewness of the values by the cubic transformation of P. Hall, J. R.
+    Stat. Soc. B 54 (1992) 221-228. Two kinds of samples have their own rules:
 
-    - Where no more than two different values are known, the interval is that of a binomial share, by mid-P
-      (H. O. Lancaster, J. Am. Stat. Assoc. 56 (1961) 223-234). Twelve equal values leave a share of 0.22 for
-      another one.
-    - Equal values otherwise tell nothing of what the rarer ones are; they are taken to be anywhere between
-      the ends of ``support``.
+    - If at most two different values are known, the interval is a binomial proportion by mid-P (H. O.
+      Lancaster, J. Am. Stat. Assoc. 56 (1961) 223-234). After twelve equal values the other one may have a
+      share of up to 0.22.
+    - Equal values otherwise carry no information on the rarer values, which are assumed to lie anywhere
+      between the ends of ``support``.
 
-    support : values that are known to occur, for instance in other samples, or ends of the range.
-    skewness : that for which to correct, where more is known of it than by these values (see
-    ``shared_skewness``). (NaN, NaN) where no interval is known: for one value, and for equal values when no
-    other value is known.
+    support : values known to occur, for instance in other samples, or ends of the range.
+    skewness : skewness to correct for, if it is known better than from these values (see
+    ``shared_skewness``).
+
+    Returns (NaN, NaN) if no interval is known: for a single value, and for equal values if no other value is
+    known.
     """
     sample = np.asarray(values, dtype=float)
     known = np.unique(np.concatenate([sample, np.ravel(support)]))
@@ -94,8 +98,8 @@ def interval(
 
 
 def sample_skewness(values: ArrayLike) -> float:
-    """Return the skewness of values as they are, which is less than that of what they are drawn from; 0 for
-    equal ones."""
+    """Return the skewness of the given values, which underestimates the skewness of their distribution; 0 for
+    equal values."""
     sample = np.asarray(values, dtype=float)
     off = sample - sample.mean()
     deviation = math.sqrt(float(np.mean(off**2)))
@@ -103,14 +107,16 @@ def sample_skewness(values: ArrayLike) -> float:
 
 
 def shared_skewness(samples: Sequence[ArrayLike], others: Moments | None = None) -> float | None:
-    """Return the skewness for which to correct the interval of each of several samples whose noise is alike.
+    """Return the skewness that corrects the intervals of several samples with similar noise.
 
-    A dozen values that have had no rare one look as if there were none; other samples have had it. So the
-    moments of all samples are taken together, with those of ``others``. The skewness of what values are drawn
-    from corrects too much for few of them, whose deviation grows with their mean: of samples of n, 1 - 1.1 /
-    sqrt(n) of it. That holds the mean most evenly over normal, exponential, lognormal and chi-square noise
-    and rare events (tests/numerics/test_skewed.py). It is no less than the mean of the samples' own.
-    None where there is nothing but a single sample.
+    A dozen values often contain no rare value, although other samples do. The moments of all samples, and of
+    ``others``, are therefore combined. The skewness of the distribution would correct too much for a small
+    sample, whose deviation grows with its mean; samples of n values use 1 - 1.1 / sqrt(n) of it. This factor
+    gives the most even coverage of the mean over normal, exponential, lognormal and chi-square noise and rare
+    events (tests/numerics/test_skewed.py). Its magnitude is at least the mean skewness of the samples
+    themselves.
+
+    None for a single sample without ``others``.
     """
     large = [one for one in map(np.asarray, samples) if len(one) > 2]
     if not large or (len(large) == 1 and others is None):
@@ -125,12 +131,15 @@ def shared_skewness(samples: Sequence[ArrayLike], others: Moments | None = None)
 
 
 def _binomial_share(successes: int, trials: int, confidence: float) -> tuple[float, float]:
-    """Return the ends of the interval of a probability, at which the mid-P of both tails is equal."""
+    """Return the interval of a probability, at whose ends the mid-P of both tails is equal."""
     tail = 0.5 - confidence / 2
 
     def end(count: int) -> float:
-        """Where no more than ``count`` successes have the probability of the tail, half of that of ``count``
-        itself taken off."""
+        """Return the probability p at which the mid-P of at most ``count`` successes equals the tail.
+
+        The mid-P is the probability of at most ``count`` successes less half of the probability of exactly
+        ``count``.
+        """
         return float(
             brentq(lambda p: binom.cdf(count, trials, p) - binom.pmf(count, trials, p) / 2 - tail, 0.0, 1.0)
         )

@@ -1,4 +1,4 @@
-"""How well the mean of independent runs is known."""
+"""Confidence interval of the mean of independent runs."""
 
 from typing import Any
 
@@ -7,14 +7,14 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
 CONFIDENCE = 0.95
-"""This is the probability with which an interval holds the true mean, where none other is asked for."""
+"""Default probability with which an interval contains the true mean."""
 
 
 def half_width(values: ArrayLike, confidence: float = CONFIDENCE) -> Any:
     """Return half of the confidence interval of the mean over the first axis, by Student's t; inf for one
     value.
 
-    Spread over further axes is that of each component by itself.
+    Each component along further axes is treated by itself.
     """
     samples = np.asarray(values, float)
     n = len(samples)

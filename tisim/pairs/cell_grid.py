@@ -1,8 +1,8 @@
-"""Particles sorted into cells, with a level of cells for each class of sizes.
+"""Particles are sorted into cells, with a separate grid level of cells for each size class.
 
-A level holds the radii from one power of two times the smallest to the next, and its cells are as wide as two
-of its particles see each other. So what is searched around a particle follows the particles there, whatever
-the ratio of sizes. How cells are filled is in cell_phases.py.
+A level holds the radii within a factor of two, and its cells are as wide as the search range between two of
+its particles. The cost of a search therefore depends on the particles nearby and not on the size ratio. The
+phases that fill the cells are in cell_phases.py.
 """
 
 from tisim.backend import runtime
@@ -16,20 +16,20 @@ from tisim.state.bound import Bound
 from tisim.state.state import State
 
 LEVELS = 8
-"""There are this many levels of cells: radii in a ratio of more than 2^7 share the last."""
+"""Number of grid levels. Radii more than 2^7 times the smallest share the last level."""
 CELLS_PER_PARTICLE, SPARE_CELLS = 2, 8
-"""A level of n particles has at most this many cells for each, and so many besides."""
+"""A level of n particles has at most CELLS_PER_PARTICLE * n + SPARE_CELLS cells."""
 BINNED_TOGETHER = {"cpu": 512}
-"""One task measures so many particles, one after the other; on other devices 1."""
+"""Particles measured by one task, one after the other; 1 on other devices."""
 
 
 @ti.data_oriented
 class CellGrid:
     """A cell grid holds the cells of every world.
 
-    order : indices of the particles, cell by cell; those of cell c begin at ``cell_start[w, c]``.
-    near : radius of each particle and how far it looks beyond the surface of another, m. skin : how much
-    farther it looks along each axis, m.
+    order : indices of the particles, cell by cell; the particles of cell c begin at ``cell_start[w, c]``.
+    near : radius of each particle plus its interaction range beyond the surface of another one, m.
+    skin : neighbour-list skin distance along each axis, m.
     """
 
     def __init__(self, s: State, domain: Bound[Domain]) -> None:
@@ -54,7 +54,7 @@ class CellGrid:
         for column in (self.dims, self.cell):
             levels.dense(ti.k, 3).place(column)
         self.tree = Tree(builder)
-        # Where each cell begins among all: counts of the cells before it.
+        # First place of each cell in ``order``: the sum of the counts of the cells before it.
         self.starts = PrefixSum(s, OfCells(self), self.cell_start, self.cell_start)
 
     def bytes(self) -> int:
@@ -81,7 +81,8 @@ class CellGrid:
 
     @ti.func
     def floor_of(self, w, level, r):
-        """Return the index along each axis of the cell that would be at a place (m), inside or outside."""
+        """Return the index along each axis of the cell that would contain a position (m), inside or outside
+        the grid."""
         at = ti.Vector.zero(ti.i32, 3)
         for k in ti.static(range(3)):
             at[k] = ti.floor((r[k] - self.low[w, k]) / self.cell[w, level, k], ti.i32)
@@ -89,7 +90,7 @@ class CellGrid:
 
     @ti.func
     def dims_of(self, w, level):
-        """Return how many cells a level has along each axis."""
+        """Return the number of cells of a level along each axis."""
         return ti.Vector([self.dims[w, level, 0], self.dims[w, level, 1], self.dims[w, level, 2]])
 
     @ti.func
@@ -99,7 +100,8 @@ class CellGrid:
 
     @ti.func
     def extent(self, w):
-        """Return the sides (m) of the box around all; along joined axes, of the domain."""
+        """Return the sides (m) of the bounding box of the particles; along joined axes, the sides of the
+        domain."""
         extent = self.domain.side(w)
         for k in ti.static(range(3)):
             if ti.static(not self.joined[k]):
@@ -108,8 +110,8 @@ class CellGrid:
 
     @ti.func
     def divide(self, cells, most):
-        """Return how many cells there are along each axis: as many as ``cells`` says, in proportion where
-        these are more than ``most``."""
+        """Return the number of cells along each axis: ``cells``, scaled down in proportion if the total
+        exceeds ``most``."""
         dims = ti.max(1, ti.floor(cells, ti.i32))
         while dims[0] * dims[1] * dims[2] > most:
             cells *= 0.9
@@ -129,7 +131,7 @@ class CellGrid:
 
 @ti.func
 def next_number(column: ti.template(), w, k, shared: ti.template()):  # type: ignore[valid-type]
-    """Return column[w, k], and count it up; where threads share a world, by an atomic operation."""
+    """Return column[w, k] and increment it; the operation is atomic if several threads share a world."""
     number = 0
     if ti.static(shared):
         number = ti.atomic_add(column[w, k], 1)
@@ -140,14 +142,14 @@ def next_number(column: ti.template(), w, k, shared: ti.template()):  # type: ig
 
 
 class OfGrid(Phase):
-    """This phase works on the cells of a world."""
+    """Base of the phases that work on the cells of a world."""
 
     def __init__(self, grid: CellGrid) -> None:
         self.g, self.s = grid, grid.s
 
 
 class OfParticles(OfGrid):
-    """This phase works on each particle."""
+    """Base of the phases that work on each particle."""
 
     def __init__(self, grid: CellGrid) -> None:
         super().__init__(grid)
@@ -159,8 +161,10 @@ class OfParticles(OfGrid):
 
 
 class OfBlocks(OfGrid):
-    """This phase works on blocks of particles, each from ``begin`` to ``end``: what it finds of a block it
-    tells the world at once, so that threads seldom meet."""
+    """Base of the phases that work on blocks of particles, each from ``begin`` to ``end``.
+
+    The result of a block is added to its world in one operation, so threads seldom compete.
+    """
 
     def __init__(self, grid: CellGrid) -> None:
         super().__init__(grid)
@@ -182,7 +186,7 @@ class OfBlocks(OfGrid):
 
 
 class OfCells(OfGrid):
-    """This phase works on each cell, and what follows the last."""
+    """Base of the phases that work on each cell and on the end of the last one."""
 
     def __init__(self, grid: CellGrid) -> None:
         super().__init__(grid)

@@ -1,7 +1,7 @@
-"""The phases that sort particles into cells: in parallel, deterministic.
+"""Phases that sort particles into cells, in parallel and deterministically.
 
-Counts are integer sums, and each cell is sorted by index in the end: the order depends neither on the threads
-nor on what was there before.
+Counts are integer sums, and each cell is finally sorted by index. The order therefore depends neither on the
+threads nor on the previous order.
 """
 
 from typing import Any
@@ -24,8 +24,8 @@ from tisim.state.status import WorldStatus
 
 
 def measure_phases(grid: CellGrid, seer: Any) -> tuple[Phase, ...]:
-    """Return the phases that measure the particles; ``seer.reach(w, i)`` says how far one looks beyond the
-    surface of another (m)."""
+    """Return the phases that measure the particles; ``seer.reach(w, i)`` is the interaction range of i beyond
+    the surface of another particle (m)."""
     return ResetGrid(grid), FindExtent(grid), MeasureLevels(grid, seer)
 
 
@@ -36,7 +36,7 @@ def cell_phases(grid: CellGrid) -> tuple[Phase, ...]:
 
 
 class ResetGrid(OfGrid):
-    """This phase forgets what is known of the particles."""
+    """This phase resets the measured extents of the particles."""
 
     @ti.func
     def run(self, w, _k):
@@ -49,7 +49,7 @@ class ResetGrid(OfGrid):
 
 
 class FindExtent(OfBlocks):
-    """This phase finds the smallest radius, and the corners of the box around all."""
+    """This phase finds the smallest radius and the bounding box of the particles."""
 
     @ti.func
     def run(self, w, b):
@@ -57,7 +57,7 @@ class FindExtent(OfBlocks):
         low, high, smallest = s.position[w, first], s.position[w, first], s.radius[w, first]
         for i in range(first, self.end(w, b)):
             r, radius = s.position[w, i], s.radius[w, i]
-            # What is not finite belongs to no cell.
+            # A particle that is not finite has no cell.
             if not finite(ti.abs(r).sum() + radius):
                 s.fail(w, WorldStatus.NOT_FINITE, i)
             low, high, smallest = ti.min(low, r), ti.max(high, r), ti.min(smallest, radius)
@@ -71,8 +71,8 @@ class FindExtent(OfBlocks):
 
 
 class MeasureLevels(OfBlocks):
-    """This phase finds how many particles each level has, their largest radius, and how far they are seen at
-    most."""
+    """This phase finds the number of particles, the largest radius and the widest search range of each
+    level."""
 
     def __init__(self, grid: CellGrid, seer: Any) -> None:
         super().__init__(grid)
@@ -83,7 +83,7 @@ class MeasureLevels(OfBlocks):
         g, s, population = self.g, self.s, 0
         none = ti.cast(0.0, s.real)
         largest, widest = none, none
-        # Those of one level that follow each other are told at once.
+        # Consecutive particles of one level are recorded together.
         current = g.level(w, s.radius[w, self.begin(b)])
         for i in range(self.begin(b), self.end(w, b)):
             radius = s.radius[w, i]
@@ -107,7 +107,8 @@ class MeasureLevels(OfBlocks):
 
 
 class ShapeGrid(OfGrid):
-    """This phase gives each level cells, as wide as two of its particles see each other and not too many."""
+    """This phase sets the cells of each level: as wide as the search range of two of its particles, and
+    limited in number."""
 
     @ti.func
     def run(self, w, _k):
@@ -138,8 +139,8 @@ class ClearCells(OfCells):
 
 
 class CountInCells(OfParticles):
-    """This phase finds the cell of each particle, and counts those of each cell, in whatever order threads
-    come."""
+    """This phase finds the cell of each particle and counts the particles of each cell, in any order of
+    threads."""
 
     @ti.func
     def run(self, w, i):
@@ -147,12 +148,12 @@ class CountInCells(OfParticles):
         level = g.level(w, s.radius[w, i])
         c = g.cell_index(w, level, g.place(w, level, s.position[w, i]))
         g.cell_of[w, i] = c
-        # One cell on, so that the sums up to each cell are where it begins.
+        # Counts are shifted by one cell, so that the prefix sum at a cell is its first place.
         g.rank[w, i] = next_number(g.cell_start, w, c + 1, ti.static(self.g.shared()))
 
 
 class PlaceInCells(OfParticles):
-    """This phase enters each particle in its cell, in the order in which they were counted."""
+    """This phase enters each particle in its cell, in the order in which the particles were counted."""
 
     @ti.func
     def run(self, w, i):
@@ -161,7 +162,7 @@ class PlaceInCells(OfParticles):
 
 
 class SortCells(OfCells):
-    """This phase orders each cell by index."""
+    """This phase sorts each cell by particle index."""
 
     @ti.func
     def size(self, w):

@@ -1,8 +1,10 @@
-"""What pairs that touch remember of each other, such as how far they have slid, for one law.
+"""Contact history of one law: values that touching pairs keep between steps, such as their sliding
+displacement.
 
-In a step it lies with the pair in the list. In between it is stored with the smaller particle of the pair (of
-equals, the one of lower id), which has few larger neighbours, under the id of the other. So it survives new
-lists, indices that move and restarts, and goes with the particle that carries it.
+During steps the history is kept with the pair in the list. Before a list is rebuilt, indices change or the
+state is read, it is stored on the smaller particle of the pair (for equal sizes, on the particle of lower
+id), which has few larger neighbours, under the id of the other particle. It is therefore kept when lists are
+rebuilt, when indices change and after a restart, and moves in memory with its particle.
 """
 
 from typing import Any
@@ -15,17 +17,20 @@ from tisim.state.state import State
 from tisim.state.status import WorldStatus
 
 PARTNERS = 16
-"""A particle can store this many pairs. Thirteen spheres of its size or larger do not find room around it."""
+"""Largest number of pairs stored on a particle; fewer than thirteen spheres of its size or larger can touch
+it."""
 NO_PARTNER, NO_SLOT = -1, -1
-"""The first is the id in a free slot; the second is what a search gives when there is none."""
+"""NO_PARTNER is the id in a free slot; NO_SLOT is the result of a search without a match."""
 
 
 def memory_fields(effect: PairForce) -> tuple[Field, ...]:
-    """Return the fields in which a law stores what its pairs remember: with whom, and what."""
+    """Return the two fields for the contact history of a law: the ids of the partners, and the values."""
     if not effect.memory:
         return ()
     if not effect.short_ranged:
-        raise TypeError(f"{type(effect).__name__} must be short-ranged: pairs remember while they are near")
+        raise TypeError(
+            f"{type(effect).__name__} must be short-ranged: contact history is kept for listed pairs"
+        )
     name = effect.label
     return (
         Field(f"{name}_partners", "", 1, "keep", integer=True, slots=PARTNERS, default=NO_PARTNER),
@@ -35,8 +40,8 @@ def memory_fields(effect: PairForce) -> tuple[Field, ...]:
 
 @ti.data_oriented
 class ContactMemory:
-    """A contact memory holds, for one law, values of each listed pair, as the particle of lower id sees
-    them."""
+    """A contact memory holds, for one law, the contact history of each listed pair as seen from the particle
+    of lower id."""
 
     def __init__(self, s: State, law: Bound[PairForce]) -> None:
         partners, past = memory_fields(law.data)
@@ -45,14 +50,17 @@ class ContactMemory:
         self.values: tuple[Any, ...] = ()
 
     def make_fields(self) -> tuple[Any, ...]:
-        """Make the fields, to be placed with the pairs, and return them. Not before that: one that is placed
-        nowhere, as there is no room for what comes first, would be a fault of every later kernel."""
+        """Make the fields that are to be placed with the pairs, and return them.
+
+        They must not be made earlier: a field that is never placed, because memory ran out before, would
+        break every later kernel.
+        """
         self.values = tuple(ti.field(self.s.real) for _ in range(self.size))
         return self.values
 
     @ti.func
     def read(self, w, m):
-        """Return what pair m remembers; a vector."""
+        """Return the contact history of pair m; a vector."""
         known = ti.Vector.zero(self.s.real, self.size)
         for c in ti.static(range(self.size)):
             known[c] = self.values[c][w, m]
@@ -65,13 +73,13 @@ class ContactMemory:
 
     @ti.func
     def forget(self, w, m):
-        """Have pair m remember nothing."""
+        """Clear the contact history of pair m."""
         for c in ti.static(range(self.size)):
             self.values[c][w, m] = 0.0
 
     @ti.func
     def find(self, w, i, other):
-        """Return the slot in which i has stored something of the particle with this id."""
+        """Return the slot in which i has stored the history with the particle of this id."""
         slot = NO_SLOT
         for k in range(PARTNERS):
             if self.partners[w, i, k] == other:
@@ -80,7 +88,8 @@ class ContactMemory:
 
     @ti.func
     def clear(self, w, i):
-        """Have i store nothing. No trace is left, which would tell how often something was stored."""
+        """Clear the stored history of i. All values are reset, so the state does not depend on how often it
+        was stored."""
         for k in range(PARTNERS):
             if self.partners[w, i, k] != NO_PARTNER:
                 self.partners[w, i, k] = NO_PARTNER
@@ -89,7 +98,7 @@ class ContactMemory:
 
     @ti.func
     def store(self, w, m, i, j):
-        """Store with i what pair m, of i and j, remembers, where it remembers anything."""
+        """Store the history of pair m, of i and j, on i unless it is zero."""
         known = self.read(w, m)
         if (known != 0.0).any():
             slot = self.find(w, i, NO_PARTNER)
@@ -102,7 +111,7 @@ class ContactMemory:
 
     @ti.func
     def stored(self, w, i, j):
-        """Return what i has stored of j; zero when it has nothing."""
+        """Return the history that i has stored with j; zero if there is none."""
         known, slot = ti.Vector.zero(self.s.real, self.size), self.find(w, i, self.s.id[w, j])
         if slot >= 0:
             for c in ti.static(range(self.size)):
@@ -111,5 +120,5 @@ class ContactMemory:
 
     @ti.func
     def recall(self, w, m, i, j):
-        """Put into pair m what either of the two has stored of the other."""
+        """Set the history of pair m from the one stored on either particle."""
         self.write(w, m, self.stored(w, i, j) + self.stored(w, j, i))

@@ -1,7 +1,7 @@
-"""Pairs that short-ranged forces may act between, each listed once, by its smaller particle.
+"""Pairs for short-ranged forces, each listed once, by its smaller particle.
 
-A list is made anew, by the phases below, when particles have moved so far that a pair it lacks could matter;
-the skin says how far that is.
+The phases below rebuild a list when particles have moved so far that a missing pair could interact; the skin
+sets this distance.
 """
 
 from collections.abc import Sequence
@@ -26,18 +26,19 @@ from tisim.state.state import State
 from tisim.state.status import WorldStatus
 
 REACH_PART = 0.125
-"""Part of the skin that is kept for laws that come to reach farther, as that of particles that grow does."""
+"""Fraction of the skin reserved for interaction ranges that increase, for example of growing particles."""
 
 
 @dataclass(frozen=True)
 class ListSizes:
-    """The list sizes say how much lists of pairs have room for: the pairs that a particle lists for forces,
-    those of each particle of a world in the mean, and the pairs that a particle lists for events and step
-    control, ``near``.
+    """The list sizes are the capacities of the pair lists.
 
-    Spheres that only touch, of any sizes, touch fewer than 14.93 others in the mean, and make half as many
-    pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339). Where laws reach farther the list
-    grows when it overflows.
+    row : pairs that one particle lists for forces. mean : mean number of listed pairs for each particle of a
+    world. near : pairs that one particle lists for events and step control.
+
+    Spheres of any sizes that only touch have fewer than 14.93 contacts on average, which makes half this
+    number of pairs per particle (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339). For longer
+    interaction ranges a list grows when it overflows.
     """
 
     row: int = 16
@@ -45,19 +46,21 @@ class ListSizes:
     near: int = 16
 
     def joined(self, other: "ListSizes") -> "ListSizes":
-        """Return sizes in which whatever either has room for finds room."""
+        """Return the larger of both sizes, one by one."""
         largest = map(max, astuple(self), astuple(other))
         return ListSizes(*largest)
 
 
 @ti.data_oriented
 class HalfList(NeighbourRows):
-    """A half list has the pairs of the worlds by which laws may act, each row in order of index.
+    """A half list has the pairs of every world that laws may act between, with each row sorted by index.
 
-    within_bodies : whether pairs within a rigid body are among them, as a law acts between these.
-    solid : whether a law holds spheres apart that touch, which must not pass through each other unseen.
-    spent : part of the skin that movements may use up. pace : how far a particle moves in a step (m), found
-    from ``moves`` steps since the list was ``made`` (s).
+    within_bodies : whether pairs within a rigid body are listed, because a law acts between them.
+    solid : whether a law holds touching spheres apart, so that they must not pass through each other
+    undetected.
+    spent : fraction of the skin that movement may use up.
+    pace : displacement of a particle in a step (m), averaged over ``moves`` steps since the list was ``made``
+    (s).
     """
 
     ordered: ClassVar[bool] = True
@@ -87,14 +90,17 @@ class HalfList(NeighbourRows):
 
     @in_taichi_thread
     def wanted(self) -> ListSizes:
-        """Return sizes in which the lists last made, which may have overflowed, have room to spare."""
+        """Return sizes with spare room for the lists as last made, which may have overflowed."""
         mean = -(-5 * int(self.total.to_numpy().max()) // (4 * self.s.capacity))
         return self.sizes.joined(ListSizes(self.wanted_row(), mean))
 
     @in_taichi_thread
     def outlooks(self, newcomers: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return how far (m) each particle looked from its centre when lists were last made, then how far one
-        of each of some radii (m) would, of the worlds for which ``newcomers`` has any."""
+        """Return the search radii (m) of the particles when the lists were last made, then the radii for
+        inserted particles.
+
+        newcomers : radii (m) of the particles that may be inserted, for each world that is asked for.
+        """
         farthest, counts = self.grid.near.to_numpy(), self.s.count.to_numpy()
         most = max(map(len, newcomers))
         later = np.zeros((self.s.worlds, most))
@@ -109,8 +115,8 @@ class HalfList(NeighbourRows):
 
     @ti.kernel
     def _look(self, later: ti.types.ndarray()):  # type: ignore[valid-type]
-        """Put how far particles of these radii (m) look in place of them; each is in turn what a world has
-        room for beyond its last particle."""
+        """Replace radii (m) by the search radii (m) of particles of that size. Each is placed in the slot
+        after the last particle to compute it."""
         for w in range(self.s.worlds):
             for k in range(later.shape[1]):
                 i = self.s.count[w]
@@ -119,8 +125,8 @@ class HalfList(NeighbourRows):
                     later[w, k] = ti.cast(self.s.radius[w, i] + self.reach(w, i), ti.f64)
 
     def forget(self) -> None:
-        """Have every list made anew before it is used again, as the first of a run: nothing is known of how
-        fast particles move."""
+        """Have every list rebuilt before its next use and, as in a new run, discard the measured speed of the
+        particles."""
         super().forget()
         self.moves.fill(0)
         self.pace.fill(0.0)
@@ -131,7 +137,8 @@ class HalfList(NeighbourRows):
 
     @ti.func
     def reach_of(self, laws: ti.template(), w, i):  # type: ignore[valid-type]
-        """Return the widest gap (m) at which one of these laws acts between i and a particle no larger."""
+        """Return the largest gap (m) at which one of these laws acts between i and a particle of equal or
+        smaller size."""
         gap = ti.cast(0.0, self.s.real)
         for law in ti.static(laws):
             gap = ti.max(gap, law.reach(self.s, w, i))
@@ -139,8 +146,10 @@ class HalfList(NeighbourRows):
 
     @ti.func
     def widest(self, laws: ti.template(), w, i, j):  # type: ignore[valid-type]
-        """Return the widest distance (m) at which one of these laws, which act beyond contact, or contact
-        itself, acts between two; beyond all in a world that looks at all."""
+        """Return the largest distance (m) at which one of these laws, or contact, acts between two particles.
+
+        It exceeds every distance in a world that lists all pairs.
+        """
         s, distance = self.s, self.s.radius[w, i] + self.s.radius[w, j]
         if ti.static(len(laws) > 0):
             a, b = s.radius[w, i], s.radius[w, j]
@@ -175,7 +184,7 @@ class HalfList(NeighbourRows):
 
     @ti.func
     def moved(self, w):
-        """Note that particles have moved by at most ``displacement`` relative to the frame, along each
+        """Record that particles have moved by at most ``displacement`` relative to the frame, along each
         axis."""
         square, step = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
         self.moves[w] = self.moves[w] + 1
@@ -183,8 +192,8 @@ class HalfList(NeighbourRows):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
             square += self.since[w, k] ** 2
             step += self.s.displacement[w, k] ** 2
-        # Two that meet head on move past each other by twice as much. A list that has just been made longer
-        # does not know the smallest radius yet, and is about to be made anew.
+        # Two particles that move towards each other approach by twice the displacement. The smallest radius
+        # is unknown in a list that was just lengthened and is about to be rebuilt.
         smallest = ti.cast(self.grid.smallest[w], ti.f64)
         if ti.static(self.solid):
             outrun = smallest > 0.0 and step > smallest * smallest
@@ -198,7 +207,7 @@ class HalfList(NeighbourRows):
 
     @ti.func
     def sheared(self, w, elapsed):
-        """Return how far (m) shear alone may move two near particles past each other in a time (s)."""
+        """Return the distance (m) by which shear alone may displace two near particles in a time (s)."""
         g, widest = self.grid, ti.cast(0.0, self.s.real)
         for level in range(LEVELS):
             widest = ti.max(widest, g.largest[w, level] + g.widest[w, level])
@@ -206,37 +215,39 @@ class HalfList(NeighbourRows):
 
 
 REBUILD_COST = 100.0
-"""Making a list takes, for each particle, as long as this many listed pairs take in a step that do not act on
-each other. Measured in a bed of grains (docs/performance.md): some 900 ns beside 9."""
+"""Cost of a list rebuild per particle, in steps of a listed pair that does not interact.
+
+Measured in a bed of grains (docs/performance.md): some 900 ns against 9 ns.
+"""
 LEAST_SKIN, MOST_SKIN = 0.01, 0.5
-"""These bound the skin, in distances at which two of the smallest particles see each other."""
+"""Bounds of the skin, relative to the interaction distance of two of the smallest particles."""
 FEWEST_PAIRS = 1.0
-"""So many pairs of each particle are taken to see each other, where there are fewer: they may come to."""
+"""Least assumed number of interacting pairs per particle, as their number may rise later."""
 
 
 def watch_reach(half_list: HalfList) -> tuple[Phase, ...]:
-    """Return the phase that finds out whether laws have come to reach farther, where they reach beyond
-    contact at all."""
+    """Return the phase that detects increased interaction ranges, if any law acts beyond contact."""
     return (WatchReach(half_list),) if half_list.laws else ()
 
 
 def rebuild_half_list(half_list: HalfList) -> tuple[Phase, ...]:
-    """Return the phases that make the list anew."""
+    """Return the phases that rebuild the list."""
     grid = half_list.grid
     measure = (*measure_phases(grid, half_list), ChooseSkin(half_list))
     return (*measure, *cell_phases(grid), *search_rows(half_list))
 
 
 class ChooseSkin(OfGrid):
-    """This phase sets the skin: that of the scene, or the one with which steps should cost least.
+    """This phase sets the skin: the skin of the scene, or the one that minimizes the estimated cost.
 
-    A wider skin makes lists last longer, in proportion, and longer to go through. Particles that move by u in
-    a step take, of n pairs each that see each other within D, with a skin b
+    A wider skin makes lists last longer, in proportion, but adds pairs to scan. For particles that move by u
+    in a step and have n pairs each within the interaction distance D, the cost of a step with a skin b is
 
         2 u / b * REBUILD_COST + n (1 + b/D)^3
 
-    times what a pair costs, which is least where b (1 + b/D) = sqrt(2 u D REBUILD_COST / 3 n). Both u and n
-    are counts of the list before. No clock is asked, so a run makes its lists in the same steps again.
+    times the cost of a pair. It is smallest for b (1 + b/D) = sqrt(2 u D REBUILD_COST / 3 n). Both u and n
+    are taken from the previous list. No clock is read, so repeated runs rebuild their lists in the same
+    steps.
     """
 
     def __init__(self, half_list: HalfList) -> None:
@@ -270,7 +281,8 @@ class ChooseSkin(OfGrid):
 
 
 class WatchReach(OfParticles):
-    """This phase has the list made anew where particles look farther than it was made for."""
+    """This phase marks the list for a rebuild if the interaction range of a particle exceeds the range it was
+    made for."""
 
     def __init__(self, half_list: HalfList) -> None:
         super().__init__(half_list.grid)

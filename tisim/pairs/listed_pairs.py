@@ -1,9 +1,10 @@
-"""Sums over listed pairs: each pair is computed once, by its chunk, and reaches both in a fixed order.
+"""Sums over listed pairs: each pair is computed once, by its chunk, and added to both particles in a fixed
+order.
 
-On a CPU several pairs are computed at once, one lane each, in a loop whose results have no other readers, so
-compilers vectorise it. First the pairs within reach are partitioned off, without a branch: no CPU can foresee
-which of those they are that a list with a skin holds, and none of the lanes should be idle. Where some laws
-end at contact and others go on to a cut-off, each sort is computed for the pairs within its own reach.
+On a CPU several pairs are computed at once, one per lane, in a loop that compilers can vectorise because its
+results have no other readers. The pairs within the interaction range are first moved to the front without
+branches: in a list with a skin a CPU cannot predict which pairs these are, and no lane should be idle. If
+some laws end at contact and others at a cut-off, each kind is computed for the pairs within its own range.
 """
 
 from collections.abc import Sequence
@@ -23,13 +24,13 @@ if TYPE_CHECKING:
 
 
 LANES = 16
-"""So many pairs are computed at once on a CPU (measured: 8 are slower by 3 %)."""
+"""Pairs computed at once on a CPU (measured: 8 are slower by 3 %)."""
 
 
 @ti.data_oriented
 class ExportedTerms:
-    """Exported terms are what pairs of two chunks add to the sum of the particle that is not in theirs, until
-    its chunk reads them."""
+    """Exported terms are contributions of pairs of two chunks to the particle in the other chunk, stored
+    until its chunk reads them."""
 
     def __init__(self, pairs: PairChunks, components: int) -> None:
         self.pairs, self.components = pairs, components
@@ -56,7 +57,7 @@ class ExportedTerms:
 
 
 class PartOfSum(PerChunk):
-    """This phase does a part of a sum, for each chunk."""
+    """Base of the phases that do a part of a sum, for each chunk."""
 
     conditional = True
 
@@ -71,7 +72,7 @@ class PartOfSum(PerChunk):
 
 
 class ComputePairs(PartOfSum):
-    """This phase computes the pairs of a chunk by some of the laws."""
+    """Base of the phases that compute the pairs of a chunk by some of the laws."""
 
     def __init__(self, total: "PairSum", exported: ExportedTerms, laws: "ListedLaws") -> None:
         super().__init__(total, exported)
@@ -79,21 +80,21 @@ class ComputePairs(PartOfSum):
 
     @ti.func
     def note_memory(self, w):
-        """Note that pairs remember what the particles have not stored, where the sum brings it up to date."""
+        """Mark the contact history as newer than the values stored on particles, if this sum updates it."""
         if ti.static(len(self.laws.remembering) > 0) and self.total.updates_memory(w):
             self.p.unsaved[w] = 1
 
     @ti.func
     def process_pair(self, w, c, m, values):
-        """Make use of the values computed for pair m of chunk c."""
+        """Use the values computed for pair m of chunk c."""
 
     @ti.func
     def process_distant_pair(self, w, c, m):
-        """Take note that pair m of chunk c is farther apart than any of the laws reaches."""
+        """Handle pair m of chunk c, which is beyond the range of all of these laws."""
 
     @ti.func
     def compute_pairs(self, w, c):
-        """Compute the pairs of a chunk that are within reach, and process each, in the order of the list."""
+        """Compute the pairs of a chunk within the interaction range, and process each in list order."""
         p = self.p
         begin, end = p.begin[w, c], p.end[w, c]
         near = self.partition_pairs(w, begin, end)
@@ -109,8 +110,8 @@ class ComputePairs(PartOfSum):
 
     @ti.func
     def partition_pairs(self, w, begin, end):
-        """Put pairs within reach first into ``partitioned``, in the order of the list; return where they
-        end."""
+        """Put the pairs within range first into ``partitioned``, in list order; return the end of these
+        pairs."""
         p, s, t = self.p, self.s, self.s.time[w]
         near, far = begin, end - 1
         for m in range(begin, end):
@@ -124,18 +125,18 @@ class ComputePairs(PartOfSum):
 
     @ti.func
     def values_of(self, w, m):
-        """Return the values that listed pair m comes to."""
+        """Return the values computed for listed pair m."""
         s, i, j, t = self.s, self.p.first[w, m], self.p.second[w, m], self.s.time[w]
         d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
         return self.total.compute_pair(self.laws, w, m, i, j, d, d.norm(), t)
 
     @ti.func
     def compute_block(self, w, c, begin, end):
-        """Compute as many pairs as there are lanes, or as there are before ``end``, and process each."""
+        """Compute one pair per lane, up to ``end``, and process each."""
         p, s = self.p, self.s
         lanes = [ti.Vector([0.0] * self.lanes, s.real) for _ in ti.static(range(self.laws.values))]
         for lane in range(self.lanes):
-            # Lanes without a pair of their own compute the last one again, and nobody reads it.
+            # Lanes beyond the last pair compute it again; their results are not read.
             values = self.values_of(w, p.partitioned[w, ti.min(begin + lane, end - 1)])
             for k in ti.static(range(self.laws.values)):
                 lanes[k][lane] = values[k]
@@ -147,10 +148,10 @@ class ComputePairs(PartOfSum):
 
 
 class AddPairs(ComputePairs):
-    """This phase computes the pairs of a chunk, and adds each to both particles, or to the one that is in
-    it.
+    """This phase computes the pairs of a chunk and adds each to the particles of the pair that are in the
+    chunk.
 
-    first : whether nothing has been added of pairs so far.
+    first : whether these are the first pair terms of the sum.
     """
 
     def __init__(self, total: "PairSum", exported: ExportedTerms, laws: "ListedLaws", first: bool) -> None:
@@ -183,7 +184,7 @@ class AddPairs(ComputePairs):
 
     @ti.func
     def export(self, w, m, term):
-        """Leave what pair m adds to the particle of another chunk."""
+        """Store the contribution of pair m to the particle of another chunk."""
         if ti.static(self.first):
             self.exported.write(w, m, term)
         else:
@@ -197,9 +198,9 @@ class AddPairs(ComputePairs):
 
 
 class CloseSum(PartOfSum):
-    """This phase adds what other chunks have exported to the particles of this one; then the sums are done.
+    """This phase adds the terms exported by other chunks to the particles of this one, and finishes the sums.
 
-    after : what follows in a step with each particle at once, while it is in the cache.
+    after : further phases of the step that run for each particle at once, while it is in the cache.
     """
 
     def __init__(
@@ -222,15 +223,17 @@ class CloseSum(PartOfSum):
             if ti.static(self.listed_only):
                 result += self.total.start(w, i, t)
             self.total.finish(w, i, result, t)
-            # What has failed stays as it was, so that the law at fault can be found.
+            # After a failure the state stays unchanged, so that the law at fault can be found.
             if self.s.failed[w] == 0 and self.s.occasion[w] == Occasion.STEP:
                 for phase in ti.static(self.after):
                     phase.run(w, i)
 
 
 def fuse(step: Sequence[Item], sums: Sequence[Item]) -> tuple[list[Item], list[Item]]:
-    """Return the items of a step, in which what is local follows the end of a sum at once, and sums that are
-    taken there and elsewhere, with such ends."""
+    """Fuse local phases that follow a sum into the end of that sum.
+
+    Returns the items of the step, and the items of the sums with the same fused ends.
+    """
     fused: list[Item] = []
     ends: dict[Item, Item] = {}
     for item in step:
@@ -244,8 +247,7 @@ def fuse(step: Sequence[Item], sums: Sequence[Item]) -> tuple[list[Item], list[I
 
 
 def sum_phases(total: "PairSum", exported: ExportedTerms | None) -> tuple[Phase, ...]:
-    """Return the phases of a sum: over all others, and over the pairs that are listed, where there are
-    any."""
+    """Return the phases of a sum: over all others, then over the listed pairs if there are any."""
     if exported is None or not total.short_ranged:
         return (total,)
     before = (total,) if total.long_ranged else ()
@@ -255,8 +257,7 @@ def sum_phases(total: "PairSum", exported: ExportedTerms | None) -> tuple[Phase,
 
 
 class AdvanceParticles(PerParticle):
-    """This phase brings what particles remember by themselves up to date with the end of a step found by
-    trial."""
+    """This phase updates the memory of single particles after a step found by trial."""
 
     def __init__(self, total: "SumForces") -> None:
         super().__init__(total.s)
@@ -268,12 +269,12 @@ class AdvanceParticles(PerParticle):
 
 
 def advance_phases(total: "SumForces", exported: ExportedTerms) -> tuple[Phase, ...]:
-    """Return the phases that bring up to date what pairs remember."""
+    """Return the phases that update the contact history."""
     return tuple(AdvancePairs(total, exported, laws) for laws in total.listed_laws() if laws.remembering)
 
 
 class AdvancePairs(ComputePairs):
-    """This phase brings what pairs remember up to date with the end of a step that was found by trial."""
+    """This phase updates the contact history after a step found by trial."""
 
     @ti.func
     def run(self, w, c):

@@ -1,4 +1,4 @@
-"""The lists of near pairs that a scene calls for, as steppers and operators see them: one object for all."""
+"""The neighbour lists of a scene, combined in one object for steppers and operators."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class NeighbourLists:
-    """The neighbour lists have to hear how far particles have moved: the list of events and step control,
-    ``near``, and the ``pairs`` of short-ranged forces."""
+    """The neighbour lists of a scene: ``near`` for events and step control, and ``pairs`` for short-ranged
+    forces.
+
+    They must be told how far particles have moved.
+    """
 
     def __init__(self, s: State, near: NearList | None, pairs: "PairChunks | None") -> None:
         self.s, self.near, self.pairs, self.watched = s, near, pairs, near is not None
@@ -24,21 +27,21 @@ class NeighbourLists:
 
     @ti.func
     def moved(self, w):
-        """Note that particles have moved by at most ``displacement`` relative to the frame, along each
+        """Record that particles have moved by at most ``displacement`` relative to the frame, along each
         axis."""
         for one in ti.static(self.lists):
             one.moved(w)
 
     @ti.func
     def invalidate(self, w):
-        """Have all lists made anew: particles have been put elsewhere."""
+        """Have all lists rebuilt, because particles have been moved other than by a step."""
         for one in ti.static(self.lists):
             one.invalidate(w)
 
     @ti.func
     def sure(self, w):
-        """Return the gap (m) between surfaces within which all pairs are offered to the step control; 0, for
-        no limit, where all pairs are."""
+        """Return the gap (m) between surfaces within which the step control gets all pairs; 0 stands for no
+        limit."""
         gap = ti.cast(0.0, self.s.real)
         if ti.static(self.watched):
             gap = self.near.sure(w)
@@ -49,13 +52,13 @@ class NeighbourLists:
         return tuple(one if isinstance(one, NeighbourRows) else one.half_list for one in self.lists)
 
     def forget(self) -> None:
-        """Have all lists made anew before they are used again."""
+        """Have all lists rebuilt before their next use."""
         for one in self.lists:
             one.forget()
 
     def wanted(self, sizes: ListSizes) -> ListSizes:
-        """Return sizes, ``sizes`` at least, in which the lists last made, which may have overflowed, have
-        room to spare."""
+        """Return sizes, at least ``sizes``, with spare room for the lists as last made, which may have
+        overflowed."""
         if self.pairs is not None:
             sizes = sizes.joined(self.pairs.half_list.wanted())
         if self.near is not None:

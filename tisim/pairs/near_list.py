@@ -1,8 +1,9 @@
-"""Pairs whose surfaces are near, for events and step control: all pairs in small worlds, rows in others.
+"""Pairs with nearby surfaces, for events and step control: all pairs in small worlds, neighbour rows in
+others.
 
-A list is made anew when particles have moved, relative to the world's own frame, so far that a pair it lacks
-could matter. Along each axis it is meant to last some steps: one in which all fly at much the same speed
-needs no skin to speak of.
+A list is rebuilt when particles have moved, relative to the frame of the world, so far that a missing pair
+could matter. The skin along each axis is chosen for some steps. If all particles move at nearly the same
+velocity, almost no skin is needed.
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ from tisim.state.bound import Bound
 from tisim.state.state import State
 
 SMALL_WORLD = 48
-"""Worlds of at most this many particles look at all pairs; ``listed_above`` of the state is this at first."""
+"""Worlds of at most this many particles check all pairs; initial value of ``listed_above``."""
 HORIZON = 0.15
-"""Every pair is sure to be offered within this gap, in mean distances between particles."""
+"""Every pair within this gap is offered, in units of the mean distance between particles."""
 STEPS_OF_SKIN = 3.0
-"""A list is meant to last this many steps: its skin along each axis is what particles move in them."""
+"""Intended lifetime of a list in steps; the skin along each axis is the displacement in this many steps."""
 
 
 @ti.data_oriented
 class NearList(NeighbourRows):
     """The near list offers the near pairs of every world.
 
-    gap : between surfaces (m), within which the list has every pair until it is made anew.
+    gap : gap between surfaces (m) within which the list has every pair until it is rebuilt.
     """
 
     def __init__(self, s: State, domain: Bound[Domain], row: int) -> None:
@@ -46,12 +47,12 @@ class NearList(NeighbourRows):
 
     @ti.func
     def listed(self, w):
-        """Return whether a world has a list, and does not look at all pairs."""
+        """Return whether a world uses a list instead of checking all pairs."""
         return self.s.count[w] > self.s.listed_above[w]
 
     @ti.func
     def offered(self, w, i, listed):
-        """Return how many candidates ``candidate`` offers particle i."""
+        """Return the number of candidates that ``candidate`` offers to particle i."""
         n = self.s.count[w]
         if listed:
             n = self.size[w, i]
@@ -59,7 +60,7 @@ class NearList(NeighbourRows):
 
     @ti.func
     def candidate(self, w, i, k, listed):
-        """Return the k-th particle that may be near i; in a world that looks at all pairs, any."""
+        """Return the k-th candidate near i; without a list, particle k."""
         j = k
         if listed:
             j = self.index[w, i, k]
@@ -67,29 +68,30 @@ class NearList(NeighbourRows):
 
     @ti.func
     def leads(self, w, i, j):
-        """Return whether i comes first in the pair: the larger does, and of equals the lower index."""
+        """Return whether i is first in the pair: the larger particle, or at equal size the one of lower
+        index."""
         a, b = self.s.radius[w, i], self.s.radius[w, j]
         return a > b or (a == b and i < j)
 
     @ti.func
     def spacing(self, w):
-        """Return the mean distance (m) between particles: the cube root of the volume at the start for
-        each."""
+        """Return the mean distance (m) between particles: the cube root of the initial volume per
+        particle."""
         return ti.cast(elementary.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
 
     @ti.func
     def horizon(self, w):
-        """Return the gap between surfaces (m) within which every pair is sure to be offered."""
+        """Return the gap between surfaces (m) within which every pair is offered."""
         return HORIZON * self.spacing(w)
 
     @ti.func
     def sure(self, w):
-        """Return ``horizon`` (m) where only near pairs are offered; 0, for no limit, where all pairs are."""
+        """Return ``horizon`` (m) in a world with a list; 0, for no limit, if all pairs are offered."""
         return ti.select(self.listed(w), self.horizon(w), 0.0)
 
     @ti.func
     def moved(self, w):
-        """Note that particles have moved by at most ``displacement`` relative to the frame, along each
+        """Record that particles have moved by at most ``displacement`` relative to the frame, along each
         axis."""
         for k in ti.static(range(3)):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
@@ -102,7 +104,7 @@ class NearList(NeighbourRows):
 
     @ti.func
     def lists(self, w, i, j):
-        # Of equals each lists half of those around it.
+        # Between equal particles each one lists half of the pairs.
         a, b = self.s.radius[w, i], self.s.radius[w, j]
         return a < b or (a == b and (i < j) != ((i + j) % 2 > 0))
 
@@ -113,14 +115,14 @@ class NearList(NeighbourRows):
 
 
 def update_near_list(near: NearList) -> tuple[Item, ...]:
-    """Return the items that bring the list up to date where it is due."""
+    """Return the items that rebuild the list if this is due."""
     grid = near.grid
     measure = (BeginNearList(near), *measure_phases(grid, near), ChooseSkinByAxis(near))
     return (RebuildNearList(near, (*measure, *cell_phases(grid), *search_rows(near), EndNearList(near))),)
 
 
 class RebuildNearList(Repeat):
-    """This item makes the list of a world anew, once, when it is due."""
+    """This item rebuilds the list of a world once if this is due."""
 
     def __init__(self, near: NearList, items: tuple[Phase, ...]) -> None:
         super().__init__(items)
@@ -132,7 +134,7 @@ class RebuildNearList(Repeat):
 
 
 class OfNearList(OfGrid):
-    """This phase works on the near list of a world."""
+    """Base of the phases that work on the near list of a world."""
 
     def __init__(self, near: NearList) -> None:
         super().__init__(near.grid)
@@ -140,7 +142,7 @@ class OfNearList(OfGrid):
 
 
 class BeginNearList(OfNearList):
-    """This phase notes within which gap pairs are to be listed."""
+    """This phase sets the gap within which pairs are listed."""
 
     @ti.func
     def run(self, w, _k):
@@ -148,8 +150,8 @@ class BeginNearList(OfNearList):
 
 
 class ChooseSkinByAxis(OfNearList):
-    """This phase chooses the skin along each axis: what particles move in some steps like the last one, and
-    at most their mean distance."""
+    """This phase chooses the skin along each axis: the displacement in some steps like the last one, at most
+    the mean distance."""
 
     @ti.func
     def run(self, w, _k):
@@ -162,7 +164,7 @@ class ChooseSkinByAxis(OfNearList):
 
 
 class EndNearList(OfNearList):
-    """This phase declares the list as good as new."""
+    """This phase marks the list as up to date."""
 
     @ti.func
     def run(self, w, _k):

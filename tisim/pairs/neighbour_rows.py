@@ -1,14 +1,13 @@
-"""Rows of neighbours, as long as needed: what all lists of pairs have in common.
+"""Neighbour rows, the common part of all pair lists.
 
-A particle lists those at least as large as itself, of which few find room around it, so rows are short
-whatever the ratio of sizes. A row that is too short stops its world, and lists are made longer
-(CompiledWorlds.grow_lists). What a pair does depends on its distance, never on whether the list was due:
-results do not depend on when lists were made.
+A particle lists neighbours of at least its own size. Few of these fit around it, so rows are short for any
+size ratio. If a row overflows, its world stops and the lists are lengthened (CompiledWorlds.grow_lists).
+Interactions depend on the distance of a pair only, so results do not depend on when lists were made.
 
-In the phases that make rows anew each pair is found once, and entered with its smaller particle. Within a
-level of cells a particle looks at those that come after it in the order of cells. Of two levels the particles
-of one search the other: those of the one that has less to search, so that a few large grains among many small
-ones look for these, but many large ones are looked for.
+A rebuild finds each pair once and enters it in the row of the smaller particle. Within a level of cells a
+particle searches only the particles after it in cell order. Between two levels, the particles of the level
+with less work search the other one. A few large grains among many small ones therefore search for the small
+ones, while many large grains are searched for.
 """
 
 from __future__ import annotations
@@ -28,18 +27,20 @@ from tisim.state.state import State
 from tisim.state.status import WorldStatus
 
 ALL_PAIRS = 2**30
-"""This is the ``listed_above`` of a world in which all pairs are listed, however far apart."""
+"""Value of ``listed_above`` for a world in which all pairs are listed at any distance."""
 
 
 @ti.data_oriented
 class NeighbourRows:
     """Neighbour rows hold the listed pairs of every world: ``index[w, i, k]`` for k below ``size[w, i]``.
 
-    sorted_position, sorted_radius, sorted_near : what a search reads of the particles, in the order of cells.
-    searched : which levels the particles of each level search, a bit for each.
-    row : room in a row. ordered : whether a row is in order of index. images : 1 where images that move past
-    the box lie in other cells than the particles, and are looked for apart. stale : whether the rows of a
-    world are to be made anew. longest : of the rows wanted last.
+    sorted_position, sorted_radius, sorted_near : copies of the particles in cell order, read by a search.
+    searched : bit mask of the levels that the particles of each level search.
+    row : capacity of a row. ordered : whether rows are sorted by index.
+    images : 1 if periodic images move past the box and thus lie in other cells, so that they are searched
+    separately; else 0.
+    stale : whether the rows of a world must be rebuilt. longest : length required by the longest row of the
+    last rebuild.
     """
 
     ordered: ClassVar[bool] = False
@@ -70,51 +71,54 @@ class NeighbourRows:
 
     @in_taichi_thread
     def wanted_row(self) -> int:
-        """Return the room in which the longest row of those last made, which may have overflowed, has some to
-        spare."""
+        """Return a row capacity with spare room for the longest row as last made, which may have
+        overflowed."""
         longest = int(self.longest.to_numpy().max())
-        # Compiling for longer rows takes seconds: where particles come together, it is done once or twice.
+        # Compiling for longer rows takes seconds; doubling them limits this to once or twice.
         return max(-(-5 * longest // 4), 2 * self.row if longest > self.row else self.row)
 
     @in_taichi_thread
     def forget(self) -> None:
-        """Have every list made anew before it is used again."""
+        """Have every list rebuilt before its next use."""
         self.stale.fill(1)
 
     @ti.func
     def invalidate(self, w):
-        """Have the list of a world made anew before it is used again."""
+        """Have the list of a world rebuilt before its next use."""
         self.stale[w] = 1
 
     @ti.func
     def reach(self, w, i):
-        """Return how far (m) beyond the surface of a particle no larger i looks at most."""
+        """Return the largest range (m) of i beyond the surface of a particle of equal or smaller size."""
         return ti.cast(0.0, self.s.real)
 
     @ti.func
     def lists(self, w, i, j):
-        """Return whether the pair is i's to list; j is not i."""
+        """Return whether the pair is listed by i; j is not i."""
         return 0
 
     @ti.func
     def leaves_out(self, w, i, j):
-        """Return whether the pair is not listed, however near."""
+        """Return whether the pair is excluded from the list at any distance."""
         return False
 
     @ti.func
     def sees(self, d, distance, skin):
-        """Return whether two that are d (m) apart may come within a distance (m) before the list is made
-        anew, with this skin along each axis (m)."""
+        """Return whether two particles at separation d (m) may come within a distance (m) before the next
+        rebuild.
+
+        skin : neighbour-list skin along each axis (m).
+        """
         return 0
 
 
 def search_rows(rows: NeighbourRows) -> tuple[Phase, ...]:
-    """Return the phases that make the rows anew; their particles have been sorted into cells."""
+    """Return the phases that rebuild the rows; particles must be sorted into cells already."""
     return BeginRows(rows), CopySorted(rows), SearchRows(rows), EndRows(rows)
 
 
 class BeginRows(OfGrid):
-    """This phase chooses which levels the particles of each level search."""
+    """This phase chooses the levels that the particles of each level search."""
 
     def __init__(self, rows: NeighbourRows) -> None:
         super().__init__(rows.grid)
@@ -139,7 +143,7 @@ class BeginRows(OfGrid):
 
     @ti.func
     def work(self, w, level, reach):
-        """Return how many rows of cells of a level are within ``reach`` (m)."""
+        """Return the number of rows of cells of a level within ``reach`` (m)."""
         g, rows = self.g, ti.cast(1.0, self.s.real)
         for k in ti.static((1, 2)):
             cells = 2.0 * (reach + g.skin[w, k]) / g.cell[w, level, k] + 1.0
@@ -148,8 +152,7 @@ class BeginRows(OfGrid):
 
 
 class CopySorted(OfParticles):
-    """This phase copies what a search reads in the order of cells, in which it is read, and empties all
-    rows."""
+    """This phase copies the particle data of the search into cell order, and empties all rows."""
 
     def __init__(self, rows: NeighbourRows) -> None:
         super().__init__(rows.grid)
@@ -163,8 +166,8 @@ class CopySorted(OfParticles):
 
 
 class SearchRows(OfBlocks):
-    """This phase lets each particle look for those near it, in the order of cells: those that follow each
-    other search the same ones."""
+    """This phase searches the neighbours of each particle, in cell order, because consecutive particles
+    search the same cells."""
 
     def __init__(self, rows: NeighbourRows) -> None:
         super().__init__(rows.grid)
@@ -179,9 +182,9 @@ class SearchRows(OfBlocks):
 
     @ti.func
     def search(self, w, m, turn):
-        """Enter the pairs of the m-th in order of cells with images of this ``turn``."""
+        """Enter the pairs of the m-th particle in cell order with images of this ``turn``."""
         n, g, t = self.n, self.g, self.s.time[w]
-        # Copies: the compiler cannot know that writing a row does not change what it reads.
+        # Local copies: the compiler cannot know that writing a row does not change these values.
         i, place, side = g.order[w, m], n.sorted_position[w, m], g.domain.side(w)
         radius, near, skin = n.sorted_radius[w, m], n.sorted_near[w, m], g.skin_along(w)
         r, every = g.domain.seen_from(w, place, turn, t), self.s.listed_above[w] >= ALL_PAIRS
@@ -200,13 +203,14 @@ class SearchRows(OfBlocks):
                     if ti.static(not g.joined[k]):
                         first[k], last[k] = ti.max(first[k], 0), ti.min(last[k], dims[k] - 1)
                     if last[k] - first[k] >= dims[k] or every:
-                        # Around the whole box: each cell once.
+                        # The range covers the whole box, so each cell is visited once.
                         first[k], last[k], whole = 0, dims[k] - 1, True
                 for z in range(first[2], last[2] + 1):
                     for y in range(first[1], last[1] + 1):
                         line = self.inside(z, dims[2]) * dims[1] + self.inside(y, dims[1])
                         row = g.offset[w, level] + dims[0] * line
-                        # Cells of a row follow each other in memory; across a joined face in two stretches.
+                        # Cells of a row are contiguous in memory; across a joined face they form two
+                        # stretches.
                         x = first[0]
                         while x <= last[0]:
                             begin = self.inside(x, dims[0])
@@ -217,7 +221,8 @@ class SearchRows(OfBlocks):
                                 there = n.sorted_position[w, q]
                                 d = there - here
                                 if ti.static(n.images > 0) or whole:
-                                    # Not as forces see it: the next step may take either through a face.
+                                    # Not the separation used by forces, as the next step may take either
+                                    # particle through a face.
                                     d = g.domain.nearest(w, place, there, t)
                                 smaller = ti.min(radius, n.sorted_radius[w, q])
                                 seen = n.sees(d, smaller + ti.max(sight, n.sorted_near[w, q]), skin)
@@ -229,7 +234,7 @@ class SearchRows(OfBlocks):
 
     @ti.func
     def enter(self, w, i, j):
-        """Enter a pair with the one that lists it."""
+        """Enter a pair in the row of the particle that lists it."""
         n, mine = self.n, self.n.lists(w, i, j)
         lister, other = ti.select(mine, i, j), ti.select(mine, j, i)
         k = next_number(n.size, w, lister, ti.static(self.g.shared()))
@@ -238,17 +243,17 @@ class SearchRows(OfBlocks):
 
     @ti.func
     def turns(self, c, cells):
-        """Return which image of the box a cell lies in, along each axis: -1, 0 or 1."""
+        """Return the image of the box that a cell lies in, along each axis: -1, 0 or 1."""
         return ti.select(c >= cells, 1, 0) - ti.select(c < 0, 1, 0)
 
     @ti.func
     def inside(self, c, cells):
-        """Return the index of a cell that may lie across a joined face, by less than one turn."""
+        """Return the index of a cell that may lie less than one box length across a joined face."""
         return c + ti.select(c < 0, cells, 0) - ti.select(c >= cells, cells, 0)
 
 
 class EndRows(OfBlocks):
-    """This phase asks whether all pairs have found room, and puts rows in order where they are to be."""
+    """This phase checks whether all pairs fit, and sorts the rows that must be ordered."""
 
     def __init__(self, rows: NeighbourRows) -> None:
         super().__init__(rows.grid)

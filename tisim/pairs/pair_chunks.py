@@ -1,13 +1,14 @@
-"""The listed pairs, laid out so that each is computed once and the sums have one order.
+"""The listed pairs, arranged so that each is computed once and every sum has one fixed order.
 
-Particles are taken in chunks of a fixed number of slots. The pairs of a chunk follow each other: first those
-within it, then those that one of its particles lists with a particle of another chunk. A chunk is the work of
-one thread. It adds a pair within it to both particles; of another it adds one side, and leaves the other in
-the slot of the pair, where the chunk of that particle fetches it. So every sum has one writer, and an order
-that depends on the indices of particles alone: the same bits on one thread and on many.
+Particles are divided into chunks of a fixed number of slots, and each chunk is the work of one thread. The
+pairs of a chunk are contiguous: first the inner pairs, then the pairs that one of its particles lists with a
+particle of another chunk. The thread adds an inner pair to both particles. For an outer pair it adds one side
+and stores the other in the slot of the pair, from which the chunk of the other particle fetches it. Every sum
+therefore has a single writer and an order that depends only on particle indices, with bitwise equal results
+on one thread and on many.
 
-What touching pairs remember lies with them. Before indices move, or a list is made anew, it is stored with
-the particles, under the id of the other, from where a new list recalls it.
+The contact history is stored with the pairs. Before indices change or a list is rebuilt, it is stored on the
+particles, under the id of the partner, and a new list reads it from there.
 """
 
 from typing import TYPE_CHECKING
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from tisim.pairs.contact_memory import ContactMemory
 
 CHUNK_SLOTS = 512
-"""A chunk has this many slots on a CPU: the state of so many particles stays in the nearest cache. On a GPU
-it has one."""
+"""Slots of a chunk on a CPU, chosen so that the state of its particles fits in the nearest cache; 1 on a
+GPU."""
 
 
 @ti.data_oriented
@@ -34,11 +35,13 @@ class PairChunks:
     """Pair chunks hold the pairs of every world: particles ``first[w, m]`` and ``second[w, m]``, the one of
     lower id first.
 
-    Chunk c has its inner pairs from ``begin[w, c]`` to ``outer[w, c]``, and the others up to ``end[w, c]``.
-    ``partitioned`` has room for the same slots in the order of a sum: those of pairs within reach come first.
-    Particle i fetches ``fetched[w, m]``, slots of pairs, for m from ``fetch_begin[w, i]`` on. ``unsaved[w]``
-    says whether pairs remember what the particles have not stored: sums that bring memory up to date set it.
-    A list that is made for a trial state may lack pairs of the last good one, whose memory stays stored.
+    The inner pairs of chunk c run from ``begin[w, c]`` to ``outer[w, c]``, and its outer pairs from there to
+    ``end[w, c]``. ``partitioned`` holds the same pairs in the order of a sum: pairs within the interaction
+    range come first. Particle i fetches the pair slots ``fetched[w, m]`` for m from ``fetch_begin[w, i]`` on.
+
+    ``unsaved[w]`` says whether the contact history is newer than the values stored on the particles; sums
+    that update the history set it. A list made for a trial state may lack pairs of the last good state; their
+    history stays stored on the particles.
     """
 
     def __init__(self, half_list: HalfList, memories: tuple["ContactMemory", ...]) -> None:
@@ -53,7 +56,7 @@ class PairChunks:
         )
         self.begin, self.outer, self.end, self.unsaved = (ti.field(ti.i32) for _ in range(4))
         builder = Builder()
-        # A pair and its memory are one record: they are read together.
+        # A pair and its history are one record, because they are read together.
         records = (self.first, self.second, *(value for one in memories for value in one.make_fields()))
         builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)
         for column in (self.partitioned, self.fetched):
@@ -64,7 +67,7 @@ class PairChunks:
             builder.dense(ti.i, s.worlds).dense(ti.j, self.chunks).place(column)
         builder.dense(ti.i, s.worlds).place(self.unsaved)
         self.tree = Tree(builder)
-        # Where the pairs of each chunk end, and where those that each particle fetches do.
+        # Ends of the pairs of each chunk, and of the slots that each particle fetches.
         self.ends = PrefixSum(s, PerChunk(self), self.end, self.end)
         self.fetch_ends = PrefixSum(s, PerParticle(s), self.fetch_count, self.fetch_begin)
 
@@ -74,13 +77,13 @@ class PairChunks:
 
     @in_taichi_thread
     def forget(self) -> None:
-        """Have every list made anew before it is used again; particles know what they have stored."""
+        """Have every list rebuilt before its next use; the stored history of the particles is up to date."""
         self.half_list.forget()
         self.unsaved.fill(0)
 
     @ti.func
     def moved(self, w):
-        """Note how far particles have moved in a step."""
+        """Record how far particles have moved in a step."""
         self.half_list.moved(w)
 
     @ti.func
@@ -90,7 +93,7 @@ class PairChunks:
 
     @in_taichi_thread
     def store_memory(self) -> None:
-        """Store what pairs remember with the particles, so that these can be read."""
+        """Store the contact history on the particles, so that their fields can be read."""
         if self.memories:
             self._store_all()
 
@@ -108,7 +111,7 @@ class PairChunks:
                 one.clear(w, i)
         for m in range(self.begin[w, c], self.end[w, c]):
             i, j = self.first[w, m], self.second[w, m]
-            # Within a chunk either may store it; else the one whose chunk this is.
+            # Within a chunk either particle may store the history; otherwise the particle of this chunk does.
             owner, other = i, j
             if self.chunk_of(i) != c or (m < self.outer[w, c] and self.half_list.lists(w, j, i)):
                 owner, other = j, i
@@ -117,19 +120,20 @@ class PairChunks:
 
     @ti.func
     def invalidate(self, w):
-        """Have the list made anew; particles have been put elsewhere, and know what they have stored."""
+        """Have the list rebuilt; particles have been moved other than by a step, and their stored history is
+        up to date."""
         self.half_list.stale[w], self.unsaved[w] = 1, 0
 
 
 class PerWorld(Phase):
-    """This phase works on the pairs of a world."""
+    """Base of the phases that work on the pairs of a world."""
 
     def __init__(self, pairs: PairChunks) -> None:
         self.p, self.s = pairs, pairs.s
 
 
 class PerChunk(PerWorld):
-    """This phase works on the pairs of each chunk."""
+    """Base of the phases that work on the pairs of each chunk."""
 
     light = False
 

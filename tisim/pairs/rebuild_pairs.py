@@ -1,4 +1,4 @@
-"""The phases that lay listed pairs out anew, where the list is due, with what they remember."""
+"""Phases that rebuild the listed pairs, with their contact history, if the list is due."""
 
 from tisim.backend.taichi import ti
 from tisim.pairs.cell_phases import sort_row
@@ -9,7 +9,7 @@ from tisim.state.status import WorldStatus
 
 
 def update_pairs(pairs: PairChunks) -> tuple[Item, ...]:
-    """Return the items that bring the pairs up to date where the list is due."""
+    """Return the items that rebuild the pairs if the list is due."""
     store = (StoreMemory(pairs),) if pairs.memories else ()
     place = (CountPairs(pairs), *pairs.ends.phases(), PlacePairs(pairs), FillPairs(pairs))
     fetch = (*pairs.fetch_ends.phases(), EnterFetches(pairs), SortFetches(pairs))
@@ -19,7 +19,7 @@ def update_pairs(pairs: PairChunks) -> tuple[Item, ...]:
 
 
 class RebuildPairs(Repeat):
-    """This item makes the pairs of a world anew, once, when its list is due."""
+    """This item rebuilds the pairs of a world once if its list is due."""
 
     usual = 0
 
@@ -33,7 +33,7 @@ class RebuildPairs(Repeat):
 
 
 class StoreMemory(PerChunk):
-    """This phase stores what pairs remember with the particles, where these have not stored it yet."""
+    """This phase stores the contact history on the particles unless it is stored already."""
 
     conditional = True
 
@@ -47,7 +47,7 @@ class StoreMemory(PerChunk):
 
 
 class BeginRebuild(PerWorld):
-    """After this phase the particles have stored what there is to remember."""
+    """This phase marks the contact history as stored on the particles."""
 
     @ti.func
     def run(self, w, _k):
@@ -55,7 +55,7 @@ class BeginRebuild(PerWorld):
 
 
 class CountPairs(PerChunk):
-    """This phase counts how many pairs of a chunk are within it, and how many not."""
+    """This phase counts the inner and outer pairs of each chunk."""
 
     @ti.func
     def run(self, w, c):
@@ -70,7 +70,7 @@ class CountPairs(PerChunk):
 
 
 class PlacePairs(PerChunk):
-    """This phase finds where the pairs of each chunk begin, and where those do that are not within it."""
+    """This phase finds the first inner and the first outer pair of each chunk."""
 
     @ti.func
     def run(self, w, c):
@@ -86,7 +86,8 @@ class PlacePairs(PerChunk):
 
 
 class FillPairs(PerChunk):
-    """This phase enters the pairs of a chunk, in the order of who lists them, and what they remember."""
+    """This phase enters the pairs of a chunk, in the order of the particles that list them, with their
+    contact history."""
 
     @ti.func
     def run(self, w, c):
@@ -108,8 +109,7 @@ class FillPairs(PerChunk):
 
 
 class EnterFetches(PerChunk):
-    """This phase tells the other particle of each pair that is not within a chunk, in whatever order threads
-    come."""
+    """This phase enters each outer pair with its particle in another chunk, in any order of threads."""
 
     @ti.func
     def run(self, w, c):
@@ -120,7 +120,7 @@ class EnterFetches(PerChunk):
 
 
 class SortFetches(PerChunk):
-    """This phase orders what each particle fetches by place in the list."""
+    """This phase sorts the slots that each particle fetches by their position in the list."""
 
     @ti.func
     def run(self, w, c):
@@ -130,7 +130,7 @@ class SortFetches(PerChunk):
 
 
 class EndRebuild(PerWorld):
-    """This phase declares the list as good as new."""
+    """This phase marks the list as up to date."""
 
     @ti.func
     def run(self, w, _k):

@@ -1,4 +1,4 @@
-"""What follows a step as a whole: operators act on the world, and slots of removed particles are filled."""
+"""Work after a step: operators act on the world, and the slots of removed particles are filled."""
 
 from typing import Any
 
@@ -13,26 +13,25 @@ from tisim.state.state import State
 
 
 def rearrange(slots: VacatedSlots, operators: tuple[Bound[Any], ...]) -> tuple[Item, ...]:
-    """Return the items in which operators act on the world as a whole, and vacated slots are filled."""
+    """Return the items in which operators act on the world and vacated slots are filled."""
     s, fill = slots.s, FillSlots(slots)
     acts = tuple(item for operator in acting(operators) for item in act(s, operator))
-    # Before operators too: a slot that a merger has freed has room for a fragment.
+    # Slots are also filled before the operators act, so that a slot freed by a merger is free for a fragment.
     return (fill, *acts, fill, ForgetPairs(s)) if acts else (fill, ForgetPairs(s))
 
 
 def acting(operators: tuple[Bound[Any], ...]) -> tuple[Bound[Any], ...]:
-    """Return the operators that act on worlds as a whole."""
+    """Return the operators that act on whole worlds."""
     return tuple(operator for operator in operators if operator.data.acts_on_worlds())
 
 
 def active(operators: tuple[Bound[Any], ...]) -> tuple[Bound[Any], ...]:
-    """Return those operators that act on worlds in phases of their own."""
+    """Return the operators that act on worlds in phases of their own."""
     return tuple(operator for operator in acting(operators) if operator.action is not None)
 
 
 def act(s: State, operator: Bound[Any]) -> tuple[Item, ...]:
-    """Return the items in which an operator acts on the world: its terms are summed before, and phases of its
-    own follow."""
+    """Return the items of an operator: the sum of its terms, its action on the world, and its own phases."""
     items: tuple[Item, ...] = ()
     if operator.data.terms > 0:
         operator.sums = BlockSums(s, operator.data.terms)
@@ -44,7 +43,7 @@ def act(s: State, operator: Bound[Any]) -> tuple[Item, ...]:
 
 
 class StoreBefore(StoreMemory):
-    """Before indices move, this phase stores what pairs remember with the particles."""
+    """This phase stores the contact history on the particles before indices change."""
 
     def __init__(self, pairs: PairChunks, operators: tuple[Bound[Any], ...]) -> None:
         super().__init__(pairs)
@@ -59,7 +58,7 @@ class StoreBefore(StoreMemory):
 
 
 class SumTerms(PerBlock):
-    """This phase sums an operator's terms over the particles of a world, where it acts on that."""
+    """This phase sums the terms of an operator over the particles of a world in which it acts."""
 
     conditional = True
 
@@ -74,7 +73,7 @@ class SumTerms(PerBlock):
     @ti.func
     def each(self, w, i):
         terms = ti.Vector.zero(ti.f64, self.sums.terms)
-        # What an operator before it has removed has no mass.
+        # A particle removed by an earlier operator has no mass.
         if self.s.mass[w, i] > 0.0:
             terms = self.operator.each(self.s, w, i)
         return terms
@@ -97,7 +96,7 @@ class ActOnWorld(Phase):
 
 
 class ForgetPairs(Phase):
-    """After events, what the survey of near pairs told the step control is no longer true."""
+    """This phase resets the step control's data of near pairs after events, as they are outdated."""
 
     def __init__(self, s: State) -> None:
         self.s = s

@@ -1,10 +1,10 @@
-"""Particles of large worlds are sorted in memory by where they are, so that neighbours lie near each other.
+"""Particles of large worlds are sorted in memory by position, so that neighbours are close in memory.
 
-It is done every so many steps of a world, from its first on, by bricks of cells. In a dense bed a brick has
-about as many particles as a chunk of pairs, so few pairs are between chunks. The order follows from the state
-of the world alone, so a run has the same bits again, alone, in a batch or restarted. Sums are ordered by
-place in memory: their last digits are those of this order. What is asked for by particle, such as a Result,
-is in the order of ids, which is that of the start.
+Each world is sorted every SORT_EVERY steps from its first step on, by bricks of cells. In a dense bed a brick
+has about the particle number of a chunk of pairs, so few pairs belong to two chunks. The order depends on the
+state of the world alone, so runs are bitwise reproducible: alone, in a batch or after a restart. The last
+digits of sums depend on this order. Output by particle, such as a Result, is in the order of ids, which is
+the order in the initial state.
 """
 
 from typing import Any
@@ -20,13 +20,13 @@ from tisim.pairs.rebuild_pairs import BeginRebuild, StoreMemory
 from tisim.program.phases import Item, Repeat
 
 SORTED_FROM = 4096
-"""Worlds of at least this many particles are sorted: where all fit into the cache, order is worth nothing."""
+"""Worlds of at least this many particles are sorted; in smaller ones all particles fit into the cache."""
 SORT_EVERY = 4096
-"""A world is sorted each time after so many steps, which take some hundred times as long."""
+"""Steps between two sorts of a world; they take some hundred times as long as the sort."""
 COLUMNS_AT_ONCE = 8
-"""So many numbers of a particle are moved at once."""
+"""Numbers of a particle that are moved at once."""
 BRICK = 8
-"""A brick has so many cells along each axis."""
+"""Cells of a brick along each axis."""
 
 
 @ti.data_oriented
@@ -34,12 +34,13 @@ class BrickGrid(CellGrid):
     """A brick grid numbers cells brick by brick; the last brick along an axis may be thinner."""
 
     def shared(self) -> bool:
-        # Worlds are always sorted by all threads.
+        # All threads sort a world together.
         return True
 
     @ti.func
     def divide(self, cells, most):
-        # The order, and so last digits, must not go by how cells are best searched.
+        # The order, and with it the last digits of sums, must not depend on the cells chosen for fast
+        # searches.
         dims = ti.max(1, ti.floor(cells, ti.i32))
         while dims[0] * dims[1] * dims[2] > most:
             dims = (dims + 1) // 2
@@ -53,7 +54,7 @@ class BrickGrid(CellGrid):
         for k in ti.static((2, 1, 0)):
             dims, begin = self.dims[w, level, k], at[k] // BRICK * BRICK
             thick = ti.min(BRICK, dims - begin)
-            # Of the bricks at this place along the axes before, those that come first along this one.
+            # Count the cells of the earlier bricks along this axis, in this brick along the previous axes.
             cells = cells // dims
             index += begin * cells
             cells *= thick
@@ -63,9 +64,10 @@ class BrickGrid(CellGrid):
 
 @ti.data_oriented
 class SpatialSort:
-    """A spatial sort permutes all fields of the particles, some columns of numbers after the others.
+    """A spatial sort permutes all fields of the particles, one group of columns after the other.
 
-    due : whether a world is being sorted. stage : says which columns' turn it is. gathered : a copy of these.
+    due : whether a world is being sorted. stage : index of the current group of columns.
+    gathered : a copy of these columns.
     """
 
     def __init__(self, pairs: PairChunks, lists: NeighbourLists) -> None:
@@ -100,7 +102,7 @@ class SpatialSort:
         return self.tree.bytes + self.grid.bytes()
 
     def items(self) -> tuple[Item, ...]:
-        """Return the items that sort the worlds whose turn it is; between two steps."""
+        """Return the items that sort the worlds that are due, between two steps."""
         grid, pairs = self.grid, self.pairs
         store = (StoreMemory(pairs),) if pairs.memories else ()
         cells = (*measure_phases(grid, pairs.half_list), DropSkin(grid), *cell_phases(grid))
@@ -112,7 +114,7 @@ class SpatialSort:
 
 
 class SortWorlds(Repeat):
-    """This item sorts the worlds whose turn it is, once."""
+    """This item sorts the worlds that are due, once."""
 
     usual = 0
 
@@ -126,7 +128,7 @@ class SortWorlds(Repeat):
 
 
 class PermuteColumns(Repeat):
-    """This item permutes some columns after the others."""
+    """This item permutes one group of columns after the other."""
 
     def __init__(self, sort: SpatialSort, items: tuple[Item, ...]) -> None:
         super().__init__(items)
@@ -138,7 +140,7 @@ class PermuteColumns(Repeat):
 
 
 class BeginSort(OfGrid):
-    """This phase asks whether it is the turn of a world."""
+    """This phase decides whether a world is due."""
 
     def __init__(self, grid: CellGrid, sort: SpatialSort) -> None:
         super().__init__(grid)
@@ -151,7 +153,7 @@ class BeginSort(OfGrid):
 
 
 class DropSkin(OfGrid):
-    """Cells are those of the laws alone: the skin depends on when lists were made."""
+    """This phase sets the skin to 0: the skin depends on when lists were made, and the order must not."""
 
     @ti.func
     def run(self, w, _k):
@@ -160,7 +162,7 @@ class DropSkin(OfGrid):
 
 
 class GatherColumns(OfParticles):
-    """This phase reads columns in the new order: along cells, and by index within a cell."""
+    """This phase reads columns in the new order: by cell, and by index within a cell."""
 
     def __init__(self, grid: CellGrid, sort: SpatialSort) -> None:
         super().__init__(grid)
@@ -181,7 +183,7 @@ class GatherColumns(OfParticles):
 
 
 class WriteColumns(GatherColumns):
-    """This phase writes the columns."""
+    """This phase writes the columns in the new order."""
 
     @ti.func
     def run(self, w, i):
@@ -198,7 +200,7 @@ class WriteColumns(GatherColumns):
 
 
 class EndColumns(BeginSort):
-    """After this phase it is the turn of the next columns."""
+    """This phase advances to the next group of columns."""
 
     @ti.func
     def run(self, w, _k):
@@ -206,7 +208,7 @@ class EndColumns(BeginSort):
 
 
 class EndSort(BeginSort):
-    """After this phase a world is sorted, and its lists are made anew."""
+    """This phase ends the sort of a world, and has its lists rebuilt."""
 
     @ti.func
     def run(self, w, _k):

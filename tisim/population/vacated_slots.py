@@ -1,4 +1,4 @@
-"""Slots of particles that are gone are filled from the end, so that those of live ones stay without a gap."""
+"""Slots of removed particles are filled from the end, so that the live particles stay contiguous."""
 
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
@@ -13,10 +13,10 @@ from tisim.state.state import State
 
 @ti.data_oriented
 class VacatedSlots:
-    """The vacated slots of a world are filled by the last particles: the first slot by the last of them.
+    """The vacated slots of a world are filled by its last particles: the first slot by the last particle.
 
-    alive : of each slot whether there is a live particle, then how many there are up to it. last : the slots
-    of those that move, from the end.
+    alive : whether a slot has a live particle; later the number of live particles up to it.
+    last : the slots of the particles that move, from the end.
     """
 
     def __init__(self, s: State, domain: Bound[Domain], lists: NeighbourLists | None) -> None:
@@ -34,8 +34,10 @@ class VacatedSlots:
 
 
 class FillSlots(Repeat):
-    """This item fills the slots of a world, and puts all particles inside the domain, where one has gone, or
-    come, or been moved other than by a step."""
+    """This item fills the slots of a world and puts all particles inside the domain.
+
+    It runs after a particle was removed, inserted, or moved other than by a step.
+    """
 
     usual = 0
 
@@ -50,7 +52,7 @@ class FillSlots(Repeat):
 
 
 class PerSlot(PerParticle):
-    """This phase is a loop over the slots up to the last one in use."""
+    """Base of the phases that loop over the slots up to the last one in use."""
 
     def __init__(self, slots: VacatedSlots) -> None:
         super().__init__(slots.s)
@@ -66,7 +68,7 @@ class MarkLive(PerSlot):
 
 
 class FindLast(PerSlot):
-    """This phase lists live particles beyond the slots that will be in use, from the end."""
+    """This phase lists the live particles beyond the slots that stay in use, from the end."""
 
     @ti.func
     def size(self, w):
@@ -81,7 +83,7 @@ class FindLast(PerSlot):
 
 
 class FillFromEnd(PerSlot):
-    """This phase fills those of the remaining slots that are vacated."""
+    """This phase fills the vacated slots among those that stay in use."""
 
     @ti.func
     def size(self, w):
@@ -96,7 +98,7 @@ class FillFromEnd(PerSlot):
 
 
 class EndFill(Phase):
-    """After this phase particles are counted anew, and others know that they are elsewhere."""
+    """This phase updates the particle count, records an event and invalidates the pair lists."""
 
     def __init__(self, slots: VacatedSlots) -> None:
         self.s, self.slots = slots.s, slots

@@ -1,4 +1,4 @@
-"""Steps by launches: each phase is one loop over all particles of all worlds."""
+"""Steps by kernel launches: each phase is one loop over all particles of all worlds."""
 
 from tisim.backend import runtime
 from tisim.backend.launcher import Launcher
@@ -13,23 +13,27 @@ from tisim.state.state import State
 from tisim.state.status import NEVER, WorldStatus
 
 PATIENCE = 8
-"""At most so many steps are launched before worlds are asked where they are."""
+"""Largest number of steps launched before the progress of the worlds is read."""
 LOOK_COST = 2.0
-"""Worlds are asked that often that the launches which find them waiting cost as much as asking does: twice
-what the launches of a step cost, in which a half of those that wait have waited."""
+"""Bound on the fraction of waiting worlds times the number of steps between two reads of their progress.
+
+Beyond it the progress is read more often. At this value launches that find their worlds waiting cost as
+much as a read: twice the launches of a step, during which on average half of the waiting worlds waited.
+"""
 LOOKS_PER_QUESTION = 4
-"""After so many looks a device that maps pages is asked whether it may go on: it takes a fraction of a ms."""
+"""Number of reads after which a device with mapped pages is checked for its limit; the check takes a fraction
+of a ms."""
 PLACES = 48
-"""A step has at most so many places: worlds tell theirs by the bits of an integer."""
+"""Largest number of launches in a step: worlds report their place as a bit of an integer."""
 SHARES = 256
-"""The share of worlds that wait for a repeat is told in this many parts."""
+"""Resolution of the reported fraction of worlds that wait for a repeat."""
 
 
 @ti.data_oriented
 class LaunchedProgram(StepRules, Program):
-    """This program launches a kernel for the phases between one repeat and the next.
+    """This program launches one kernel for the phases between two repeats.
 
-    once : whether worlds go through the items once, whatever steps they take.
+    once : whether worlds run the items once, independent of their steps.
     """
 
     def __init__(
@@ -37,11 +41,11 @@ class LaunchedProgram(StepRules, Program):
     ) -> None:
         super().__init__(s, rest_every)
         self.items, self.once, self.patience = items, once, 1
-        # A CPU has ended a launch when it returns, so what it says of it costs nothing.
+        # On a CPU a launch has ended when it returns, so reading its result costs nothing.
         self.asks, self.maps_pages = (runtime.current().device == name for name in ("cpu", "vulkan"))
-        # One task has one thread, which is faster without waking it.
+        # A single task runs faster without waking a thread.
         self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
-        # The first place is that of worlds which wait for nothing.
+        # The first place belongs to worlds that do not wait.
         launched = (Phase(), *items) if isinstance(next(iter(items), None), Repeat) else items
         self.begin = entry(launched, 0, lambda _: OVER, 0)
         planner = Planner(self)
@@ -68,7 +72,7 @@ class LaunchedProgram(StepRules, Program):
             self._learn(found)
 
     def _launch(self, plan: Plan) -> None:
-        """Make the launches, unasked."""
+        """Make the launches without reading the progress."""
         for item in plan:
             if isinstance(item, Visit):
                 item.launch.run(item.place)
@@ -77,8 +81,11 @@ class LaunchedProgram(StepRules, Program):
                     self._launch(item.plan)
 
     def _launch_asking(self, plan: Plan, found: int) -> int:
-        """Make the launches, each repeat while there are worlds in it, and return where worlds are, as
-        ``_look`` does; ``found`` says where they were."""
+        """Make the launches, each repeat while worlds are in it, and return the places of the worlds as
+        ``_look`` does.
+
+        found : the places of the worlds before.
+        """
         for item in plan:
             if isinstance(item, Visit):
                 found = item.launch.run_and_look(item.place)
@@ -88,8 +95,10 @@ class LaunchedProgram(StepRules, Program):
         return found
 
     def _learn(self, found: int) -> None:
-        """Learn from where worlds are after some steps, as ``_look`` tells it, how many steps and turns to
-        launch unasked."""
+        """Adapt the number of steps and turns launched without a read to the places found after some steps.
+
+        found : the result of ``_look``.
+        """
         for loop in self.loops:
             loop.learn(found)
         few = (found >> PLACES) * self.patience <= LOOK_COST * SHARES
@@ -112,7 +121,7 @@ class LaunchedProgram(StepRules, Program):
 
     @ti.kernel
     def _allow(self, steps: ti.i32) -> ti.i64:
-        """Let worlds take steps, and return the places of those that do, a bit for each."""
+        """Allow worlds to take steps, and return the places of the running worlds, one bit for each place."""
         places = ti.cast(0, ti.i64)
         if ti.static(self.serial):
             ti.loop_config(serialize=True)
@@ -124,7 +133,7 @@ class LaunchedProgram(StepRules, Program):
 
     @ti.func
     def _follow(self, route: ti.template(), w, place):  # type: ignore[valid-type]
-        """Return where a world goes on, from this place."""
+        """Return the next place of a world after this place."""
         there = NOWHERE
         if ti.static(isinstance(route, Fork)):
             ways = ti.static(route.ways)
@@ -140,7 +149,7 @@ class LaunchedProgram(StepRules, Program):
 
     @ti.func
     def _next_step(self, w):
-        """Return where a world begins its next step; nowhere, where it waits."""
+        """Return the first place of the next step of a world; NOWHERE if it waits."""
         return ti.select(self._waits(w), NOWHERE, self._follow(self.begin, w, 0))
 
     @ti.func
@@ -149,14 +158,14 @@ class LaunchedProgram(StepRules, Program):
 
     @ti.func
     def _bit(self, w):
-        """Return the bit of where a world is; 0 for one that does not go on."""
+        """Return the bit for the place of a world; 0 if it does not go on."""
         bit = ti.cast(1, ti.i64) << ti.max(self.s.place[w], 0)
         return ti.select(self._goes_on(w), bit, ti.cast(0, ti.i64))
 
     @ti.kernel
     def _look(self) -> ti.i64:
-        """Return the places at which there are worlds that go on, a bit for each, and which part of them is
-        not between two steps, in the bits above."""
+        """Return the places of the running worlds, one bit for each, and in the bits above the fraction of
+        worlds within a step."""
         places, going, waiting = ti.cast(0, ti.i64), 0, 0
         if ti.static(self.serial):
             ti.loop_config(serialize=True)

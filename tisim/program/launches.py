@@ -1,9 +1,9 @@
-"""The launches of kernels that phases take where each is a loop over all worlds.
+"""Kernel launches of the phases, each a loop over all worlds.
 
-Each world knows its ``place``, the launch of the step that it takes next, and has nothing to do in the
-others. A device is not asked after a launch what has become of it, as it would have to end all that it was
-given before it answers: launches are made in a row, many steps of them, and a world that comes to a repeat
-that they do not have in them waits there.
+Each world has a ``place``, the next launch of the step that it takes, and does nothing in other launches.
+Reading the outcome after every launch would force the device to finish all pending work first. Launches are
+therefore queued for many steps in a row, and a world that needs another turn of a repeat which is not queued
+waits there.
 """
 
 from collections.abc import Callable
@@ -22,22 +22,24 @@ if TYPE_CHECKING:
     from tisim.program.launched_program import LaunchedProgram
 
 TASK = 512
-"""Taichi and Quadrants hand so many iterations to a CPU thread at once, whatever block size is asked for
-(measured: a loop of 512 runs on one thread, one of 1024 on two). With one world in each, worlds spread over
-all threads."""
+"""Iterations that Taichi and Quadrants give to a CPU thread at once, for any block size (measured: a loop of
+512 runs on one thread, a loop of 1024 on two). With one world per task, worlds spread over all threads."""
 
 TASKS_PER_THREAD = 4
-"""A loop has so many tasks for each thread of a CPU, so that a thread that comes late has less to do."""
+"""Tasks of a loop per CPU thread, so that a thread that starts late has less to do."""
 
 
 def iterations_of_task() -> int:
-    """Return how many iterations of a loop a task takes up, so that each may have a thread of its own."""
+    """Return the loop iterations of a task, so that each task may have its own thread."""
     return TASK if runtime.current().device == "cpu" else 1
 
 
 def tasks_of(phase: Phase, worlds: int, threads: int) -> int:
-    """Return into how many tasks a phase of a world is cut for threads of a CPU: a multiple of these, where
-    there are more. Only few of the worlds that there is room for may have work."""
+    """Return the number of tasks that a phase of one world is divided into for CPU threads.
+
+    It is a multiple of the number of threads if it exceeds it. Often only a few of the allocated worlds have
+    work.
+    """
     least = TASK if phase.light and not phase.long else 1
     wanted = max(-(-TASKS_PER_THREAD * threads // worlds), threads)
     tasks = max(1, min(wanted, phase.extent // least))
@@ -46,11 +48,12 @@ def tasks_of(phase: Phase, worlds: int, threads: int) -> int:
 
 @ti.data_oriented
 class Launch:
-    """A launch takes phases that follow each other: a loop over tasks of each, in every world whose turn it
-    is; ``route`` says where these go on.
+    """A launch runs consecutive phases: for each, a loop over tasks in every world at this place.
 
-    A task is a range of items. On a CPU there are not more than keep all threads busy, nor are they so small
-    that waking a thread is not worth it.
+    A task is a range of items. On a CPU there are only enough tasks to keep all threads busy, and none is too
+    small to be worth waking a thread.
+
+    route : the next place of these worlds.
     """
 
     def __init__(self, program: "LaunchedProgram", phases: tuple[Phase, ...], route: Route) -> None:
@@ -70,7 +73,7 @@ class Launch:
 
     @ti.kernel
     def _run_and_look(self, place: ti.i32) -> ti.i64:
-        """Take the phases, and return where worlds are then, as ``LaunchedProgram._look`` does."""
+        """Run the phases, and return the places of the worlds as ``LaunchedProgram._look`` does."""
         self._take(place)
         places = ti.cast(0, ti.i64)
         if ti.static(self.program.serial):
@@ -99,7 +102,7 @@ class Launch:
 
     @ti.func
     def _takes(self, w, place):
-        """Return whether it is a world's turn; one that has come to its end keeps its place."""
+        """Return whether a world takes this launch; a world that has ended keeps its place."""
         return self.s.place[w] == place and self.s.status[w] == WorldStatus.RUNNING
 
     @ti.func
@@ -112,7 +115,7 @@ class Launch:
 
 @dataclass(frozen=True)
 class Visit:
-    """A visit is a launch in its place."""
+    """A visit is a launch at a place of the step."""
 
     launch: Launch
     place: int
@@ -121,7 +124,7 @@ class Visit:
 class Loop:
     """A loop makes the launches of a repeat as often as a step usually takes them.
 
-    bits : of the places of its launches, at the first of which worlds wait that are not through.
+    bits : the places of its launches; worlds that need more turns wait at the first of them.
     """
 
     def __init__(self, plan: "Plan", usual: int, places: range) -> None:
@@ -129,12 +132,12 @@ class Loop:
         self.bits = sum(1 << place for place in places)
 
     def turns(self) -> int:
-        """Return how many turns are to be made now, unasked."""
+        """Return the number of turns to launch now without a read."""
         turns, self.more = self.usual + self.more, 0
         return turns
 
     def learn(self, found: int) -> None:
-        """Hear where worlds wait; where some are in this repeat, it has one turn more next time."""
+        """Add one turn next time if worlds wait in this repeat, according to the places found."""
         self.more = int(found & self.bits > 0)
 
 
@@ -142,7 +145,7 @@ Plan = tuple[Visit | Loop, ...]
 
 
 class Planner:
-    """A planner makes the launches of a program, and its loops; launches that are the same only once."""
+    """A planner makes the launches and loops of a program; equal launches are made only once."""
 
     def __init__(self, program: "LaunchedProgram") -> None:
         self.program = program
@@ -154,8 +157,10 @@ class Planner:
         return self._plan(items, 0, lambda _: OVER)
 
     def _plan(self, items: Items, place: int, after: Callable[[int], Route]) -> Plan:
-        """Return the launches of items, the first of which has this place; ``after`` makes the route of a
-        world that is through with them, from where it is."""
+        """Return the launches of items that begin at a place.
+
+        after : makes the route of a world that has finished the items, from its place.
+        """
         plan: list[Visit | Loop] = []
         while items:
             first, rest = first_group(items)

@@ -1,4 +1,5 @@
-"""Why what stands several times in a program is taken: a world says it, so that it is compiled once."""
+"""The occasion of a sum is stored by the world, so that phases used several times in a program are compiled
+once."""
 
 from enum import IntEnum
 
@@ -8,23 +9,23 @@ from tisim.state.state import State
 
 
 class Occasion(IntEnum):
-    """An occasion is when forces are summed, and near pairs looked at."""
+    """An occasion is the reason why forces are summed and near pairs searched."""
 
     STEP = 0
-    """At the end of a step."""
+    """The end of a step."""
     START = 1
-    """Before the first step, at the start or after a world was written to: no time has gone by."""
+    """Before the first step of a run, or after a world was written to: no time has passed."""
     AHEAD = 2
-    """Before that, as if the first step were over: what lies so deep in each other that the step is too long
-    for it would be far apart after it, and nobody would know."""
+    """Before START, evaluated as if the first step were over. This detects overlaps so deep that the step is
+    too long for them; after that step the particles would be far apart and the fault invisible."""
     AFTER_EVENTS = 3
-    """After events have changed who is where: what is remembered is up to date, and stays."""
+    """After events have added, removed or changed particles: the contact history is up to date and stays."""
     NONE = 4
-    """Events have changed nothing, and there is nothing to do."""
+    """Events have changed nothing, so there is nothing to do."""
 
 
 class Enter(Phase):
-    """This phase begins an occasion."""
+    """This phase sets the occasion."""
 
     def __init__(self, s: State, occasion: Occasion) -> None:
         self.s, self.occasion = s, occasion
@@ -39,7 +40,7 @@ class Enter(Phase):
 
 
 class EnterAfterEvents(Phase):
-    """This phase begins what follows events, where there were any."""
+    """This phase sets the occasion after events: AFTER_EVENTS if there were any, else NONE."""
 
     def __init__(self, s: State) -> None:
         self.s = s
@@ -50,7 +51,7 @@ class EnterAfterEvents(Phase):
 
 
 class OnOccasion(Phase):
-    """This phase is taken unless there is nothing to do."""
+    """This phase is skipped on the occasion NONE."""
 
     conditional = True
     s: State

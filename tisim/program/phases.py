@@ -1,4 +1,4 @@
-"""What a step consists of: phases, each a loop over independent items, and repeats of them."""
+"""Phases, each a loop over independent items, and repeats of phases: the building blocks of a step."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from tisim.backend.taichi import ti
 from tisim.state.state import State
 
 MANY = 1000
-"""With so many particles, items of unlike length are work enough for a launch (measured on 2 cores: launches
-cost a step 0.2 ms, as much as the pairs of 400)."""
+"""From this many particles on, items of unequal length are enough work for a launch (measured on 2 cores:
+launches cost a step 0.2 ms, the same as the pairs of 400 particles)."""
 
 
 class Phase:
-    """A phase is one loop: ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds
+    """A phase is one loop: ``run(w, k)`` is called for k in 0..size(w)-1 if ``when(w)``; ``extent`` bounds
     size.
 
-    ``long`` says that one item is work enough for a launch, ``light`` that else a task has many, on a CPU;
-    ``others`` how many other particles an item goes through one by one: by it the schedule is chosen
-    (engine/schedule_choice.py), and how long a team waits for a thread.
+    long : whether one item is enough work for a launch.
+    light : whether a task otherwise has many items, on a CPU.
+    others : number of other particles that an item loops over. It determines the choice of the schedule
+    (``choose`` in engine/compiled_worlds.py) and how long a team waits for a thread.
     """
 
     conditional: ClassVar[bool] = False
@@ -31,7 +32,7 @@ class Phase:
 
     @property
     def name(self) -> str:
-        """Return what the phase is called where a step is explained."""
+        """Return the name of the phase in the description of a step."""
         return type(self).__name__
 
     @ti.func
@@ -50,8 +51,8 @@ class Phase:
 class PerParticle(Phase):
     """This phase is a loop over the live particles of a world.
 
-    local : whether an item reads and writes nothing but its own particle and what its world had before, so
-    that it may follow at once when the phase before is done with that particle.
+    local : whether an item reads and writes only its own particle and earlier values of its world. It may
+    then run as soon as the previous phase has finished that particle.
     """
 
     local: ClassVar[bool] = False
@@ -65,10 +66,12 @@ class PerParticle(Phase):
 
 
 class Repeat:
-    """A repeat takes items in order, again and again while ``pending(w)`` is above zero.
+    """A repeat runs items in order, again and again, while ``pending(w)`` is above zero.
 
-    Items are phases, at least one, and further repeats. ``pending`` is asked before the first and after the
-    last of them. So many turns as are ``usual`` in a step are launched before anybody asks.
+    Items are phases, at least one, and further repeats. ``pending`` is evaluated before the first and after
+    the last item.
+
+    usual : turns that are launched before the progress is read.
     """
 
     usual: int = 1
@@ -85,7 +88,7 @@ Item = Phase | Repeat
 
 
 def nested(items: tuple[Item, ...], depth: int = 0) -> Iterator[tuple[Phase, int]]:
-    """Yield every phase among the items, in order, with the number of repeats that it is in."""
+    """Yield every phase among the items, in order, with the number of repeats around it."""
     for item in items:
         if isinstance(item, Repeat):
             yield from nested(item.items, depth + 1)
@@ -94,17 +97,17 @@ def nested(items: tuple[Item, ...], depth: int = 0) -> Iterator[tuple[Phase, int
 
 
 class WorldAction(ABC):
-    """A world action is what an operator does to a world in loops over its particles.
+    """A world action is the work of an operator on a world, in loops over its particles.
 
     It is a ``ti.data_oriented`` object with device memory of its own.
     """
 
     @abstractmethod
     def phases(self) -> tuple[Item, ...]:
-        """Return the items of the action, which are taken in every step: a repeat that is pending only where
-        there is something to do costs others next to nothing.
+        """Return the items of the action, which run in every step.
 
-        What they come to may not depend on the order of parallel work.
+        A repeat that is pending only when there is work costs next to nothing otherwise. The result must not
+        depend on the order of parallel work.
         """
 
     @abstractmethod

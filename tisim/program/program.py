@@ -1,22 +1,21 @@
-"""A step as a list of loops, and the three ways to run it.
+"""A step is a list of loops, which run on one of three schedules.
 
-A ``Phase`` is one loop over the items of a world (its particles, its contacts, or the world itself) whose
-items are independent of each other. A ``Program`` is the list of phases that make one step, some of them in
-a ``Repeat``. The same phases run on three schedules, with the same bits:
+A ``Phase`` is one loop over independent items of a world (its particles, its contacts, or the world itself).
+A ``Program`` is the list of phases of one step, some of them inside a ``Repeat``. The same phases run on
+three schedules with bitwise equal results:
 
-"world"    - a thread takes a world through many steps in one launch. No launches and no barriers between
-             phases, and a world stays in cache: the way for batches and small systems on a CPU.
-"team"     - so does a team of threads: each takes a share of the items of a phase, and they wait for each
-             other, awake, before the next (team.py): the way for large systems on many cores of a CPU, or
-             smaller ones in which all feel each other. Where other programs want the cores, each thread
-             takes a world alone meanwhile (team.py).
-"particle" - each phase is one loop of a launch over all particles of all worlds: the way for GPUs, and for
-             phases of few long items on a CPU, where threads take tasks as they are done with others. What
-             may be repeated begins a launch of its own. On a GPU many steps are launched in a row before
-             anybody asks how far worlds have come.
+"world"    - a thread takes a world through many steps in one launch. There are no launches or barriers
+             between phases, and the world stays in cache. For batches and small systems on a CPU.
+"team"     - a team of threads does the same. Each thread takes a share of the items of a phase, and all
+             wait in a busy loop for the others before the next phase (team.py). For large systems on a
+             CPU with many cores, or smaller ones with all-pairs interactions. While other programs use
+             the cores, each thread takes a world alone.
+"particle" - each phase is one loop of a launch over all particles of all worlds. For GPUs, and for phases
+             with few long items on a CPU, where idle threads take the next task. Each repeat begins a
+             launch of its own. On a GPU many steps are launched before the progress is read.
 
-That the bits agree needs no luck: phases only combine through sums in a fixed order, integer atomics and
-floating-point minima and maxima, none of which depend on the order of parallel work.
+The results are bitwise equal because phases combine values only by sums in a fixed order, integer atomics,
+and floating-point minima and maxima. None of these depends on the order of parallel work.
 """
 
 from abc import ABC, abstractmethod
@@ -31,9 +30,9 @@ from tisim.state.status import NEVER
 
 
 class StepRules:
-    """These rules say, in kernels, which worlds go on, and how far.
+    """Rules, evaluated in kernels, for which worlds continue and how far.
 
-    rest_every : worlds rest after a number of steps that is a multiple of this one, for what is done there.
+    rest_every : worlds pause after each multiple of this number of steps for work between launches.
     """
 
     def __init__(self, s: State, rest_every: int = NEVER) -> None:
@@ -52,7 +51,7 @@ class StepRules:
 
     @ti.func
     def _stop_failed(self, w):
-        """Stop a world in which a phase has failed, once all of its items have been heard."""
+        """Stop a world in which a phase has failed, after all items of the phase have finished."""
         if self.s.failed[w] > 0:
             self.s.status[w], self.s.place[w] = self.s.failed[w], NOWHERE
 
@@ -64,31 +63,34 @@ class Program(ABC):
 
     @abstractmethod
     def advance(self, steps: int) -> None:
-        """Take at most ``steps`` steps of every running world; none goes on past its ``pause_time`` or its
-        ``goal``, or after a launch that has left a step under way."""
+        """Take at most ``steps`` steps of every running world.
+
+        No world continues past its ``pause_time`` or its ``goal``, or after a launch that has left a step
+        under way.
+        """
 
     @abstractmethod
     def compile(self) -> None:
-        """Compile what ``advance`` runs, and run nothing: no world may be running."""
+        """Compile the code of ``advance`` without running it: no world may be running."""
 
     def names(self) -> list[str]:
-        """Return what runs in a step, in order; repeated phases have a star for each repeat that they are
-        in."""
+        """Return the names of the phases of a step, in order, with one star for each repeat around a
+        phase."""
         return [phase.name + "*" * depth for phase, depth in nested(self.items)]
 
 
 OVER = 2**30
-"""This route says that the step is over."""
+"""The route at the end of a step."""
 NOWHERE = -1
-"""This is the place of a world that does not go on."""
+"""The place of a world that does not continue."""
 
 
 class Fork:
-    """A fork leads a world into a repeat while it is pending, else past it."""
+    """A fork leads a world into a repeat while it is pending, and otherwise past it."""
 
-    # No dataclass: Quadrants takes those apart, and forks lie within forks.
+    # Not a dataclass: Quadrants takes dataclasses apart, and forks are nested.
     def __init__(self, repeat: Repeat, inside: "Route", past: "Route") -> None:
-        # In a tuple, out of which kernels of Quadrants take one fork within another.
+        # A tuple, because kernels of Quadrants can take a nested fork out of it.
         self.repeat, self.ways = repeat, (inside, past)
 
     def __eq__(self, other: object) -> bool:
@@ -99,14 +101,15 @@ class Fork:
 
 
 Route = Fork | int
-"""A route is a fork, or so many places on from where one is, or ``OVER``. That it tells no places makes
-launches of the same phases the same, wherever they are."""
+"""A route is a fork, or an offset to the next place, or ``OVER``. As it has no absolute places, launches of
+the same phases are equal at any place."""
 
 Items = tuple[Item, ...]
 
 
 def first_group(items: Items) -> tuple[tuple[Phase, ...] | Repeat, Items]:
-    """Return what begins these items, the phases that one launch takes or a repeat, and what follows it."""
+    """Return the first group of items, either the phases of one launch or a repeat, and the remaining
+    items."""
     if isinstance(items[0], Repeat):
         return items[0], items[1:]
     phases = tuple(next(group for _, group in groupby(items, lambda item: isinstance(item, Repeat))))
@@ -114,7 +117,7 @@ def first_group(items: Items) -> tuple[tuple[Phase, ...] | Repeat, Items]:
 
 
 def launch_count(items: Items) -> int:
-    """Return how many launches these items take, each repeat once."""
+    """Return the number of launches of these items, with each repeat counted once."""
     number = 0
     while items:
         first, items = first_group(items)
@@ -123,9 +126,10 @@ def launch_count(items: Items) -> int:
 
 
 def entry(items: Items, place: int, after: Callable[[int], Route], here: int) -> Route:
-    """Return the route, from ``here``, of a world that comes to these items.
+    """Return the route from ``here`` of a world that comes to these items.
 
-    place : that of their first launch. after : makes the route of a world that is through with them.
+    place : place of their first launch.
+    after : makes the route of a world that has finished them.
     """
     if not items:
         return after(here)

@@ -1,4 +1,4 @@
-"""Sorting by whole numbers, in parallel: one digit after the other, from the lowest, each time stably."""
+"""Parallel radix sort by integer keys: stable passes over the digits, from the lowest on."""
 
 from tisim.backend import runtime
 from tisim.backend.layout import Builder
@@ -11,29 +11,29 @@ from tisim.state.state import State
 DIGIT_BITS = 8
 BASE = 1 << DIGIT_BITS
 SORT_BLOCK = {"cpu": 1024}
-"""One task counts and moves so many items, one after the other; on other devices 64."""
+"""Items that one task counts and moves, one after the other; 64 on other devices."""
 
 
 @ti.data_oriented
 class RadixSort:
     """A radix sort orders items of each world by keys: ``order[w, k]`` is the item in place k.
 
-    Keys are set with ``set_key``; items of equal keys stay in the order of their numbers. The order depends
+    Keys are set with ``set_key``; items with equal keys stay in the order of their numbers. The order depends
     on the keys alone.
 
-    items : a phase of the same extent and size. bits : those that keys have, from the lowest on.
+    items : a phase of the same extent and size. bits : number of bits of the keys.
     """
 
     def __init__(self, s: State, items: Phase, bits: int) -> None:
         self.s, self.items, self.capacity = s, items, items.extent
-        # An even number of passes ends where the first one began.
+        # With an even number of passes the result ends in the half in which the first pass began.
         self.passes = 2 * -(-bits // (2 * DIGIT_BITS))
         self.block = SORT_BLOCK.get(runtime.current().device, 64)
         self.blocks = -(-items.extent // self.block)
         self.key, self.order = ti.field(ti.i64), ti.field(ti.i32)
         self.start, self.done = ti.field(ti.i32), ti.field(ti.i32)
         builder = Builder()
-        # Two halves, between which items go to and fro.
+        # Two halves; each pass moves the items from one to the other.
         for column in (self.key, self.order):
             builder.dense(ti.i, s.worlds).dense(ti.j, 2 * self.capacity).place(column)
         builder.dense(ti.i, s.worlds).dense(ti.j, BASE * self.blocks + 1).place(self.start)
@@ -51,7 +51,7 @@ class RadixSort:
 
     @ti.func
     def begin(self, w):
-        """Ask that a world be sorted, in the phase before keys are set."""
+        """Request the sorting of a world, in a phase before keys are set."""
         self.done[w] = 0
 
     @ti.func
@@ -61,12 +61,12 @@ class RadixSort:
 
     @ti.func
     def digit(self, w, at):
-        """Return the digit of this pass of what is at a place of either half."""
+        """Return the digit of the current pass for an entry of either half."""
         return ti.cast(self.key[w, at] >> (DIGIT_BITS * self.done[w]) & (BASE - 1), ti.i32)
 
     @ti.func
     def half(self, w):
-        """Return where the half begins in which items are before this pass."""
+        """Return the first place of the half that holds the items before this pass."""
         return self.done[w] % 2 * self.capacity
 
     @ti.func
@@ -76,7 +76,7 @@ class RadixSort:
 
 
 class SortByDigits(Repeat):
-    """This item takes one digit after the other."""
+    """This item sorts by one digit after the other."""
 
     def __init__(self, sort: RadixSort) -> None:
         super().__init__((CountDigits(sort), *sort.starts.phases(), MoveByDigit(sort), EndPass(sort)))
@@ -88,7 +88,7 @@ class SortByDigits(Repeat):
 
 
 class OfDigits(Phase):
-    """This phase works on each digit of each block, and what follows the last."""
+    """Base of the phases that work on each digit of each block, and on the end of the last."""
 
     def __init__(self, sort: RadixSort) -> None:
         self.sort, self.extent = sort, BASE * sort.blocks + 1
@@ -99,7 +99,7 @@ class OfDigits(Phase):
 
 
 class OfDigitBlocks(Phase):
-    """This phase works on each block of items."""
+    """Base of the phases that work on each block of items."""
 
     light = False
 
@@ -117,14 +117,14 @@ class OfDigitBlocks(Phase):
 
 
 class CountDigits(OfDigitBlocks):
-    """This phase counts how often each digit stands in a block."""
+    """This phase counts the occurrences of each digit in a block."""
 
     @ti.func
     def run(self, w, b):
         a, number = self.sort, self.sort.number(w)
         if b == 0:
             a.start[w, 0] = 0
-        # One on, so that the sums up to each are where its items begin.
+        # Counts are shifted by one, so that each prefix sum is the first place of the items of a digit.
         for digit in range(BASE):
             a.start[w, digit * number + b + 1] = 0
         for k in range(b * a.block, self.end(w, b)):
@@ -133,7 +133,7 @@ class CountDigits(OfDigitBlocks):
 
 
 class MoveByDigit(OfDigitBlocks):
-    """This phase moves the items of a block to where their digit belongs, in the order in which they are."""
+    """This phase moves the items of a block to the places of their digits, in their current order."""
 
     @ti.func
     def run(self, w, b):
@@ -149,7 +149,7 @@ class MoveByDigit(OfDigitBlocks):
 
 
 class EndPass(Phase):
-    """After this phase it is the turn of the next digit."""
+    """This phase advances to the next digit."""
 
     def __init__(self, sort: RadixSort) -> None:
         self.sort = sort

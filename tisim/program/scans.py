@@ -1,5 +1,8 @@
-"""Sums over all items before each, and over all particles of a world: by blocks, then over the blocks, so
-that no loop is as long as a world and the order is always the same."""
+"""Prefix sums over items and block sums over the particles of a world.
+
+Sums are taken within blocks, then over the blocks. No loop is as long as a world, and the order is always the
+same.
+"""
 
 from math import isqrt
 from typing import Any
@@ -12,14 +15,16 @@ from tisim.program.phases import Phase
 from tisim.state.state import State
 
 LEAST_BLOCK = {"cpu": 4096}
-"""A block has at least so many items, on other devices 64; and as many as there are blocks."""
+"""Least number of items of a block; 64 on other devices. Blocks are longer if a world would otherwise have
+more blocks than a block has items."""
 
 
 @ti.data_oriented
 class PrefixSum:
     """A prefix sum sets ``target[w, k]`` to ``source[w, 0] + ... + source[w, k]``, integers, for each item k.
 
-    items : a phase of the same extent and size. The two columns may be one. ``total[w]`` is the sum of all.
+    items : a phase of the same extent and size. source, target : the columns, which may be the same one.
+    total : ``total[w]`` is the sum of all items.
     """
 
     def __init__(self, s: State, items: Phase, source: Any, target: Any) -> None:
@@ -34,11 +39,11 @@ class PrefixSum:
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
-        """Return the device memory that the sums of the blocks take, in bytes."""
+        """Return the device memory of the block sums, in bytes."""
         return self.tree.bytes
 
     def phases(self) -> tuple[Phase, ...]:
-        """Return the phases that make the sums; a single block takes one to compile and run."""
+        """Return the phases of the sums; a single block needs only one phase."""
         if self.blocks == 1:
             return (SumAll(self),)
         return SumBlocks(self), SumOverBlocks(self), AddToBlocks(self)
@@ -50,7 +55,7 @@ class PrefixSum:
 
 
 class SumAll(Phase):
-    """This phase makes the sums where all items are one block."""
+    """This phase computes the sums if all items are in one block."""
 
     def __init__(self, sums: PrefixSum) -> None:
         self.sums = sums
@@ -65,7 +70,7 @@ class SumAll(Phase):
 
 
 class SumBlocks(Phase):
-    """This phase makes the sums within each block."""
+    """This phase computes the sums within each block."""
 
     light = False
 
@@ -86,7 +91,7 @@ class SumBlocks(Phase):
 
 
 class SumOverBlocks(Phase):
-    """This phase finds the sum of all blocks before each."""
+    """This phase computes the sum of all blocks before each."""
 
     def __init__(self, sums: PrefixSum) -> None:
         self.sums = sums
@@ -102,7 +107,7 @@ class SumOverBlocks(Phase):
 
 
 class AddToBlocks(SumBlocks):
-    """This phase adds to each block the sum of those before it."""
+    """This phase adds the sum of the previous blocks to each block."""
 
     @ti.func
     def run(self, w, b):
@@ -114,12 +119,12 @@ class AddToBlocks(SumBlocks):
 
 
 BLOCK = 64
-"""A block has so many particles."""
+"""Particles of a block."""
 
 
 @ti.data_oriented
 class BlockSums:
-    """BlockSums hold the sums over each block, ``terms`` of them side by side; f64."""
+    """Block sums hold ``terms`` sums over each block of particles, side by side; f64."""
 
     def __init__(self, s: State, terms: int) -> None:
         self.s, self.terms = s, terms
@@ -130,7 +135,7 @@ class BlockSums:
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
-        """Return the device memory that the sums take, in bytes."""
+        """Return the device memory of the sums, in bytes."""
         return self.tree.bytes
 
     @ti.func
@@ -148,7 +153,7 @@ class BlockSums:
 
 
 class PerBlock(Phase):
-    """This phase is a loop over blocks of particles that also sums ``each(w, i)`` over them."""
+    """This phase is a loop over blocks of particles that also sums the terms of ``each(w, i)``."""
 
     def __init__(self, sums: BlockSums) -> None:
         self.s, self.sums, self.extent = sums.s, sums, sums.blocks
@@ -159,7 +164,7 @@ class PerBlock(Phase):
 
     @ti.func
     def each(self, w, i):
-        """Work on particle i, and return its terms of the sums; f64."""
+        """Process particle i, and return its terms of the sums; f64."""
         return ti.Vector.zero(ti.f64, self.sums.terms)
 
     @ti.func

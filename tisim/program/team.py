@@ -1,15 +1,17 @@
-"""Teams of threads: who is in them, which world they take next, how they wait for each other, and when
-each thread takes a world alone, as other programs want the cores too.
+"""Teams of threads that share a world: membership, the next world, barriers, and the fallback to single
+threads.
 
-Taichi 1.7.4 and Quadrants 1.3.3 cut a parallel loop into a block for each CPU thread that they were started
-with, of 512 iterations at least, and hand blocks out in order: each is done by one thread, to its end, before
-that thread gets another. So a loop of 512 iterations for each thread has one place for each. Other programs
-may want the cores, though: a place may be taken late, when all others are done, so nobody waits for whom he
-has not met.
+Threads take worlds alone while other programs also use the cores.
 
-What a member has written others may read once they have met. It counts itself in by an atomic operation, the
-last one says so by another, and they look by a third: all of these are sequentially consistent in both
-packages (``atomicrmw ... seq_cst`` in what they give to LLVM), on any kind of CPU.
+Taichi 1.7.4 and Quadrants 1.3.3 cut a parallel loop into one block for each CPU thread, of at least 512
+iterations, and hand out the blocks in order. One thread runs a block to its end before it gets another. A
+loop of 512 iterations for each thread therefore has one block for each thread. If other programs use the
+cores, however, a block may start only when all others are done, so a thread must never wait for one that has
+not joined.
+
+After a barrier each member can read the values written by the others. Members count themselves in by an
+atomic operation, the last one publishes a value by another, and the others poll by a third. All of these are
+sequentially consistent in both packages (``atomicrmw ... seq_cst`` in their LLVM code), on any kind of CPU.
 """
 
 from tisim.backend.layout import Builder
@@ -17,30 +19,30 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import BACKEND, ti
 
 LOOKS_WHEN_LATE = 40_000 if BACKEND == "taichi" else 300_000
-"""Who has looked so often for the others waits for one that has no core: it takes about 1.5 ms."""
+"""Number of polls after which a member assumes that another one has no core; about 1.5 ms."""
 DOUBLED_AT = 40_000
-"""In a world with the work of so many particles it is twice as often, as there may be as much to wait for."""
+"""The number of polls is doubled in a world with the work of this many particles, as waits are longer
+there."""
 MOST_LOOKS = 2**30
-"""Looks are counted in 32 bits."""
+"""Limit of the 32-bit poll counter."""
 TIMES_LATE = 8
-"""A team that has waited so often for one without a core parts after the step."""
+"""A team that has waited this often for a member without a core parts after the step."""
 LINE = 16
-"""A number of 8 bytes for each team is so many numbers away from the next one's, in cache lines of its own:
-CPUs fetch two of 64 bytes."""
+"""Numbers of 8 bytes between the counters of two teams, so that each is in cache lines of its own: CPUs fetch
+two lines of 64 bytes."""
 OVER = 2**30
-"""The roll of a team is longer than that once nobody can join any more."""
+"""The roll of a team exceeds this value once nobody can join any more."""
 
 Member = ti.types.struct(team=ti.i32, seat=ti.i32, members=ti.i32)
-"""A member knows its team, its own number in it, from 0, and how many there are; there are none where it has
-come too late."""
+"""A member has its team, its seat in it, from 0, and the number of members; 0 members if it came too late."""
 
 
 @ti.data_oriented
 class Teams:
-    """Teams of the CPU threads of a launch take one world after the other.
+    """Teams of the CPU threads of a launch; each team takes one world after the other.
 
-    work : of a world in a step, in particles that feel those near them alone. threads : so many there are.
-    number : of teams, where threads are not alone. turns : of each world, that it may still take.
+    work : work of a world in a step, in particles with short-ranged forces only. threads : number of threads.
+    number : number of teams, if threads do not work alone. turns : turns that each world may still take.
     """
 
     def __init__(self, worlds: int, work: int, threads: int, number: int) -> None:
@@ -57,14 +59,14 @@ class Teams:
 
     @ti.func
     def begin(self, number):
-        """Begin team ``number`` anew, before the loop in which its members come."""
+        """Reset team ``number``, before the loop in which its members join."""
         at = number * LINE
         self.roll[at], self.arrived[at], self.said[at], self.waits[at] = 0, 0, 0, 0
         self.drawn[0] = 0
 
     @ti.func
     def join(self, place, teams):
-        """Return who takes this one of all places, dealt to the teams in turns."""
+        """Return the member for a block of the loop; blocks are dealt to the teams in turn."""
         team = place % teams
         seat, members = 0, 1
         if ti.static(self.shared):
@@ -73,8 +75,11 @@ class Teams:
 
     @ti.func
     def _enrol(self, at, places):
-        """Return a seat, and how many members there are: all that have places, or those who have come before
-        one of them has waited for long. Exactly one of them ends the roll, and says how long it is."""
+        """Return a seat and the number of members: all expected threads, or those that joined before one
+        waited too long.
+
+        Exactly one member closes the roll and publishes its length.
+        """
         seat, members, looks = ti.atomic_add(self.roll[at], 1), ti.cast(0, ti.i64), 0
         while seat < OVER and members == 0:
             if seat + 1 == places or looks > self.late:
@@ -87,7 +92,7 @@ class Teams:
 
     @ti.func
     def draw(self, me):
-        """Return the next world of this member's team; ``worlds`` where there is none left."""
+        """Return the next world of the team of this member; ``worlds`` if none is left."""
         came, w = self.come(me), 0
         if self.is_last(me, came):
             w = ti.cast(ti.atomic_add(self.drawn[0], 1), ti.i32)
@@ -95,7 +100,7 @@ class Teams:
 
     @ti.func
     def come(self, me):
-        """Come to a meeting, and return a ticket to it."""
+        """Arrive at a barrier, and return a ticket for it."""
         ticket = ti.cast(0, ti.i64)
         if ti.static(self.shared):
             ticket = ti.atomic_add(self.arrived[me.team * LINE], 1)
@@ -103,8 +108,8 @@ class Teams:
 
     @ti.func
     def is_last(self, me, ticket):
-        """Return whether all others wait already: what they have done can be read, and they change nothing
-        before this member agrees with them."""
+        """Return whether this member is the last to arrive. It can then read all results of the others, and
+        they change nothing until it broadcasts."""
         last = True
         if ti.static(self.shared):
             last = ti.cast(ticket, ti.i32) == me.members - 1
@@ -112,10 +117,10 @@ class Teams:
 
     @ti.func
     def agree(self, me, ticket, value):
-        """Return what the last one who came to the meeting says, a whole number from 0 on; wait for it."""
+        """Wait for the barrier and return the value broadcast by the last member, an integer from 0 on."""
         if ti.static(self.shared):
-            # The number of the meeting stands in the upper half of a word, that of members or what is said
-            # in the lower one.
+            # The upper half of the word has the number of the barrier; the lower half has the number of
+            # members or the value.
             at, meeting = me.team * LINE, (ticket >> 32) + 1
             if self.is_last(me, ticket):
                 self.arrived[at] = meeting << 32
@@ -132,7 +137,7 @@ class Teams:
 
     @ti.func
     def share(self, me, size):
-        """Return where this member's share of so many items begins and ends."""
+        """Return the beginning and the end of this member's share of the items."""
         begin, end = 0, size
         if ti.static(self.shared):
             each = (size + me.members - 1) // me.members
@@ -141,12 +146,12 @@ class Teams:
 
     @ti.func
     def _look(self, at):
-        # A plain load would be taken out of the loop; of this, LLVM makes a fence and a load.
+        # The compiler would move a plain load out of the loop; LLVM turns this into a fence and a load.
         return ti.atomic_add(self.said[at], 0)
 
     @ti.func
     def parts(self, me):
-        """Return whether the team is to part, as the last one may ask."""
+        """Return whether the team is to part; only the last member may call this."""
         parts = False
         if ti.static(self.shared):
             parts = self.waits[me.team * LINE] >= TIMES_LATE
@@ -154,25 +159,29 @@ class Teams:
 
 
 FIRST_ALONE = 4
-"""So many steps by threads alone tell how long they take."""
+"""Number of single-thread steps that are timed."""
 TRIAL_COST = 0.1
-"""Trying teams again is to cost at most this part of the time."""
+"""Largest fraction of the time that repeated trials of teams may cost."""
 
 
 class TeamTrials:
-    """Teams that have parted, as somebody had no core too often, and were slower for it than threads alone,
-    are tried again after some time.
+    """Team trials decide when teams are tried again after they have parted.
 
-    alone : threads take so many steps more of each world alone; 0 where they are in teams. pace : the time of
-    a step of one world, then (s).
+    Teams part if a member too often has no core and if they are slower than single threads.
+
+    alone : further steps of each world by single threads; 0 while teams are used.
+    pace : time of a step of one world by a single thread (s).
     """
 
     def __init__(self, worlds: int) -> None:
         self.worlds, self.alone, self.pace = worlds, 0, 0.0
 
     def learn(self, taken: int, most: int, seconds: float, parted: bool) -> None:
-        """Hear how long a launch took, of at most so many steps of each world, and how many all of them have
-        taken; ``parted``: whether they had more to take."""
+        """Record the time of a launch.
+
+        taken : steps taken by all worlds together. most : largest number of steps of each world. parted :
+        whether worlds had further steps to take.
+        """
         if self.alone:
             self.alone -= min(most, self.alone)
             if taken:

@@ -1,4 +1,4 @@
-"""Steps world by world: a thread, or a team of them, takes a world through many of them in one launch."""
+"""Steps world by world: a thread, or a team of threads, takes a world through many steps in one launch."""
 
 import time
 
@@ -13,16 +13,16 @@ from tisim.state.state import State
 from tisim.state.status import NEVER, WorldStatus
 
 GOES_ON, DONE, PARTED = 0, 1, 2
-"""This is how a team goes on after a turn of a world: with the next turn, the next world, or not at all."""
+"""The answer after a turn of a world: continue with the next turn, go to the next world, or part."""
 
 Piece = tuple[Items, tuple[int, ...]]
-"""A piece is items that follow each other, and the places at which they are taken."""
+"""A piece is a sequence of consecutive items, with the places at which it runs."""
 
 
 def in_pieces(lists: tuple[Items, ...]) -> tuple[tuple[Piece, ...], tuple[range, ...]]:
-    """Return lists of items in pieces, and the places that each list takes.
+    """Split lists of items into pieces; return the pieces and the range of places of each list.
 
-    An item that recurs is a piece, taken at several places; so is all that lies between two of those.
+    An item that recurs is a piece with several places. The items between two such items form a piece.
     """
     every = [item for items in lists for item in items]
     pieces: dict[Items, list[int]] = {}
@@ -43,8 +43,8 @@ def in_pieces(lists: tuple[Items, ...]) -> tuple[tuple[Piece, ...], tuple[range,
 
 
 def in_shares(items: Items) -> tuple[tuple[tuple[Phase, ...], Item], ...]:
-    """Return what a team shares, phases and repeats, each with the phases of a single item that go before,
-    which one member takes."""
+    """Return the items that a team shares, phases and repeats, each with the preceding single-item phases,
+    which one member runs."""
     shares: tuple[tuple[tuple[Phase, ...], Item], ...] = ()
     single: tuple[Phase, ...] = ()
     for item in items:
@@ -60,9 +60,9 @@ def in_shares(items: Items) -> tuple[tuple[tuple[Phase, ...], Item], ...]:
 class WorldKernel(StepRules):
     """This kernel takes worlds through one of several lists of items, again and again.
 
-    One kernel is made of all lists, in which an item that recurs stands once: a search for pairs takes
-    seconds to compile. Each world is taken by a team, whose members take a share of the items of every phase.
-    All that depends on what phases change is asked by the last to be done with the one before.
+    All lists are compiled into one kernel, in which a recurring item appears once: compiling a pair search
+    takes seconds. Each world is taken by a team, whose members share the items of every phase. The last
+    member to finish a phase evaluates every condition that depends on its results.
     """
 
     def __init__(self, s: State, lists: tuple[Items, ...], rest_every: int, teams: Teams) -> None:
@@ -73,11 +73,13 @@ class WorldKernel(StepRules):
 
     @ti.kernel
     def _advance(self, steps: ti.i32, most: ti.i32, teams: ti.i32, begin: ti.i32, end: ti.i32) -> ti.i64:
-        """Take worlds through turns, each from place ``begin`` to ``end``, and return how many they have
-        taken, all together, below 0 where none goes on.
+        """Take worlds through turns, each from place ``begin`` to ``end``; return the number of turns of all
+        worlds.
 
-        steps : every running world is allowed so many turns; where it is 0, those that it still has.
-        most : so many of them are taken now. teams : so many there are, of about as many threads.
+        The number is negative if no world goes on.
+
+        steps : turns that every running world is allowed; 0 keeps the remaining ones.
+        most : largest number of turns in this launch. teams : number of teams of about equal size.
         """
         taken, going = ti.cast(0, ti.i64), 0
         ti.loop_config(serialize=True)
@@ -131,7 +133,7 @@ class WorldKernel(StepRules):
 
     @ti.func
     def _end_turn(self, w, me, turn, most):
-        """Count a turn, unless this is before the first, and return how to go on."""
+        """Count a finished turn, and return how to go on."""
         turns = ti.static(self.teams.turns)
         self._stop_failed(w)
         if turn > 0:
@@ -187,13 +189,13 @@ class WorldKernel(StepRules):
 
     @ti.func
     def _is_running(self, w):
-        """Return whether a world is running, once all items of the phase before have been heard."""
+        """Return whether a world is running, after all items of the previous phase have finished."""
         self._stop_failed(w)
         return self.s.status[w] == WorldStatus.RUNNING
 
     @ti.func
     def _size(self, phase: ti.template(), w):  # type: ignore[valid-type]
-        """Return how many items a phase has now."""
+        """Return the current number of items of a phase."""
         size = 0
         if self._is_running(w):
             if ti.static(phase.conditional):
@@ -205,7 +207,7 @@ class WorldKernel(StepRules):
 
 
 class WorldProgram(Program):
-    """This program is one of the lists of items of a kernel."""
+    """This program runs one of the lists of items of a kernel."""
 
     def __init__(self, kernel: WorldKernel, items: Items, places: range) -> None:
         self.kernel, self.items, self.places = kernel, items, places
@@ -219,7 +221,7 @@ class WorldProgram(Program):
             going = self._launch(0, steps)
 
     def _launch(self, allowed: int, steps: int) -> bool:
-        """Take at most so many steps of each world, and return whether any goes on."""
+        """Take at most this many steps of each world, and return whether any world goes on."""
         teams, most = self.kernel.teams, steps
         number = teams.number
         if self.trials.alone:
@@ -237,6 +239,6 @@ class WorldProgram(Program):
 def world_programs(
     s: State, lists: tuple[Items, ...], teams: Teams, rest_every: int = NEVER
 ) -> list[WorldProgram]:
-    """Return a program for each list of items, of one kernel."""
+    """Return a program for each list of items, all with one kernel."""
     kernel = WorldKernel(s, lists, rest_every, teams)
     return [WorldProgram(kernel, items, places) for items, places in zip(lists, kernel.spans, strict=True)]

@@ -1,18 +1,18 @@
-"""Sweeps that solve for a quantity which particles give each other, such as induced dipoles
+"""Sweeps that solve for a self-consistent quantity of particles, such as induced dipoles
 (``SelfConsistentQuantity``).
 
-Sweeps are mixed (D. G. Anderson, J. ACM 12 (1965) 547-560, of depth 1). A sweep takes the values x to f(x);
-r = f(x) - x is the residual. In place of f the next values are the combination of the last two sweeps that
-would make the residual smallest if f were linear:
+Sweeps are mixed by Anderson acceleration of depth 1 (D. G. Anderson, J. ACM 12 (1965) 547-560). A sweep maps
+the values x to f(x), with the residual r = f(x) - x. The next values combine the last two sweeps such that
+the residual would be smallest if f were linear:
 
     x = f - theta (f - f_last),    theta = <r, r - r_last> / |r - r_last|^2
 
-So values are found also where plain sweeps overshoot, and would be where there is nothing to be found: where
-what others do to a particle grows with its own value by more than that value itself (an eigenvalue of f above
-1), as in spheres of iron that lie in each other. Of f linear, and alike from i to j and from j to i in the
-inner product, <x - x_last, r - r_last> / |x - x_last|^2 + 1 is a mean of its eigenvalues. Above 1 it shows
-that one of them is: a linear law then has no solution, and of one that saturates plain sweeps go on to that
-which is stable.
+Mixing converges also in cases in which plain sweeps overshoot. It would even return values if there is no
+solution: if the feedback through the other particles exceeds the value that causes it (an eigenvalue of f
+above 1), as in overlapping iron spheres. For f linear and symmetric in the inner product (the same from i to
+j as from j to i), <x - x_last, r - r_last> / |x - x_last|^2 + 1 is a weighted mean of its eigenvalues. If it
+is above 1, so is one of the eigenvalues. A linear law then has no solution, and for a law that saturates
+plain sweeps continue to the stable solution.
 """
 
 from typing import Any
@@ -39,15 +39,16 @@ from tisim.state.state import State
 from tisim.state.status import WorldStatus
 
 ROUNDING_UNITS = 4.0
-"""Changes of so many units in the last place count as none: sweeps in f32 may go on with them for ever."""
+"""Changes of this many units in the last place count as none; sweeps in f32 might otherwise never end."""
 
 
 class SelfConsistentSolver(DerivedSolver):
-    """A self-consistent solver finds a quantity that particles give each other: the values of the next sweep,
-    and whether there is one.
+    """A self-consistent solver computes the sweeps of a quantity that depends on its values on other
+    particles.
 
-    changes : the largest of a particle in this sweep, the last, and the one before. once : whether a step
-    makes one sweep while that suffices. mixed : whether sweeps are mixed with the last (sweep_mixing.py).
+    changes : the largest change of a particle in this sweep, the last one, and the one before.
+    once : whether a step makes a single sweep as long as that suffices.
+    mixed : whether sweeps are mixed with the last one.
     """
 
     def __init__(
@@ -80,7 +81,7 @@ class SelfConsistentSolver(DerivedSolver):
         self.tree = Tree(builder)
 
     def column(self) -> Any:
-        """Return a field of values of the quantity."""
+        """Return a field for values of the quantity."""
         return ti.Vector.field(3, self.s.real) if self.components == 3 else ti.field(self.s.real)
 
     def phases(self, trial: bool = False) -> tuple[Item, ...]:
@@ -93,7 +94,7 @@ class SelfConsistentSolver(DerivedSolver):
 
 
 class BeginSweeps(OnOccasion, PerParticle):
-    """This phase asks for a sweep, from the last values, or from nothing where they have been lost."""
+    """This phase requests a sweep from the last values, or from zero if these are not finite."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         super().__init__(solver.s)
@@ -112,7 +113,7 @@ class BeginSweeps(OnOccasion, PerParticle):
 
 
 class SweepUntilConverged(Repeat):
-    """This item repeats sweeps of a world until it has converged."""
+    """This item repeats the sweeps of a world until it has converged."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         far = solver.effect.sum.phases() if isinstance(solver.effect.data, LongRange) else ()
@@ -170,7 +171,7 @@ class JacobiSweep(PairSum):
         size = a.size(new)
         largest = size
         if ti.static(a.once):
-            # Where a field has been switched off, what was is the measure of what is left.
+            # After a field is switched off, the previous value sets the scale of the remaining one.
             largest = ti.max(size, a.size(a.value[w, i]))
         if largest > a.largest[w]:
             ti.atomic_max(a.largest[w], largest)
@@ -179,8 +180,10 @@ class JacobiSweep(PairSum):
 
     @ti.func
     def check(self, w, i, size):
-        """Fail a world by what is not finite: in the first sweep it never was finite; what becomes so later
-        has not converged."""
+        """Fail a world with a value that is not finite.
+
+        In the first sweep this is a fault of the effect; in later sweeps it counts as a failure to converge.
+        """
         if not finite(size):
             if self.solver.sweeps[w] == 0:
                 self.s.fail_by_effect(w, i, self.effect.index)
@@ -189,7 +192,7 @@ class JacobiSweep(PairSum):
 
 
 class ReplaceValues(PerParticle):
-    """This phase puts the new values in the place of the old, and compares the two."""
+    """This phase replaces the old values by the new ones, and records the change."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__(solver.s)
@@ -215,14 +218,14 @@ class ReplaceValues(PerParticle):
             ti.atomic_max(a.unconverged[w], 1)
         elif on or unsolvable:
             if ti.static(self.trial):
-                # Forces that are not finite: the step is given up.
+                # The forces are then not finite, and the step is rejected.
                 a.value[w, i] *= ti.math.nan
             else:
                 fail_to_converge(self.s, w, i, self.effect)
 
     @ti.func
     def tolerance(self, w):
-        """Return the change, over the largest value, up to which there is no other sweep."""
+        """Return the relative change, over the largest value, below which no further sweep is made."""
         tolerance = self.effect.tolerance(w)
         if ti.static(self.solver.once):
             first = self.solver.sweeps[w] == 0
@@ -237,7 +240,7 @@ def fail_to_converge(s, w, i, effect: ti.template()):  # type: ignore[valid-type
 
 
 class CheckConvergence(Phase):
-    """This phase decides by the changes of a sweep whether there is another."""
+    """This phase decides from the changes of a sweep whether to make another one."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         self.solver = solver
@@ -248,7 +251,7 @@ class CheckConvergence(Phase):
         s.mutual_sweeps[w] += 1
         now, last, before = ti.static(a.changes)
         if before[w] > 0.0 and finite(now[w]):
-            # Of two sweeps: where others act as much along as against, changes grow by turns.
+            # Mean over two sweeps: if positive and negative influences balance, changes alternate in size.
             s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
         s.sweep_change[w] = now[w] / ti.select(a.largest[w] > 0.0, a.largest[w], 1.0)
         before[w], last[w], now[w] = last[w], now[w], 0.0
@@ -262,7 +265,7 @@ class CheckConvergence(Phase):
 def solver(
     s: State, effect: Bound[DerivedQuantity], domain: Bound[Domain], pairs: PairChunks | None
 ) -> DerivedSolver:
-    """Return what solves for the quantity of an effect."""
+    """Return the solver for the quantity of an effect."""
     return (
         SelfConsistentSolver(s, effect, domain, pairs)
         if isinstance(effect.data, SelfConsistentQuantity)
@@ -273,13 +276,13 @@ def solver(
 MIXING_TERMS = 5
 """The sums: <r, r - r_last>, |r - r_last|^2, <x - x_last, r - r_last>, |x - x_last|^2 and |f|^2."""
 EXCESS = 1e-3
-"""An eigenvalue so much above 1 is taken for one; what is less may be rounding."""
+"""An eigenvalue is taken to be above 1 if it exceeds 1 by this much; a smaller excess may be rounding."""
 SEEN = 1e4
-"""Changes of so many units in the last place show what eigenvalues there are."""
+"""Changes of at least this many units in the last place are used to estimate eigenvalues."""
 
 
 class CompareSweeps(PerBlock):
-    """This phase sums what tells how a sweep differs from the last, where there was one."""
+    """This phase sums the terms that compare a sweep with the last one, from the second sweep on."""
 
     conditional = True
 
@@ -306,7 +309,7 @@ class CompareSweeps(PerBlock):
 
 
 class ChooseMixing(Phase):
-    """This phase chooses theta by those sums, and notes whether there is nothing to converge to."""
+    """This phase chooses theta from those sums, and detects that there is no solution."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         self.solver = solver
@@ -323,7 +326,7 @@ class ChooseMixing(Phase):
     @ti.func
     def compare(self, w, total):
         a = self.solver
-        # Where residuals grow along the way there is nothing to extrapolate to, but what plain sweeps leave.
+        # If residuals grow along the change there is no value to extrapolate to, and the plain sweep is kept.
         if total[1] > 0.0 and total[2] <= 0.0 and finite(total[0]) and finite(total[1]):
             a.theta[w] = total[0] / total[1]
         if ti.static(a.effect.data.linear):

@@ -1,6 +1,6 @@
-"""What kernels see of a part of a scene: an object of its own, beside the data that it is made from.
+"""Bound parts: the objects through which kernels read a part of a scene.
 
-``part.hardness`` is a number in Pa. ``bound.hardness`` is a function of the world, which kernels read.
+``part.hardness`` is a number in Pa. ``bound.hardness`` is a function of the world, which kernels call.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ Kind = TypeVar("Kind", bound=Component)
 
 
 class Bound(Generic[Part]):
-    """A bound part is a part of a scene with the device memory of a batch of worlds.
+    """A bound part gives kernels access to a part of a scene in the device memory of a batch of worlds.
 
-    In a method decorated with ``ti.func``, ``self`` is the bound object. There each parameter is a function
-    of the world, ``self.hardness(w)``, each list of parts is one object for all of its rows,
-    ``self.bodies.radius(w, k)``, and what ``connect`` of the part returns stands beside them. Whatever else
-    is asked of it, such as an option or a constant of the class, is that of the data.
+    In a method decorated with ``ti.func``, ``self`` is the bound object. Each parameter is a function of the
+    world, ``self.hardness(w)``. A list of parts is one object for all rows: ``self.bodies.radius(w, k)``. The
+    values returned by ``connect`` of the part are attributes too. Any other attribute, such as an option or a
+    constant of the class, is taken from the data.
 
-    data : the part that it was made from: of the scene that was compiled, so its parameters say nothing of
-        the scenes that are loaded. index : its place among the effects of the scene.
+    data : the part of the scene that was compiled; its parameter values differ from the loaded scenes.
+    index : its index among the effects of the scene.
     """
 
     data: Part
@@ -51,12 +51,12 @@ class Peers(tuple[Bound[Any], ...]):
         return tuple(effect for effect in self if isinstance(effect.data, kinds))
 
     def bound(self, part: Kind) -> Bound[Kind]:
-        """Return the peer that was made from this very part."""
+        """Return the peer that was made from exactly this part."""
         return next(effect for effect in self if effect.data is part)
 
 
 def connected(bound: list[Bound[Any]]) -> Peers:
-    """Let each bound effect know its index and what it has chosen to know of the others."""
+    """Give each bound effect its index and the values that its ``connect`` takes from the other effects."""
     peers = Peers(bound)
     for index, effect in enumerate(peers):
         effect.index = index

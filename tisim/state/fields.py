@@ -1,4 +1,4 @@
-"""The quantities that particles carry: what each is, and which of them a scene needs."""
+"""Particle fields: the definition of each, and the choice of the fields that a scene needs."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ from tisim.errors import must
 
 @dataclass(frozen=True)
 class Field:
-    """A field is a quantity that particles carry.
+    """A field is a quantity that every particle has.
 
-    merge : what becomes of it when two particles become one: "mean" by mass, "sum", "volume" (a radius),
-        or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
-    slots : a particle has so many values, ``s.NAME[w, i, k]``; 0 for one value or vector, ``s.NAME[w, i]``.
-        They are its own: a piece that breaks off starts with the default.
-    default : what a particle starts with where the start does not say: a number, or the name of a field of
-        which it is a copy then, such as "position"; None where the start must say.
-    minimum : the least value that a start may give.
-    scratch : of use to a stepper only: results do not have it. double : in f64 also in single precision.
-    lookup : of memory, not of the particle in a slot: it stays when particles are moved, put in or taken out.
+    merge : rule when two particles merge: "mean" by mass, "sum", "volume" (a radius), or "keep" (of the
+    absorbing particle). Splitting reverses the rule: a sum is shared equally.
+    slots : number of values per particle, ``s.NAME[w, i, k]``; 0 for one value or vector, ``s.NAME[w, i]``.
+    They are not inherited: a fragment starts with the default.
+    default : value if the initial state gives none: a number, or the name of a field to copy, such as
+    "position"; None if the initial state must give it.
+    minimum : least value allowed in an initial state.
+    scratch : whether it is internal to a stepper and left out of results. double : whether it is f64 also in
+    single precision.
+    lookup : whether it belongs to the memory slot and not to its particle: it stays when particles are moved,
+    inserted or removed.
     """
 
     name: str
@@ -48,8 +50,10 @@ class Field:
         return (*particles, *((3,) if self.components == 3 else ()), *((self.slots,) if self.slots else ()))
 
     def bytes(self, real: int, *particles: int) -> int:
-        """Return the bytes of the field for an array of particles of this shape; ``real``: those of a real
-        number."""
+        """Return the bytes of the field for an array of particles of this shape.
+
+        real : bytes of a real number.
+        """
         return math.prod(self.shape(*particles)) * (4 if self.integer else 8 if self.double else real)
 
 
@@ -72,11 +76,11 @@ SHARED = {
         Field("material", "", 1, "keep", integer=True, minimum=0.0),
     )
 }
-"""These are the fields that several effects share by name."""
+"""Fields that several effects share by name."""
 
 
 def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
-    """Return the core and everything needed, each once, in a fixed order.
+    """Return the core fields and all needed fields, each once, in a fixed order.
 
     InputError is raised for a field that two parts declare differently.
     """

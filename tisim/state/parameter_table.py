@@ -1,8 +1,8 @@
-"""From plain data to what kernels see: one parameter table for all worlds.
+"""One parameter table for all worlds, and the functions through which kernels read it.
 
-A bound part (see bound.py) has, in place of each parameter, a function of the world that reads the table. So
-a kernel written ``self.hardness(w)`` sees the value of world w, and loading other designs changes numbers in
-a table, not code.
+For each parameter a bound part (see bound.py) has a function of the world that reads the table. A kernel that
+calls ``self.hardness(w)`` gets the value of world w, and loading other designs changes numbers in a table,
+not code.
 """
 
 from __future__ import annotations
@@ -67,15 +67,18 @@ def _width(kind: type[Component]) -> int:
 
 
 def _slots(part: Component) -> int:
-    """Return the number of slots of a part in the table of a world: its own, for each list its length and
-    room for its rows, what is derived for each row, and those of its members."""
+    """Return the number of table slots of a part.
+
+    The slots hold its own parameters, for each list the length and room for the rows, the derived values of
+    each row, and the slots of its members.
+    """
     lists = sum(1 + _width(kind) * kind.room(len(getattr(part, n))) for n, kind in part.lists())
     derived = sum(len(values) for values in part.derived_rows().values())
     return _width(type(part)) + lists + derived + sum(_slots(one) for one in part.members().values())
 
 
 def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
-    """Yield what stands in the slots of a part, in order, each with its dotted name."""
+    """Yield the values in the slots of a part, in order, each with its dotted name."""
     names = [f"{where}.{name}" for name, size in part.columns() for _ in range(size)]
     yield from zip(names, part.values(), strict=True)
     for name, kind in part.lists():
@@ -92,7 +95,7 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
 
 
 class ParameterTable:
-    """The table has the parameters of every part of a scene, for every world: ``table[world, slot]``."""
+    """The parameter table holds the parameters of all parts and all worlds: ``table[world, slot]``."""
 
     def __init__(self, parts: Sequence[Component], worlds: int, real: Any) -> None:
         self.slots = sum(_slots(part) for part in parts)
@@ -103,7 +106,7 @@ class ParameterTable:
         self._next, self.array_bytes = 0, 0
 
     def bind(self, part: Kind) -> Bound[Kind]:
-        """Return what kernels see of a part, the next one in the order of the table."""
+        """Bind a part, the next one in the order of the table, and return the object for kernels."""
         bound, slot = Bound(part), self._next
         for name, size in part.columns():
             setattr(bound, name, _reader(self.field, slot, size))
@@ -133,7 +136,7 @@ class ParameterTable:
         return column
 
     def _bind_rows(self, kind: type[Component], slot: int) -> Bound[Any]:
-        """Return the one object that stands for all rows of a list."""
+        """Return the object that gives kernels access to all rows of a list."""
         rows, first = Bound(kind.model_construct()), slot + 1
         rows.size = _length_reader(self.field, slot)
         for name, size in kind.columns():
@@ -142,9 +145,9 @@ class ParameterTable:
         return rows
 
     def write(self, rows: Sequence[Sequence[Component]]) -> None:
-        """Set the parameters of each world from its parts, in the order they were bound.
+        """Set the parameters of each world from its parts, in the order in which they were bound.
 
-        InputError is raised for one that the precision cannot hold, or that kernels would flush to zero.
+        InputError is raised for a value that the precision cannot hold, or that kernels would flush to zero.
         """
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):

@@ -1,5 +1,5 @@
-"""The state of a batch of worlds, with what kernels do to whole particles and worlds: add, remove, fail; and
-whether all of it is finite."""
+"""The state of a batch of worlds, with kernel operations on particles and worlds: add, remove, fail, check
+for finite values."""
 
 import numpy as np
 
@@ -12,22 +12,21 @@ from tisim.state.state_memory import StateMemory
 from tisim.state.status import ASKED, WorldStatus
 
 HEAVY = 2.0**40
-"""A particle that is fixed or moves as prescribed counts in contacts as so many times as heavy as it is: as a
-wall."""
+"""Factor on the mass of a fixed or prescribed particle in contacts, which makes it as heavy as a wall."""
 
 
 @ti.data_oriented
 class State(StateMemory):
-    """A state is all that a batch of worlds is at a time; kernels read and write it.
+    """A state holds all fields of a batch of worlds at one time; kernels read and write it.
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
     ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
     (i64), quantities (f64) and flags (i32) that effects and steppers declare.
 
-    A step that takes long may be made in several launches. ``underway`` is the number of particles that have
-    not ended it yet: unless that is 0 the particles have no time in common, ``time`` is that of when the step
-    began, and ``reached`` (s) one that all have got to. ``cut`` is how far into such a step all was well (s),
-    when it has failed; a step that begins with ``cut`` above 0 ends there, and its world does.
+    A long step may be made in several launches. ``underway`` is the number of particles that have not ended
+    it yet. Unless it is 0, the particles have no common time: ``time`` is then the beginning of the step, and
+    ``reached`` (s) a time that all particles have reached. After a failure, ``cut`` is the time into the step
+    (s) up to which all was well. A step that begins with ``cut`` above 0 ends there, and so does its world.
     """
 
     @ti.func
@@ -37,14 +36,16 @@ class State(StateMemory):
 
     @ti.func
     def relative_velocity(self, w, i, j, separation):
-        """Return the velocity (m/s) of j, as i sees it at ``separation`` (m), relative to i; of an image that
-        moves past the box it is not the difference of the two velocities."""
+        """Return the velocity (m/s) of j relative to i, for the image of j at ``separation`` (m) from i.
+
+        For an image that moves past the box it is not the difference of the two velocities.
+        """
         return self.domain.relative_velocity(self, w, i, j, separation)
 
     @ti.func
     def mass_behind(self, w, i):
-        """Return the mass (kg) that a contact of particle i meets: that of its rigid body, where it is part
-        of one; HEAVY times its own, where it is fixed."""
+        """Return the effective mass (kg) of particle i in a contact: its rigid body's mass, or HEAVY times
+        its own if it is fixed."""
         mass = self.mass[w, i]
         if ti.static(hasattr(self, "body_mass")):
             mass = self.body_mass[w, i]
@@ -54,17 +55,21 @@ class State(StateMemory):
 
     @ti.func
     def mass_at_wall(self, w, i):
-        """Return the mass (kg) that damps a contact of particle i with a wall, and 1; where i is as heavy as
-        a wall itself its own mass, as the force on either is that of a particle, and 0: nothing moves by
-        it."""
+        """Return the mass (kg) for damping in a contact of particle i with a wall, and 1.
+
+        If i is as heavy as a wall, return its own mass and 0: the contact moves nothing, but its force is
+        still computed with the mass of a particle.
+        """
         mass, own = self.mass_behind(w, i), self.mass[w, i]
         held = mass >= HEAVY * own
         return ti.select(held, own, mass), ti.cast(ti.select(held, 0.0, 1.0), self.real)
 
     @ti.func
     def masses_behind(self, w, i, j):
-        """Return the masses (kg) that a contact of particles i and j meets, and 1; where both are as heavy as
-        walls their own masses, and 0: nothing moves by the contact."""
+        """Return the effective masses (kg) of particles i and j in a contact, and 1.
+
+        If both are as heavy as walls, return their own masses and 0: the contact moves nothing.
+        """
         m, n, own, other = self.mass_behind(w, i), self.mass_behind(w, j), self.mass[w, i], self.mass[w, j]
         both = (m >= HEAVY * own) & (n >= HEAVY * other)
         free = ti.cast(ti.select(both, 0.0, 1.0), self.real)
@@ -81,27 +86,32 @@ class State(StateMemory):
 
     @ti.func
     def remove(self, w, i):
-        """Mark a particle as gone; its slot is reused after the events of this step."""
+        """Mark a particle as removed; its slot is reused after the events of this step."""
         self.mass[w, i] = 0.0
         ti.atomic_max(self.changed[w], 1)
 
     @ti.func
     def invalidate_lists(self, w):
-        """Say that a particle has been moved or resized other than by a step: it is put back into the domain,
-        and pair lists are made anew."""
+        """Declare that a particle has been moved or resized other than by a step.
+
+        It is put back into the domain, and pair lists are rebuilt.
+        """
         ti.atomic_max(self.changed[w], 1)
 
     @ti.func
     def append(self, w, i):
-        """Copy particle i to a new slot, and return its index. The caller has checked ``room``."""
+        """Copy particle i to a new slot, and return its index. The caller must have checked ``room``."""
         k = self.append_uncounted(w, i, 0)
         self.lengthen(w, 1)
         return k
 
     @ti.func
     def append_uncounted(self, w, i, k):
-        """Copy particle i to the k-th slot after the last one in use, and return its index; it counts from
-        ``lengthen`` on. Others may be copied at the same time. The caller has checked ``room``."""
+        """Copy particle i to the k-th slot after the last one in use, and return its index.
+
+        The copy counts after a call of ``lengthen``. Other particles may be copied at the same time. The
+        caller must have checked ``room``.
+        """
         new = self.count[w] + k
         self.copy(w, i, new)
         self.begin(w, new, self.next_id[w] + k)
@@ -109,15 +119,17 @@ class State(StateMemory):
 
     @ti.func
     def lengthen(self, w, number):
-        """Count so many new particles, in the slots after the last one in use."""
+        """Count new particles in the slots after the last one in use."""
         self.count[w] += number
         self.next_id[w] += number
         self.changed[w] = 1
 
     @ti.func
     def insert(self, w, position, velocity, radius, mass):
-        """Put a new particle in, with what all fields start with besides; return its index. The caller has
-        checked ``room``."""
+        """Insert a new particle, with defaults in all other fields; return its index.
+
+        The caller must have checked ``room``.
+        """
         k = self.count[w]
         for column in ti.static(self.defaults):
             if ti.static(column[2] == 3):
@@ -134,7 +146,7 @@ class State(StateMemory):
 
     @ti.func
     def begin(self, w, i, number):
-        """Give a new particle an id, and nothing that is its own yet."""
+        """Give a new particle an id, and reset the slots that are not inherited."""
         for column in ti.static(self.slotted):
             for m in range(column[1]):
                 column[0][w, i, m] = column[2]
@@ -142,44 +154,50 @@ class State(StateMemory):
 
     @ti.func
     def finish(self, w, effect):
-        """Have a world end after this step, by an effect, by its index in the scene."""
+        """End a world after this step by an effect, given by its index in the scene."""
         self.end[w] = self.time[w]
         ti.atomic_min(self.ending_effect[w], effect)
 
     @ti.func
     def room(self, w):
-        """Return the number of free slots, of those that its scene has, so that no world ends otherwise in a
-        larger simulation."""
+        """Return the number of free slots within the capacity of the scene of a world.
+
+        It does not depend on the capacity of the simulation, so a world ends the same way in a larger one.
+        """
         return self.most[w] - self.count[w]
 
     @ti.func
     def fail(self, w, status, i):
-        """Stop a world, after this phase: all of its items are heard, and of several particles at fault the
-        lowest id is recorded, whatever the order of parallel work."""
+        """Stop a world after this phase.
+
+        All items of the phase finish, and the lowest id of several particles at fault is recorded, so the
+        record does not depend on the order of parallel work.
+        """
         ti.atomic_max(self.failed[w], status)
         ti.atomic_min(self.failing_particle[w], self.id[w, i])
 
     @ti.func
     def fail_by_force(self, w, status, i):
-        """Stop a world by a force on particle i; failure_attribution.py finds out which of them it was."""
+        """Stop a world by a force on particle i; failure_attribution.py later identifies the force."""
         self.fail(w, status, i)
         self.ask(w, self.time[w])
 
     @ti.func
     def ask(self, w, t):
-        """Ask which force it was that stopped a world, at t (s) and as the world is now."""
+        """Request the identification of the force that stopped a world, at t (s) and in the current state."""
         ti.atomic_min(self.failing_effect[w], ASKED)
         self.failure_time[w] = t
 
     @ti.func
     def fail_by_effect(self, w, i, effect):
-        """Stop a world in which an effect, by its index in the scene, has made something not finite."""
+        """Stop a world in which an effect, given by its index in the scene, has produced a value that is not
+        finite."""
         self.fail(w, WorldStatus.NOT_FINITE, i)
         ti.atomic_min(self.failing_effect[w], effect)
 
     @ti.func
     def fail_world_by_effect(self, w, effect):
-        """Stop a world in which an effect, by its index in the scene, has made a quantity of the world not
+        """Stop a world in which an effect, given by its index in the scene, has made a world quantity not
         finite."""
         ti.atomic_max(self.failed[w], WorldStatus.NOT_FINITE)
         ti.atomic_min(self.failing_effect[w], effect)
@@ -187,7 +205,7 @@ class State(StateMemory):
 
 @ti.data_oriented
 class FiniteCheck:
-    """This check asks for all worlds of a state at once whether all is finite; a copy of all quantities would
+    """A check on the device, for all worlds at once, that all values are finite; copying the values would
     take much longer."""
 
     def __init__(self, s: State) -> None:
@@ -202,7 +220,7 @@ class FiniteCheck:
 
     @in_taichi_thread
     def finite_worlds(self) -> np.ndarray:
-        """Return whether all is finite, by world."""
+        """Return for each world whether all values are finite."""
         self._check_all()
         finite: np.ndarray = self.not_finite.to_numpy() == 0
         return finite

@@ -1,10 +1,10 @@
-"""The memory of a batch of worlds, as Python sees it: fields are placed, read and written.
+"""The memory of a batch of worlds and its access from Python: fields are placed, read and written.
 
-The particle fields are a core, plus the union of what the scene's effects need.
+The particle fields are a core, plus the union of the fields that the effects of the scene need.
 
-Every field has a leading world axis. Vectors are stored as separate components (structure of arrays),
-which the compiler can vectorise over particles; or all quantities of a particle together (array of
-structures), for scenes that do most of their work on pairs of particles picked from a list.
+Every field has a leading world axis. By default, vectors are stored as separate components (structure of
+arrays), which the compiler can vectorise over particles. Scenes that mostly compute listed pairs store all
+quantities of a particle together (array of structures).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -32,10 +32,10 @@ from tisim.state.status import (
 class StateMemory:
     """A state memory is the device memory of ``worlds`` worlds of at most ``capacity`` particles.
 
-    shared : whether several threads may work on a world at once, as kernels are compiled.
-    records : whether the real quantities of a particle lie together in memory.
-    domain : the space of the worlds, as kernels see it.
-    before_reading : called before particle fields are read, by what keeps some of their values elsewhere.
+    shared : whether several threads may work on a world at once, in the compiled kernels.
+    records : whether the real quantities of a particle are adjacent in memory.
+    domain : the domain of the worlds, as kernels see it.
+    before_reading : functions called before particle fields are read, for values that are kept elsewhere.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class StateMemory:
         records: bool = False,
         totals: tuple[str, ...] = (),
     ) -> None:
-        # Before anything is placed: fields that are left half made are a fault of every later kernel.
+        # Checked before allocation: fields that are left half made would break every later kernel.
         names = (*(field.name for field in fields), *counters, *world_quantities, *flags, *totals)
         check_names(type(self), names)
         self.worlds, self.capacity = worlds, capacity
@@ -72,16 +72,16 @@ class StateMemory:
                 setattr(self, name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
-        # The skin of its scene, m, 0 to have one chosen; and the first step, s, where that is known.
+        # The skin of the scene, m, or 0 to choose it automatically; and the first step, s, if it is known.
         self.skin, self.step_ahead = ti.field(ti.f64), ti.field(ti.f64)
         builder.dense(ti.i, worlds).place(self.skin, self.step_ahead)
-        # Particles that its scene may ever have; the capacity may be that of a larger one.
+        # Largest number of particles of the scene; the capacity may be larger.
         self.most = ti.field(ti.i32)
         builder.dense(ti.i, worlds).place(self.most)
-        # No part of what a run is: a world waits at the first end of a step at or after ``pause_time`` (s),
-        # at ``goal`` steps, and for the next launches at ``step_limit`` steps; ``place`` tells which of
-        # these it takes next, and ``occasion`` why. With more particles than ``listed_above`` it looks for
-        # pairs in cells.
+        # Not part of the state of a run. A world waits at the first end of a step at or after ``pause_time``
+        # (s), at ``goal`` steps, and until the next launches at ``step_limit`` steps. ``place`` is the next
+        # launch that it takes, and ``occasion`` the reason for it. With more particles than ``listed_above``
+        # a world searches pairs in cells.
         self.pause_time, self.place = ti.field(ti.f64), ti.field(ti.i32)
         self.goal, self.step_limit = ti.field(ti.i64), ti.field(ti.i64)
         self.listed_above, self.occasion = ti.field(ti.i32), ti.field(ti.i32)
@@ -89,7 +89,7 @@ class StateMemory:
         for column in waits:
             builder.dense(ti.i, worlds).place(column)
         for name in WORLD_VECTORS:
-            # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
+            # Scalars with an axis index: atomic operations on a component of a vector field are lost.
             column = ti.field(ti.f64)
             builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
             setattr(self, name, column)
@@ -103,7 +103,7 @@ class StateMemory:
         self.slotted = tuple(
             (getattr(self, field.name), field.slots, _number(field)) for field in fields if field.slots
         )
-        # What a particle that is put in has besides: a number, or the value of another field.
+        # Values of the other fields of an inserted particle: a number, or a copy of another field.
         self.defaults = tuple(
             (getattr(self, field.name), _number(field), field.components)
             for field in carried
@@ -140,7 +140,7 @@ class StateMemory:
         return tuple(getattr(self, field.name) for field in self.fields if field.merge == rule)
 
     def bytes(self) -> dict[str, int]:
-        """Return the bytes of each particle field, all worlds together."""
+        """Return the bytes of each particle field, for all worlds together."""
         real = 8 if self.real == ti.f64 else 4
         return {f.name: f.bytes(real, self.worlds, self.capacity) for f in self.fields}
 
@@ -153,7 +153,7 @@ class StateMemory:
     def snapshot(self, names: Iterable[str]) -> dict[str, np.ndarray]:
         """Return fields as arrays of their full shapes, by name.
 
-        A copy is compiled for each choice of particle fields, and one for all quantities of the worlds.
+        A copy kernel is compiled for each choice of particle fields, and one for all world quantities.
         """
         names = tuple(names)
         particles = tuple(name for name in names if name not in self.columns)
@@ -169,14 +169,14 @@ class StateMemory:
         return self.snapshot((name,))[name]
 
     def saved(self) -> tuple[str, ...]:
-        """Return the names of all that decides how a simulation goes on, pair lists apart: these may be made
-        anew."""
+        """Return the names of all fields that determine how a simulation continues, except pair lists, which
+        can be rebuilt."""
         fields = (field.name for field in self.fields)
         worlds = (*WORLD_QUANTITIES, *WORLD_INTEGERS, *self.counters, *self.world_quantities, *self.flags)
         return (*fields, *worlds, *self.totals, "frame", "seed", "goal")
 
     def image(self) -> dict[str, np.ndarray]:
-        """Return a copy of all worlds as they are, by the names that are saved."""
+        """Return a copy of the current state of all worlds, by the names of ``saved``."""
         return self.snapshot(self.saved())
 
     def fill(self, values: Mapping[str, Any]) -> None:
@@ -195,12 +195,11 @@ class StateMemory:
 
     @property
     def alive(self) -> bool:
-        """Return whether the memory is there: neither given back, nor gone because Taichi has been started
-        anew."""
+        """Return whether the memory still exists: it has not been freed, nor lost in a restart of Taichi."""
         return self._tree.alive
 
     def check(self) -> None:
-        """Raise RunError when the memory is gone."""
+        """Raise RunError if the memory no longer exists."""
         if self._tree.generation != runtime.generation():
             raise RunError("a Simulation must be used with the settings it was made under; start it anew")
         if not self.alive:
@@ -208,5 +207,5 @@ class StateMemory:
 
 
 def _number(field: Field) -> int | float:
-    """Return what a new particle has in a field, where that is a number."""
+    """Return the value of a field of a new particle, for a numeric default."""
     return int(field.default or 0) if field.integer else float(field.default or 0.0)

@@ -1,4 +1,4 @@
-"""How the worlds of a batch are doing, and the names of what a state holds of each."""
+"""The status of the worlds of a batch, and the names of the world fields of a state."""
 
 from enum import IntEnum
 
@@ -6,8 +6,7 @@ from tisim.errors import must
 
 
 class WorldStatus(IntEnum):
-    """A status says how a world is doing; of several failures in one phase, the one with the highest number
-    counts."""
+    """The status of a world; of several failures in one phase, the one with the highest number counts."""
 
     RUNNING = 0
     ENDED = 1
@@ -17,51 +16,49 @@ class WorldStatus(IntEnum):
     OUT_OF_ROOM = 3
     """There is no free slot for another particle."""
     CONTACT_OVERFLOW = 4
-    """There are more simultaneous contacts than there is room for."""
+    """More simultaneous contacts than a particle, or a world, can store."""
     NOT_CONVERGED = 5
     """A self-consistent quantity of the particles does not converge."""
     POSITION_LOST = 6
-    """A particle has left the box so far that rounding loses its position."""
+    """A particle has left the box so far that rounding loses its position in it."""
     STEP_TOO_SHORT = 7
     """The implicit equations of a step cannot be solved even at the shortest step."""
     FORCE_TOO_STEEP = 8
-    """A force asks for a step shorter than the shortest."""
+    """A force requires a step shorter than the shortest."""
     NOT_POSITIVE_DEFINITE = 9
     """A diffusion matrix is not positive definite."""
     STEP_TOO_LONG = 10
-    """A step is too long beside the critical step of the forces on a particle."""
+    """A step is too long compared with the critical step of the forces on a particle."""
     LIST_OVERFLOW = 11
-    """There are more near pairs than their list has room for; it is made longer, and the world goes on."""
+    """More near pairs than their list can hold; the list is lengthened, and the world continues."""
     OUTRUN = 12
-    """Grains move so far in a step that they may pass through each other unseen."""
+    """Grains move so far in a step that they may pass through each other undetected."""
 
 
 NO_ONE = 2**31 - 1
-"""This is the value of failing_particle and failing_effect of a world that no particle, or no effect, has
-stopped."""
+"""Value of failing_particle and failing_effect if no particle, or no effect, has stopped the world."""
 ASKED = NO_ONE - 1
-"""This is the value of failing_effect where a force has stopped a world and which of them is not yet
-known."""
+"""Value of failing_effect if a force has stopped the world and has not been identified yet."""
 
 NEVER = 2**62
-"""This is a number of steps that no world gets to."""
+"""A number of steps that no world reaches."""
 
 
 WORLD_QUANTITIES = (
     *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "failure_time"),
     *("reached", "cut"),
 )
-"""These quantities of a world (f64) tell its time and how its steps go."""
+"""World quantities (f64) for the time of a world and its steps."""
 WORLD_INTEGERS = (
     *("count", "status", "failed", "failing_particle", "failing_effect"),
     "ending_effect",
     *("changed", "events", "next_id", "underway"),
 )
-"""These integers of a world (i32) tell how many particles it has and how it is doing."""
+"""World integers (i32) for the number of particles of a world and its status."""
 WORLD_VECTORS = ("frame", "displacement")
-"""These vectors of a world (f64) tell how far its particles have moved."""
+"""World vectors (f64) for the displacement of the particles."""
 WORLD_COUNTERS = ("steps", "particle_steps")
-"""These counters (i64) are those that every world keeps."""
+"""Counters (i64) of every world."""
 WORLD_SETTINGS = (
     "seed",
     "skin",
@@ -74,7 +71,7 @@ WORLD_SETTINGS = (
     "step_limit",
     "listed_above",
 )
-"""These numbers of a world say what it is and what it waits for."""
+"""Settings of a world, and the limits at which it waits."""
 ATTRIBUTES = (
     *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "totals", "reported"),
     *("real", "records", "shared", "domain", "before_reading", "columns", "singles", "slotted", "defaults"),
@@ -83,7 +80,7 @@ ATTRIBUTES = (
 
 
 def check_names(state: type, names: tuple[str, ...]) -> None:
-    """Raise InputError where a declared name is that of another one, or means something else on a state."""
+    """Raise InputError if a declared name is used twice or has another meaning on a state."""
     for k, name in enumerate(names):
         taken = name in (
             *WORLD_QUANTITIES,

@@ -246,7 +246,9 @@ def test_what_no_step_can_follow_of_unlike_grains_stops_the_world():
     assert below.status.ok, below.status.reason
     assert np.abs(below.state["spin"]).max() < 1e-4
     assert "effects.parallel_bond" in above.status.reason
-    assert "(it is so where a step is too long for the springs and dashpots of a bond)" in above.status.reason
+    assert (
+        "(this happens if a step is too long for the springs and dashpots of a bond)" in above.status.reason
+    )
     np.testing.assert_array_equal(above.state["spin"], above.start["spin"])
 
 

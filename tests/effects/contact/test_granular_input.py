@@ -228,7 +228,7 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
     }
     for (_, by), result in zip(made.values(), ends([one for one, _ in made.values()]), strict=True):
         assert not result.status.ok
-        for word in ("not finite", f"effects.{by}", "particle 0 (it is so where a step is too long for"):
+        for word in ("not finite", f"effects.{by}", "particle 0 (this happens if a step is too long for"):
             assert word in result.status.reason
         for name in ("position", "velocity", "spin"):
             assert np.isfinite(result.state[name]).all(), name

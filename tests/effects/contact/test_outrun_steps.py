@@ -17,7 +17,7 @@ RADIUS, STEP = 0.45e-3, 3.55756e-7
 """m, s: a step that follows the springs of grains of this radius, of 10 MPa and 2500 kg/m^3."""
 LAW = {"young": 1e7, "poisson": 0.25, "restitution": 0.5, "friction": 0.5}
 MASS = 2500 * 4 / 3 * np.pi * RADIUS**3
-BOUND = re.compile(r"the step is (\S+) s, and at most (\S+) s would do there")
+BOUND = re.compile(r"the step is (\S+) s, and the force is finite up to (\S+) s")
 
 
 def thrown(height, velocity, **more):

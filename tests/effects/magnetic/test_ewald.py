@@ -148,7 +148,7 @@ def test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name(rng):
         scenes.append(one.model_copy(update={"particles": one.particles.model_copy(update=start)}))
     gone, stayed = simulate(scenes, worlds=2, capacity=16)
     assert "effects.ewald_dipole_dipole" in gone.status.reason
-    why = "(it is so where the centre of a particle is beyond the box along its open axis)"
+    why = "(this happens if the centre of a particle is beyond the box along its open axis)"
     assert f"particle 0 {why}" in gone.status.reason
     assert 3.8 < gone.time < 4.0
     assert stayed.status.ok, stayed.status.reason

@@ -254,7 +254,7 @@ def test_a_force_that_is_too_steep_is_refused_with_time_and_particle(together):
     steep, fine, mad = run([colloids(place * k, together, trap=trap, **limits) for k, trap in cases])
     assert fine.status.ok, fine.status.reason
     reason = steep.status.reason
-    assert "found at t = 0 s: a force so strong that it asks for a step shorter than the shortest" in reason
+    assert "found at t = 0 s: a force so strong that it requires a step shorter than the shortest" in reason
     assert "by effects.trap, at particle 1" in reason
     assert "found at t = 0 s: a quantity is not finite, by effects.trap, at particle 1" in mad.status.reason
     np.testing.assert_array_equal(steep.state["position"], steep.start["position"])
