@@ -27,9 +27,12 @@ from tisim.console import err, out, plain_table
 from tisim.errors import RunError
 
 VERDICTS = {True: Text("pass", "green"), False: Text("FAIL", "bold red"), None: Text("")}
-"""What is printed of a check that holds, of one that does not, and of a number that is only shown."""
+"""The text printed for a check that passes, one that fails, and a value that is shown without a check."""
 Everything = Annotated[
-    bool, typer.Option("--all", help="Also memory, phases of a step, sources, and what is not compiled.")
+    bool,
+    typer.Option(
+        "--all", help="Also show memory, the phases of a step, sources and the parts that are not compiled."
+    ),
 ]
 
 
@@ -79,7 +82,7 @@ def check(
     outcomes: list[bool | None] = []
     with err().status("checking") as status:
         for item in checks:
-            # What is only shown is judged by nobody.
+            # A value that is only shown has no verdict.
             ok = None if item.ok is None else bool(item.ok)
             outcomes.append(ok)
             table.add_row(item.name, *item.cells, VERDICTS[ok])
@@ -91,7 +94,7 @@ def check(
 
 
 def doctor() -> None:
-    """Say what this machine is to tisim, and what the other backend would give."""
+    """Report this machine's backend, processor, memory and versions, and time the other backend."""
     from tisim.describe.diagnostics import findings
 
     table = plain_table()
