@@ -20,7 +20,7 @@ AFRESH = 100
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """An ellipsoid is the places r with sum_k ((r - centre) . axes_k / semi_axes_k)^2 <= 1.
+    """The set of points r with sum_k ((r - centre) . axes_k / semi_axes_k)^2 <= 1.
 
     centre : m. semi_axes : the largest first (m). axes : unit vectors, as rows, shape (3, 3).
     """

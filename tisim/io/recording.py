@@ -19,10 +19,10 @@ from tisim.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Recording:
-    """This is a trajectory to record: ``frames`` evenly over the duration, or one frame ``every`` so much
-    time (s).
+    """A trajectory to record: ``frames`` at equal intervals over the duration, or a frame ``every`` time
+    interval (s).
 
-    The start and the end are recorded always; with ``frames`` the start is one more.
+    The start and the end are always recorded; the start is not counted in ``frames``.
     """
 
     path: Path | str
