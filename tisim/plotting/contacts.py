@@ -1,4 +1,4 @@
-"""A figure of the contacts of grains: how many each has, and which way they point."""
+"""A figure of the contacts of grains: coordination numbers and contact directions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tisim.errors import must
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 ROSE_SECTORS = 24
-"""A rose has so many sectors."""
+"""Number of sectors of a rose diagram."""
 
 
 def fabric(
@@ -50,7 +50,7 @@ def fabric(
     rose.bar(middle, 2 * np.pi * density, width=2 * np.pi / ROSE_SECTORS, color=AXIS_COLOURS[0], alpha=0.6)
     theta = np.linspace(-np.pi, np.pi, 361)
     smooth = planar_density(fabric_tensor(position, pairs, sides), plane, theta)
-    # Below 0, where contacts favour one direction, two terms say nothing.
+    # For strong anisotropy the two-term expansion becomes negative and is meaningless there.
     rose.plot(theta, np.maximum(smooth, 0.0), color=AXIS_COLOURS[1])
     rose.set_yticks([1.0])
     rose.set_xticks(np.pi / 2 * np.arange(4), [f"{sign}{'xyz'[k]}" for sign in ("", "-") for k in plane])
@@ -60,7 +60,7 @@ def fabric(
 
 
 def planar_density(tensor: np.ndarray, plane: tuple[int, int], theta: np.ndarray) -> np.ndarray:
-    """Return E at angles (rad) from the first axis of a plane to the second, of a fabric tensor (3, 3)."""
+    """Return E at angles (rad) from the first axis of a plane to the second, for a fabric tensor (3, 3)."""
     within = tensor[np.ix_(plane, plane)] / tensor[plane, plane].sum()
     return np.asarray(
         1 + 2 * (within[0, 0] - within[1, 1]) * np.cos(2 * theta) + 4 * within[0, 1] * np.sin(2 * theta)

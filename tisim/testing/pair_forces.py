@@ -1,5 +1,4 @@
-"""Pair forces must write nothing, and be the same whichever way they are asked for, and of images that
-move."""
+"""Test that pair forces write nothing, and that all ways of evaluating them agree, also for moving images."""
 
 from typing import Any
 
@@ -17,10 +16,10 @@ from tisim.testing.image_velocities import ImageVelocities, assert_same
 from tisim.testing.uncompiled import started
 
 TOUCHING = 0.9
-"""A law is evaluated where two particles are in the scene, and on the same line at this part of the distance
-at which they touch."""
+"""Second distance at which a law is evaluated, relative to the contact distance; the first is that in the
+scene."""
 COMPARED_AT = (0.5, 1.0, 2.0)
-"""The force by the inverse of the distance is compared at these distances, relative to that in the scene."""
+"""Distances, relative to the one in the scene, at which the force from the inverse distance is compared."""
 
 
 @in_taichi_thread
@@ -51,7 +50,8 @@ def assert_pair_forces(scene: Scene) -> None:
 
 
 def _written_nothing(s: State, call: "_Calls", duration: float) -> list[np.ndarray]:
-    """Return what a law gives for pairs that remember nothing, and something; it must write nothing."""
+    """Return the results of a law for pairs without and with a contact history, after checking that it writes
+    nothing."""
     before, label = s.image(), call.effect.data.label
     found = [call.results(remembered, duration) for remembered in (0.0, 1.0)]
     for name, values in s.image().items():
@@ -61,9 +61,10 @@ def _written_nothing(s: State, call: "_Calls", duration: float) -> list[np.ndarr
 
 
 def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
-    """forces : of each two particles and factor by distance, by its inverse, and by an inverse of 0."""
+    """forces : for each two particles and each factor, from the distance, from its inverse, and from an
+    inverse of 0."""
     by_distance, by_inverse, by_none = (forces[..., k, :] for k in range(3))
-    # Forces that pass through 0 at some distance are compared with what they are at others.
+    # A force that passes through 0 at some distance is compared relative to its size at other distances.
     size = np.abs(by_distance).max(axis=(2, 3), keepdims=True)
     wrong = ~(np.abs(by_inverse - by_distance) <= np.sqrt(np.finfo(forces.dtype).eps) * size)
     for i, j, k, c in np.argwhere(wrong)[:1]:
@@ -80,7 +81,7 @@ def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
 
 @ti.data_oriented
 class _Calls:
-    """This kernel asks a law for each two particles of the first world, at two distances."""
+    """Kernel that evaluates a law for each two particles of the first world, at two distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect, self.found, builder = s, effect, ti.field(s.real), Builder()
@@ -107,7 +108,7 @@ class _Calls:
         apart = s.position[0, j] - s.position[0, i]
         length, touching = apart.norm(), ti.cast(TOUCHING, s.real) * (s.radius[0, i] + s.radius[0, j])
         past = ti.Vector.zero(s.real, self.memory) + ti.cast(remembered, s.real)
-        # A loop, so that the law is compiled once.
+        # A loop is used so that the law is compiled once.
         for k in range(2):
             distance = ti.select(k == 0, length, touching)
             force, turn, back, _ = self.effect.interaction(
@@ -134,8 +135,8 @@ class _ByInverse:
         self.factor.from_numpy(np.array(COMPARED_AT))
 
     def forces(self) -> np.ndarray:
-        """Return the forces by index of the particle, of the other one, of the factor and of the way, (...,
-        3)."""
+        """Return the forces by index of the particle, of the other one, of the factor and of the way of
+        evaluation, (..., 3)."""
         self.measure()
         found = self.force.to_numpy()
         return found.reshape(*found.shape[:3], 3, 3)
