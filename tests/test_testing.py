@@ -164,7 +164,7 @@ class Drift(PerParticle):
 
 @pytest.mark.slow
 def test_a_stepper_that_does_not_say_so_is_reported():
-    with pytest.raises(AssertionError, match=r"^position at the end must be with lists what it"):
+    with pytest.raises(AssertionError, match=r"^position at the end must be the same with lists as"):
         assert_lists(crossing(Silent(), (SHELL,), velocity=3.0))
 
 

@@ -47,7 +47,7 @@ def picture(study: Study) -> Figure:
         letters(axes)
     axes[0].set_ylabel("relative error")
     if any(row.errors and not row.trusted(k) for row in study.rows for k in range(wide)):
-        axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: no more than this")
+        axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: upper bound")
     # Lines appear in every panel, rings in some.
     named = {name: h for axis in axes for h, name in zip(*axis.get_legend_handles_labels(), strict=True)}
     figure.legend(
@@ -77,7 +77,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     best = {row.key: row for row, *_ in cheapest}
     others = {row.key: row for _, *rows in cheapest for row in rows if row.key not in best}
     _ring(axis, list(best.values()), k, "-", "cheapest for a power of ten of the error")
-    _ring(axis, list(others.values()), k, ":", "as cheap, as far as timings tell, with more work")
+    _ring(axis, list(others.values()), k, ":", "equally cheap within timing uncertainty, with more work")
     axis.set_xscale("log")
     axis.set_yscale("log")
     # If nothing was measured, the axis has no data to fit.

@@ -41,7 +41,7 @@ class Quantity:
     @property
     def relative_to(self) -> str:
         """Text that describes the size to which errors are relative."""
-        return "its largest on the way" if self.returns else "its true value"
+        return "its largest value during the run" if self.returns else "its true value"
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ LARGEST_REFERENCE_ERROR = 0.1
 """A reference with a larger error than this, relative to the size of the motion, cannot tell settings
 apart."""
 ADVICE = (
-    "paths are chaotic, or hard to resolve. A shorter duration may do; or ask for a quantity of many random "
+    "paths are chaotic, or hard to resolve. Use a shorter duration, or a quantity averaged over many random "
     "starts (docs/accuracy.md)"
 )
 """Advice that is given if the reference cannot tell settings apart."""
@@ -79,7 +79,7 @@ def attempts(methods: Sequence[SettingSweep], level: float) -> list[ReferenceRun
     level : decades of error at the finest settings of the methods. InputError if no method converges.
     """
     able = [m for m in methods if m.converges and all(s.numbers == USUAL_NUMBERS for s in m.settings)]
-    must(bool(able), "stepper", "one with an accuracy parameter that its error vanishes with", Words("none"))
+    must(bool(able), "stepper", "one with an error that vanishes with an accuracy parameter", Words("none"))
     best = max(able, key=lambda method: method.base.stepper.order)
     others = [
         m for m in able if type(m.base.stepper) is not type(best.base.stepper) and m.base.stepper.order > 1

@@ -57,7 +57,7 @@ class StudyRunner:
         base = self._run([study.scene], 0.0)
         sweeps = self._methods(base)
         self.base = base.seconds
-        must(bool(sweeps), "scene", "one that has something to turn", study.scene.stepper.kind())
+        must(bool(sweeps), "scene", "one with a setting to vary", study.scene.stepper.kind())
         rounds = max(len(method.settings) for method in sweeps)
         measured = {row.key for row in study.rows}
         plan = [

@@ -16,9 +16,9 @@ from tisim.accuracy.row import Row
 from tisim.console import TERMINAL_WIDTH
 
 HEADINGS = (
-    "time: the median of the wall seconds; spread: the longest less the shortest of them",
-    "steps, forces, rejected: the steps, force evaluations and rejected steps of a particle",
-    "best for: the error that no other setting meets in less time",
+    "time: median of the wall seconds; spread: longest minus shortest",
+    "steps, forces, rejected: steps, force evaluations and rejected steps per particle",
+    "best for: the error for which no other setting is faster",
 )
 """Explanations of the column headings of the table."""
 
@@ -96,13 +96,17 @@ def notes(study: Study) -> list[str]:
     measured = [row for row in study.rows if row.errors]
     lines += HEADINGS if measured else []
     if any(not row.trusted(k) for row in measured for k in range(len(row.errors))):
-        lines.append("<: no more is known of the error than that it is smaller")
+        lines.append("<: upper bound of an error that is too small to be known")
     if any(len(rows) > 1 for rows in study.decades().values()):
-        lines.append("best for, in brackets: timings do not tell it from the other, which takes less work")
+        lines.append(
+            "best for, in brackets: within the timing uncertainty as fast as another setting with less work"
+        )
     if not study.complete:
-        lines.append("not complete: the budget, or Ctrl-C, came before the other settings")
+        lines.append(
+            "not complete: the budget was spent, or the study was stopped, before all settings were run"
+        )
     if any(row.same for row in study.rows):
-        lines.append("no change: the same as of the law that it stands for, but for rounding")
+        lines.append("no change: the same errors, up to rounding, as with the law that it approximates")
     return lines
 
 

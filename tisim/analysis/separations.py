@@ -29,7 +29,7 @@ def vectors_of(sides: Sides) -> np.ndarray:
     must(vectors.shape == (3, 3), "sides", "three lengths, or three vectors", given.shape)
     must(bool((np.diag(vectors) >= 0).all()), "sides", "0 or above", given)
     leaning = [axis for axis in range(3) if np.count_nonzero(vectors[axis]) > 1]
-    must(len(leaning) < 2, "sides", "vectors of which at most one leans, as in a sheared box", given)
+    must(len(leaning) < 2, "sides", "vectors with at most one tilted, as in a sheared box", given)
     return vectors
 
 

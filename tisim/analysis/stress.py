@@ -79,7 +79,7 @@ def stress_on_wall(measures: Mapping[str, float | np.ndarray], name: str, area: 
     measures : measures of a result, or of a time series.
     name : name of the body, as in ``lid_force_z``.
     """
-    must(f"{name}_force_x" in measures, "name", "that of a body with measures of its force", name)
+    must(f"{name}_force_x" in measures, "name", "a body with measures of its force", name)
     must(area > 0, "area", "above 0 m^2", area)
     force = [np.asarray(measures[f"{name}_force_{axis}"], float) for axis in "xyz"]
     return np.stack(force, axis=-1) / area

@@ -154,7 +154,9 @@ def cost(
             out().print(table.table(study))
             out().print("\n".join([*table.notes(study), *map(str, paths)]))
     if not finished:
-        err().print(f"stopped; {out_folder / storage.HDF5} has what is done. {resume_hint(fresh, overwrite)}")
+        err().print(
+            f"stopped; {out_folder / storage.HDF5} has all measurements. {resume_hint(fresh, overwrite)}"
+        )
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)

@@ -44,7 +44,7 @@ def cases() -> None:
         out().print(Text.assemble((case.name, "bold"), f"  {case.title}\n    {case.source}"))
         table = plain_table()
         for name, size in case.sizes.items():
-            usual = "; that of tisim cost" if name == case.cost_size else ""
+            usual = "; default of tisim cost" if name == case.cost_size else ""
             table.add_row(f"    --size {name}", f"{size.summary}{usual}")
         if case.problem is not None:
             for variant in case.variants:

@@ -105,7 +105,7 @@ def _describe(entry: Entry) -> RenderableType:
     references = [f"Source: {entry.source}", *(f"    {work}" for work in entry.publications()), ""]
     lines += references if entry.source else []
     if entry.settings:
-        table = plain_table("parameter", "unit", "default", "must be", "what it is")
+        table = plain_table("parameter", "unit", "default", "must be", "description")
         for setting in entry.settings:
             table.add_row(
                 setting.name, setting.unit, setting.default or "(required)", setting.rule, setting.text

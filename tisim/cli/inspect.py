@@ -215,7 +215,7 @@ def _trajectory_file(path: Path) -> Path:
         if regular_file.exists(path / name):
             pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
             raise InputError(
-                f"folder must be that of a run; received that of {what}, whose pictures are: {pictures}"
+                f"folder must be of a run; received the folder of {what}, with the pictures: {pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 

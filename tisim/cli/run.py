@@ -131,8 +131,9 @@ def _save_after_error(simulation: Simulation, path: Path, hint: str) -> str:
     try:
         checkpoint.save(simulation, path)
     except RunError:
-        return "No checkpoint could be written either" + "; that of before is intact." * regular_file.exists(
-            path
+        return (
+            "No checkpoint could be written either"
+            + "; the previous one is intact." * regular_file.exists(path)
         )
     return f"{path} is written. {hint}"
 

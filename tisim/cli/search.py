@@ -151,12 +151,12 @@ def optimize(
         )  # fmt: skip
     if outcome.interrupted:
         err().print(
-            f"stopped; {out_folder / SEARCH_FILE} has all that is done. {resume_hint(fresh, overwrite)}"
+            f"stopped; {out_folder / SEARCH_FILE} has all finished runs. {resume_hint(fresh, overwrite)}"
         )
         raise typer.Exit(130)
     if not outcome.logbook:
         hint = resume_hint(fresh, overwrite)
-        raise RunError(f"the time was over before the first generation. {hint}")
+        raise RunError(f"the time limit was reached before the first generation. {hint}")
     if outcome.best is None:
         raise RunError(f"no design has run to its end; 'tisim cache {out_folder / SEARCH_FILE}' says why")
 
@@ -225,7 +225,7 @@ def compare(
                 line = f"{result.method}, search {result.repeat + 1} of {repeats}: {result.evaluations} runs"
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
-            message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all that is done."
+            message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all finished runs."
             err().print(f"{message} {resume_hint(fresh, overwrite)}")
             raise
     replace_file(out_folder / comparison.CSV, comparison.as_csv(problem, results))

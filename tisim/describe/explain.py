@@ -173,24 +173,24 @@ def _head(explanation: Explanation) -> Text:
 
 def render(explanation: Explanation) -> RenderableType:
     """Return the whole explanation for a terminal."""
-    what = _table("It has", "effect", "what it is", "source")
+    what = _table("Parts of the scene", "effect", "description", "source")
     for whole in (*explanation.effects, *explanation.others):
         for part in whole.all():
             _add(what, part)
-    materials = _table("Its materials", "material", "what it is", "source")
+    materials = _table("Materials", "material", "description", "source")
     for part in explanation.materials:
         _add(materials, part)
-    memory = _table("It allocates", "", "bytes", "for")
+    memory = _table("Memory allocated", "", "bytes", "for")
     memory.columns[1].justify = "right"
     for item in explanation.memory:
         memory.add_row(item.name, f"{item.bytes:,}", item.why)
-    phases = Text.assemble(("A step runs  ", "italic"), " > ".join(explanation.phases))
-    absent = _table("It leaves out (not compiled, nothing allocated)", "effect", "what it is", "source")
+    phases = Text.assemble(("Phases of a step  ", "italic"), " > ".join(explanation.phases))
+    absent = _table("Effects left out (not compiled, nothing allocated)", "effect", "description", "source")
     for part in explanation.absent_effects:
         absent.add_row(part.name, part.summary, part.source)
     fields = [f"{name} (of {kinds_})" for name, kinds_ in explanation.absent_fields]
-    lacking = Text.assemble(("Fields it does without  ", "italic"), "; ".join(fields) or "none")
-    left_out = absent if explanation.absent_effects else Text("It leaves out no effect that tisim knows.")
+    lacking = Text.assemble(("Fields not allocated  ", "italic"), "; ".join(fields) or "none")
+    left_out = absent if explanation.absent_effects else Text("No effect of tisim is left out.")
     of_materials = (materials, "") if explanation.materials else ()
     return Group(
         _head(explanation),
@@ -213,7 +213,7 @@ def _time_steps(explanation: Explanation) -> RenderableType:
     """Return the stepper, the reason if it was chosen automatically, and the critical time steps."""
     stepper = explanation.others[1].name
     why = (
-        f"{stepper}, chosen: {explanation.reason}" if explanation.reason else f"{stepper}, as the scene says"
+        f"{stepper}, chosen: {explanation.reason}" if explanation.reason else f"{stepper}, given by the scene"
     )
     head = Text.assemble(("Stepper  ", "italic"), why)
     if not explanation.critical:

@@ -84,7 +84,7 @@ def explained_materials(materials: Materials) -> Iterator[Part]:
         yield Part(name, "a material", "", _given(material))
     for pair in materials.touching():
         if list(materials.named).index(pair.names[0]) <= list(materials.named).index(pair.names[1]):
-            yield Part("-".join(pair.names), "where they touch", "", (*_elastic(pair), *_mixed(pair)))
+            yield Part("-".join(pair.names), "contact properties", "", (*_elastic(pair), *_mixed(pair)))
 
 
 def _given(material: Material) -> tuple[Row, ...]:
@@ -113,5 +113,5 @@ def _origin(pair: Touching, name: str) -> str:
     if pair.given is not None and getattr(pair.given, name) is not None:
         return "given for the pair"
     if getattr(pair.first, name) == getattr(pair.second, name):
-        return "that of each"
+        return "the same for both"
     return "harmonic mean" if name in HARMONIC else "geometric mean"

@@ -103,8 +103,8 @@ class Domain(Component):
 
     @ti.func
     def seen_from(self, w, r, turn, t):
-        """Return the place (m) from which particles themselves are seen as their images of this ``turn`` are
-        from r."""
+        """Return the position (m) from which particles appear as their images of this ``turn`` appear from
+        r."""
         return r
 
     @ti.func

@@ -21,7 +21,7 @@ from tisim.files.atomic import replace_file
 from tisim.files.framing import MAGIC, frame, scan
 from tisim.files.superblock import SIGNATURE
 
-OLDER_VERSION = "an older version has written it, whose files h5py still reads"
+OLDER_VERSION = "it was written by an older version, and h5py can read it"
 """Message for a file of tisim that has no checksum."""
 
 

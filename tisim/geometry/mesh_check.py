@@ -52,14 +52,14 @@ class MeshCheck:
         """Return a description of the defects; empty if there are none."""
         found = {
             "without area, which are left out": self.degenerate,
-            "that are there twice": self.duplicates,
+            "that are duplicates": self.duplicates,
         }
         return " and ".join(f"{number} faces {what}" for what, number in found.items() if number)
 
     def __str__(self) -> str:
         parts = [f"{self.triangles} triangles"]
         parts.append("closed" if not self.open_edges else f"open, with {self.open_edges} edges of one face")
-        turned = f"{self.turned_edges} edges where it turns over"
+        turned = f"{self.turned_edges} edges between faces of opposite orientation"
         parts.append(turned if self.turned_edges else "of one orientation")
         parts += [f"{self.shared_edges} edges of more than two faces"] if self.shared_edges else []
         return "; ".join([*parts, *filter(None, [self.suspect()])])

@@ -16,7 +16,7 @@ from tisim.geometry.shape import SEAM, Shape, same_line
 
 
 class Plane(Directed, Shape):
-    """An infinite plane; particles are on the side that its normal points to.
+    """An infinite plane; particles are on the side to which its normal points.
 
     Its signed distance is d(r) = (r - point) . normal / |normal|.
     """
@@ -52,5 +52,5 @@ class Plane(Directed, Shape):
 
     @ti.func
     def distance(self, w, k, r):
-        """Return the signed distance (m) of r from plane k, positive where particles are."""
+        """Return the signed distance (m) of r from plane k, positive on the side of particles."""
         return r.dot(self.direction(w, k)) - self.offset(w, k)

@@ -44,7 +44,7 @@ def read(path: str | Path) -> Any:
     if regular_file.is_folder(file_path):
         files = [file_path / name for name in ("result.h5", "cost.h5")]
         file = next((file for file in files if regular_file.exists(file)), None)
-        rule = "one with a whole run or study (what an interrupted run has left is read file by file)"
+        rule = "one with a whole run or study (the files of an interrupted run are read one by one)"
         if file is None:
             raise InputError(f"folder must be {rule}; received {str(path)!r}")
         return read(file)

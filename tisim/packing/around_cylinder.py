@@ -59,7 +59,7 @@ class RandomAroundCylinder(Placement):
         farthest = np.abs(self.centre) + self.radius + self.length / 2 + self.thickness
         check_resolved("places around the cylinder", farthest, radius)
         most = self.volume() / (4 / 3 * np.pi * radius**3)
-        rule = f"at most what finds room around the cylinder, less than {most:.4g}"
+        rule = f"at most the number that fits around the cylinder, less than {most:.4g}"
         must(number <= most, "cloud.number", rule, number)
         generator = np.random.default_rng([seed, 0x6C61796572])
         centres = np.empty((0, 3))
@@ -71,7 +71,8 @@ class RandomAroundCylinder(Placement):
                 break
         else:
             raise InputError(
-                f"cloud.number must be at most what finds room around the cylinder, {len(centres)} here; "
+                "cloud.number must be at most the number that fits around the cylinder, "
+                f"{len(centres)} here; "
                 f"received {number}"
             )
         return along_axis(centres, self.axis) + np.asarray(self.centre)

@@ -23,11 +23,12 @@ SINGLE = (0.88, 0.88, 0.88)
 def clusters(
     state: Arrays, cluster: np.ndarray, scene: Scene, ellipsoid: Ellipsoid | None = None, hull: bool = False
 ) -> Figure:
-    """Draw the particles of a state, seen from one side without perspective: grey those that are alone in
-    their clusters, the others in the colour of theirs.
+    """Draw the particles of a state in a projection without perspective: single particles in grey, others in
+    the colour of their cluster.
 
-    cluster : the number of that of each, as ``tisim.analysis.labels`` returns it. ellipsoid : around all,
-    drawn as its outline. hull : whether the outline of the convex hull of the spheres is drawn.
+    cluster : cluster number of each particle, as returned by ``tisim.analysis.labels``.
+    ellipsoid : an ellipsoid around all particles, drawn as its outline.
+    hull : whether to draw the outline of the convex hull of the spheres.
     """
     figure = empty(5.6, 5.4)
     axis = figure.subplots()

@@ -19,16 +19,21 @@ ROSE_SECTORS = 24
 def fabric(
     position: np.ndarray, pairs: np.ndarray, sides: Sides = None, plane: tuple[int, int] = (0, 1)
 ) -> Figure:
-    """Draw how many contacts grains have, as fractions of all; and the rose of their directions in a plane of
-    two axes, 0 to 2 for x to z, with that of the fabric tensor.
+    """Draw the distribution of contact numbers as fractions of all grains, and a rose diagram of contact
+    directions in the plane of two axes (0 to 2 for x to z) with the density given by the fabric tensor.
 
         E(theta) = 1 + 2 (F_aa - F_bb) cos(2 theta) + 4 F_ab sin(2 theta),    F_aa + F_bb = 1
 
-    E is the density of directions over that of contacts which favour none. Contacts count by the square of
-    the part of their direction that lies in the plane, so F is that of all contacts, there.
+    E is the density of directions relative to isotropic contacts. Each contact is weighted by the squared
+    in-plane component of its direction, so F is the in-plane part, normalised, of the fabric tensor of all
+    contacts.
 
-    position : m, shape (n, 3). pairs : those in contact, shape (m, 2). sides : those of a periodic box.
-    InputError where there are no pairs, or no such plane.
+    position : m, shape (n, 3).
+    pairs : pairs in contact, shape (m, 2).
+    sides : side lengths of a periodic box.
+
+    InputError if there are no pairs, or the axes are invalid.
+
     Source: L. Rothenburg and R. J. Bathurst, Geotechnique 39 (1989) 601.
     """
     must({*plane} in ({0, 1}, {0, 2}, {1, 2}), "plane", "two of 0, 1, 2", plane)

@@ -71,7 +71,7 @@ def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
     must(len(frames) > 1, "file", "one with 2 frames or more", Words(f"{len(frames)} frames"))
     if path.suffix == ".mp4":
         if not FFMpegWriter.isAvailable():
-            raise InputError(f"movie must be a .gif where ffmpeg is not installed; received {path.name!r}")
+            raise InputError(f"movie must be a .gif if ffmpeg is not installed; received {path.name!r}")
         return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
     must(path.suffix == ".gif", "movie", "a .gif or .mp4 file", path.name)
     return PillowWriter(fps=rate)

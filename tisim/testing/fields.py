@@ -20,9 +20,9 @@ from tisim.testing.uncompiled import allocated, offered
 def assert_fields(scene: Scene) -> None:
     """Assert that every effect of a scene declares the particle fields that it reads or writes.
 
-    A field that another effect happens to declare would be there in this scene, and missing in the next.
-    Fields of the effects that it requires, or refers to in ``connect``, are there whenever it is; ``force``
-    and ``torque`` it may read where it checks first whether they exist.
+    An undeclared field may exist in this scene because another effect declares it, and be missing in another
+    scene. Fields of effects that it requires, or refers to in ``connect``, always exist. It may read
+    ``force`` and ``torque`` if it first checks that they exist.
     """
     with allocated(scene) as allocation:
         effects = allocation.assembly.effects

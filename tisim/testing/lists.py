@@ -46,6 +46,6 @@ def _assert_equal(simulation: Simulation, when: str) -> None:
         allowed += 100 * precision * np.abs(values).max(initial=0.0)
         off = np.abs(values - others).max(initial=0.0)
         assert off <= allowed, (
-            f"{name} {when} must be with lists what it is with a check of all pairs, within {allowed:g}; "
+            f"{name} {when} must be the same with lists as with a check of all pairs, within {allowed:g}; "
             f"received one that is off by {off:g}"
         )

@@ -24,14 +24,16 @@ COMPARED_AT = (0.5, 1.0, 2.0)
 
 @in_taichi_thread
 def assert_pair_forces(scene: Scene) -> None:
-    """Assert that each pair force of a scene writes nothing, takes velocities from ``s.relative_velocity``
-    alone, if it is ``homogeneous``, and comes to the same by ``pair_force_by_inverse``, if it defines that:
-    to rounding, and to 0 at no inverse at all.
+    """Assert that each pair force of a scene satisfies its contract.
 
-    Several pairs are computed at once, and some twice: what a law writes would be counted twice, or be lost.
-    Images in a sheared box have other velocities than their particles. A law is evaluated for each two
-    particles where they are at the start of the scene, with velocities of that size; derived quantities are
-    taken to be 1.
+    It must write nothing. If it is ``homogeneous``, it must take velocities only from
+    ``s.relative_velocity``. If it defines ``pair_force_by_inverse``, this must agree with ``pair_force`` to
+    rounding, and be 0 for an inverse distance of 0.
+
+    Several pairs are computed in parallel, and some twice, so that a write by a law would be counted twice or
+    lost. Images in a sheared box have other velocities than their particles. A law is evaluated for each two
+    particles at their initial positions, with velocities of the magnitude in the start; derived quantities
+    are set to 1.
     """
     with started(scene) as (allocation, start):
         s, n = allocation.s, len(start["radius"])
@@ -122,8 +124,8 @@ class _Calls:
 
 @ti.data_oriented
 class _ByInverse:
-    """This kernel evaluates a law for each two particles of the first world, given distances and given their
-    inverse."""
+    """Kernel that evaluates a law for each two particles of the first world, from distances and from inverse
+    distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect, self.number = s, effect, len(COMPARED_AT)

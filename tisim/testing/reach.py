@@ -23,12 +23,12 @@ RADIUS_FACTORS = np.array([1.0, 1 / 2, 1 / 3])
 
 @in_taichi_thread
 def assert_reach(scene: Scene) -> dict[str, float]:
-    """Assert that each short-ranged law does nothing to two particles that are farther apart than its reach.
+    """Assert that each short-ranged law is 0 for two particles farther apart than its interaction range.
 
-    It is evaluated with the radii of the scene, and with others, equal and unequal, along the line between
-    each two particles; derived quantities are taken to be 1. The return value has, for each such law by its
-    name, the largest value within its reach (N or N m, or in the unit of the quantity that it sets): where
-    this is 0, the scene shows nothing of the law.
+    It is evaluated with the radii of the scene, and with other radii, equal and unequal, along the line
+    between each two particles; derived quantities are set to 1. The return value has, for each such law by
+    name, the largest value within its range (N or N m, or in the unit of the quantity that it sets). If this
+    is 0, the scene does not test the law.
     """
     largest: dict[str, float] = {}
     with started(scene) as (allocation, start):
