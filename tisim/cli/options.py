@@ -78,15 +78,16 @@ Precision = Annotated[str, typer.Option(help="f64 or f32.")]
 Arithmetic = Annotated[
     str,
     typer.Option(
-        help="strict, or fast: fused multiply-add, reordered sums and approximate functions; "
-        "faster, with different rounding errors."
+        help="strict, or fast: fused multiply-add, reordered sums, approximate reciprocals and "
+        "roots; faster, with different rounding errors."
     ),
 ]
 Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
 Overwrite = Annotated[
     bool,
     typer.Option(
-        "--overwrite", help="Start from the beginning; replace earlier results and files from other programs."
+        "--overwrite",
+        help="Start from the beginning; replace earlier results, and files that tisim has not written.",
     ),
 ]
 Fresh = Annotated[

@@ -89,7 +89,9 @@ def _wait_for_lock(handle: int, path: Path, kind: int, timeout: float) -> None:
                 raise RunError(f"{path} has been locked by another process for {timeout:g} s") from None
             time.sleep(0.002)
         except OSError as error:
-            raise InputError(f"{path} must be where files can be locked; received {error.strerror}") from None
+            raise InputError(
+                f"{path} must be on a file system with file locks; received {error.strerror}"
+            ) from None
 
 
 def append_at(path: Path, end: int, data: bytes) -> int:

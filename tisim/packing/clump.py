@@ -137,9 +137,7 @@ def _shares(places: np.ndarray, radius: np.ndarray) -> np.ndarray:
     scale = np.linalg.norm(places, axis=1).max()
     if len(places) == 1:
         centred = bool(scale <= ROUNDED * radius[0])
-        must(
-            centred, "clump.centres", "0, where mass and inertia of one sphere are given", places[0].tolist()
-        )
+        must(centred, "clump.centres", "0 if mass and inertia of one sphere are given", places[0].tolist())
         return np.ones(1)
     r, weights = places / scale, np.log(radius**3 / (radius**3).sum())
     found = minimize(

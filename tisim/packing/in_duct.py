@@ -70,7 +70,7 @@ class RandomInDuct(Placement):
         check_resolved("places in the duct", np.abs(self.centre) + length, float(radii.min()))
         endless = domain.imaged()[2]
         if endless:
-            side, rule = float(domain.edges(0.0)[2, 2]), "that of the box along z, which is periodic"
+            side, rule = float(domain.edges(0.0)[2, 2]), "the side of the box along z, which is periodic"
             must(abs(side - length) <= 1e-9 * side, "length of the duct", f"{side:g} m, {rule}", length)
             rule = "equal at both ends in a box that is periodic along z"
             must(self.radii[0] == self.radii[-1], "duct.radii", rule, self.radii)

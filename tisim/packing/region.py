@@ -52,7 +52,7 @@ def box(low: np.ndarray, high: np.ndarray, periodic: Axes = NO_AXIS) -> Region:
     """Return the region of centres anywhere in a box low..high (m); spheres may extend beyond its faces."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     wide = bool((high > low).all())
-    must(wide, "box", "wider than nothing in each direction", (high - low).tolist())
+    must(wide, "box", "of positive width in each direction", (high - low).tolist())
     return Region(low, high, float(np.prod(high - low)), periodic)
 
 

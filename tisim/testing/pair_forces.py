@@ -58,7 +58,7 @@ def _written_nothing(s: State, call: "_Calls", duration: float) -> list[np.ndarr
     found = [call.results(remembered, duration) for remembered in (0.0, 1.0)]
     for name, values in s.image().items():
         same = np.array_equal(values, before[name], equal_nan=values.dtype.kind == "f")
-        assert same, f"{label} must write nothing between two particles; received another {name}"
+        assert same, f"{label} must write nothing between two particles; received a changed {name}"
     return found
 
 
