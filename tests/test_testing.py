@@ -304,7 +304,10 @@ class Damped(PairForce):
     ("law", "said"),
     [
         (Damped(), "damped must take the velocity of particle 1 relative to 0 from s.relative_velocity"),
-        (Tally(stiffness=1.0, width=1.0), "tally must write nothing between two .* received a changed pressed"),
+        (
+            Tally(stiffness=1.0, width=1.0),
+            "tally must write nothing between two .* received a changed pressed",
+        ),
         (
             InverseSquare(power=2),
             r"must be pair_force, 0.44\d+ N on particle 0 by 1 .*; received 0.6",

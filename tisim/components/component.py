@@ -235,7 +235,7 @@ class Component(AccuracyHints, Checked):
     precedes: ClassVar[tuple[type[Component], ...]] = ()
     """Effects that must come after this one, if the scene has them."""
     incompatible_controls: ClassVar[tuple[str, ...]] = ()
-    """Kinds of step control that cannot resolve the time scales of this effect."""
+    """Kinds of step control that cannot be used with this effect, because they do not account for it."""
     least_rows: ClassVar[int] = 32
     """Smallest capacity of a list of parts of this class."""
 

@@ -76,7 +76,7 @@ def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
         )
     for i, j, k, c in np.argwhere(by_none != 0)[:1]:
         raise AssertionError(
-            f"{effect.data.label}.pair_force_by_inverse must be 0 where the inverse is; "
+            f"{effect.data.label}.pair_force_by_inverse must be 0 if the inverse is 0; "
             f"received {by_none[i, j, k, c]:g} N on particle {i} by {j} along axis {c}"
         )
 
