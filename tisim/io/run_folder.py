@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
-"""Files of one run, in the order in which a new run removes them: without result.h5 the folder is that of an
+"""Files of one run, in the order in which a new run removes them: without result.h5 the folder is one of an
 interrupted run, and a checkpoint is useful only with the earlier frames."""
 RUN_FILES = (*DATA, lock.LOCK)
 """Names of all files that a run writes."""
