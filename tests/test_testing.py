@@ -164,7 +164,7 @@ class Drift(PerParticle):
 
 @pytest.mark.slow
 def test_a_stepper_that_does_not_say_so_is_reported():
-    with pytest.raises(AssertionError, match=r"^position at the end must be with lists what it"):
+    with pytest.raises(AssertionError, match=r"^position at the end must be the same with lists as"):
         assert_lists(crossing(Silent(), (SHELL,), velocity=3.0))
 
 
@@ -282,7 +282,7 @@ class InverseSquare(PairForce):
 
 
 class NeverZero(InverseSquare):
-    """Is not 0 where the inverse is."""
+    """Is not 0 if the inverse is 0."""
 
     @ti.func
     def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
@@ -304,12 +304,15 @@ class Damped(PairForce):
     ("law", "said"),
     [
         (Damped(), "damped must take the velocity of particle 1 relative to 0 from s.relative_velocity"),
-        (Tally(stiffness=1.0, width=1.0), "tally must write nothing between two .* received another pressed"),
+        (
+            Tally(stiffness=1.0, width=1.0),
+            "tally must write nothing between two .* received a changed pressed",
+        ),
         (
             InverseSquare(power=2),
             r"must be pair_force, 0.44\d+ N on particle 0 by 1 .*; received 0.6",
         ),
-        (NeverZero(), "must be 0 where the inverse is; received 1 N on particle 0 by 1 along axis 0"),
+        (NeverZero(), "must be 0 if the inverse is 0; received 1 N on particle 0 by 1 along axis 0"),
     ],
 )
 def test_a_force_that_writes_or_is_another_by_the_inverse_or_of_images_is_reported(law, said):

@@ -1,4 +1,4 @@
-"""``python -m tisim`` is the command ``tisim``, also where no script of that name is on the path."""
+"""``python -m tisim`` is the command ``tisim``, for use if the script is not on the path."""
 
 from tisim.cli.main import main
 

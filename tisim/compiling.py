@@ -1,4 +1,4 @@
-"""Whether kernels of a step are being compiled now, for what shows progress."""
+"""A flag for progress displays: whether kernels of a step are being compiled."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +8,7 @@ _now = 0
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Have ``is_compiling`` say so within the block, in every thread."""
+    """Make ``is_compiling`` return True within this context, in every thread."""
     global _now
     _now += 1
     try:

@@ -1,8 +1,8 @@
-"""Consoles, progress bars and tables that runs and searches print with.
+"""Consoles, progress bars and tables for the output of runs and searches.
 
-Text is printed as it is: names of files and of extras may have brackets, which are no markup here. Characters
-that would control the terminal, as the name of a scene may have them, are printed as escapes. Where a stream
-is closed, full, or no file at all, the text is lost and nothing else.
+Text is printed literally: file names and other names may have brackets, which are not taken as markup.
+Control characters, for example in the name of a scene, are printed as escapes. If a stream is closed, full,
+or not a file, its text is lost without further effect.
 """
 
 import sys
@@ -21,11 +21,11 @@ from tisim.streams import escaped, safe, say
 FILE_WIDTH = 110
 """Width of tables that do not go to a terminal, characters; rich would assume 80."""
 TERMINAL_WIDTH = 80
-"""Largest width of tables for a terminal, characters: every terminal has as many."""
+"""Largest width of tables on a terminal, characters."""
 
 
 class PrintableConsole(Console):
-    """This console prints characters that control a terminal as escapes, such as \\x1b, but for its own."""
+    """A console that prints control characters in text as escapes, such as \\x1b."""
 
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str(escaped(text), **options)
@@ -51,14 +51,15 @@ def err() -> Console:
 
 
 class Compiling(bars.ProgressColumn):
-    """This column says so while kernels are compiled, in which nothing else advances."""
+    """A column that shows "compiling" while kernels are compiled, when no progress is made."""
 
     def render(self, task: bars.Task) -> Text:
         return Text("compiling" if is_compiling() else "")
 
 
 def progress_bar(before: str, after: str = "", console: Console | None = None) -> bars.Progress:
-    """Return a bar with the time taken and left, between two texts with fields of its task."""
+    """Return a progress bar with the elapsed and remaining time, between two texts with fields of its
+    task."""
     return bars.Progress(
         bars.TextColumn(before, markup=False), Compiling(), bars.BarColumn(), bars.TaskProgressColumn(),
         bars.TextColumn("elapsed"), bars.TimeElapsedColumn(),
@@ -68,7 +69,7 @@ def progress_bar(before: str, after: str = "", console: Console | None = None) -
 
 
 def plain_table(*headings: str) -> Table:
-    """Return a table without lines; it has no head when there are no headings."""
+    """Return a table without lines; without headings it has no header row."""
     table = Table(*headings, show_header=bool(headings), box=None, padding=(0, 2, 0, 0))
     for column in table.columns:
         column.overflow = "fold"

@@ -1,7 +1,7 @@
-"""Ctrl-C is made to wait for a good moment: between two steps, where a state is whole.
+"""Handling of Ctrl-C, deferred to a moment between two steps, when the state is complete.
 
-SIGTERM and SIGHUP, by which a system asks to stop, are taken as Ctrl-C. Signals that are ignored when a
-program begins, as SIGHUP under nohup, stay so.
+SIGTERM and SIGHUP are treated like Ctrl-C. Signals that are ignored when the program starts, such as SIGHUP
+under nohup, remain ignored.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _last = signal.SIGINT
 
 
 def exit_code() -> int:
-    """Return the exit code of a process that was stopped: 128 + the number of the signal that came last."""
+    """Return the exit code of a stopped process: 128 + the number of the last signal."""
     return 128 + _last
 
 
@@ -27,7 +27,7 @@ class Interrupt:
     """Within ``with Interrupt(notify) as ctrl_c``, the first Ctrl-C is pending: ``notify`` is called, and the
     next ``ctrl_c.check()`` raises KeyboardInterrupt. A second one is raised at once, and sets ``forced``.
 
-    SIGTERM and SIGHUP count as a first one: whoever ends a session may send them several times.
+    SIGTERM and SIGHUP always count as a first one, because a system may send them several times.
     """
 
     def __init__(self, notify: Callable[[], None]) -> None:
@@ -59,9 +59,9 @@ class Interrupt:
 
 @contextlib.contextmanager
 def handle_signals(handle: Callable[[int], None]) -> Iterator[None]:
-    """Call ``handle`` with the number of each signal that asks to stop, within this context.
+    """Call ``handle`` with the number of each signal that requests a stop, within this context.
 
-    Nothing is done outside of the main thread, as Python handles signals in no other.
+    It has no effect outside of the main thread, because Python handles signals only there.
     """
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -84,9 +84,9 @@ def handle_signals(handle: Callable[[int], None]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def defer_signals() -> Iterator[None]:
-    """Hold signals that ask to stop within this context, and raise them again at its end.
+    """Hold signals that request a stop within this context, and raise them again at its end.
 
-    It is for a library that calls back into Python and does not bear an exception from there.
+    It is for a library that calls back into Python and cannot handle an exception there.
     """
     received: list[int] = []
     try:
@@ -98,12 +98,12 @@ def defer_signals() -> Iterator[None]:
 
 
 def raise_interrupt(number: int) -> None:
-    """Raise the KeyboardInterrupt of Ctrl-C, whatever the signal is."""
+    """Raise KeyboardInterrupt for any signal."""
     raise KeyboardInterrupt
 
 
 def _redirect_dead_terminals() -> None:
-    """Send what is still printed to the null device where the terminal is gone, to avoid an error."""
+    """Redirect output to the null device if the terminal is gone, to avoid an error."""
     for descriptor in (1, 2):
         try:
             os.write(descriptor, b"")

@@ -1,4 +1,4 @@
-"""Standard streams that are closed, full, or replaced by something else lose text, never work."""
+"""Standard streams that cannot be written (closed, full or replaced) lose text, but do not stop a command."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from collections.abc import Iterator
 from typing import Any
 
 STANDARD = ("stdout", "stderr")
-"""The names in ``sys`` of the streams that are written to; their file descriptors are 1 and 2."""
+"""Names in ``sys`` of the output streams; their file descriptors are 1 and 2."""
 _READER_GONE = (errno.EPIPE, errno.EBADF)
-"""Errors of a stream that nobody reads: a closed pipe, as behind ``head``, or a closed descriptor."""
+"""Errors of a stream without a reader: a closed pipe, as behind ``head``, or a closed descriptor."""
 
 
 class SafeStream:
-    """A safe stream hands text on to another stream, and drops it where that is missing or cannot be written.
+    """A stream that passes text to another stream, and drops it if that is missing or cannot be written.
 
     A character that the other stream cannot encode is written as an escape such as ``\\xb5``.
-    failure : the error of the first write that failed, after which nothing is written; None until then.
+
+    failure : the error of the first failed write, after which nothing is written; None before.
     """
 
     def __init__(self, stream: Any) -> None:
@@ -62,7 +63,7 @@ class SafeStream:
 
     @property
     def complaint(self) -> str:
-        """Return why text was lost that somebody may have wanted; nothing where nobody reads the stream."""
+        """Return the reason for lost text; empty if there is no loss, or if the stream has no reader."""
         failure = self.failure
         if failure is None or (isinstance(failure, OSError) and failure.errno in _READER_GONE):
             return ""
@@ -72,12 +73,12 @@ class SafeStream:
     def _caught(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, ValueError) as failure:  # ValueError: a stream that has been closed
+        except (OSError, ValueError) as failure:  # ValueError: a closed stream
             self.failure = failure
 
 
 def safe(stream: Any) -> SafeStream:
-    """Return a stream, which may be None, as a safe one."""
+    """Return a stream, which may be None, as a SafeStream."""
     return stream if isinstance(stream, SafeStream) else SafeStream(stream)
 
 
@@ -99,8 +100,8 @@ def say(line: str) -> None:
 def safe_standard_streams() -> Iterator[tuple[SafeStream, SafeStream]]:
     """Make standard output and standard error safe within this context; yield both.
 
-    At its end a descriptor that could not be written is led to the null device: what the interpreter still
-    holds for it would fail again as the process ends.
+    At its end, a descriptor that could not be written is redirected to the null device: otherwise the data
+    still buffered by the interpreter would fail again when the process ends.
     """
     before = [getattr(sys, name) for name in STANDARD]
     out, error = (safe(stream) for stream in before)
@@ -116,9 +117,9 @@ def safe_standard_streams() -> Iterator[tuple[SafeStream, SafeStream]]:
 
 
 def fill_standard_descriptors() -> None:
-    """Open the null device in the place of each standard descriptor that is closed.
+    """Open the null device for each standard descriptor that is closed.
 
-    The next file that is opened would have its number, and what libraries print would go into that file.
+    Otherwise the next opened file would get its number, and output of libraries would go into that file.
     """
     for descriptor in (0, 1, 2):
         try:

@@ -1,3 +1,3 @@
-"""The version of tisim; results say it."""
+"""The version of tisim, recorded in results."""
 
 __version__ = "0.1.0"

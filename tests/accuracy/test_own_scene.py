@@ -46,7 +46,10 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
         assert row.errors[0][0] == pytest.approx(2 * np.pi * (RATE * dt) ** 2 / 24, rel=0.1)
     # The clock decides which of the finer rows is cheapest, but the coarsest is not accurate enough.
     assert cost_study.cheapest(1e-4).errors[0][0] <= 1e-4 < cost_study.rows[0].errors[0][0]
-    assert "displacement: relative to its largest on the way" in cost_study.table().renderables[0].plain
+    assert (
+        "displacement: relative to its largest value during the run"
+        in cost_study.table().renderables[0].plain
+    )
     cost_study.write(tmp_path)
     again = Study(closed(), **FEW)
     storage.resume(again, tmp_path)
@@ -183,7 +186,7 @@ def test_a_law_that_makes_no_difference_is_called_the_same(verlet_only, monkeypa
     assert [row.same for row in cost_study.line("Tether")] == [False, True]
     assert not any(row.same for row in cost_study.line("Verlet, FixedStep: dt"))
     below = notes(cost_study)
-    assert "no change: the same as of the law that it stands for, but for rounding" in below
-    assert any(line.startswith("time: the median of the wall seconds; spread: ") for line in below)
+    assert "no change: the same errors, up to rounding, as with the law that it approximates" in below
+    assert any(line.startswith("time: median of the wall seconds; spread: ") for line in below)
     unknown = any(text.startswith("<") for row in cost_study.rows for text in error_texts(row))
     assert any(line.startswith("<: ") for line in below) == unknown

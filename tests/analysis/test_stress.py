@@ -58,7 +58,7 @@ def test_stress_on_a_wall():
     np.testing.assert_array_equal(stress_on_wall(measures, "lid", 2.0), [1.5, 0.0, 4.0])
     series = {name: np.full(5, value) for name, value in measures.items()}
     assert stress_on_wall(series, "lid", 2.0).shape == (5, 3)
-    with pytest.raises(InputError, match="name must be that of a body"):
+    with pytest.raises(InputError, match="name must be a body with"):
         stress_on_wall(measures, "floor", 2.0)
     with pytest.raises(InputError, match="area must be above 0"):
         stress_on_wall(measures, "lid", 0.0)

@@ -74,7 +74,7 @@ def test_a_case_has_a_size_of_its_own_for_costs(tisim, tmp_path, monkeypatch):
     ]
     code, out, _ = tisim("cases")
     assert code == 0
-    assert " ".join(out.split()).count("fallen into a cup; that of tisim cost") == 1
+    assert " ".join(out.split()).count("fallen into a cup; default of tisim cost") == 1
 
 
 @pytest.fixture

@@ -94,7 +94,7 @@ def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "search.h5").touch()
-    message = "folder must be that of a run; received that of a search, whose pictures are:"
+    message = "folder must be of a run; received the folder of a search, with the pictures:"
     assert tisim("plot", "s") == (2, "", f"{message} none yet\n")
     for name in ("front.png", "convergence.png"):
         (tmp_path / "s" / name).touch()

@@ -140,7 +140,7 @@ def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim
         "explain", "agglomeration", "--size", "small", "--without", "fragmentation", "--without", "cooling"
     )
     assert code == 0
-    present, left_out = " ".join(out.split()).split("It leaves out")
+    present, left_out = " ".join(out.split()).split("Effects left out")
     assert not any(word in present for word in ("fragmentation", "cooling", "pieces", "fracture_energy"))
     assert "pieces (of fragmentation)" in left_out
     assert "cooling_loss (of cooling)" in left_out

@@ -79,7 +79,7 @@ def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c
     press_ctrl_c(monkeypatch, after=9, number=signal.SIGTERM)
     code, _, err = tisim("compare", "drift", "--methods", "random", "--out", "c")
     assert code == 143
-    assert "compare.h5 has all that is done. To go on, give the same command" in " ".join(err.split())
+    assert "compare.h5 has all finished runs. To go on, give the same command" in " ".join(err.split())
     assert (tmp_path / "c" / "compare.h5").exists()
 
 

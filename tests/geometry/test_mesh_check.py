@@ -44,7 +44,7 @@ def test_explain_says_it_once():
 def test_suspect_faces_of_a_file_are_warned_of_once(tmp_path):
     faces = "f 1 2 3\nf 1 3 4\n"
     read(tmp_path, "open.obj", VERTICES + faces)
-    twice = r"^surface: 1 faces without area, which are left out and 2 faces that are there twice \(.*obj\)$"
+    twice = r"^surface: 1 faces without area, which are left out and 2 faces that are duplicates \(.*obj\)$"
     with pytest.warns(MeshWarning, match=twice) as told:
         surface = read(tmp_path, "twice.obj", VERTICES + faces + "f 2 3 1\nf 4 3 1\nf 1 1 2\n")
     assert len(told) == 1

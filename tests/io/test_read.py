@@ -182,7 +182,7 @@ def test_rows_of_a_study(tmp_path):
             hdf5_store.build_image([], {}),
             "a search is read by `tisim.optimize.read`",
         ),
-        (".", None, r"folder must be one with a whole run or study \(what an interrupted run has left"),
+        (".", None, r"folder must be one with a whole run or study \(the files of an interrupted run are"),
     ],
 )
 def test_what_cannot_be_read(tmp_path, name, content, message):

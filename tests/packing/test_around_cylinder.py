@@ -63,9 +63,11 @@ def test_no_room():
         RandomAroundCylinder(**CYLINDER).centres(np.full(1, 0.3), Open(), 0)
     with pytest.raises(InputError, match="length must be above a diameter"):
         RandomAroundCylinder(**{**CYLINDER, "length": 0.1}, part="side").centres(np.full(1, 0.1), Open(), 0)
-    with pytest.raises(InputError, match=r"cloud.number must be at most what finds room around the cylinder"):
+    with pytest.raises(
+        InputError, match=r"cloud.number must be at most the number that fits around the cylinder"
+    ):
         RandomAroundCylinder(**CYLINDER).centres(np.full(1500, 0.1), Open(), 0)
-    with pytest.raises(InputError, match=r"finds room around the cylinder, less than 1746; received 2000"):
+    with pytest.raises(InputError, match=r"fits around the cylinder, less than 1746; received 2000"):
         RandomAroundCylinder(**CYLINDER).centres(np.full(2000, 0.1), Open(), 0)
     with pytest.raises(InputError, match="axis must be a direction"):
         RandomAroundCylinder(**{**CYLINDER, "axis": (0.0, 0.0, 0.0)})

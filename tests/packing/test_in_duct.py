@@ -118,7 +118,7 @@ def test_what_finds_no_room_is_refused():
         placement.centres(np.full(1, 1.3), AROUND, 0)
     taller = Box(low=(-4.0, -4.0, -2.0), high=(4.0, 4.0, 9.0), periodic=(False, False, True))
     with pytest.raises(
-        InputError, match=r"length of the duct must be 11 m, that of the box along z, which is"
+        InputError, match=r"length of the duct must be 11 m, the side of the box along z, which is"
     ):
         placement.centres(np.full(1, 0.3), taller, 0)
     stepped = RandomInDuct(centre=LOW, heights=(0.0, 10.0), radii=(1.0, 3.0))

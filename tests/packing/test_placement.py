@@ -209,7 +209,7 @@ WRONG = {
                 placement=RandomAroundCylinder(radius=1.0, length=1.0, thickness=1.0),
             )
         ),
-        r"cloud.number must be at most what finds room around the cylinder, less than",
+        r"cloud.number must be at most the number that fits around the cylinder, less than",
     ),
     "velocities beyond numbers": (
         lambda: arrays(

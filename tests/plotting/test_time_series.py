@@ -205,7 +205,7 @@ def test_movies_that_cannot_be_made_are_refused(file, tmp_path, monkeypatch):
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
     with frames(file) as trajectory:
         for name, rate, message in (
-            ("t.mp4", 20, r"movie must be a .gif where ffmpeg is not installed; received 't.mp4'"),
+            ("t.mp4", 20, r"movie must be a .gif if ffmpeg is not installed; received 't.mp4'"),
             ("t.avi", 20, r"movie must be a .gif or .mp4 file; received 't.avi'"),
             ("t.gif", 0, "frames a second must be 1 to 100; received 0"),
         ):

@@ -1,4 +1,4 @@
-"""What accuracy costs in time, for any scene."""
+"""Cost studies: how the accuracy of a scene depends on the run time."""
 
 import lazy_loader
 

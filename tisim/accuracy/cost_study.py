@@ -1,4 +1,4 @@
-"""What accuracy costs in time: a study of a scene, and what it has found."""
+"""A cost study measures the error and the run time of many settings of a scene."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ if TYPE_CHECKING:
 
 
 class Study:
-    """A study measures what settings of a scene cost in time, and how accurate they are.
+    """A study measures the run time and the error of the settings of a scene.
 
-    quantities : what errors are of; by default ``quantity.usual``.
-    coarser, finer : decades of error on either side of what the scene asks for.
-    repeats : of each timing. precisions : "f64" and others to try. arithmetics : "strict", and "fast" to try
-    it in f64.
-    starts : numbers of random starts, for quantities that are random.
-    budget : wall seconds of running, of which compiling takes nothing; what would not fit is left out.
+    quantities : quantities whose errors are measured; by default ``quantity.usual``.
+    coarser, finer : decades of error to scan above and below the scene's own setting.
+    repeats : number of times each setting is timed.
+    precisions : "f64", and other precisions to try.
+    arithmetics : "strict", and "fast" to try fast arithmetic in f64.
+    starts : numbers of random starts (seeds) to try, for random quantities.
+    budget : wall seconds of running, without compiling; settings that would exceed it are left out.
     limit : wall seconds, without compiling, after which the run of a setting is stopped; its row says so.
-    require_reference : whether to stop with a RunError, before any setting is run, where the reference does
-        not tell settings apart.
-    rows, truths : what is known so far, in order; a truth for each quantity.
-    complete : nothing is left to measure.
+    require_reference : whether to raise RunError before any setting is run if the reference cannot tell
+        settings apart.
+    rows, truths : the results so far, in order; one truth for each quantity.
+    complete : whether all settings are measured.
 
-    To measure another precision or arithmetic, tisim starts anew: simulations made before must not be used
-    afterwards.
+    To measure another precision or arithmetic, tisim is initialised again: simulations made before must not
+    be used afterwards.
     """
 
     def __init__(
@@ -91,15 +92,15 @@ class Study:
 
     @property
     def numbers(self) -> list[tuple[str, str]]:
-        """Precisions and arithmetics to try: each by itself."""
+        """The (precision, arithmetic) pairs to try; other arithmetics are tried in f64 only."""
         return [(p, "strict") for p in self.precisions] + [("f64", a) for a in self.arithmetics[1:]]
 
     def sweep_settings(self) -> dict[str, Any]:
-        """Return what says which settings are measured; a study is complete for these only."""
+        """Return the choices that determine the measured settings; a study is complete for these only."""
         return {"levels": self.levels, "precisions": self.precisions, "arithmetics": self.arithmetics}
 
     def identity(self) -> dict[str, Any]:
-        """Return what must agree for rows of an earlier study to be of use."""
+        """Return the properties that must be equal for the rows of an earlier study to be reused."""
         return {
             "tisim": version.__version__,
             "scene": self.scene.digest(),
@@ -112,10 +113,10 @@ class Study:
         }
 
     def run(self, progress: Progress | None = None, finished: Callable[[], object] | None = None) -> None:
-        """Measure all that is not known yet. finished : called when a row, or the truth, has become known.
+        """Measure all missing rows. finished : called after each new row, and after the truths.
 
-        InputError when the scene cannot be run at all or has nothing to turn. Rows that were finished are
-        kept when anything is raised. Other threads that call ``tisim.run`` meanwhile wait until it is over.
+        InputError if the scene cannot be run or has no setting to vary. If an error is raised, finished rows
+        are kept. Other threads that call ``tisim.run`` wait until the study ends.
         """
         if self.complete:
             return
@@ -127,10 +128,10 @@ class Study:
                 runtime.init(before.device, before.precision, before.threads, before.arithmetic)
 
     def cheapest(self, error: float, quantity: str | None = None) -> Row:
-        """Return the cheapest setting whose error of a quantity (the first, unless named) is at most this; of
-        those that timings do not tell apart, the one of the least work.
+        """Return the cheapest setting whose error in a quantity (by default the first) is at most ``error``.
+        Among settings with indistinguishable timings, the one with the least work is returned.
 
-        RunError, with the least error there is, where none is so accurate.
+        RunError, naming the smallest error reached, if no setting is accurate enough.
         """
         k = self.index(quantity)
         if best := tied(self.rows, error, k):
@@ -148,30 +149,31 @@ class Study:
         )
 
     def decades(self, quantity: str | None = None) -> dict[float, list[Row]]:
-        """Return for each power of ten of the error the settings that take the least time, as far as timings
-        tell; the one of the least work first."""
+        """Return, for each power of ten of the error, the settings with the shortest time within the timing
+        uncertainty, the one with the least work first."""
         return decades(self.rows, self.index(quantity))
 
     def index(self, quantity: str | None) -> int:
-        """Return the place of a quantity among all of the study, by its name; 0 where none is given."""
+        """Return the index of a quantity of the study by its name; 0 for None."""
         names = [q.name for q in self.quantities]
         must(quantity is None or quantity in names, "quantity", f"one of {', '.join(names)}", quantity)
         return names.index(quantity) if quantity is not None else 0
 
     def table(self) -> RenderableType:
-        """Return a table of every setting with its time, work and errors, which rich prints."""
+        """Return a table of the time, work and errors of every setting, for printing with rich."""
         from tisim.accuracy.table import table
 
         return table(self)
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write cost.csv and cost.h5 (see storage.py) into a folder, made if missing; return their paths."""
+        """Write cost.csv and cost.h5 (see storage.py) into a folder, created if missing; return their
+        paths."""
         from tisim.accuracy.storage import write
 
         return write(self, Path(folder))
 
     def picture(self, path: str | Path) -> Path:
-        """Draw error against time, a line for each method, in the format of the suffix, such as .png."""
+        """Draw error against time, one line per method; the suffix, such as .png, gives the format."""
         from tisim.accuracy.plot import picture
 
         return pictures.write(Path(path), lambda: picture(self))
@@ -182,7 +184,7 @@ class Study:
 
 
 def study(scene: Scene, quantities: Sequence[Quantity] = (), **settings: Any) -> Study:
-    """Return a ``Study`` of a scene, with these settings, that has been run to its end."""
+    """Return a completed ``Study`` of a scene with these settings."""
     cost_study = Study(scene, quantities, **settings)
     cost_study.run()
     return cost_study

@@ -1,4 +1,4 @@
-"""Settings of a scene are written as text: as Python, and as options of ``tisim run``."""
+"""Settings of a scene as text: as Python, and as options of ``tisim run``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tisim.scene.scene import Scene
 
 
 def non_default_settings(part: Component) -> dict[str, Any]:
-    """Return the settings of a part that are not at their defaults, by name."""
+    """Return the settings of a part that differ from their defaults, by name."""
     return {
         name: getattr(part, name)
         for name, info in type(part).model_fields.items()
@@ -21,7 +21,7 @@ def non_default_settings(part: Component) -> dict[str, Any]:
 
 
 def expression(part: Component) -> str:
-    """Return a part as Python, without what is at its default: Boris(control=FixedStep(dt=1e-05))."""
+    """Return a part as Python, without default settings: Boris(control=FixedStep(dt=1e-05))."""
     arguments = (f"{name}={text_of_setting(value)}" for name, value in non_default_settings(part).items())
     return f"{type(part).__name__}({', '.join(arguments)})"
 
@@ -32,7 +32,7 @@ def text_of_setting(value: Any) -> str:
 
 
 def options(scene: Scene, changed: Scene, precision: str = "f64", arithmetic: str = "strict") -> list[str]:
-    """Return options with which ``tisim run`` runs ``changed`` where it would have run ``scene``."""
+    """Return the options that make ``tisim run`` run ``changed`` instead of ``scene``."""
     old, new = ({effect.label: effect for effect in s.effects} for s in (scene, changed))
     arguments = [argument for name in old if name not in new for argument in ("--without", name)]
     settings = list(_differences(scene.stepper, changed.stepper, "stepper"))
@@ -47,13 +47,13 @@ def options(scene: Scene, changed: Scene, precision: str = "f64", arithmetic: st
 
 
 def shell_line(arguments: list[str]) -> str:
-    """Return command-line arguments as one line that a shell takes."""
+    """Return command-line arguments as one line for a shell."""
     return shlex.join(arguments)
 
 
 def _differences(old: Component | None, new: Component, path: str) -> Iterator[tuple[str, str]]:
-    """Yield dotted key and TOML of each setting that differs; as a whole a part that is of another kind, or
-    that lacks what was there, as TOML has no word for nothing."""
+    """Yield the dotted key and the TOML value of each setting that differs. A part is given as a whole if its
+    kind differs, or if a setting becomes None, which TOML cannot express."""
     names = type(new).model_fields
     if type(old) is not type(new) or any(
         getattr(new, n) is None for n in names if getattr(old, n) is not None

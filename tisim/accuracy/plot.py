@@ -1,4 +1,4 @@
-"""Error against time, a line for each method."""
+"""Plot of error against time, one line per method."""
 
 from __future__ import annotations
 
@@ -16,24 +16,26 @@ from tisim.accuracy.sweep import USUAL_NUMBERS
 from tisim.plotting.style import empty, letters, plain
 
 METHOD_COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
-"""The methods are drawn in P. Tol's bright set of colours, and one of his light one."""
+"""Colours of the methods: P. Tol's bright scheme, and one colour of his light scheme."""
 MARKERS = "osD^vP<>X"
-"""The methods are drawn with these marks, one after the other."""
+"""Markers of the methods, used in turn."""
 STYLES = {USUAL_NUMBERS: "-", ("f64", "fast"): ":"}
-"""The lines of precisions and arithmetics; others are dashed."""
+"""Line styles of precisions and arithmetics; others are dashed."""
 LEGEND_WIDTH = 80
-"""A line of the legend has so many characters at most, which a panel has room for."""
+"""Largest number of characters in a line of the legend; a panel is this wide."""
 
 
 def picture(study: Study) -> Figure:
-    """Draw a panel for each quantity: wall seconds across, error up, both logarithmic.
+    """Draw one panel per quantity: wall time (s) on the horizontal axis, error on the vertical, both
+    logarithmic.
 
-    A method in another precision or arithmetic has its colour and a broken line. Laws that differ in one part
-    or another are not joined.
+    A method in another precision or arithmetic has the same colour and a broken line. Laws with different
+    parameters are not joined by a line.
 
-    An error includes what it may be off by; a hollow mark is one of which no more is known than that it is no
-    larger. Rings are the cheapest setting for each power of ten of the error, dotted ones others that timings
-    do not tell from it. Below the shaded edge, the error of the reference itself, nothing can be told.
+    A plotted error includes its uncertainty. A hollow mark is only an upper bound. A solid ring marks the
+    cheapest setting for each power of ten of the error; dotted rings mark settings with timings
+    indistinguishable from it. The shaded area lies below the error of the reference, so errors there cannot
+    be measured.
     """
     wide = len(study.quantities)
     lines = list(dict.fromkeys(row.method for row in study.rows))
@@ -45,8 +47,8 @@ def picture(study: Study) -> Figure:
         letters(axes)
     axes[0].set_ylabel("relative error")
     if any(row.errors and not row.trusted(k) for row in study.rows for k in range(wide)):
-        axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: no more than this")
-    # Lines are in every panel, rings not.
+        axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: upper bound")
+    # Lines appear in every panel, rings in some.
     named = {name: h for axis in axes for h, name in zip(*axis.get_legend_handles_labels(), strict=True)}
     figure.legend(
         named.values(), named.keys(), loc="outside lower center", ncols=1 if wide == 1 else 2, frameon=False,
@@ -59,7 +61,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     methods = list(dict.fromkeys(map(_usual_method, study.rows)))
     for at, method in enumerate(lines):
         drawn = (row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same)
-        # Not as they were measured, which is another order where a study was stopped and goes on.
+        # Sort by time: after a resumed study, rows are not in the order of the settings.
         rows = sorted(drawn, key=lambda row: row.median)
         one = study.line(method)[0]
         colour = METHOD_COLOURS[methods.index(_usual_method(one)) % len(METHOD_COLOURS)]
@@ -75,10 +77,10 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     best = {row.key: row for row, *_ in cheapest}
     others = {row.key: row for _, *rows in cheapest for row in rows if row.key not in best}
     _ring(axis, list(best.values()), k, "-", "cheapest for a power of ten of the error")
-    _ring(axis, list(others.values()), k, ":", "as cheap, as far as timings tell, with more work")
+    _ring(axis, list(others.values()), k, ":", "equally cheap within timing uncertainty, with more work")
     axis.set_xscale("log")
     axis.set_yscale("log")
-    # Where nothing could be measured there is nothing to fit the axis to.
+    # If nothing was measured, the axis has no data to fit.
     low, high = axis.get_ylim() if any(row.errors for row in study.rows) else (1e-3, 1.0)
     own = study.truths[k].error if k < len(study.truths) else 0.0
     if own > 0:
@@ -88,7 +90,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
             "error of the reference", (0.99, own), (0, -3), xycoords=("axes fraction", "data"),
             textcoords="offset points", ha="right", va="top", fontsize=8,
         )  # fmt: skip
-    # Room for a ring on the topmost; what is far off where others are not is left out.
+    # Leave room for a ring at the top; do not extend the axis for outliers.
     axis.set_ylim(low, min(1.2 * high, max(30.0, 30.0 * low)))
     quantity = study.quantities[k]
     axis.set_title(f"{quantity.name}, relative to {quantity.relative_to}")
@@ -102,19 +104,20 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
 
 
 def _parameters(row: Row) -> str:
-    """Return what a setting sets, without its values: a line joins values of the same parameters, not laws
-    that differ in one part or another."""
+    """Return the names of the parameters in a setting, without values: only settings of the same parameters
+    are joined by a line."""
     return re.sub(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?", "", row.setting)
 
 
 def _usual_method(row: Row) -> str:
-    """Return the name of the method of a row in the usual precision and arithmetic, whose colour it has."""
+    """Return the name of the method of a row in the usual precision and arithmetic, which determines its
+    colour."""
     numbers = zip((row.precision, row.arithmetic), USUAL_NUMBERS, strict=True)
     return row.method.removesuffix("".join(f", {kind}" for kind, usual in numbers if kind != usual))
 
 
 def _label(study: Study, method: str) -> str:
-    """Return the name of a method, with how many of its settings have failed and why."""
+    """Return the name of a method, with the number of failed settings and the reason."""
     rows = study.line(method)
     failed = [row.failed for row in rows if row.failed]
     if not failed:

@@ -1,4 +1,4 @@
-"""What a study compares: a quantity of a result, and what is known of its true value."""
+"""Quantities that a study compares, and estimates of their true values."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Value = Callable[[Result], "np.ndarray | float"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a result; its error is |measured - true| / size, with the root of the sum of squares.
+    """A quantity of a result; its error is |measured - true| / size, with the Euclidean norm.
 
-    value : of a result, any shape; zero means that nothing has happened, as for a displacement.
-    exact : the true value in closed form, of the scene of a result; None where there is none.
-    random : whether it is the mean over random starts that counts. Then ``exact`` is of that mean.
-    returns : whether it may come back to zero, as the displacement on a closed path does. Then size is the
-        largest |value| on the way, in steps short enough to see it; else it is |true|, at the end.
+    value : function of a result, of any shape; zero means no change, as for a displacement.
+    exact : the true value in closed form, as a function of a result; None if there is none.
+    random : whether the quantity is a mean over random starts. Then ``exact`` is this mean.
+    returns : whether the value may return to zero, such as the displacement on a closed path. Then ``size``
+        is the largest |value| during the run, observed in short steps; otherwise it is |true| at the end.
     """
 
     name: str
@@ -40,25 +40,26 @@ class Quantity:
 
     @property
     def relative_to(self) -> str:
-        """What its errors are relative to, for people."""
-        return "its largest on the way" if self.returns else "its true value"
+        """Text that describes the size to which errors are relative."""
+        return "its largest value during the run" if self.returns else "its true value"
 
 
 @dataclass(frozen=True)
 class QuantityEstimate:
-    """An estimate is a value, and how far it may be off: half its 95 % interval, or a bound; 0 if exact."""
+    """An estimate of a value with its uncertainty: half its 95 % confidence interval, or a bound; 0 if
+    exact."""
 
     value: np.ndarray
     uncertainty: float = 0.0
 
     def error(self, truth: QuantityEstimate, size: float) -> tuple[float, float]:
-        """Return the distance from the truth relative to ``size``, and how far that may be off."""
+        """Return the distance from the truth relative to ``size``, and the uncertainty of this distance."""
         off = float(np.linalg.norm(self.value - truth.value))
         return off / size, float(np.hypot(self.uncertainty, truth.uncertainty)) / size
 
 
 def estimate(quantity: Quantity, results: Sequence[Result]) -> QuantityEstimate:
-    """Return the estimate from one result, or from the mean over those of random starts."""
+    """Return the estimate from one result, or from the mean over random starts."""
     values = np.array([np.ravel(np.asarray(quantity.value(result))) for result in results])
     if not quantity.random:
         return QuantityEstimate(values[0])
@@ -66,27 +67,26 @@ def estimate(quantity: Quantity, results: Sequence[Result]) -> QuantityEstimate:
 
 
 def mean(values: np.ndarray) -> QuantityEstimate:
-    """Return the mean over the first axis, with its interval by Student's t.
+    """Return the mean over the first axis, with its confidence interval from Student's t.
 
-    values : of shape (n, components), n > 1.
+    values : array of shape (n, components), n > 1.
     """
     return QuantityEstimate(values.mean(axis=0), float(np.linalg.norm(half_width(values))))
 
 
 def displacement(result: Result) -> np.ndarray:
-    """Return the displacement of every particle since the start, by their ids, m, shape (n, 3)."""
+    """Return the displacement of every particle since the start, ordered by id, m, shape (n, 3)."""
     order = np.argsort(result.state["id"])
     return result.state["position"][order] - result.start["position"]
 
 
 def velocity(result: Result) -> np.ndarray:
-    """Return the velocity of every particle at the end, in the order of their ids, m/s, shape (n, 3)."""
+    """Return the velocity of every particle at the end, ordered by id, m/s, shape (n, 3)."""
     return result.state["velocity"][np.argsort(result.state["id"])]
 
 
 def velocity_in_shear(result: Result) -> np.ndarray:
-    """Return the ``velocity`` relative to the flow that the images of a sheared box take part in, m/s, shape
-    (n, 3)."""
+    """Return the ``velocity`` relative to the streaming velocity of a sheared box, m/s, shape (n, 3)."""
     place = result.state["position"][np.argsort(result.state["id"])]
     return velocity(result) - result.scene.domain.streaming_velocity(place)
 
@@ -102,17 +102,19 @@ def mean_square(result: Result) -> float:
 
 
 def usual(scene: Scene) -> tuple[Quantity, ...]:
-    """Return what is compared unless something else is asked for: where particles have moved to.
+    """Return the default quantity of a scene: the displacement of its particles.
 
-    Impacts and operators may remove particles, and after some impacts no path can be followed: there it is
-    the mean kinetic energy over random starts. InputError where there is nothing random. Of paths that are
-    random themselves it is the mean square displacement.
+    If the stepper is random, the quantity is the mean square displacement. In a periodic box it is the
+    velocity, in a sheared box the velocity relative to the flow, because positions jump at the periodic
+    faces. If impacts or operators are present, they may remove particles or make trajectories unpredictable;
+    then it is the mean kinetic energy over random starts. InputError for random paths in a periodic box, and
+    if impacts or operators start from a state without randomness.
     """
     if scene.stepper.random:
         must(not any(scene.domain.joined()), "quantities", "given for random paths in a box", Words("none"))
         return (Quantity("mean square displacement", mean_square, random=True),)
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
-        # Across joined faces a place jumps, and so does a velocity where these move past each other.
+        # Positions jump at periodic faces, and so do velocities if the faces move relative to each other.
         name, value = "displacement", displacement
         if scene.domain.shears():
             name, value = "velocity relative to the flow", velocity_in_shear

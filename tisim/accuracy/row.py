@@ -1,8 +1,8 @@
-"""A measured setting, and the choice among them.
+"""A measured setting, and the choice of the cheapest.
 
-Timings that overlap are not told apart: among settings that take the least time as far as can be seen, the
-one with the fewest force evaluations is chosen, which no machine changes, unless the table shows another to
-be both faster and more accurate.
+Timings that overlap within their uncertainty are treated as equal. Among such settings the one with the
+fewest force evaluations, which is independent of the machine, is chosen, unless another setting is both
+faster and more accurate.
 """
 
 from __future__ import annotations
@@ -14,28 +14,31 @@ from dataclasses import dataclass
 import numpy as np
 
 TRUSTED = 3.0
-"""An error is known when it is at least so many times what it may be off by."""
+"""An error counts as known if it is at least this many times its uncertainty."""
 TIMED_ONCE, TIMED_OFTEN = 0.15, 0.05
-"""A time is known to this part of itself at best: where it was taken once, and more often than once."""
+"""Relative uncertainty of a time that was measured once, and more than once."""
 CLOCK_RESOLUTION = 1e-3
-"""A time is known to so much at best, s."""
+"""Smallest uncertainty of a time, s."""
 ROUNDING = 1e-11
-"""Rounding makes a difference of two relative errors as large as this; such laws have done the same."""
+"""Two relative errors that differ by at most this are equal up to rounding; such laws give the same
+result."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a study says what a setting costs and how accurate it is.
+    """A row of a study: the cost and the error of one setting.
 
-    method : the name of its sweep, a line in the picture. setting : its description.
-    python : stepper, and laws and materials that were exchanged, as Python. options : those of ``tisim run``
-    that make the setting, as a shell takes them. starts : the number of random starts that all that follows
-    is of.
-    seconds : wall seconds of each repeat. steps, sums, rejections : steps, force evaluations and rejected
-    steps of a particle, the mean over particles and starts.
-    errors : for each quantity the error, and how far that may be off; both relative.
-    failed : why there is no result, or nothing; of a run that was stopped as it took too long ``seconds`` is
-    the limit. same : whether it is a cheaper law that makes no difference here to the law it stands for.
+    method : name of its sweep, which is one line in the picture.
+    setting : description of the setting.
+    python : stepper, and exchanged laws and materials, as Python.
+    options : options of ``tisim run`` that produce the setting, as a shell line.
+    starts : number of random starts of each run.
+    seconds : wall seconds of each repeat; the limit if the run was stopped for taking too long.
+    steps, sums, rejections : steps, force evaluations and rejected steps per particle, averaged over
+        particles and starts.
+    errors : for each quantity its relative error, and the uncertainty of that error.
+    failed : the reason for a missing result, otherwise empty.
+    same : whether this is a cheaper law that gives the same errors here as the law it approximates.
     """
 
     method: str
@@ -55,23 +58,23 @@ class Row:
 
     @property
     def key(self) -> tuple[str, str]:
-        """The method and the setting, by which a row is found again."""
+        """The method and the setting, which identify a row."""
         return self.method, self.setting
 
     @property
     def median(self) -> float:
-        """The median of the wall seconds of all repeats, s; NaN before there is one."""
+        """The median of the wall seconds of all repeats, s; NaN if there are none."""
         return float(np.median(self.seconds)) if self.seconds else math.nan
 
     @property
     def spread(self) -> float:
-        """The longest less the shortest of the wall seconds of all repeats, s."""
+        """The longest minus the shortest of the wall seconds of all repeats, s."""
         return max(self.seconds) - min(self.seconds) if self.seconds else math.nan
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The least and the most wall time that the setting may take, s: as measured, but no closer than a
-        clock tells."""
+        """The shortest and the longest plausible wall time of the setting, s: the measured range, widened by
+        the uncertainty of timing."""
         uncertainty = max(
             CLOCK_RESOLUTION, (TIMED_OFTEN if len(self.seconds) > 1 else TIMED_ONCE) * self.median
         )
@@ -79,30 +82,28 @@ class Row:
 
     @property
     def stopped_after(self) -> float:
-        """The limit at which it was stopped, wall seconds; infinite for any other row."""
+        """The time limit at which the run was stopped, wall seconds; infinite for all other rows."""
         return max(self.seconds) if self.failed and self.seconds else math.inf
 
     def same_errors(self, other: Row) -> bool:
-        """Return whether another row has the same errors, but for rounding."""
+        """Return whether another row has the same errors up to rounding."""
         if other is self or not (self.errors and other.errors):
             return False
         return all(abs(a[0] - b[0]) <= ROUNDING for a, b in zip(self.errors, other.errors, strict=True))
 
     def at_most(self, quantity: int = 0) -> float:
-        """Return the relative error of a quantity and what it may be off by, in sum; infinite when the run
-        has failed."""
+        """Return the relative error of a quantity plus its uncertainty; infinite if the run has failed."""
         return sum(self.errors[quantity]) if self.errors else math.inf
 
     def trusted(self, quantity: int = 0) -> bool:
-        """Return whether the error of a quantity is large enough, beside what it may be off by, to be
-        known."""
+        """Return whether the error of a quantity is well above its uncertainty."""
         return bool(self.errors) and self.errors[quantity][0] >= TRUSTED * self.errors[quantity][1]
 
 
 def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
-    """Return the rows that take least time, as far as timings tell, among those whose error of a quantity is
-    at most this. The one to choose is the first: it takes the least work of those that no other row beats in
-    both time and error."""
+    """Return the fastest rows, within the timing uncertainty, among rows whose error of a quantity is at most
+    ``error``. The first is the recommended one: of the rows that no other row beats in both time and error,
+    it takes the least work."""
     good = [row for row in rows if row.at_most(quantity) <= error and not row.same]
     if not good:
         return []
@@ -118,7 +119,8 @@ def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
 
 
 def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:
-    """Return ``tied`` for each power of ten of the error, from the largest down to the least that was met."""
+    """Return ``tied`` for each power of ten of the error, from the largest error down to the smallest
+    reached."""
     reached = [row.at_most(quantity) for row in rows if 0 < row.at_most(quantity) < math.inf]
     if not reached:
         return {}

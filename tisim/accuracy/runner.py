@@ -1,7 +1,8 @@
-"""The runs of a study, in their order, timed.
+"""The runs of a study, in their order, with timing.
 
-Every method of the scene is run from its coarsest setting to its finest, all methods at one level before the
-next and repeats in turns, so that a machine that drifts, a budget that ends and Ctrl-C treat all alike.
+Every method is run from its coarsest setting to its finest. All methods are run at one level before the next
+level, and repeats are interleaved. Drifting machine speed, an exhausted budget and Ctrl-C therefore affect
+all methods alike.
 """
 
 from __future__ import annotations
@@ -28,19 +29,19 @@ if TYPE_CHECKING:
     from tisim.accuracy.cost_study import Study
 
 Progress = Callable[[float, str], None]
-"""Called with the fraction of the study that is done, 0..1, and what is being run."""
+"""Called with the fraction of the study that is done, 0..1, and a description of the current run."""
 REFERENCE_SEED_OFFSET = 1_000_000
-"""The seeds of a random quantity's reference lie so far beyond those of its rows: they share no start."""
+"""Offset between the seeds of a random quantity's reference and of its rows, so that no start is shared."""
 REFERENCE_STARTS = 4
-"""A random reference has so many times the largest number of starts that is tried: its interval is half as
-wide."""
+"""The reference of a random quantity has this many times the largest number of starts; its confidence
+interval is half as wide."""
 
 
 class StudyRunner:
-    """Measures what is not known yet of a study, and puts it there.
+    """Measures the missing rows and truths of a study, and stores them in it.
 
-    progress : called with the fraction that is done and what is being run. finished : called when a row, or
-    the truth, has become known.
+    progress : called with the fraction that is done and a description of the current run.
+    finished : called after each new row, and after the truths.
     """
 
     def __init__(self, study: Study, progress: Progress, finished: Callable[[], object]) -> None:
@@ -49,14 +50,14 @@ class StudyRunner:
         self.done, self.planned, self.what = 0.0, 1.0, "the scene as it is"
 
     def run(self) -> None:
-        """Run the scene as it is, then the reference, then every setting that has no row."""
+        """Run the scene unchanged, then the reference, then every setting without a row."""
         study = self.study
         where = runtime.current()
         runtime.init(where.device, "f64", where.threads)
         base = self._run([study.scene], 0.0)
         sweeps = self._methods(base)
         self.base = base.seconds
-        must(bool(sweeps), "scene", "one that has something to turn", study.scene.stepper.kind())
+        must(bool(sweeps), "scene", "one with a setting to vary", study.scene.stepper.kind())
         rounds = max(len(method.settings) for method in sweeps)
         measured = {row.key for row in study.rows}
         plan = [
@@ -93,8 +94,8 @@ class StudyRunner:
         return [ensembles(study.scene, study.starts), *sweeps] if study.random else sweeps
 
     def _cost(self, method: SettingSweep, k: int) -> float:
-        """Return a guess of the seconds that all repeats of the k-th setting of a method take, from another
-        of the method where one is known."""
+        """Return an estimate of the seconds that all repeats of the k-th setting of a method take, based on
+        another setting of the method if one was timed."""
         weights, repeats = method.weights, self.study.repeats
         most = repeats * self.study.limit
         guesses = dict(zip((setting.description for setting in method.settings), weights, strict=True))
@@ -105,8 +106,8 @@ class StudyRunner:
         return min(repeats * self.base * method.settings[k].starts * weight, most)
 
     def _largest(self) -> list[float]:
-        """Return how large each quantity has been on the way, in a run whose steps are so short that no
-        observation has to wait for one; 0 where no quantity asks."""
+        """Return the largest size of each quantity during a run with steps short enough for all observations;
+        0 if no quantity needs it."""
         largest = [0.0 for _ in self.study.quantities]
 
         def update_largest(result: Result) -> None:
@@ -120,7 +121,7 @@ class StudyRunner:
         return largest
 
     def _truths(self, base: Timed, sweeps: Sequence[SettingSweep], rest: float) -> None:
-        """Find the true values, where they are not known yet. rest : seconds planned for all that follows."""
+        """Find the true values unless they are known. rest : planned seconds of all other runs."""
         study, self.planned = self.study, rest
         if study.truths:
             return
@@ -154,7 +155,8 @@ class StudyRunner:
         self.finished()
 
     def _check_truths(self) -> None:
-        """RunError where the truth of a quantity does not tell settings apart, and it was asked to."""
+        """Raise RunError if ``require_reference`` is set and the truth of a quantity cannot tell settings
+        apart."""
         for quantity, truth in zip(self.study.quantities, self.study.truths, strict=True):
             if self.study.require_reference and not reference.tells_apart(quantity, truth):
                 rule = f"known by the reference to {reference.LARGEST_REFERENCE_ERROR:g} of the motion"
@@ -170,7 +172,8 @@ class StudyRunner:
         )
 
     def _round(self, items: Sequence[tuple[SettingSweep, int]]) -> None:
-        """Run the settings of one level, repeats in turns; the row of each is made when its last is done."""
+        """Run the settings of one level with interleaved repeats; add the row of each after its last
+        repeat."""
         repeats = self.study.repeats
         trials = [Trial(method, k, self._cost(method, k) / repeats) for method, k in items]
         try:
@@ -181,12 +184,12 @@ class StudyRunner:
                     if repeat == repeats - 1:
                         self._row(trial)
         finally:
-            # Also when it is stopped half-way: what is measured stays.
+            # If the round is stopped, the finished measurements are kept.
             for trial in trials:
                 self._row(trial)
 
     def _repeat(self, trial: Trial) -> None:
-        """Run a setting once more, unless it has failed or would not fit the budget."""
+        """Run a setting once more, unless it has failed or would exceed the budget."""
         self.what = f"{trial.method.name}, {trial.setting.description}"
         if trial.failed or trial.left_out:
             self.done += trial.cost
@@ -203,7 +206,7 @@ class StudyRunner:
             trial.failed = str(error)
 
     def _compare_laws(self, sweeps: Sequence[SettingSweep]) -> None:
-        """Mark the rows of cheaper laws that make the same errors as the law they stand for."""
+        """Mark the rows of cheaper laws that have the same errors as the law they approximate."""
         rows = {row.key: row for row in self.study.rows}
         stands_for = {(m.name, s.description): m.exact for m in sweeps for s in m.settings if m.exact}
         self.study.rows[:] = [
@@ -213,7 +216,7 @@ class StudyRunner:
         self.finished()
 
     def _left(self) -> float:
-        """Return the seconds that the budget has left; compiling takes none of it."""
+        """Return the remaining seconds of the budget, which does not include compiling."""
         return self.study.budget - self.spent
 
     def _run(
@@ -223,7 +226,7 @@ class StudyRunner:
         limit: float = math.inf,
         on_result: ResultCallback | None = None,
     ) -> Timed:
-        """Run and time; ``cost`` is what was planned for it, s; OutOfTime after ``limit`` (s)."""
+        """Run and time scenes; ``cost`` is the planned time, s; OutOfTime after ``limit`` (s)."""
         done_before = self.done
         if limit <= 0.0:
             raise OutOfTime
@@ -241,7 +244,7 @@ class StudyRunner:
         return timed
 
     def _row(self, trial: Trial) -> None:
-        """Make the row of a setting that has been run, once."""
+        """Add the row of a setting that has been run, unless it was already added."""
         if not trial.in_rows and (trial.runs or trial.failed):
             trial.in_rows = True
             self.study.rows.append(trial.row(self.study))

@@ -1,4 +1,4 @@
-"""The parts of a scene by their dotted places, and copies of a scene with another part in one of them."""
+"""The parts of a scene by their dotted paths, and copies of a scene with one part exchanged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tisim.scene.scene import Scene
 
 
 def parts(scene: Scene) -> Iterator[tuple[str, Component]]:
-    """Yield every part of a scene with its dotted place, as in its TOML file."""
+    """Yield every part of a scene with its dotted path, as in a TOML file."""
     for effect in scene.effects:
         yield from within(f"effects.{effect.label}", effect)
     for name in ("particles", "domain", "stepper"):
@@ -19,7 +19,7 @@ def parts(scene: Scene) -> Iterator[tuple[str, Component]]:
 
 
 def within(path: str, part: Component) -> Iterator[tuple[str, Component]]:
-    """Yield a part at a dotted place, and every part within it with its own."""
+    """Yield a part at a dotted path, and every part within it with its own path."""
     yield path, part
     for name in type(part).model_fields:
         if isinstance(inner := getattr(part, name), Component):
@@ -27,8 +27,8 @@ def within(path: str, part: Component) -> Iterator[tuple[str, Component]]:
 
 
 def exchanged(scene: Scene, path: str, part: Component) -> Scene:
-    """Return a copy of a scene with another part in the place with this dotted name, and with the settings in
-    other effects that must be those of this one."""
+    """Return a copy of a scene with another part at this dotted path. Settings of other effects that must
+    equal those of the part are changed too."""
     first, *rest = path.split(".")
     if first == "effects":
         own = next(effect for effect in scene.effects if effect.label == rest[0])
@@ -45,12 +45,13 @@ def _put(part: Any, path: Sequence[str], new: Component) -> Any:
 
 
 def turned(scene: Scene, path: str, accuracy_parameter: AccuracyParameter, decades: float) -> Scene:
-    """Return a copy with an accuracy parameter of the part at ``path`` turned; InputError if it refuses."""
+    """Return a copy with an accuracy parameter of the part at ``path`` changed; InputError if the value is
+    invalid."""
     return exchanged(scene, path, accuracy_parameter.turned(dict(parts(scene))[path], decades))
 
 
 def in_steps(scene: Scene, length: Callable[[float], float]) -> Scene:
-    """Return a copy with other lengths of steps: settings of a control in s are such lengths (s)."""
+    """Return a copy with other step lengths: all settings of the step control with the unit s."""
     control = scene.stepper.control
     lengths = [name for name, info in type(control).model_fields.items() if unit_of(info) == "s"]
     changed = {name: length(getattr(control, name)) for name in lengths}
@@ -63,8 +64,8 @@ def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
 
 
 def finest(scene: Scene, decades: float) -> Scene:
-    """Return a copy with every accuracy parameter of its effects turned, so that they cannot hide the error
-    of the stepper."""
+    """Return a copy with every accuracy parameter of its effects refined, so that their errors do not hide
+    the error of the stepper."""
     for path, part in list(parts(scene)):
         for accuracy_parameter in part.accuracy_parameters:
             if accuracy_parameter.converges and not path.startswith("stepper"):

@@ -1,4 +1,4 @@
-"""Scenes of softer materials in longer steps, as is usual for grains: what a study tries of them."""
+"""Scenes with softer materials and longer steps, a common approximation for grains."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from tisim.components.accuracy_parameter import three_digits
 from tisim.scene.scene import Scene
 
 SOFTER = (1000.0, 100.0, 10.0)
-"""By these factors materials are softened."""
+"""Factors by which materials are softened."""
 
 
 def softening(scene: Scene) -> dict[str, float]:
-    """Return the properties of materials by which the contacts of a scene may be softened, each with the
-    power of it that the time of an impact goes by; none where one of them is given for a pair of materials,
-    which would stay as stiff as it is."""
+    """Return the material properties by which the contacts of a scene may be softened. Each value is the
+    power of the property with which the duration of an impact decreases. Empty if such a property is set for
+    a pair of materials, which would not be softened."""
     powers = {name: power for _, part in parts(scene) for name, power in part.softening.items()}
     pairs = scene.material_pairs.values()
     given = any(getattr(pair, name, None) is not None for pair in pairs for name in powers)
@@ -23,8 +23,8 @@ def softening(scene: Scene) -> dict[str, float]:
 
 
 def softened(scene: Scene, properties: Mapping[str, float], factor: float) -> Scene:
-    """Return a copy whose materials have properties that are lower by a factor, and whose steps are longer by
-    as much as the impacts are."""
+    """Return a copy in which material properties are divided by a factor and steps are lengthened in
+    proportion to the duration of impacts."""
     materials = {}
     for label, material in scene.materials.items():
         given = {name: getattr(material, name) for name in properties}

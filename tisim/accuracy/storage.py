@@ -1,10 +1,10 @@
-"""What a study leaves in its folder: cost.csv, cost.h5 and cost.png. Written anew as rows become known.
+"""The files of a study: cost.csv, cost.h5 and cost.png, rewritten after each new row.
 
 cost.h5: group ``rows`` has one array per column, in the order of cost.csv, with ``errors`` and
-``uncertainties`` of shape (rows, quantities) and ``seconds`` (rows, repeats), NaN where there was none; group
-``truths`` has the true value of each quantity, with its own uncertainty, where it is from, and the size that
-errors are relative to. The attributes hold the scene as TOML, the settings and the versions, as in a run's
-result.h5.
+``uncertainties`` of shape (rows, quantities) and ``seconds`` of shape (rows, repeats), NaN for missing
+values. Group ``truths`` has the true value of each quantity, with its uncertainty, its origin, and the size
+to which errors are relative. The attributes hold the scene as TOML, the settings and the versions, as in the
+result.h5 of a run.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "reje
 
 
 def write(study: Study, folder: Path) -> list[Path]:
-    """Write cost.csv and cost.h5, in place of any before; return their paths. RunError on a full disk."""
+    """Write cost.csv and cost.h5, replacing earlier ones; return their paths. RunError if the disk is
+    full."""
     ensure_writable(folder)
     replace_file(folder / COST_CSV, as_csv(study).encode())
     _write_rows(study, folder / HDF5)
@@ -107,22 +108,22 @@ def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
 
 
 def resumes(folder: Path, fresh: bool | None, overwrite: bool) -> bool:
-    """Return whether a study goes on with what is in the folder; see ``resuming.resumes``."""
+    """Return whether a study continues from the files in the folder; see ``resuming.resumes``."""
     begun = regular_file.exists(folder / HDF5)
     return resuming.resumes(folder, "measurement", begun, "measured costs" * begun, fresh, overwrite)
 
 
 def clear(folder: Path) -> None:
-    """Remove what an earlier study has left, so that nothing of it is taken for a new one's."""
+    """Remove the files of an earlier study, so that they are not taken for results of a new one."""
     for name in (HDF5, COST_CSV, PICTURE):
         (folder / name).unlink(missing_ok=True)
 
 
 def resume(study: Study, folder: Path) -> None:
-    """Give a study the rows and truths that an earlier one of the same scene has left in a folder.
+    """Load into a study the rows and truths that an earlier study of the same scene has stored in a folder.
 
-    What was stopped at a shorter limit than the study has is left to be measured again. InputError when what
-    is there is of another one; nothing happens where nothing is.
+    Rows stopped at a shorter time limit than that of this study are dropped and measured again. InputError if
+    the stored study differs; no effect if the folder has none.
     """
     path = folder / HDF5
     if not regular_file.exists(path):
@@ -139,7 +140,7 @@ def resume(study: Study, folder: Path) -> None:
 
 
 def rows(path: Path) -> list[Row]:
-    """Return the rows in a cost.h5. InputError when the file is none of a study, cut short or damaged."""
+    """Return the rows in a cost.h5. InputError if the file is not of a study, is truncated or damaged."""
     with checksum.open_file(path, "cost", COST_FORMAT) as file:
         return _rows(file["rows"])
 

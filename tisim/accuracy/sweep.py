@@ -1,4 +1,4 @@
-"""A study measures every way to run a scene that trades accuracy for time; the parts of a scene say which."""
+"""The sweeps of a study: all ways to run a scene that trade accuracy for time, as declared by its parts."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from tisim.scene.scene import Scene
 from tisim.steppers.base import Stepper
 
 USUAL_NUMBERS = ("f64", "strict")
-"""The precision and the arithmetic that methods are compared with."""
+"""The precision and the arithmetic with which methods are compared."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting is one way to run a scene: the scene with it, what it is, its precision, arithmetic and
-    random starts."""
+    """One way to run a scene: the changed scene, its description, precision, arithmetic and number of
+    starts."""
 
     scene: Scene
     description: str
@@ -40,12 +40,12 @@ class Setting:
 
 @dataclass(frozen=True)
 class SettingSweep:
-    """A sweep is a line in the picture: the settings of one method, the cheapest first.
+    """A sweep over the settings of one method, the cheapest first; one line in the picture.
 
-    weights : guesses of their times, relative to each other.
-    accuracy_parameter : the one that is turned, of the part at ``path``; None for a list of laws or of
-    numbers of starts.
-    exact : method and setting that such laws differ from in the law only; None for all else.
+    weights : estimated run times, relative to each other.
+    accuracy_parameter : the varied parameter, of the part at ``path``; None for a list of laws or of numbers
+        of starts.
+    exact : method and setting with the exact law, for approximate laws; None for all other sweeps.
     """
 
     name: str
@@ -63,8 +63,8 @@ class SettingSweep:
         return parameter is not None and parameter.converges and self.path.startswith("stepper")
 
     def at(self, decades: float) -> Scene:
-        """Return the scene with the accuracy parameter turned to an error so many decades larger than that of
-        ``base``."""
+        """Return the scene with the accuracy parameter set to an error larger than in ``base`` by
+        ``decades``."""
         assert self.accuracy_parameter is not None
         return turned(self.base, self.path, self.accuracy_parameter, decades)
 
@@ -79,9 +79,10 @@ def methods(
 ) -> list[SettingSweep]:
     """Return all methods for a scene with steps of about dt (s) and particles up to ``extent`` (m) apart.
 
-    levels : decades of error, relative to what the scene asks for, that accuracy parameters are turned to.
-    The first method is the scene's own stepper. numbers : precisions and arithmetics, of which all but f64,
-    strict, are tried with that method. starts : random starts of each run.
+    levels : decades of error, relative to the scene, to which accuracy parameters are set.
+    numbers : precisions and arithmetics; all but ("f64", "strict") are tried with the first method only,
+        which is the scene's own stepper.
+    starts : number of random starts of each run.
     """
     sweeps = []
     own = sorted(parts(scene), key=lambda item: not item[0].startswith("stepper"))
@@ -98,7 +99,7 @@ def methods(
     for effect in scene.effects:
         laws = effect.approximations(extent)
         if laws:
-            # As accurate otherwise as anything here, so that what is seen is the error of the law.
+            # All other settings are as accurate as possible, so that only the error of the law shows.
             accurate = sweeps[0].settings[-1] if sweeps else Setting(scene, "")
             exact = (sweeps[0].name, accurate.description) if sweeps else None
             sweeps.append(_laws(accurate.scene, effect, laws, starts, exact))
@@ -114,23 +115,24 @@ def methods(
 
 
 def ensembles(scene: Scene, sizes: Sequence[int]) -> SettingSweep:
-    """Return the sweep of the scene as it is, from more and more random starts."""
+    """Return the sweep of the unchanged scene over increasing numbers of random starts."""
     settings = tuple(Setting(scene, f"{n} starts", starts=n) for n in sizes)
     return SettingSweep("random starts", settings, tuple(n / sizes[0] for n in sizes), scene)
 
 
 def rivals(stepper: Stepper, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
-    """Return what is tried beside a stepper in a scene of these effects, with steps of some dt (s)."""
+    """Return the steppers to compare with a stepper in a scene of these effects, with steps of about dt
+    (s)."""
     own = stepper.rivals(effects, dt)
     if own is not None:
         return own
-    # By name, whatever has been imported first.
+    # Sorted by name, so that the order does not depend on imports.
     kinds = [kind for _, kind in sorted(Stepper.known().items())]
     return tuple(other for kind in kinds for other in kind.alternatives(effects, dt))
 
 
 def _steppers(scene: Scene, dt: float) -> list[Stepper]:
-    """Return the steppers that suit the scene, other than its own."""
+    """Return the steppers, other than its own, that are suitable for the scene."""
     serialization.load(steppers)
     kinds = {_kind(scene.stepper)}
     suitable = []
@@ -152,7 +154,7 @@ def _suits(stepper: Stepper, scene: Scene) -> bool:
 
 
 def _kind(stepper: Stepper) -> tuple[Any, ...]:
-    """Return what makes a stepper another method, whatever its step control is set to."""
+    """Return a key that distinguishes methods but ignores the settings of the step control."""
     return type(stepper), type(stepper.control), stepper.structure(), tuple(stepper.values())
 
 
@@ -169,9 +171,9 @@ def _turning(
         try:
             changed = turned(scene, path, accuracy_parameter, decades)
         except InputError:
-            continue  # The part cannot be set so, such as to a shortest step above the longest.
+            continue  # The part cannot have this setting, for example a shortest step above the longest.
         if not _stands(changed):
-            continue  # It does not suit the domain, such as waves for which there is no room.
+            continue  # The setting does not suit the domain, for example waves that do not fit into it.
         part = dict(parts(changed))[path]
         description = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
         settings.append(Setting(changed, description, numbers[0], starts, numbers[1]))
@@ -189,7 +191,7 @@ def _laws(
         named = law.model_copy(update={"name": own.name})
         changed = exchanged(scene, f"effects.{own.label}", named)
         if not _stands(changed):
-            continue  # The materials lack what this law needs of them, or it does not suit the domain.
+            continue  # The materials lack properties of this law, or it does not suit the domain.
         differ = [
             f"{name}={text_of_setting(getattr(law, name))}"
             for name in type(law).model_fields
@@ -201,7 +203,7 @@ def _laws(
 
 
 def _stands(scene: Scene) -> bool:
-    """Return whether a scene, of which a part was exchanged, can be run."""
+    """Return whether a scene with an exchanged part can be run."""
     try:
         Scene(**dict(scene))
     except InputError:
@@ -223,7 +225,7 @@ def _softer(scene: Scene, properties: Mapping[str, float], starts: int) -> Setti
 def _title(scene: Scene, path: str) -> str:
     if not path.startswith("stepper"):
         return path.removeprefix("effects.")
-    # What any such stepper must be given, such as what fluid it is in, is no matter of method.
+    # Required settings of every such stepper, such as the fluid, do not distinguish methods.
     stepper, fields = scene.stepper, type(scene.stepper).model_fields
     chosen = [
         f"{k}={v!r}"

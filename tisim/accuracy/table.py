@@ -1,4 +1,4 @@
-"""A study in text: its table, and the answer to how to get an error for the least time."""
+"""A study as text: its table, and the commands for the cheapest setting."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from tisim.accuracy.row import Row
 from tisim.console import TERMINAL_WIDTH
 
 HEADINGS = (
-    "time: the median of the wall seconds; spread: the longest less the shortest of them",
-    "steps, forces, rejected: the steps, force evaluations and rejected steps of a particle",
-    "best for: the error that no other setting meets in less time",
+    "time: median of the wall seconds; spread: longest minus shortest",
+    "steps, forces, rejected: steps, force evaluations and rejected steps per particle",
+    "best for: the error for which no other setting is faster",
 )
-"""What the heads of the table stand for."""
+"""Explanations of the column headings of the table."""
 
 
 def table(study: Study) -> RenderableType:
-    """Return every setting by method, with its median time, work and errors; for what error it is the
-    cheapest, in brackets where timings do not tell it from the one that is chosen; below, what has failed and
-    why."""
+    """Return a table of all settings by method, with median time, work and errors. The last column has the
+    error for which a setting is the cheapest, in brackets if its timing is indistinguishable from that of the
+    recommended setting. Failed settings are listed below each method with the reason."""
     names = [quantity.name.replace(" ", "\n") for quantity in study.quantities]
     heads = ["", "time\n(s)", "spread\n(s)", "steps", "forces", "re-\njected", *names, "best\nfor"]
     best: dict[tuple[str, str], str] = {}
@@ -35,7 +35,7 @@ def table(study: Study) -> RenderableType:
     cells = {row.key: _cells(row, best.get(row.key, "")) for row in study.rows if not row.failed}
     columns = zip(heads, *cells.values(), strict=True)
     first, *widths = (max(len(line) for cell in column for line in cell.split("\n")) for column in columns)
-    # No number is cut: the settings wrap between them, and have room for the longest.
+    # Numbers are never cut: setting descriptions wrap between words, and the column fits the longest word.
     longest = max((len(word) for row in study.rows for word in row.setting.split()), default=0)
     widths = [max(1 + longest, min(1 + first, TERMINAL_WIDTH - sum(widths) - len(widths))), *widths]
     for cell in cells.values():
@@ -50,7 +50,7 @@ def table(study: Study) -> RenderableType:
 
 
 def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
-    """Return lines in columns of these widths; what does not fit into the first column goes on below."""
+    """Return lines in columns of these widths; text too long for the first column wraps."""
     grid = Table.grid(padding=(0, 1, 0, 0))
     for k, width in enumerate(widths):
         grid.add_column(
@@ -62,7 +62,7 @@ def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
 
 
 def error_texts(row: Row) -> list[str]:
-    """Return the error of each quantity as text; where no more is known, what it is at most."""
+    """Return the error of each quantity as text, or its upper bound if the error is not known."""
     return [
         f"{row.errors[k][0]:.1e}" if row.trusted(k) else f"< {row.at_most(k):.0e}"
         for k in range(len(row.errors))
@@ -76,8 +76,8 @@ def _cells(row: Row, best: str) -> list[str]:
 
 
 def truths(study: Study) -> list[str]:
-    """Return a line for each quantity that says where its true value is from and how good it is; one more
-    where that does not tell settings apart, unless the study ends there and says so itself."""
+    """Return a line for each quantity with the origin and the error of its true value. A second line warns if
+    the reference cannot tell settings apart, unless the study then stops with that message."""
     lines = []
     for quantity, truth in zip(study.quantities, study.truths, strict=False):
         own = f"; its own error at most {truth.error:.1e}" if truth.error else ""
@@ -91,25 +91,29 @@ def truths(study: Study) -> list[str]:
 
 
 def notes(study: Study) -> list[str]:
-    """Return lines that stand below the table: the true values, and what words in the table mean."""
+    """Return the lines below the table: the true values, and explanations of terms in the table."""
     lines = truths(study)
     measured = [row for row in study.rows if row.errors]
     lines += HEADINGS if measured else []
     if any(not row.trusted(k) for row in measured for k in range(len(row.errors))):
-        lines.append("<: no more is known of the error than that it is smaller")
+        lines.append("<: upper bound of an error that is too small to be known")
     if any(len(rows) > 1 for rows in study.decades().values()):
-        lines.append("best for, in brackets: timings do not tell it from the other, which takes less work")
+        lines.append(
+            "best for, in brackets: within the timing uncertainty as fast as another setting with less work"
+        )
     if not study.complete:
-        lines.append("not complete: the budget, or Ctrl-C, came before the other settings")
+        lines.append(
+            "not complete: the budget was spent, or the study was stopped, before all settings were run"
+        )
     if any(row.same for row in study.rows):
-        lines.append("no change: the same as of the law that it stands for, but for rounding")
+        lines.append("no change: the same errors, up to rounding, as with the law that it approximates")
     return lines
 
 
 def recipe(row: Row, words: Sequence[str], quantity: int = 0) -> str:
     """Return how to run a setting: as Python in a scene, and as a command.
 
-    words : all those of ``tisim run``. quantity : the place of the one whose error is told.
+    words : all arguments of ``tisim run``. quantity : index of the quantity whose error is shown.
     """
     starts = f", over {row.starts} random starts" if row.starts > 1 else ""
     return (

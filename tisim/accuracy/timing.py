@@ -1,4 +1,4 @@
-"""Runs that are timed: compiled first, and again and again without."""
+"""Timed runs: simulations are compiled once and then reused."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from tisim.scene.scene import Scene
 
 ResultCallback = Callable[[Result], None]
 OBSERVATIONS = 127
-"""A run is observed so many times on its way. The number is prime: of a motion of any whole number of
-periods, but for multiples of it, no two observations are at the same part of the period."""
+"""Number of observations of a run. It is prime, so that for a motion of any whole number of periods (except
+multiples of this number) no two observations are at the same phase."""
 ROOM = 40
-"""So many trees of fields must be free before a simulation is made, which takes two to some ten."""
+"""This many field trees must be free before a simulation is created, which takes two to about ten."""
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,14 @@ class Timed:
 
     @property
     def work(self) -> tuple[float, float, float]:
-        """The number of steps, of force evaluations and of rejected steps, per particle and start."""
+        """The number of steps, force evaluations and rejected steps, per particle and start."""
         steps, sums, rejections = 0.0, 0.0, 0.0
         for result in self.results:
             n, stepper = len(result.start["mass"]), result.scene.stepper
             independent, evaluations = stepper.independent(result.scene.effects), stepper.evaluations
             steps += result.work["particle_steps"] / n
             sums += evaluations(result.work, n, independent)
-            # A rejected step counts as a force evaluation does: of one particle, or of all.
+            # A rejected step is counted like a force evaluation: of one particle, or of all.
             rejections += evaluations(
                 dict.fromkeys(result.work, result.work.get("rejections", 0)), n, independent
             )
@@ -52,7 +52,7 @@ class Timed:
 
 
 class ResultObserver(Observer):
-    """Lets the first world pause ``OBSERVATIONS`` times on its way, and hands on its result there."""
+    """Pauses the first world ``OBSERVATIONS`` times during a run, and passes its result to a callback."""
 
     def __init__(self, duration: float, on_result: ResultCallback) -> None:
         """duration : simulated time of the run, s."""
@@ -70,9 +70,10 @@ class ResultObserver(Observer):
 
 
 class SimulationCache:
-    """Compiled simulations, one for each structure and number of worlds: idle worlds would be timed too.
+    """Compiled simulations, one for each structure and number of worlds, because idle worlds would add to the
+    time.
 
-    They are kept for as long as there is room for another. Those that were not used for longest go first.
+    Simulations are kept while there is memory for another. The least recently used are closed first.
     """
 
     def __init__(self) -> None:
@@ -80,7 +81,7 @@ class SimulationCache:
         self.warm: weakref.WeakSet[Simulation] = weakref.WeakSet()
 
     def compiled(self, scene: Scene, worlds: int) -> Simulation:
-        """Return the simulation that is compiled for a scene of this structure and size."""
+        """Return the compiled simulation for a scene of this structure and size."""
         key = scene.structure(), worlds, scene.capacity()
         simulation = self.cached.pop(key, None)
         if simulation is None:
@@ -96,16 +97,16 @@ class SimulationCache:
         progress: Progress | None = None,
         on_result: ResultCallback | None = None,
     ) -> Timed:
-        """Run scenes of one structure at once, compiled before; RunError, with the reason, when one fails.
+        """Run scenes of one structure together, after compiling; RunError with the reason if one fails.
 
-        progress : called about four times a second, first when all is compiled and the run begins.
-        on_result : called with the first scene's result about ``OBSERVATIONS`` times, evenly in its simulated
-        time.
+        progress : called about four times a second, first when compiling is done and the run begins.
+        on_result : called with the first scene's result about ``OBSERVATIONS`` times, at equal intervals of
+            simulated time.
         """
         simulation = self.compiled(scenes[0], len(scenes))
         simulation.load(scenes)
         if simulation not in self.warm:
-            # What is only compiled when it is first used: steps, and all that reads their results.
+            # Steps, and kernels that read results, are compiled at first use.
             simulation.run(steps=1)
             simulation.results()
             simulation.load(scenes)
@@ -121,7 +122,7 @@ class SimulationCache:
         return Timed(results, simulation.wall_s)
 
     def close(self) -> None:
-        """Give the device memory of all simulations back."""
+        """Free the device memory of all simulations."""
         for simulation in self.cached.values():
             simulation.close()
         self.cached.clear()
@@ -129,11 +130,12 @@ class SimulationCache:
 
 
 class OutOfTime(Exception):
-    """Raised where a run is stopped because it takes too long."""
+    """Raised when a run exceeds its time limit."""
 
 
 class Limit:
-    """Progress that stops a run with OutOfTime, so many seconds after it has first been called."""
+    """A progress callback that stops a run with OutOfTime when ``seconds`` have passed since its first
+    call."""
 
     def __init__(self, seconds: float, then: Progress) -> None:
         self.seconds, self.then, self.began = seconds, then, math.inf

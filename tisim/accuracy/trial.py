@@ -1,4 +1,4 @@
-"""A setting while it is being run, and the row that is made of its runs."""
+"""A setting during its runs, and the row made from them."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 class Trial:
     """A setting that is being run: the k-th of its method.
 
-    cost : planned wall seconds of a repeat. runs : its repeats so far. failed : why it is not run again.
-    stopped_after : the limit at which it was stopped (s), if it was. left_out : whether it does not fit the
-    budget. in_rows : whether its row is among those of the study.
+    cost : planned wall seconds of a repeat.
+    runs : repeats so far.
+    failed : the reason for not running it again.
+    stopped_after : the time limit at which it was stopped (s), if it was.
+    left_out : whether it does not fit the budget.
+    in_rows : whether its row was added to the study.
     """
 
     method: SettingSweep
@@ -36,11 +39,11 @@ class Trial:
 
     @property
     def setting(self) -> Setting:
-        """The setting itself."""
+        """The setting."""
         return self.method.settings[self.k]
 
     def row(self, study: Study) -> Row:
-        """Return its row: what it took and how far off it is; or why it has failed."""
+        """Return its row: time and errors, or the reason for failure."""
         setting = self.setting
         steps, sums, rejections = math.nan, math.nan, math.nan
         errors: tuple[tuple[float, float], ...] = ()

@@ -1,4 +1,4 @@
-"""What results say: of how particles are arranged and how they flow, in NumPy."""
+"""Analysis of results in NumPy: structure and flow of particles."""
 
 import lazy_loader
 

@@ -9,18 +9,18 @@ import numpy as np
 from tisim.errors import Words, must
 
 STEPS_AT_MOST = 100_000
-"""The search ends after so many steps at most; some hundreds are usual."""
+"""Largest number of steps of the search; some hundreds are usual."""
 CUTS = 200
-"""So many times spheres that stand out are added, at most; some ten are usual."""
+"""Largest number of times that protruding spheres are added; about ten are usual."""
 NEWCOMERS = 50
-"""So many spheres are added at once, at most."""
+"""Largest number of spheres that are added at once."""
 AFRESH = 100
-"""After so many steps what has been brought up to date is computed anew, as it rounds."""
+"""After this number of steps the updated quantities are computed anew, to limit rounding errors."""
 
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """An ellipsoid is the places r with sum_k ((r - centre) . axes_k / semi_axes_k)^2 <= 1.
+    """The set of points r with sum_k ((r - centre) . axes_k / semi_axes_k)^2 <= 1.
 
     centre : m. semi_axes : the largest first (m). axes : unit vectors, as rows, shape (3, 3).
     """
@@ -35,7 +35,8 @@ class Ellipsoid:
         return float(4 / 3 * np.pi * np.prod(self.semi_axes))
 
     def level(self, position: np.ndarray) -> np.ndarray:
-        """Return how far out places (n, 3), m, are: 0 in the centre, 1 on the surface; shape (n,)."""
+        """Return the scaled distance of points (n, 3), m, from the centre: 0 at the centre, 1 on the surface;
+        shape (n,)."""
         scaled = (position - self.centre) @ self.axes.T / self.semi_axes
         return np.asarray(np.linalg.norm(scaled, axis=1))
 
@@ -43,12 +44,13 @@ class Ellipsoid:
 def bounding_ellipsoid(
     position: np.ndarray, radius: np.ndarray | float = 0.0, tolerance: float = 1e-3
 ) -> Ellipsoid:
-    """Return an ellipsoid that holds all spheres of a radius (m) at positions (n, 3), m; its volume is at
-    most 1 + ``tolerance`` times the smallest of any that does.
+    """Return an ellipsoid that contains all spheres of a radius (m) at positions (n, 3), m; its volume is at
+    most 1 + ``tolerance`` times the minimum.
 
-    Khachiyan's algorithm, with the steps away of Todd and Yildirim, finds the smallest ellipsoid around the
-    outermost points of some spheres: weights of points make an ellipsoid that is no larger than that. Points
-    of spheres that stand out farthest are added until growing it to hold all is within the tolerance.
+    Khachiyan's algorithm with the away steps of Todd and Yildirim finds the smallest ellipsoid around the
+    outermost points of some spheres. Weights of the points define an ellipsoid, which is never larger than
+    the smallest one. The outermost points of protruding spheres are added until the ellipsoid, enlarged to
+    contain all spheres, is within the tolerance.
 
     Source: L. G. Khachiyan, Math. Oper. Res. 21 (1996) 307; M. J. Todd, E. A. Yildirim, Discrete Appl. Math.
     155 (2007) 1731.
@@ -57,7 +59,7 @@ def bounding_ellipsoid(
     size = np.broadcast_to(np.asarray(radius, float), len(r))
     must(0 < tolerance < 1, "tolerance", "above 0 and below 1", tolerance)
     must(len(r) > 0, "particles", "at least one", len(r))
-    # About the middle and over the size, so that rounding does no harm.
+    # Centre and scale the coordinates to reduce rounding errors.
     middle = (r.min(axis=0) + r.max(axis=0)) / 2
     scale = float(np.abs(r - middle).max() + size.max()) or 1.0
     x, size = (r - middle) / scale, size / scale
@@ -71,7 +73,7 @@ def bounding_ellipsoid(
     points, growth = _outermost(x, size), np.inf
     weights = np.full(len(points), 1 / len(points))
     for _ in range(CUTS):
-        # As long as spheres stand out by much, a rough ellipsoid tells which.
+        # While spheres protrude far, a rough ellipsoid is sufficient to select them.
         weights = _weights(points, weights, max(tolerance / 4, min(0.1, (growth - 1) / 4)))
         centre, shape = _ellipsoid(points, weights)
         squares, axes = np.linalg.eigh(shape)
@@ -91,11 +93,11 @@ def bounding_ellipsoid(
 
 
 def _outermost(x: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return the points of spheres that are outermost along some directions."""
+    """Return the outermost points of the spheres along some directions."""
     steps = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), -1).reshape(-1, 3)
     directions = steps[np.any(steps != 0, axis=1)]
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    # Aslant, so that no face of a lattice is met head-on.
+    # Rotate the directions, so that they are not normal to faces of a lattice.
     turn = np.linalg.qr(np.array([[1.0, 0.2, 0.1], [-0.3, 1.0, 0.2], [0.1, -0.2, 1.0]]))[0]
     directions = directions @ turn.T
     chosen = np.argmax(x @ directions.T + size[:, None], axis=0)
@@ -103,15 +105,15 @@ def _outermost(x: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def _weights(points: np.ndarray, weights: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return weights of points, from others on, in whose ellipsoid none is farther out than sqrt(1 +
-    tolerance), all but."""
+    """Return weights of points, starting from given ones, such that no point lies outside sqrt(1 + tolerance)
+    times their ellipsoid."""
     n, d = points.shape
     lifted, weights = np.column_stack([points, np.ones(n)]), weights.copy()
     for turn in range(STEPS_AT_MOST):
         if turn % AFRESH == 0:
             inverse = np.linalg.pinv(lifted.T @ (weights[:, None] * lifted), hermitian=True)
             far = ((lifted @ inverse) * lifted).sum(axis=1)
-        # That farthest out gains weight, or the one deepest inside of those that have some loses it.
+        # Either the outermost point gains weight, or the innermost point with a weight loses it.
         used = np.where(weights > 0, far, np.inf)
         k, deepest = int(far.argmax()), int(used.argmin())
         if far[k] <= (1 + tolerance) * (d + 1):
@@ -124,7 +126,7 @@ def _weights(points: np.ndarray, weights: np.ndarray, tolerance: float) -> np.nd
         step = max(best, least)
         weights *= 1 - step
         weights[k] = max(weights[k] + step, 0.0) if step > least else 0.0
-        # The inverse of a matrix to which a square is added.
+        # Rank-one update of the inverse (Sherman-Morrison).
         column = inverse @ lifted[k]
         part = step / (1 - step + step * far[k])
         far = (far - part * (lifted @ column) ** 2) / (1 - step)
@@ -133,20 +135,24 @@ def _weights(points: np.ndarray, weights: np.ndarray, tolerance: float) -> np.nd
 
 
 def _ellipsoid(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return centre c and matrix A of the ellipsoid (r - c) A (r - c) <= 1 that weights of points make: its
-    volume is no larger than that of any that holds the points."""
+    """Return centre c and matrix A of the ellipsoid (r - c) A (r - c) <= 1 defined by weights of points. Its
+    volume does not exceed that of any ellipsoid around the points."""
     centre = weights @ points
     away = points - centre
     return centre, np.linalg.inv(points.shape[1] * away.T @ (weights[:, None] * away))
 
 
 def _farthest(y: np.ndarray, size: np.ndarray, squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far out in an ellipsoid the farthest point of each sphere is, and where that is.
+    """Return, for each sphere, the scaled distance and the position of its outermost point relative to an
+    ellipsoid.
 
-    y : centres along the axes of the ellipsoid. squares : those of its inverse semi-axes, rising. The point z
-    has A z = l (z - y) with l above all of A, so z = l y / (l - A), at a distance R from y: l is bisected.
+    y : centres along the axes of the ellipsoid.
+    squares : squared inverse semi-axes, increasing.
+
+    The point z satisfies A z = l (z - y) with l above all eigenvalues of A, so z = l y / (l - A), at a
+    distance R from y. l is found by bisection.
     """
-    # A sphere in the middle of a plane of the ellipsoid has two such points, and one of them is taken.
+    # A sphere centred in a symmetry plane of the ellipsoid has two such points, and one is chosen.
     y = np.where(np.abs(y) < 1e-12, 1e-12, y)
     pull = np.linalg.norm(squares * y, axis=1)
     reach = np.maximum(size, 1e-15)

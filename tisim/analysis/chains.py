@@ -1,4 +1,4 @@
-"""Shapes of clusters: how long chains are, where they point and how thick they are."""
+"""Shapes of clusters: length, direction and thickness of chains."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from tisim.analysis.separations import Sides, nearest_image
 
 
 class ClusterShapes(NamedTuple):
-    """Cluster shapes are what is known of the shapes of clusters, a row for each by its number.
+    """Shapes of clusters, one row per cluster.
 
-    size : particles. path : particles along the longest of the shortest ways through it. extent : of centres
-    along its first axis (m). centre : mean of positions (m). gyration_radii : root mean squares of
-    the distances from the centre along each of its axes, the largest first (m). axes : unit vectors, the
-    principal axes of the positions, as rows, shape (clusters, 3, 3).
+    size : number of particles.
+    path : number of particles on the longest of the shortest paths through the cluster.
+    extent : range of centres along its first axis (m).
+    centre : mean position (m).
+    gyration_radii : root mean square distances from the centre along each axis, the largest first (m).
+    axes : principal axes of the positions, unit vectors as rows, shape (clusters, 3, 3).
     """
 
     size: np.ndarray
@@ -30,43 +32,43 @@ class ClusterShapes(NamedTuple):
 
     @property
     def direction(self) -> np.ndarray:
-        """Return the first axis of each, the direction of a chain, as a unit vector; either end is its
-        head."""
+        """Return the first axis of each cluster, the direction of a chain, as a unit vector with arbitrary
+        sign."""
         return self.axes[:, 0]
 
     @property
     def thickness(self) -> np.ndarray:
-        """Return the root mean square distance of the centres from the first axis, m; 0 of a straight
+        """Return the root mean square distance of the centres from the first axis, m; 0 for a straight
         chain."""
         return np.hypot(self.gyration_radii[:, 1], self.gyration_radii[:, 2])
 
     @property
     def breadth(self) -> np.ndarray:
-        """Return how many particles are side by side in the mean: ``size`` over ``path``, 1 of a chain."""
+        """Return the mean number of particles side by side: ``size`` over ``path``, 1 for a chain."""
         return self.size / self.path
 
 
 def cluster_shapes(position: np.ndarray, pairs: np.ndarray, sides: Sides = None) -> ClusterShapes:
-    """Return the shapes of the clusters into which ``pairs`` (n, 2) bind particles at positions (n, 3), m;
-    clusters are numbered as by ``labels``.
+    """Return the shapes of the clusters that ``pairs`` (n, 2) form of particles at positions (n, 3), m, in
+    the order of ``labels``.
 
-    A cluster that goes on across joined faces is put together first; one that goes round the whole box is cut
-    somewhere. ``path`` is that of two sweeps, from any particle to the farthest, and from there: the longest
-    where there are no rings, and else a good lower bound. Axes of a cluster that is alike in some directions,
-    such as a single particle, are any of these.
+    A cluster that crosses periodic faces is unwrapped first; one that spans the whole box is cut at some
+    place. ``path`` is found by two breadth-first searches, from any particle to the farthest one, and from
+    there. It is exact for clusters without rings, and otherwise a good lower bound. If a cluster is
+    symmetric, such as a single particle, its axes are not unique.
 
-    sides : those of a box that is periodic, as ``near`` takes them.
+    sides : side lengths of a periodic box, as for ``near``.
     """
     position = np.asarray(position, float)
     number = len(position)
     cluster = labels(number, pairs)
     first = np.unique(cluster, return_index=True)[1]
     order, before, steps = _ways(number, pairs, first)
-    # Far from the first particle is an end; from there it is as far as the path is long.
+    # The particle farthest from the first one is an end of the path; the second search starts there.
     ends = order[np.lexsort([steps[order], cluster[order]])][np.cumsum(np.bincount(cluster)) - 1]
     path = np.zeros(len(first), int)
     np.maximum.at(path, cluster, _ways(number, pairs, ends)[2])
-    # Each is put where the image is that the particle before it on the way touches.
+    # Place each particle at its image nearest to its predecessor on the path.
     where = position.copy()
     later = order[before[order] < number]
     apart = nearest_image(position[later] - position[before[later]], sides)
@@ -87,11 +89,12 @@ def cluster_shapes(position: np.ndarray, pairs: np.ndarray, sides: Sides = None)
 
 
 def orientation_tensor(direction: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-    """Return the mean of n (x) n over unit vectors n of shape (n, 3), symmetric, of trace 1; shape (3, 3).
+    """Return the mean of n (x) n over unit vectors n of shape (n, 3), symmetric with trace 1; shape (3, 3).
 
-    Of directions at random it is a third of the unit matrix; its largest eigenvalue is 1 where all are one.
-    Of no directions, or where none counts, it is NaN.
-    weights : how much each counts, shape (n,); alike unless given, such as by the size of a chain.
+    For random directions it is a third of the unit matrix; if all directions are parallel, its largest
+    eigenvalue is 1. Without directions, or if all weights are 0, it is NaN.
+
+    weights : weight of each direction, such as the size of its chain, shape (n,); equal by default.
 
     Source: S. G. Advani, C. L. Tucker, J. Rheol. 31 (1987) 751.
     """
@@ -105,15 +108,15 @@ def orientation_tensor(direction: np.ndarray, weights: np.ndarray | None = None)
 def alignment(
     direction: np.ndarray, axis: tuple[float, float, float], weights: np.ndarray | None = None
 ) -> float:
-    """Return the mean of (3 cos^2 - 1) / 2 of the angles of unit vectors (n, 3) to an axis: 1 along it, 0 at
-    random, -1/2 across it, NaN of none."""
+    """Return the mean of (3 cos^2 - 1) / 2 over the angles between unit vectors (n, 3) and an axis: 1 if
+    parallel, 0 if random, -1/2 if perpendicular, NaN without vectors."""
     e = np.asarray(axis, float) / np.linalg.norm(axis)
     return float((3 * e @ orientation_tensor(direction, weights) @ e - 1) / 2)
 
 
 def fabric_tensor(position: np.ndarray, pairs: np.ndarray, sides: Sides = None) -> np.ndarray:
-    """Return the fabric tensor of contacts, the ``orientation_tensor`` of the directions from centre to
-    centre of ``pairs`` (n, 2), NaN of none; shape (3, 3).
+    """Return the fabric tensor of contacts, the ``orientation_tensor`` of the branch vectors between the
+    centres of ``pairs`` (n, 2); shape (3, 3), NaN without pairs.
 
     Source: M. Oda, Soils Found. 12 (1972) 17; M. Satake, IUTAM Conf. on Deformation and Failure of Granular
     Materials (1982) 63.
@@ -123,10 +126,13 @@ def fabric_tensor(position: np.ndarray, pairs: np.ndarray, sides: Sides = None) 
 
 
 def _ways(number: int, pairs: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the particles as they are come to from one of each cluster, of which there are so many; the one
-    before each on the shortest way, ``number`` for those where a way starts, and particles on its way."""
+    """Return a breadth-first search of all clusters from one start particle in each.
+
+    The three arrays are the particles in the order of the search; the predecessor of each particle
+    (``number`` for a start); and the number of particles on its path from the start.
+    """
     i, j = np.asarray(pairs).reshape(-1, 2).T
-    # A root that is bound to the starts has all clusters searched at once.
+    # An extra root node connected to all starts lets one search cover all clusters.
     rows = np.concatenate([i, np.full(len(starts), number)])
     graph = coo_array((np.ones(len(rows)), (rows, np.concatenate([j, starts]))), shape=2 * (number + 1,))
     order, before = breadth_first_order(graph.tocsr(), number, directed=False)

@@ -1,4 +1,4 @@
-"""What the bodies of rigid clumps do, from the particles of a Result."""
+"""Motion of rigid clumps, computed from the particles of a Result."""
 
 from __future__ import annotations
 
@@ -10,11 +10,15 @@ from scipy.spatial.transform import Rotation as Turn
 
 
 class ClumpBodies(NamedTuple):
-    """Clump bodies are what is known of the bodies of clumps, a row for each.
+    """The bodies of clumps, one row per clump.
 
-    position : centres of mass (m). velocity : of these (m/s). orientation : quaternions w, x, y, z from the
-    principal axes to space. angular_momentum, angular_velocity : in space (kg m^2/s, rad/s). mass : kg.
-    inertia : principal moments (kg m^2). energy : kinetic energies (J).
+    position : centres of mass (m).
+    velocity : velocities of the centres of mass (m/s).
+    orientation : quaternions w, x, y, z from the principal axes to the space frame.
+    angular_momentum, angular_velocity : in the space frame (kg m^2/s, rad/s).
+    mass : kg.
+    inertia : principal moments (kg m^2).
+    energy : kinetic energies (J).
     """
 
     position: np.ndarray
@@ -28,7 +32,7 @@ class ClumpBodies(NamedTuple):
 
 
 def clump_bodies(state: Mapping[str, np.ndarray]) -> ClumpBodies:
-    """Return the bodies of the clumps among the particles of a Result, ``result.state``, by number."""
+    """Return the bodies of the clumps among the particles of a Result, ``result.state``, by clump number."""
     leads = np.flatnonzero((state["clump"] >= 0) & (state["clump_member"] == state["clump_first"]))
     leads = leads[np.argsort(state["clump"][leads])]
     position, velocity, orientation, momentum, inertia = (

@@ -1,4 +1,4 @@
-"""Clusters and chains of particles: connected components of the graph of those that are bound."""
+"""Clusters and chains of particles: connected components of the graph of bonds."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from tisim.analysis.separations import Sides, near, nearest_image
 def head_to_tail(
     position: np.ndarray, moment: np.ndarray, diameter: float, share: float = 0.5, sides: Sides = None
 ) -> np.ndarray:
-    """Return the pairs (i < j) of equal spheres of a diameter (m) at positions (n, 3), m, whose dipoles (n,
-    3) bind them by ``share`` or more of what two of them bind at contact, head to tail; shape (pairs, 2).
+    """Return the pairs (i < j) of equal dipolar spheres that are bound head to tail; shape (pairs, 2).
 
-    U_ij / U_contact = (D/d)^3 (3 (e_i.n)(e_j.n) - e_i.e_j) / 2, e the unit vectors of the moments, so that a
-    pair is bound by where it lies, whatever the size of the moments. Side by side no pair is.
+        U_ij / U_contact = (D/d)^3 (3 (e_i.n)(e_j.n) - e_i.e_j) / 2
 
-    sides : those of a box that is periodic, as ``near`` takes them.
+    A pair is bound if this ratio, of its dipole energy to that of two spheres head to tail in contact, is at
+    least ``share``. e are unit vectors of the moments, so only positions and directions matter, and not the
+    magnitude of the moments. Spheres side by side are never bound.
+
+    position : m, shape (n, 3). moment : shape (n, 3). diameter : m.
+    sides : side lengths of a periodic box, as for ``near``.
     """
     pairs = near(position, diameter * share ** (-1 / 3), sides)
     i, j = pairs.T
@@ -31,22 +34,22 @@ def head_to_tail(
 
 
 def labels(number: int, pairs: np.ndarray) -> np.ndarray:
-    """Return the cluster that each of ``number`` particles is in, as ``pairs`` (n, 2) bind them; shape
+    """Return the index of the cluster of each of ``number`` particles, given bonds ``pairs`` (n, 2); shape
     (number,).
 
-    Numbered from 0; a particle that is bound to none is a cluster of its own.
+    Clusters are numbered from 0; a particle without bonds is a cluster.
     """
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(number, number))
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def mean_size(number: int, pairs: np.ndarray) -> float:
-    """Return the mean number of particles per cluster, singles included: 1 where nothing is bound."""
+    """Return the mean number of particles per cluster, including single particles: 1 without bonds."""
     return float(number / (labels(number, pairs).max() + 1))
 
 
 def fraction_in_clusters(cluster: np.ndarray, least: int) -> float:
-    """Return the fraction of particles that are in clusters of ``least`` or more, given the ``labels`` of
-    their clusters; NaN of none."""
+    """Return the fraction of particles in clusters of at least ``least`` particles, given the ``labels`` of
+    clusters; NaN without particles."""
     sizes = np.bincount(cluster)
     return float(sizes[sizes >= least].sum() / sizes.sum()) if len(cluster) else float("nan")

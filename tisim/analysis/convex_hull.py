@@ -8,16 +8,17 @@ from scipy.spatial import ConvexHull, QhullError
 from tisim.errors import InputError, must
 
 FACETS = 400
-"""A sphere is taken for the hull of so many points on it, a bit outside, so that its volume is right."""
+"""Number of points that represent a sphere; they lie slightly outside, so that their hull has the volume of
+the sphere."""
 
 
 def hull_volume(position: np.ndarray, radius: np.ndarray | float = 0.0) -> float:
-    """Return the volume (m^3) of the convex hull of spheres of a radius (m) at positions (n, 3), m; of their
-    centres where it is 0.
+    """Return the volume (m^3) of the convex hull of spheres of a radius (m) at positions (n, 3), m; for
+    radius 0, of their centres.
 
-    That of the centres is exact. Spheres are replaced by polyhedra of their own volume: of one sphere alone
-    it is right, and of others to a thousandth or so of what the hull of the spheres has beyond that of their
-    centres. InputError is raised for points in a plane.
+    The hull of centres is exact. Spheres are replaced by polyhedra of equal volume. The result is exact for a
+    single sphere. For several, the error is about a thousandth of the difference between the hulls of spheres
+    and of centres. InputError is raised for points in a plane.
     """
     r = np.asarray(position, float)
     size = np.broadcast_to(np.asarray(radius, float), len(r))
@@ -40,7 +41,7 @@ def hull_volume(position: np.ndarray, radius: np.ndarray | float = 0.0) -> float
 def hull_density(position: np.ndarray, mass: np.ndarray, radius: np.ndarray | float = 0.0) -> float:
     """Return the density (kg/m^3) of particles: the sum of masses (kg) over ``hull_volume``.
 
-    L21 has the hull of "bounding particles", and so perhaps of their centres, ``radius`` 0.
+    L21 uses the hull of "bounding particles", which may mean their centres, ``radius`` 0.
 
     Source: L21 section 4.2.2.3.
     """
@@ -48,7 +49,7 @@ def hull_density(position: np.ndarray, mass: np.ndarray, radius: np.ndarray | fl
 
 
 def _directions(number: int) -> np.ndarray:
-    """Return points around the origin, evenly spread, with a hull of the volume of the unit sphere."""
+    """Return evenly spread points around the origin whose hull has the volume of the unit sphere."""
     k = np.arange(number) + 0.5
     z, turn = 1 - 2 * k / number, np.pi * (3 - np.sqrt(5)) * k
     level = np.sqrt(1 - z**2)
@@ -57,7 +58,7 @@ def _directions(number: int) -> np.ndarray:
 
 
 def _corners(points: np.ndarray) -> np.ndarray:
-    """Return which points are corners of their hull; all of them where they have none, in a plane."""
+    """Return the indices of points at corners of their hull; all points if they lie in a plane."""
     try:
         return np.asarray(ConvexHull(points).vertices)
     except QhullError:

@@ -1,4 +1,4 @@
-"""How fast a hopper empties: rates from a time series of what has flowed out, and Beverloo's law."""
+"""Discharge rates of hoppers: from a time series of the discharged mass, and from Beverloo's law."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from scipy.constants import g as STANDARD_GRAVITY
 from tisim.errors import must
 
 STEADY = (0.2, 0.8)
-"""Between these parts of what flows out in all the flow is taken as steady."""
+"""The flow is taken as steady while the discharged mass is between these fractions of its final value."""
 
 
 def discharge_rate(time: np.ndarray, mass: np.ndarray, steady: tuple[float, float] = STEADY) -> float:
-    """Return the rate (kg/s) at which the mass (kg) that has flowed out grows while the flow is steady: the
-    slope of the straight line, by least squares, through the times (s) at which it is between two parts of
-    what flows out in all."""
+    """Return the rate (kg/s) of steady discharge: the slope of a least-squares line through the discharged
+    mass (kg) at times (s) while it is between two fractions of its final value."""
     time, mass = np.asarray(time, float), np.asarray(mass, float)
     part = (mass - mass[0]) / max(mass[-1] - mass[0], np.finfo(float).tiny)
     chosen = (part >= steady[0]) & (part <= steady[1])
@@ -39,8 +38,12 @@ def beverloo_rate(
 
         W = C rho_b sqrt(g) (D_0 - k d)^(5/2)
 
-    outlet : its diameter D_0, m. diameter : d of the grains, m. bulk_density : rho_b of the bed, kg/m^3.
-    discharge : C, 0.55 to 0.65. empty : k, 1 to 2, the part of a diameter along the rim that stays empty.
+    outlet : its diameter D_0, m.
+    diameter : diameter d of the grains, m.
+    bulk_density : rho_b of the bed, kg/m^3.
+    gravity : g, m/s^2.
+    discharge : C, 0.55 to 0.65.
+    empty : k, 1 to 2, width of the empty annulus along the rim in grain diameters.
 
     Source: W. A. Beverloo, H. A. Leniger, J. van de Velde, Chem. Eng. Sci. 15 (1961) 260.
     """

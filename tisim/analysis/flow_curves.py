@@ -1,4 +1,4 @@
-"""Flow curves: laws of shear stress against shear rate, fitted, with how well they are known."""
+"""Flow curves: laws of shear stress against shear rate, fitted with confidence intervals."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tisim.numerics.statistics import CONFIDENCE
 
 
 class Estimate(NamedTuple):
-    """An estimate has a value and half the width of its confidence interval."""
+    """A fitted value and the half-width of its confidence interval."""
 
     value: float
     half: float
 
 
 class BinghamFit(NamedTuple):
-    """A Bingham fluid has a yield stress (Pa) and a plastic viscosity (Pa s)."""
+    """A fitted Bingham fluid: yield stress (Pa) and plastic viscosity (Pa s)."""
 
     yield_stress: Estimate
     plastic_viscosity: Estimate
@@ -33,7 +33,7 @@ class BinghamFit(NamedTuple):
 
 
 class HerschelBulkleyFit(NamedTuple):
-    """A Herschel-Bulkley fluid has a yield stress (Pa), a consistency (Pa s^n) and an exponent n."""
+    """A fitted Herschel-Bulkley fluid: yield stress (Pa), consistency (Pa s^n) and exponent n."""
 
     yield_stress: Estimate
     consistency: Estimate
@@ -52,14 +52,14 @@ def fit_bingham(
     above: float = 0.0,
     confidence: float = CONFIDENCE,
 ) -> BinghamFit:
-    """Return the Bingham fluid that fits shear stresses (Pa) at shear rates (1/s) best, by least squares.
+    """Return the least-squares fit of a Bingham fluid to shear stresses (Pa) at shear rates (1/s).
 
         tau = tau_y + eta_p rate
 
-    error : standard errors of the stresses, Pa, such as those of means over runs; intervals are then those
-    that follow from them. Without it all stresses are taken to be known alike, and how well is told by how
-    far they are off the law, with Student's t. above : rates up to this (1/s) are left out; L21 fits above
-    200 1/s, where a curve is straight.
+    error : standard errors of the stresses, Pa, for example of means over runs; the confidence intervals then
+        follow from them. Without it, all stresses are taken as equally accurate, their error is estimated
+        from the residuals, and the intervals use Student's t.
+    above : rates up to this (1/s) are left out; L21 fits above 200 1/s, where a curve is straight.
 
     Source: E. C. Bingham, Fluidity and Plasticity (1922); L21 section 2.3.
     """
@@ -82,13 +82,12 @@ def fit_herschel_bulkley(
     above: float = 0.0,
     confidence: float = CONFIDENCE,
 ) -> HerschelBulkleyFit:
-    """Return the Herschel-Bulkley fluid that fits shear stresses (Pa) at shear rates (1/s) best, by least
-    squares.
+    """Return the least-squares fit of a Herschel-Bulkley fluid to shear stresses (Pa) at shear rates (1/s).
 
         tau = tau_y + K rate^n
 
-    Arguments are those of ``fit_bingham``. Intervals are to first order in the errors: where the rates span
-    little, or the exponent is hardly known, they are no better than that.
+    Arguments as for ``fit_bingham``. The confidence intervals are first-order in the errors; they are
+    inaccurate if the range of rates is narrow or the exponent is poorly determined.
 
     Source: W. H. Herschel, R. Bulkley, Kolloid-Z. 39 (1926) 291.
     """
@@ -104,10 +103,10 @@ def fit_herschel_bulkley(
         line = np.linalg.lstsq(columns, y, rcond=None)[0]
         return float(((columns @ line - y) ** 2).sum()), np.array([*line, exponent])
 
-    # For each exponent the best of the others is known, so that the search starts near its end.
+    # For a given exponent the other parameters are known, so a scan of exponents gives a good initial guess.
     _, start = min((best(n) for n in np.geomspace(0.1, 4.0, 40)), key=lambda one: one[0])
     (yields, thickness, exponent), covariance = _fitted(law, scaled, y, sigma, start)
-    # K rate^n at the largest rate is what was found.
+    # The fitted coefficient is K rate^n at the largest rate.
     factor = largest**-exponent
     turn = np.array([[1, 0, 0], [0, factor, -thickness * factor * np.log(largest)], [0, 0, 1]])
     values = np.array([yields, thickness * factor, exponent])
@@ -117,7 +116,7 @@ def fit_herschel_bulkley(
 def _taken(
     rate: np.ndarray, stress: np.ndarray, error: np.ndarray | None, above: float, parameters: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Return what is fitted: rates, stresses and errors."""
+    """Return the rates, stresses and errors to be fitted."""
     x, y = np.asarray(rate, float), np.asarray(stress, float)
     must(x.shape == y.shape and x.ndim == 1, "stress", f"of the shape of rate, {x.shape}", y.shape)
     sigma = None if error is None else np.broadcast_to(np.asarray(error, float), x.shape)
@@ -135,7 +134,7 @@ def _fitted(
     sigma: np.ndarray | None,
     start: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the parameters that fit best, and their covariance."""
+    """Return the best-fit parameters and their covariance."""
     scale = float(np.abs(y).max()) or 1.0
     units = np.array([scale, scale, *np.ones(len(start) - 2)])
     errors = None if sigma is None else sigma / scale
@@ -150,7 +149,7 @@ def _fitted(
 def _estimates(
     values: np.ndarray, covariance: np.ndarray, number: int, sigma: np.ndarray | None, confidence: float
 ) -> list[Estimate]:
-    """Return values with half of their intervals."""
+    """Return values with the half-widths of their confidence intervals."""
     part = 0.5 + confidence / 2
     width = norm.ppf(part) if sigma is not None else student.ppf(part, number - len(values))
     halves = width * np.sqrt(np.diag(covariance))

@@ -1,4 +1,4 @@
-"""Energy of gravity, angular momentum and balance of particles that attract each other."""
+"""Gravitational energy, virial ratio and angular momentum of particles."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ import numpy as np
 from scipy.constants import G
 
 BLOCK_PAIRS = 2**20
-"""So many pairs are computed at once."""
+"""Number of pairs that are computed at once."""
 
 
 def gravitational_energy(position: np.ndarray, mass: np.ndarray, softening_length: float = 0.0) -> float:
-    """Return the energy of the gravity of particles on each other (J), over all pairs; below 0.
+    """Return the gravitational energy of particles (J), summed over all pairs; negative.
 
         U = -G sum_(i < j) m_i m_j / (d^2 + eps^2)^(1/2)
 
-    position : m, shape (n, 3). mass : kg, shape (n,). softening_length : eps, m. It is that of the forces of
-    ``self_gravity`` and ``softened_self_gravity`` without images, and takes a time that goes as n^2.
+    position : m, shape (n, 3). mass : kg, shape (n,). softening_length : eps, m.
+
+    It corresponds to the forces of ``self_gravity`` and ``softened_self_gravity`` without images. The cost is
+    proportional to n^2.
     """
     places, mass = np.asarray(position, float), np.asarray(mass, float)
     total, block = 0.0, max(1, BLOCK_PAIRS // max(len(places), 1))
@@ -23,7 +25,7 @@ def gravitational_energy(position: np.ndarray, mass: np.ndarray, softening_lengt
         some = slice(begin, begin + block)
         apart = places[None, begin:] - places[some, None]
         square = np.einsum("ijk,ijk->ij", apart, apart) + softening_length**2
-        # Of a pair within the block only the one in which j comes after i.
+        # Within the block each pair counts once, with j after i.
         after = np.arange(len(places) - begin) > np.arange(len(places[some]))[:, None]
         inverse = np.divide(1.0, np.sqrt(square), out=np.zeros_like(square), where=after)
         total -= G * float(mass[some] @ inverse @ mass[begin:])
@@ -33,12 +35,14 @@ def gravitational_energy(position: np.ndarray, mass: np.ndarray, softening_lengt
 def virial_ratio(
     position: np.ndarray, velocity: np.ndarray, mass: np.ndarray, softening_length: float = 0.0
 ) -> float:
-    """Return 2 K / |U| of particles held together by their gravity alone: 1 in the mean over time where they
-    neither contract nor expand, 0 at rest, and above 2 where they are not bound.
+    """Return 2 K / |U| of particles bound by their gravity alone. Its time average is 1 in equilibrium; it is
+    0 at rest, and above 2 if the particles are unbound.
 
-    K is the kinetic energy relative to the centre of mass, U that of ``gravitational_energy``. position : m,
-    velocity : m/s, each of shape (n, 3). mass : kg, shape (n,). softening_length : m, as the scene has it;
-    with one the mean is 1 only as far as few are nearer to each other.
+    K is the kinetic energy relative to the centre of mass, U the ``gravitational_energy``. With a softening
+    length the equilibrium value is 1 only if few pairs are closer than that.
+
+    position : m, velocity : m/s, each of shape (n, 3). mass : kg, shape (n,). softening_length : m, as in the
+        scene.
     """
     mass = np.asarray(mass, float)
     relative = np.asarray(velocity, float) - np.average(velocity, axis=0, weights=mass)
@@ -57,8 +61,10 @@ def angular_momentum(
 
         L = sum_i (m_i (r_i - r_c) x (v_i - v_c) + 2/5 m_i R_i^2 w_i)
 
-    position : m, velocity : m/s, each of shape (n, 3). mass : kg, shape (n,). radius : R, m, shape (n,), and
-    spin : w, rad/s, shape (n, 3), where what spheres turn with is to count.
+    position : m, velocity : m/s, each of shape (n, 3).
+    mass : kg, shape (n,).
+    radius, spin : R, m, shape (n,), and angular velocity w, rad/s, shape (n, 3); the spin of spheres is
+        included only if both are given.
     """
     mass = np.asarray(mass, float)
     arm = np.asarray(position, float) - np.average(position, axis=0, weights=mass)

@@ -7,9 +7,9 @@ import numpy as np
 from tisim.errors import must
 
 FLANK = (0.2, 0.8)
-"""Between these parts of the height lies the flank, without the foot that runs out and the round top."""
+"""The flank lies between these fractions of the height, without the foot and the rounded top."""
 SECTORS = 12
-"""The heap is looked at from this many sides."""
+"""Number of sectors into which the heap is divided."""
 
 
 def angle_of_repose(
@@ -17,13 +17,14 @@ def angle_of_repose(
 ) -> float:
     """Return the angle (rad) of the flank of a conical heap on a horizontal floor, z upwards.
 
-    The heap is divided in sectors around its axis, and in rings as wide as a mean diameter. The surface in a
-    ring is the mean over sectors of the height of the highest point of a grain; a straight line through the
-    rings where it is from 0.2 to 0.8 of the height of the heap, by least squares, has the slope. Of a cone of
-    some twenty diameters that is right to a degree.
+    The heap is divided into sectors around its axis and into rings with the width of a mean diameter. The
+    surface height in a ring is the mean over sectors of the highest point of any grain. The angle is the
+    slope of a least-squares line through the rings with a surface height of 0.2 to 0.8 times the height of
+    the heap. For a cone about twenty diameters wide the error is about a degree.
 
-    position : m, shape (n, 3). radius : m, shape (n,). centre : x and y of the axis (m), that of the mass
-    unless given. floor : height of the floor (m).
+    position : m, shape (n, 3). radius : m, shape (n,).
+    centre : x and y of the axis (m); by default the centre of mass.
+    floor : height of the floor (m).
     """
     r, radius = np.asarray(position, float), np.asarray(radius, float)
     axis = np.average(r[:, :2], axis=0, weights=radius**3) if centre is None else np.asarray(centre)
@@ -35,7 +36,7 @@ def angle_of_repose(
     np.maximum.at(tops, (ring, sector), r[:, 2] + radius)
     surface = tops.mean(axis=1) - floor
     high = surface.max()
-    # From the top down to where the foot begins, so that strays do not count.
+    # From the top down to the foot, so that scattered grains do not count.
     low = np.flatnonzero(surface < FLANK[0] * high)
     last = int(low[0]) if len(low) else len(surface)
     flank = np.flatnonzero(surface[:last] <= FLANK[1] * high)

@@ -1,4 +1,4 @@
-"""Means of random runs, and how well they are known."""
+"""Means over random runs, with their confidence intervals."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tisim.numerics.statistics import half_width
 
 @dataclass(frozen=True)
 class Mean:
-    """The mean of independent runs, and half the width of its 95 % confidence interval.
+    """The mean of independent runs, and the half-width of its 95 % confidence interval.
 
-    Of results that differ in their seeds alone:
+    For results that differ only in their seeds,
 
         Mean.of([result.measures["captured"] for result in results])
 
-    prints as "0.483 ± 0.082". value, half : in the unit of the quantity; ``half`` is infinite of a single
+    prints as "0.483 ± 0.082". value, half : in the unit of the quantity; ``half`` is infinite for a single
     run.
     """
 
@@ -28,9 +28,10 @@ class Mean:
 
     @classmethod
     def of(cls, runs: ArrayLike) -> Mean:
-        """Return the mean of a quantity over runs, a number for each, with its interval by Student's t.
+        """Return the mean of a quantity over runs, given one number per run, with its interval from Student's
+        t.
 
-        InputError unless there are one or more finite numbers.
+        InputError unless there is at least one number and all are finite.
         """
         try:
             values = np.asarray(runs, float)
@@ -50,10 +51,11 @@ class Mean:
         return Mean(ratio, abs(ratio) * float(np.hypot(self.half / self.value, other.half / other.value)))
 
     def __str__(self) -> str:
-        """Return it with two digits of the interval, and none of the mean that are beyond those."""
+        """Return the mean and the half-width as text, with two digits of the half-width and the same
+        decimals."""
         if not (np.isfinite([self.value, self.half]).all() and self.half > 0):
             return f"{self.value:.4g} ± {self.half:.2g}"
-        # Of the interval as it is rounded, which may have a digit more before the point.
+        # Digits of the rounded half-width, which may have one more digit before the decimal point.
         digits = 1 - int(np.floor(np.log10(float(f"{self.half:.1e}"))))
         if -4 < digits < 6:
             value, half = (f"{round(one, digits):.{max(digits, 0)}f}" for one in (self.value, self.half))

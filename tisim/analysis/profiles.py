@@ -1,4 +1,4 @@
-"""Profiles across a direction: means over the particles in layers, and how much they scatter there."""
+"""Profiles along an axis: means over the particles in layers, and their granular temperature."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 
 
 def layer_means(position: np.ndarray, values: np.ndarray, edges: np.ndarray, axis: int = 2) -> np.ndarray:
-    """Return the mean of what particles have in each layer between ``edges`` (m, rising) along an axis; NaN
-    where none is; shape (edges - 1,), or (edges - 1, k) for values of shape (n, k)."""
+    """Return the mean of particle values in each layer between ``edges`` (m, increasing) along an axis; NaN
+    for empty layers; shape (edges - 1,), or (edges - 1, k) for values of shape (n, k)."""
     values = np.asarray(values, float)
     layer, inside = layers(position, edges, axis)
     columns = values[inside].reshape(int(inside.sum()), -1).T
@@ -20,14 +20,14 @@ def layer_means(position: np.ndarray, values: np.ndarray, edges: np.ndarray, axi
 def granular_temperature(
     position: np.ndarray, velocity: np.ndarray, edges: np.ndarray, axis: int = 2
 ) -> np.ndarray:
-    """Return the granular temperature in each layer between ``edges`` (m, rising) along an axis, m^2/s^2;
-    NaN where fewer than three particles are; shape (edges - 1,).
+    """Return the granular temperature in each layer between ``edges`` (m, increasing) along an axis, m^2/s^2;
+    NaN for fewer than three particles; shape (edges - 1,).
 
         T = sum |v - u(x)|^2 / (3 n - 6),    u(x) = a + b x
 
-    x is the place along the axis, and u the straight line through the velocities of the n particles of the
-    layer, by least squares: a mean flow and its shear are no temperature. Six numbers are taken from the
-    data, so that T is right in the mean for few particles too.
+    x is the coordinate along the axis, and u a least-squares line through the velocities of the n particles
+    of the layer, so that the mean flow and its shear do not contribute. Its six parameters are subtracted
+    from the degrees of freedom, so that T is unbiased for few particles too.
 
     position : m, velocity : m/s, shape (n, 3).
 
@@ -51,8 +51,8 @@ def granular_temperature(
 
 
 def layers(position: np.ndarray, edges: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the layer, between ``edges`` (m, rising) along an axis, of each particle that is in one, and
-    which are."""
+    """Return the layer, between ``edges`` (m, increasing) along an axis, of each particle inside, and a mask
+    of these particles."""
     layer = np.searchsorted(edges, np.asarray(position)[:, axis], side="right") - 1
     inside = (layer >= 0) & (layer < len(edges) - 1)
     return layer[inside], inside

@@ -1,4 +1,4 @@
-"""The radial distribution function: how many neighbours particles have at each distance."""
+"""The radial distribution function: the density of neighbours as a function of distance."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ def radial_distribution(
     high: tuple[float, float, float],
     sides: Sides = None,
 ) -> np.ndarray:
-    """Return the radial distribution function g(r) of particles in a box, a mean for each range of distance
-    between ``edges`` (m, rising); shape (edges - 1,).
+    """Return the radial distribution function g(r) of particles in a box, averaged over each interval of
+    distance between ``edges`` (m, increasing); shape (edges - 1,).
 
         g = n(r) / (rho 4/3 pi (r_2^3 - r_1^3)),    rho = (N - 1) / V
 
-    n is the mean number of others between distances r_1 and r_2, over particles that are at least the last of
-    the edges away from all faces that are not joined: around these the ranges are within the box. So g is 1
-    where particles are at random, near faces and far from them. Others outside the box do not count.
+    n is the mean number of other particles between distances r_1 and r_2. It is averaged over particles
+    farther than the last edge from all non-periodic faces, for which all intervals lie within the box. g is
+    therefore 1 for random particles, near faces and far from them. Particles outside the box are ignored.
 
-    position : m, shape (n, 3). low, high : corners of the box, m; of a sample that has none, those of a box
-    inside of it. sides : those along which the box is periodic, as ``near`` takes them.
+    position : m, shape (n, 3).
+    low, high : corners of the box, m; for a sample without a box, corners of a box inside it.
+    sides : side lengths of a periodic box, as for ``near``.
 
     Source: M. P. Allen, D. J. Tildesley, Computer Simulation of Liquids (2017), section 8.2.
     """
@@ -48,7 +49,7 @@ def radial_distribution(
     must(len(centres) > 0, "particles", "farther than the last edge from all open faces, at least one", 0)
     within = cKDTree(centres).count_neighbors(cKDTree(places), edges)
     if edges[0] == 0:
-        # Each is at a distance of 0 from itself.
+        # Exclude each particle's distance of 0 to itself.
         within[0] = len(centres)
     density = (count - 1) / np.prod(lengths)
     shells = 4 / 3 * np.pi * np.diff(edges**3)

@@ -1,4 +1,4 @@
-"""The slope of a bed that leans to one side, as after an avalanche in a box."""
+"""The slope of a bed that is inclined to one side, as after an avalanche in a box."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from tisim.analysis.heap import FLANK
 from tisim.errors import must
 
 FEWEST_COLUMNS = 3
-"""A straight piece of a slope has as many columns, at least."""
+"""Smallest number of columns in a straight piece of a slope."""
 
 
 class SlopeAngles(NamedTuple):
-    """Slope angles are those (rad) of the straight pieces of a slope, from its top to its foot, and the
-    places (m) along it at which pieces meet."""
+    """Angles (rad) of the straight pieces of a slope, from top to foot, and the positions (m) of the breaks
+    between them."""
 
     angles: np.ndarray
     breaks: np.ndarray
@@ -24,8 +24,9 @@ class SlopeAngles(NamedTuple):
 def surface_profile(
     position: np.ndarray, radius: np.ndarray, along: int = 1, across: int = 0, up: int = 2
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (m) along an axis, a mean diameter apart, and the height (m) of the surface of a bed
-    there: the mean across it of that of the highest point of a grain. Columns without grains are left out."""
+    """Return positions (m) along an axis, a mean diameter apart, and the surface height (m) of a bed there:
+    the mean over the transverse axis of the highest point of any grain. Columns without grains are left
+    out."""
     r, radius = np.asarray(position, float), np.asarray(radius, float)
     width = 2 * float(radius.mean())
     column, row = (((r[:, axis] - r[:, axis].min()) / width).astype(int) for axis in (along, across))
@@ -45,12 +46,14 @@ def slope_angles(
     floor: float = 0.0,
     part: tuple[float, float] = FLANK,
 ) -> SlopeAngles:
-    """Return the angles of repose of a slope, by a line of one straight piece or of two that meet where it
-    fits best, by least squares.
+    """Return the angles of repose of a slope from a least-squares fit of one straight line, or of two lines
+    with the best break between them.
 
-    place, height : of its surface, as ``surface_profile`` returns them, m. pieces : 1 or 2. floor : height of
-    the floor (m). part : between these parts of the height above it the slope is taken, without its top and
-    its foot.
+    place, height : surface of the slope, as returned by ``surface_profile``, m.
+    pieces : 1 or 2.
+    floor : height of the floor (m).
+    part : fractions of the height above the floor between which the slope is fitted, without its top and
+        foot.
 
     L21 finds two angles in a slope of small magnetised grains, a steeper one at the top.
 
@@ -71,14 +74,14 @@ def slope_angles(
         fits = [(*_bent(x, h, at), at) for at in between]
         _, slopes, at = min(fits, key=lambda fit: fit[0])
         breaks = np.array([at])
-    # From the top, whichever side that is on.
+    # Order from the top, on whichever side it is.
     falls = np.polyfit(x, h, 1)[0] < 0
     ordered = slopes if falls else -slopes[::-1]
     return SlopeAngles(np.arctan(-ordered), breaks)
 
 
 def _bent(x: np.ndarray, h: np.ndarray, at: float) -> tuple[float, np.ndarray]:
-    """Return the sum of squares off a line that is bent at a place, and its two slopes."""
+    """Return the sum of squared residuals of a line with a break at a position, and its two slopes."""
     columns = np.column_stack([np.ones_like(x), x - at, np.maximum(x - at, 0.0)])
     line = np.linalg.lstsq(columns, h, rcond=None)[0]
     off = columns @ line - h

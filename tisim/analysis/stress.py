@@ -1,4 +1,4 @@
-"""Stress: that of particles, by their motion and the virial of their forces, and that on walls."""
+"""Stress of particles, from their motion and the virial of their forces, and stress on walls."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from tisim.errors import must
 
 
 def stress_tensor(result: Result, volume: float | None = None) -> np.ndarray:
-    """Return the mean stress (Pa) of the particles of a result, tension positive, a force along b on a face
-    across a at [a, b]; shape (3, 3).
+    """Return the mean stress (Pa) of the particles of a result, tension positive; the component [a, b] is the
+    force along b on a face normal to a; shape (3, 3).
 
-        sigma = -(sum m c (x) c + W) / V,    c = v - u - mean of that
+        sigma = -(sum m c (x) c + W) / V,    c = v - u - mean(v - u)
 
-    W is the virial of pair forces, which the effect ``virial`` of the scene has summed; u is the flow of a
-    sheared box. In a flow along x that grows along y sigma_xy is positive, and the pressure is minus a third
-    of the trace.
+    W is the virial of pair forces, summed by the effect ``virial`` of the scene; u is the flow of a sheared
+    box. In a flow along x with a velocity that increases along y, sigma_xy is positive. The pressure is minus
+    a third of the trace.
 
-    volume : V, m^3, that of the box unless given, where it is periodic along all axes. InputError is raised
-    without the effect, or where there is no such volume. Forces at walls and of fields are no part of it; in
-    between walls it is the stress in the grains alone.
+    volume : V, m^3; by default the volume of a box that is periodic along all axes. InputError is raised
+        without the effect, or without a volume if the box is not periodic. Forces from walls and fields are
+        not included; between walls the result is the stress in the grains only.
 
     Source: J. H. Irving, J. G. Kirkwood, J. Chem. Phys. 18 (1950) 817.
     """
@@ -37,8 +37,8 @@ def stress_tensor(result: Result, volume: float | None = None) -> np.ndarray:
 
 
 def streaming_part(result: Result) -> np.ndarray:
-    """Return what the motion of particles adds to the virial of their forces, sum m c (x) c with the velocity
-    c beside the mean flow, J; shape (3, 3)."""
+    """Return the kinetic contribution to the stress, sum m c (x) c with the velocity c relative to the mean
+    flow, J; shape (3, 3)."""
     state = result.state
     mass, velocity = state["mass"].astype(float), state["velocity"].astype(float)
     beside = velocity - result.scene.domain.streaming_velocity(state["position"].astype(float))
@@ -47,13 +47,15 @@ def streaming_part(result: Result) -> np.ndarray:
 
 
 def stress_profile(result: Result, edges: np.ndarray, area: float, axis: int = 2) -> np.ndarray:
-    """Return the stress (Pa) in each layer between ``edges`` (m, rising) along an axis, as ``stress_tensor``
-    has it of all; of velocities beside the mean of each layer; shape (edges - 1, 3, 3).
+    """Return the stress (Pa), as ``stress_tensor``, in each layer between ``edges`` (m, increasing) along an
+    axis, with velocities relative to the mean of each layer; shape (edges - 1, 3, 3).
 
-    area : that of the box or container across the axis, m^2. Each particle has the half of each of its pairs,
-    in the layer where its centre is: layers should be wider than a diameter, and in layers at a wall a part
-    of the force goes through the wall, which is no pair. Away from walls and field forces a steady flow has
-    the same stress on all layers as on the walls.
+    area : cross-section of the box or container normal to the axis, m^2.
+
+    Half of the virial of a pair is attributed to each of its particles, in the layer of its centre. Layers
+    should therefore be wider than a diameter. In layers at a wall, part of the force is transmitted by the
+    wall contact, which is not a pair. Away from walls and field forces, the stress of a steady flow is equal
+    in all layers and on the walls.
     """
     state = result.state
     must("virial" in state, "scene", "with the effect virial for a stress", sorted(state))
@@ -71,12 +73,13 @@ def stress_profile(result: Result, edges: np.ndarray, area: float, axis: int = 2
 
 
 def stress_on_wall(measures: Mapping[str, float | np.ndarray], name: str, area: float) -> np.ndarray:
-    """Return the force of particles on a wall or a driven group over an area (m^2), Pa: the last axis is x,
-    y, z; over time, of ``MeasureSeries``, shape (times, 3).
+    """Return the force of particles on a wall or a driven group per area (m^2), Pa; the last axis is x, y, z.
+    For a time series, as in ``MeasureSeries``, the shape is (times, 3).
 
-    measures : those of a result, or of a time series. name : of the body, as in ``lid_force_z``.
+    measures : measures of a result, or of a time series.
+    name : name of the body, as in ``lid_force_z``.
     """
-    must(f"{name}_force_x" in measures, "name", "that of a body with measures of its force", name)
+    must(f"{name}_force_x" in measures, "name", "a body with measures of its force", name)
     must(area > 0, "area", "above 0 m^2", area)
     force = [np.asarray(measures[f"{name}_force_{axis}"], float) for axis in "xyz"]
     return np.stack(force, axis=-1) / area

@@ -1,4 +1,4 @@
-"""Voronoi cells: the space that is closer to the centre of a particle than to any other."""
+"""Voronoi cells: the region closer to the centre of a particle than to any other."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tisim.analysis.separations import Sides, vectors_of, with_images
 from tisim.errors import InputError, must
 
 SHELL = 4.0
-"""Images are taken from this many mean distances of particles beyond the faces of a periodic box, and from
-farther away where cells reach there."""
+"""Images within this number of mean particle distances outside a periodic box are included first; farther
+ones are added if the cells extend there."""
 
 
 class ShellVolumes(NamedTuple):
-    """Shell volumes are the mean Voronoi volume (m^3) of the particles in each shell, NaN where none counts,
-    and the number of those and of those that are left out."""
+    """The mean Voronoi volume (m^3) of the counted particles in each shell, NaN if there are none, the number
+    of counted particles, and the number left out."""
 
     volume: np.ndarray
     number: np.ndarray
@@ -26,12 +26,13 @@ class ShellVolumes(NamedTuple):
 
 
 def voronoi_volumes(position: np.ndarray, sides: Sides = None) -> np.ndarray:
-    """Return the volume (m^3) of the Voronoi cell of each position (n, 3), m; NaN of one that goes on without
-    end, as at the surface of a sample in open space; shape (n,).
+    """Return the volume (m^3) of the Voronoi cell of each position (n, 3), m; NaN for unbounded cells, as at
+    the surface of a sample in open space; shape (n,).
 
-    sides : those of a box that is periodic, as ``near`` takes them; then the cells fill it, however long or
-    crowded it is. Sizes of particles do not count: a face is half-way between two centres. InputError is
-    raised for particles in a plane, and where cells do not fill the box, such as of a lattice to all bits.
+    sides : side lengths of a periodic box, as for ``near``; the cells then fill the box, for any aspect ratio
+        and distribution. The radii of particles have no effect: a face is half-way between two centres.
+        InputError is raised for particles in a plane, and if the cells do not fill the box, which can happen
+        for an exact lattice.
 
     Source: G. Voronoi, J. Reine Angew. Math. 134 (1908) 198.
     """
@@ -39,11 +40,11 @@ def voronoi_volumes(position: np.ndarray, sides: Sides = None) -> np.ndarray:
 
 
 def voronoi_by_shell(position: np.ndarray, ellipsoid: Ellipsoid, shells: int) -> ShellVolumes:
-    """Return the mean Voronoi volume in concentric shells of equal volume, of one shape, from the centre of
-    an ellipsoid to its surface.
+    """Return the mean Voronoi volume in concentric ellipsoidal shells of equal volume, from the centre of an
+    ellipsoid to its surface.
 
-    A particle is in the shell of its centre. Cells at the surface are open, or reach far into empty space:
-    those that are not within the ellipsoid as a whole are left out, and counted.
+    A particle belongs to the shell that contains its centre. Cells at the surface are unbounded, or extend
+    far into empty space: cells that are not completely inside the ellipsoid are left out, and counted.
 
     Source: L21 section 4.2.2.3, which does not say how it takes cells at the surface.
     """
@@ -76,11 +77,11 @@ def _cells(r: np.ndarray, sides: Sides) -> tuple[np.ndarray, Voronoi]:
 
 
 def _diagram(r: np.ndarray, vectors: np.ndarray) -> Voronoi:
-    """Return the diagram of particles and as many of their images as have a part in their cells."""
+    """Return the diagram of particles and all images that affect their cells."""
     periodic = np.diag(vectors)[np.diag(vectors) > 0]
     if not len(periodic):
         return Voronoi(r)
-    # Along an axis without images cells at the surface are open, however many images there are.
+    # With a non-periodic axis, cells at the surface are unbounded for any number of images.
     if len(periodic) < 3:
         return Voronoi(_with_layers(r, float(periodic.max()), vectors))
     reach = SHELL * float(np.cbrt(np.prod(periodic) / len(r)))
@@ -90,27 +91,27 @@ def _diagram(r: np.ndarray, vectors: np.ndarray) -> Voronoi:
             if reach >= _farthest(vectors).max() or _is_whole(diagram, r, vectors):
                 return diagram
         except QhullError:
-            # All in a plane, of which there may be images farther away.
+            # The points lie in a plane; images farther away may lie outside of it.
             if reach >= periodic.max():
                 raise
         reach *= 2
 
 
 def _farthest(vectors: np.ndarray) -> np.ndarray:
-    """Return how far (m) beyond the faces along each axis there may be images with a part in the cells of
-    particles: a side, as no cell reaches farther than half of one; along an axis whose vector leans that is
-    not so, and has no limit here."""
+    """Return the distance (m) beyond the faces along each axis within which images can affect the cells of
+    particles. It is one side, because no cell extends farther than half a side. For a tilted axis this does
+    not hold, and the distance is infinite."""
     return np.where(np.count_nonzero(vectors, axis=1) > 1, np.inf, np.diag(vectors))
 
 
 def _with_layers(position: np.ndarray, reach: float, vectors: np.ndarray) -> np.ndarray:
-    """Return positions (m) inside the periodic box, then those of all images at most ``reach`` (m) outside,
-    and not farther than any have a part in cells: of as many layers along each axis as it takes."""
+    """Return positions (m) inside the periodic box, followed by all images at most ``reach`` (m) outside that
+    can affect the cells, from the necessary number of image layers along each axis."""
     sides = np.diag(vectors)
     places = with_images(position, 0.0, vectors)[0][: len(position)]
     beyond = np.minimum(reach, _farthest(vectors))
     layers = np.ceil(np.divide(beyond, sides, out=np.zeros(3), where=sides > 0))
-    # A box that leans carries its layers along another axis.
+    # The layers of a tilted box extend along another axis.
     lean = np.abs(vectors - np.diag(sides)).T @ layers
     layers += np.ceil(np.divide(lean, sides, out=np.zeros(3), where=sides > 0))
     turns = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in layers), indexing="ij"), -1).reshape(-1, 3)
@@ -121,8 +122,8 @@ def _with_layers(position: np.ndarray, reach: float, vectors: np.ndarray) -> np.
 
 
 def _is_whole(diagram: Voronoi, r: np.ndarray, vectors: np.ndarray) -> bool:
-    """Return whether no image that was left out has a part in the cells of the first particles: none is
-    nearer to a corner of theirs than they are."""
+    """Return whether no omitted image affects the cells of the first particles, which means that no image is
+    nearer to a corner of a cell than its particle."""
     corners, ridge = _flat(diagram)
     ends = diagram.ridge_points[ridge].min(axis=1)
     corners, ends = corners[ends < len(r)], ends[ends < len(r)]
@@ -130,7 +131,7 @@ def _is_whole(diagram: Voronoi, r: np.ndarray, vectors: np.ndarray) -> bool:
         return False
     places = diagram.vertices[corners]
     apart = np.linalg.norm(places - diagram.points[ends], axis=1)
-    # Nothing is farther than this from an image of any particle.
+    # The distance from any point to the nearest image of any particle is at most this.
     farthest = float(np.linalg.norm(np.abs(vectors).sum(axis=0)))
     if apart.max() > farthest:
         return False
@@ -140,7 +141,8 @@ def _is_whole(diagram: Voronoi, r: np.ndarray, vectors: np.ndarray) -> bool:
 
 
 def _volumes(diagram: Voronoi) -> np.ndarray:
-    """Return the volumes of all cells: of pyramids, each with a facet half-way to another particle."""
+    """Return the volumes of all cells as sums of pyramids over the facets, which lie half-way to
+    neighbours."""
     corners, ridge = _flat(diagram)
     begins = np.flatnonzero(np.diff(ridge, prepend=-1))
     following = np.arange(1, len(corners) + 1)
@@ -156,6 +158,6 @@ def _volumes(diagram: Voronoi) -> np.ndarray:
 
 
 def _flat(diagram: Voronoi) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of all facets, in their order around each, and the facet that each is of."""
+    """Return the corners of all facets, in order around each facet, and the facet index of each corner."""
     sizes = [len(corners) for corners in diagram.ridge_vertices]
     return np.concatenate(diagram.ridge_vertices), np.repeat(np.arange(len(sizes)), sizes)

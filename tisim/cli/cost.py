@@ -1,4 +1,4 @@
-"""The command ``tisim cost`` measures what accuracy costs in time."""
+"""The command ``tisim cost`` measures how the accuracy of a scene depends on the run time."""
 
 from __future__ import annotations
 
@@ -38,10 +38,12 @@ if TYPE_CHECKING:
 
 CostSize = Annotated[
     str | None,
-    typer.Option("--size", help="Size of the case; by default the one that 'tisim cases' has for this."),
+    typer.Option(
+        "--size", help="Size of the case; by default the size that 'tisim cases' marks for this command."
+    ),
 ]
 QUICK_LIMIT = 20.0
-"""With --quick a setting that runs longer is stopped, s: what takes so long is no match for the others."""
+"""With --quick, a setting that runs longer than this is stopped, s."""
 
 
 def cost(
@@ -51,7 +53,9 @@ def cost(
     ] = None,
     quantity: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="What --error is of; first of the table by default."),
+        typer.Option(
+            metavar="NAME", help="Quantity that --error refers to; by default the first in the table."
+        ),
     ] = None,
     size: CostSize = None,
     seed: Seed = None,
@@ -61,14 +65,17 @@ def cost(
     coarser: Annotated[
         int | None,
         typer.Option(
-            min=-16, max=16, help="Decades of error to go above what the scene asks for; 3 by default."
+            min=-16, max=16, help="Decades of error to scan above the scene's own setting; 3 by default."
         ),
     ] = None,
     finer: Annotated[
-        int | None, typer.Option(min=-16, max=16, help="Decades of error to go below it; 0 by default.")
+        int | None,
+        typer.Option(
+            min=-16, max=16, help="Decades of error to scan below the scene's own setting; 0 by default."
+        ),
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option(max=1000, help="How often to time each setting; 3 by default.")
+        int | None, typer.Option(max=1000, help="Number of times each setting is timed; 3 by default.")
     ] = None,
     starts: Annotated[
         str | None, typer.Option(metavar="N,N,...", help="Numbers of random starts to try: 8,32,128.")
@@ -77,12 +84,12 @@ def cost(
         bool,
         typer.Option(
             "--quick",
-            help="A quick estimate: stop a decade above what the scene asks for, time once, and give up "
-            "where the reference does not tell settings apart.",
+            help="A quick estimate: scan down to one decade above the scene's own error, time each setting "
+            "once, and give up if the reference cannot tell settings apart.",
         ),
     ] = False,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Go on with --quick whatever the reference is good for.")
+        bool, typer.Option("--anyway", help="With --quick, continue even if the reference is too inaccurate.")
     ] = False,
     limit: Annotated[
         float | None,
@@ -92,10 +99,14 @@ def cost(
         ),
     ] = None,
     budget: Annotated[
-        float, typer.Option(metavar="MINUTES", help="Leave out what would run longer; compiling is free.")
+        float,
+        typer.Option(
+            metavar="MINUTES",
+            help="Skip settings that would exceed this running time; compiling is not counted.",
+        ),
     ] = math.inf,
     single: Annotated[bool, typer.Option("--f32/--no-f32", help="Also run in single precision.")] = True,
-    fast: Annotated[bool, typer.Option("--fast/--no-fast", help="Also run in fast arithmetic.")] = True,
+    fast: Annotated[bool, typer.Option("--fast/--no-fast", help="Also run with fast arithmetic.")] = True,
     device: Device = "cpu",
     threads: Threads = 0,
     fresh: Fresh = None,
@@ -104,7 +115,8 @@ def cost(
 ) -> None:
     """Measure error against time for every setting of a scene; write cost.csv, cost.h5 and cost.png.
 
-    The same command, given again, goes on where it was stopped, and answers --error from what is measured.
+    The same command, given again, resumes where it was stopped, and answers --error from the stored
+    measurements.
     """
     from tisim.accuracy import Study, storage, table
 
@@ -142,7 +154,9 @@ def cost(
             out().print(table.table(study))
             out().print("\n".join([*table.notes(study), *map(str, paths)]))
     if not finished:
-        err().print(f"stopped; {out_folder / storage.HDF5} has what is done. {resume_hint(fresh, overwrite)}")
+        err().print(
+            f"stopped; {out_folder / storage.HDF5} has all measurements. {resume_hint(fresh, overwrite)}"
+        )
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)
@@ -168,7 +182,7 @@ def answer(
     pairs = list(zip(tokens[::2], tokens[1::2], strict=True))
     absent, settings = ([value for key, value in pairs if key == name] for name in ("--without", "--set"))
     measured_scene = scene.without(*absent).replace(scene_arguments.assignments(settings))
-    # Stepper, effects and materials as they have become, whoever has changed them; all else as it was given.
+    # Stepper, effects and materials as measured, including changes from --set; all else as given.
     _, base = scene_arguments.load_scene(target, size, seed)
     arguments = [target, *_run_options(size, seed, changes, device, threads, plugins)]
     arguments += options(base, measured_scene, row.precision, row.arithmetic)
@@ -179,7 +193,7 @@ def _run_options(
     size: str | None, seed: int | None, changes: Sequence[str] | None,
     device: str, threads: int, plugins: Sequence[str] | None,
 ) -> Iterator[str]:  # fmt: skip
-    """Yield the options of this command that ``tisim run`` needs too, but those of stepper, effects and
+    """Yield the options of this command that ``tisim run`` also needs, except those of stepper, effects and
     materials."""
     for name, value, default in (
         ("--size", size, None), ("--seed", seed, None),
@@ -195,7 +209,7 @@ def _run_options(
 
 
 def _size(target: str) -> str | None:
-    """Return the size that costs of a case are measured of unless one is given; none for a scene file."""
+    """Return the size of a case at which costs are measured by default; None for a scene file."""
     return None if target.endswith(".toml") else targets.case(target, targets.SCENE_FILE).cost_size
 
 
@@ -217,7 +231,7 @@ def _whole_numbers(text: str) -> tuple[int, ...]:
 
 
 def _measure(study: Study, out_folder: Path) -> bool:
-    """Run a study, show its progress and store its rows as they come; return False after Ctrl-C."""
+    """Run a study, show its progress and store each row when it is complete; return False after Ctrl-C."""
     from tisim.accuracy import storage
     from tisim.cli.cost_progress import CostProgress
 

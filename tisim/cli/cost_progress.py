@@ -1,4 +1,4 @@
-"""The progress of a study of costs is shown on standard error: its reference, then each setting."""
+"""Progress of a cost study on standard error: first its reference, then each setting."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ if TYPE_CHECKING:
     from tisim.accuracy import Row, Study
 
 LEAST_FRACTION = 0.02
-"""So much of a study must be done before the time that is left is shown."""
+"""The remaining time is shown only after this fraction of the study is done."""
 
 
 class CostProgress:
-    """Progress is a bar on a terminal; elsewhere, where a bar would be seen at its end only, a line for each
-    setting."""
+    """Progress of a study: a bar on a terminal, otherwise one line for each finished setting."""
 
     def __init__(self, study: Study) -> None:
         self.study, self.console = study, err()
@@ -26,7 +25,7 @@ class CostProgress:
         self.bar.disable = not self.console.is_terminal
         self.task = self.bar.add_task("", total=1.0)
         self.began, self.fraction, self.what = time.monotonic(), 0.0, ""
-        # What an earlier study has left is not shown again, but for what its reference is good for.
+        # Rows of an earlier study are not shown again, but the quality of its reference is.
         self.rows, self.truths = len(study.rows), 0
 
     def __enter__(self) -> CostProgress:
@@ -40,7 +39,7 @@ class CostProgress:
         self.bar.__exit__(kind, error, trace)
 
     def running(self, fraction: float, what: str) -> None:
-        """Show that so much of the study is done, and what is being run."""
+        """Show the fraction of the study that is done and the name of the current run."""
         self.fraction = fraction
         self.bar.update(self.task, completed=fraction, description=what[:48])
         if self.bar.disable and what != self.what and not self.study.truths:
@@ -48,7 +47,7 @@ class CostProgress:
         self.what = what
 
     def finished(self) -> None:
-        """Show what has become known: the truth, or rows."""
+        """Show the new results: true values or rows."""
         self._print_truths()
         if self.bar.disable:
             for row in self.study.rows[self.rows :]:
@@ -62,7 +61,7 @@ class CostProgress:
             self.truths = len(self.study.truths)
 
     def _left(self) -> str:
-        """Return about how long the rest takes, or nothing while too little is known of it."""
+        """Return the estimated remaining time as text, or an empty string before there is an estimate."""
         if self.fraction < LEAST_FRACTION:
             return ""
         seconds = (time.monotonic() - self.began) * (1.0 - self.fraction) / self.fraction
@@ -73,6 +72,6 @@ class CostProgress:
 
 
 def _line(row: Row, left: str) -> str:
-    """Return what a setting costs and how accurate it is, in a line."""
+    """Return one line with the error and the time of a setting."""
     measured = f"error {', '.join(table.error_texts(row))}; {row.median:.3g} s"
     return f"{row.method}, {row.setting}: {row.failed or measured}{left}"

@@ -27,9 +27,12 @@ from tisim.console import err, out, plain_table
 from tisim.errors import RunError
 
 VERDICTS = {True: Text("pass", "green"), False: Text("FAIL", "bold red"), None: Text("")}
-"""What is printed of a check that holds, of one that does not, and of a number that is only shown."""
+"""The text printed for a check that passes, one that fails, and a value that is shown without a check."""
 Everything = Annotated[
-    bool, typer.Option("--all", help="Also memory, phases of a step, sources, and what is not compiled.")
+    bool,
+    typer.Option(
+        "--all", help="Also show memory, the phases of a step, sources and the parts that are not compiled."
+    ),
 ]
 
 
@@ -41,7 +44,7 @@ def cases() -> None:
         out().print(Text.assemble((case.name, "bold"), f"  {case.title}\n    {case.source}"))
         table = plain_table()
         for name, size in case.sizes.items():
-            usual = "; that of tisim cost" if name == case.cost_size else ""
+            usual = "; default of tisim cost" if name == case.cost_size else ""
             table.add_row(f"    --size {name}", f"{size.summary}{usual}")
         if case.problem is not None:
             for variant in case.variants:
@@ -79,7 +82,7 @@ def check(
     outcomes: list[bool | None] = []
     with err().status("checking") as status:
         for item in checks:
-            # What is only shown is judged by nobody.
+            # A value that is only shown has no verdict.
             ok = None if item.ok is None else bool(item.ok)
             outcomes.append(ok)
             table.add_row(item.name, *item.cells, VERDICTS[ok])
@@ -91,7 +94,7 @@ def check(
 
 
 def doctor() -> None:
-    """Say what this machine is to tisim, and what the other backend would give."""
+    """Report this machine's backend, processor, memory and versions, and time the other backend."""
     from tisim.describe.diagnostics import findings
 
     table = plain_table()

@@ -1,4 +1,4 @@
-"""The command ``tisim effects`` lists and explains what a scene can be made of."""
+"""The command ``tisim effects`` lists and explains the parts of which a scene is made."""
 
 from __future__ import annotations
 
@@ -21,13 +21,12 @@ Name = Annotated[
     str | None,
     typer.Argument(
         metavar="NAME",
-        help="One of them, in full: impact. Or a category, with a line for each of its members: operators, "
-        "pair. "
-        "All, without.",
+        help="Full name of one part, such as impact; or a category, to list its members: operators, pair. "
+        "Without a name, list all.",
     ),
 ]
 LEAST_WIDTH = 20
-"""So much of what a part is stands in its line on any terminal, characters."""
+"""The description of a part gets at least this many characters of its line on any terminal."""
 
 
 def effects(name: Name = None, plugins: Plugins = None) -> None:
@@ -39,7 +38,8 @@ def effects(name: Name = None, plugins: Plugins = None) -> None:
         _print_list(reference.entries())
         print(f"'tisim effects NAME' explains one, or lists a category: {', '.join(groups)}.")
         return
-    # A category may have the name of its first law, such as impact: that is explained, and others are listed.
+    # If a category has the name of its first law, such as impact, the law is explained and the category is
+    # listed.
     if name not in groups or name in reference.names():
         out().print(_describe(reference.find(name)))
     if name in groups:
@@ -47,7 +47,8 @@ def effects(name: Name = None, plugins: Plugins = None) -> None:
 
 
 def _print_list(entries: Sequence[Entry]) -> None:
-    """Print a line for each entry, family by family: whole into a file, as much as fits on a terminal."""
+    """Print one line for each entry, family by family, cut to the width of a terminal but complete in a
+    file."""
     from tisim.describe.reference import FAMILIES
 
     width = out().width if out().is_terminal else None
@@ -63,13 +64,13 @@ def _print_list(entries: Sequence[Entry]) -> None:
 
 
 def _fitting(text: str, width: int) -> str:
-    """Return as many words of a text as fit, with no number cut."""
+    """Return the words of a text that fit into a width; words and numbers are not cut."""
     return shorten(text, max(width, LEAST_WIDTH), placeholder=" ...")
 
 
 def _fitted(body: str, width: int) -> str:
-    """Return the paragraphs of a docstring in lines of at most so many characters, equations as they stand
-    where they fit."""
+    """Return the paragraphs of a docstring in lines of at most ``width`` characters; equations that fit keep
+    their lines."""
     paragraphs = []
     for paragraph in body.split("\n\n"):
         if paragraph.startswith("    "):
@@ -80,7 +81,8 @@ def _fitted(body: str, width: int) -> str:
 
 
 def _fitted_equation(line: str, width: int) -> str:
-    """Return a line of equations; one that is too long is broken between them, or else between words."""
+    """Return a line of equations; a line that is too long is broken between equations, or else between
+    words."""
     if len(line) <= width:
         return line
     lines = ["  "]
@@ -96,14 +98,14 @@ def _names(entry: Entry) -> tuple[str, str]:
 
 
 def _describe(entry: Entry) -> RenderableType:
-    """Return all that the reference has of one entry."""
+    """Return the complete reference entry."""
     heading = Text.assemble((entry.name, "bold"), f"  {entry.kind.__module__}.{entry.kind.__name__}")
     lines: list[RenderableType] = [heading, "", f"{entry.summary}.", ""]
     lines += [_fitted(entry.body, out().width), ""] if entry.body else []
     references = [f"Source: {entry.source}", *(f"    {work}" for work in entry.publications()), ""]
     lines += references if entry.source else []
     if entry.settings:
-        table = plain_table("parameter", "unit", "default", "must be", "what it is")
+        table = plain_table("parameter", "unit", "default", "must be", "description")
         for setting in entry.settings:
             table.add_row(
                 setting.name, setting.unit, setting.default or "(required)", setting.rule, setting.text

@@ -1,4 +1,4 @@
-"""The commands ``tisim plot``, ``movie``, ``export`` and ``figures`` show what runs have left."""
+"""The commands ``tisim plot``, ``movie``, ``export`` and ``figures`` show the results of runs."""
 
 from __future__ import annotations
 
@@ -43,12 +43,13 @@ File = Annotated[
     ),
 ]
 OTHER_FOLDERS = {"search.h5": "a search", "cost.h5": "a study of costs"}
-"""Files of folders that have pictures of their own and no frames, and whose folders they are."""
-World = Annotated[int, typer.Option(help="Which world of a batch, from 0.")]
+"""Files that mark folders without frames, each with the kind of the folder; such folders hold their own
+pictures."""
+World = Annotated[int, typer.Option(help="Index of the world in a batch, from 0.")]
 IntoFolder = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="DIR", callback=nameable, help="Folder to write to; that of the file by default."
+        "--out", metavar="DIR", callback=nameable, help="Folder to write to; by default the folder of FILE."
     ),
 ]
 
@@ -60,8 +61,8 @@ def plot(
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
-    """Draw the cloud, energy, centre of gravity and number of particles in time, forces on walls and driven
-    groups, and what its case shows."""
+    """Draw the cloud, the time series of energy, centre of gravity and number of particles, the forces on
+    walls and driven groups, and the pictures of its case."""
     from tisim.io.reader import frames
 
     file = _trajectory_file(file)
@@ -102,7 +103,7 @@ def figures(
 ) -> None:  # fmt: skip
     """Make the figures of a case that take many runs, and the numbers in them.
 
-    Stopped, it keeps nothing, and begins anew.
+    An interrupted command keeps no results; it starts from the beginning when run again.
     """
     from tisim.files.atomic import replace_file
 
@@ -111,7 +112,7 @@ def figures(
     chosen_case.size(size_name)
     if chosen_case.figures is None:
         raise InputError(f"case must be one with figures; received {case!r}")
-    # Whether anything can be drawn is known before the runs, not after.
+    # Check that drawing works before the runs.
     with pictures.drawing(f"figures of {chosen_case.name}"):
         from tisim.plotting import style
 
@@ -127,7 +128,7 @@ def figures(
         with _progress("running") as progress:
             results = chosen_case.figures(size_name, progress)
         ownership.claim(out_folder, results, overwrite)
-        # Numbers first: a figure that cannot be drawn takes none with it.
+        # Write numbers first, so that a figure that cannot be drawn does not lose them.
         for name, content in sorted(results.items(), key=lambda item: not isinstance(item[1], str)):
             if isinstance(content, str):
                 replace_file(out_folder / name, content.encode())
@@ -142,7 +143,7 @@ def movie(
         Path | None,
         typer.Option("--to", metavar="NAME.gif", callback=nameable, help="A .gif, or an .mp4 with ffmpeg."),
     ] = None,
-    rate: Annotated[int, typer.Option(help="Frames a second.")] = 20,
+    rate: Annotated[int, typer.Option(help="Frames per second.")] = 20,
     world: World = 0,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
@@ -202,7 +203,7 @@ def _print_missing(missing: str) -> None:
 
 
 def _trajectory_file(path: Path) -> Path:
-    """Return the trajectory in a folder, or its result where it has none; InputError where it has neither."""
+    """Return the trajectory in a folder, or else its result; InputError if the folder has neither."""
     if not regular_file.is_folder(path):
         return path
     for file in (path / "trajectory.h5", path / "result.h5"):
@@ -214,7 +215,7 @@ def _trajectory_file(path: Path) -> Path:
         if regular_file.exists(path / name):
             pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
             raise InputError(
-                f"folder must be that of a run; received that of {what}, whose pictures are: {pictures}"
+                f"folder must be of a run; received the folder of {what}, with the pictures: {pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 

@@ -1,4 +1,5 @@
-"""The command line is thin: a command calls what a script would call, and prints it."""
+"""The command line: each command calls the Python functions that a script would call, and prints the
+result."""
 
 from __future__ import annotations
 
@@ -22,9 +23,9 @@ COMMANDS = (
     cost.cost, search.optimize, search.compare, search.cache,
     inspect.plot, inspect.figures, inspect.movie, inspect.export,
 )  # fmt: skip
-"""The functions of all commands, whose names they have, in the order of ``tisim --help``."""
+"""The command functions, in the order of ``tisim --help``; each function name is the command name."""
 WRITERS = ("run", "new", "cost", "optimize", "compare", "plot", "figures", "movie", "export")
-"""The commands whose results are files: they have done their work also where nothing can be printed."""
+"""Commands whose results are files; they succeed even if standard output cannot be written."""
 
 app = typer.Typer(
     cls=CommandGroup,
@@ -36,11 +37,12 @@ for _command in COMMANDS:
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run a command and exit: with 0 when it is done; 1 when a run or check failed; 2 at wrong input, when
-    nothing was run; 130, 143, 129 when stopped by Ctrl-C, SIGTERM, SIGHUP.
+    """Run a command and exit with 0 on success; 1 if a run or check failed; 2 for wrong input, before
+    anything is run; 130, 143, 129 when stopped by Ctrl-C, SIGTERM, SIGHUP.
 
-    Standard streams that are closed, or whose reader has gone, change nothing. One that is full is reported
-    on standard error, and makes 1 of 0 where the result was to be printed, and not in files.
+    Closed standard streams, and pipes whose reader has exited, do not change the exit code. If standard
+    output is full, an error is reported on standard error, and the exit code becomes 1 for commands that
+    print their result instead of writing files.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     with safe_standard_streams() as (out, _):
@@ -54,16 +56,16 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _exit_code(words: list[str]) -> int:
-    """Run a command; return its exit code, and print why where it is not 0."""
+    """Run a command; return its exit code, and print the reason if it is not 0."""
     warnings.formatwarning = _one_line
     with handle_signals(raise_interrupt):
         try:
             choice.check()
             code = app(words, prog_name="tisim", standalone_mode=False)
-            # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
+            # Commands, and Typer for a KeyboardInterrupt, return 130 for every signal.
             return exit_code() if code == 130 else code or 0
         except UsageError as error:
-            # No command was named: this is the help.
+            # No command was given: the message is the help text.
             say(error.format_message())
             return 2
         except InputError as error:
@@ -83,7 +85,7 @@ def _exit_code(words: list[str]) -> int:
 
 
 def _one_line(message: Warning | str, *_where: Any, **_more: Any) -> str:
-    """Return the text of a warning, on one line and without its place in the code."""
+    """Return the text of a warning on one line, without its location in the code."""
     text = " ".join(str(message).split())
     return f"warning: {text if text.isprintable() else repr(text)[1:-1]}\n"
 

@@ -1,4 +1,4 @@
-"""The command ``tisim new`` writes a file that runs, for users to extend, with its test beside it."""
+"""The command ``tisim new`` writes a runnable file for users to extend, with a test."""
 
 from __future__ import annotations
 
@@ -23,23 +23,25 @@ USES = {
     "case": "tisim check {}.py",
     "problem": "tisim optimize {}.py",
 }
-"""What can be written, and the command that uses each."""
+"""The kinds of file that can be written, each with a command that uses the file."""
 FORCES = ("pair", "external")
-"""Kinds of effects that are written: forces between two particles, and on each by itself."""
+"""Kinds of effects: a force between two particles, or a force on each particle."""
 
 What = Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(USES)}.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the file NAME.py, such as soft_shell.")]
 Kind = Annotated[
     str | None,
-    typer.Option("--kind", help="Of an effect: pair (between two particles; default) or external (on each)."),
+    typer.Option(
+        "--kind", help="For an effect: pair (between two particles; default) or external (on each)."
+    ),
 ]
 
 
 def new(what: What, name: Name, kind: Kind = None) -> None:
     """Write NAME.py with a part of scenes, a case or an inverse problem that runs, and test_NAME.py.
 
-    Beside an effect, operator, source or stepper stands NAME.toml, a scene with it. Files that are there
-    already stay as they are.
+    For an effect, operator, source or stepper it also writes NAME.toml, a scene that uses it. Existing files
+    are not overwritten.
     """
     rule = f"one of {', '.join(USES)}"
     if what not in USES:
@@ -64,7 +66,7 @@ def new(what: What, name: Name, kind: Kind = None) -> None:
 
 
 def _check_name(what: str, name: str) -> None:
-    """Raise InputError where Python, or a scene for its parts, would take the name for something else."""
+    """Raise InputError if the name is already that of a Python module or of a part of scenes."""
     from tisim.describe import reference
 
     must(find_spec(name) is None, "name", "one that no other module has", name)
@@ -73,7 +75,7 @@ def _check_name(what: str, name: str) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    """Make a file; InputError where there is one or it cannot be made."""
+    """Create a file; InputError if it exists or cannot be created."""
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)

@@ -1,4 +1,4 @@
-"""Commands share these options."""
+"""Options shared by several commands."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from tisim.errors import InputError, abbreviated
 
 
 def nameable(path: Path | None) -> Path | None:
-    """Return a path of a command line; InputError where the system can have none of this name."""
+    """Return a path from the command line; InputError if the system cannot have a path of this name."""
     if path is None:
         return None
     try:
@@ -18,7 +18,7 @@ def nameable(path: Path | None) -> Path | None:
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         pass
     except (OSError, ValueError) as error:
-        # Too long, a loop of links, a NUL, or bytes that are no text.
+        # Too long, a loop of links, a NUL, or bytes that are not text.
         why = error.strerror if isinstance(error, OSError) else "not a name"
         raise InputError(
             f"path must be one that this system can have; received {abbreviated(str(path))} ({why})"
@@ -27,12 +27,12 @@ def nameable(path: Path | None) -> Path | None:
 
 
 def _load_plugins(paths: list[str] | None) -> list[str]:
-    """Load plugins before anything else is done: what is read later may be made of what they define."""
+    """Load plugins first, because later arguments may use their definitions."""
     from tisim.scene import plugins
 
     for path in paths or ():
         plugins.load(path)
-    # Some versions of typer ask for the length of what they get back.
+    # Some versions of typer ask for the length of the returned value.
     return paths or []
 
 
@@ -60,7 +60,7 @@ Changes = Annotated[
     ),
 ]
 SceneVariant = Annotated[
-    str | None, typer.Option("--variant", help="Which scene of the case, where it has one for a variant.")
+    str | None, typer.Option("--variant", help="Name of the scene, for a case with several.")
 ]
 Out = Annotated[
     Path | None,
@@ -68,28 +68,34 @@ Out = Annotated[
         "--out",
         metavar="DIR",
         callback=nameable,
-        help="Folder to write to; out/NAME by default, out/NAME-cost of cost, out/NAME-figures of figures.",
+        help="Folder to write to; out/NAME by default, out/NAME-cost for cost, out/NAME-figures for figures.",
     ),
 ]
-Seed = Annotated[int | None, typer.Option(help="Seed of all that is random.")]
-Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of all random numbers.")]
+Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists the sizes.")]
 Device = Annotated[str, typer.Option(help="cpu, cuda or vulkan.")]
 Precision = Annotated[str, typer.Option(help="f64 or f32.")]
 Arithmetic = Annotated[
     str,
-    typer.Option(help="strict, or fast: fused, regrouped, by estimates; quicker, in other last bits."),
+    typer.Option(
+        help="strict, or fast: fused multiply-add, reordered sums, approximate reciprocals and "
+        "roots; faster, with different rounding errors."
+    ),
 ]
 Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
 Overwrite = Annotated[
     bool,
-    typer.Option("--overwrite", help="Begin anew, and replace earlier results and files of other origin."),
+    typer.Option(
+        "--overwrite",
+        help="Start from the beginning; replace earlier results, and files that tisim has not written.",
+    ),
 ]
 Fresh = Annotated[
     bool | None,
     typer.Option(
         "--fresh/--resume", show_default=False,
-        help="Begin anew; or be refused where there is nothing to go on with. Without either, the same "
-        "command goes on where it was stopped.",
+        help="--fresh starts from the beginning; --resume fails if there is nothing to resume. Without "
+             "either, the same command resumes where it was stopped.",
     ),
 ]  # fmt: skip
 Absent = Annotated[
@@ -98,8 +104,11 @@ Absent = Annotated[
 ]
 Frames = Annotated[
     int | None,
-    typer.Option("--frames", help="Also write trajectory.h5, with so many frames after the start."),
+    typer.Option("--frames", help="Also write trajectory.h5 with this number of frames after the start."),
 ]
 Every = Annotated[
-    float | None, typer.Option("--every", metavar="SECONDS", help="As --frames, by simulated time between.")
+    float | None,
+    typer.Option(
+        "--every", metavar="SECONDS", help="As --frames, but given as the simulated time between frames."
+    ),
 ]

@@ -1,4 +1,4 @@
-"""The command ``tisim run`` runs a scene to its end, or until Ctrl-C, and goes on where it was stopped."""
+"""The command ``tisim run`` runs a scene to its end or until Ctrl-C, and resumes a run that was stopped."""
 
 from __future__ import annotations
 
@@ -92,13 +92,13 @@ def run(
 
 
 def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -> bool:
-    """Run to the end behind a bar; return False when Ctrl-C has stopped it, between two steps."""
+    """Run to the end with a progress bar; return False if Ctrl-C has stopped the run between two steps."""
     with progress_bar("{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
         task = bar.add_task(name, total=1.0)
 
         def report(simulation: Simulation) -> None:
             description = f"{name}, {simulation.remaining_steps():.3g} steps to go"
-            # Of a run that has failed it is not the whole that is done.
+            # A failed run is not complete, so its simulated fraction is shown.
             bar.update(task, completed=float(simulation.simulated()[0]), description=description)
             ctrl_c.check()
 
@@ -112,7 +112,7 @@ def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -
 
 
 def _restore(simulation: Simulation, path: Path) -> None:
-    """Bring a simulation to where the run was stopped."""
+    """Restore a simulation to the state in which the run was stopped."""
     from tisim.io import checkpoint
 
     try:
@@ -122,17 +122,18 @@ def _restore(simulation: Simulation, path: Path) -> None:
 
 
 def _save_after_error(simulation: Simulation, path: Path, hint: str) -> str:
-    """Save a checkpoint after a file could not be written; return sentences that say what can be resumed.
+    """Save a checkpoint after a file could not be written; return sentences that tell how to resume.
 
-    hint : which command resumes the run, as a sentence.
+    hint : the command that resumes the run, as a sentence.
     """
     from tisim.io import checkpoint
 
     try:
         checkpoint.save(simulation, path)
     except RunError:
-        return "No checkpoint could be written either" + "; that of before is intact." * regular_file.exists(
-            path
+        return (
+            "No checkpoint could be written either"
+            + "; the previous one is intact." * regular_file.exists(path)
         )
     return f"{path} is written. {hint}"
 

@@ -1,4 +1,4 @@
-"""The arguments of a command line give a scene: a case or a file, its size and seed, --without and --set."""
+"""The scene given by the arguments of a command: a case or a file, its size and seed, --without and --set."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ def load_scene(
     changes: Sequence[str] = (),
     variant: str | None = None,
 ) -> tuple[str, Scene]:
-    """Return name and scene of a case, or of a file that ends in .toml or .py; InputError when there is none.
+    """Return name and scene of a case, or of a file that ends in .toml or .py; InputError if there is none.
 
-    absent : effects to leave out. changes : key=value texts, of what is then there. variant : of a case that
-    has scenes of its own for some.
+    absent : effects to leave out, before ``changes``.
+    changes : "key=value" texts.
+    variant : name of a scene of the case, for cases with several.
     """
     if target.endswith(".toml"):
         must(size is None, "--size", "given for a case only", size)
@@ -53,9 +54,9 @@ def checkpoint_seconds() -> float:
 
 
 def assignments(changes: Sequence[str], option: str = "--set") -> dict[str, Any]:
-    """Return ``key=value`` texts as a mapping. A value is read as TOML; what is not TOML is text.
+    """Return ``key=value`` texts as a mapping. A value is parsed as TOML; if that fails, it is text.
 
-    option : that they were given with, for messages.
+    option : the option of the command line, for messages.
     """
     result = {}
     for change in changes:
@@ -66,27 +67,27 @@ def assignments(changes: Sequence[str], option: str = "--set") -> dict[str, Any]
 
 
 def _parse_value(key: str, text: str) -> Any:
-    """Return the value right of the equals sign: a TOML value, else text."""
+    """Return the value to the right of the equals sign: a TOML value, otherwise text."""
     try:
         return serialization.parse(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text.strip()
     except (RecursionError, ValueError):
-        # Nested too deeply to be read, or a number of thousands of digits.
+        # The value is nested too deeply, or is a number with thousands of digits.
         raise InputError(
             f"{printable(key)} must be a value that can be read; received {abbreviated(text)}"
         ) from None
 
 
 def table_changes(table: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return changes to the settings of one table, without its name; InputError for any other."""
+    """Return changes to the settings of one table without its name; InputError for keys of other tables."""
     for key in changes:
         must(key.startswith(f"{table}."), "--set", f"of the form {table}.KEY=VALUE", key)
     return {key.removeprefix(f"{table}."): value for key, value in changes.items()}
 
 
 def with_changes(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings with dotted keys changed; tables on the way are made where they are missing."""
+    """Return settings with dotted keys changed; missing tables are created."""
     result = dict(settings)
     for dotted, value in changes.items():
         *path, last = dotted.split(".")
@@ -94,7 +95,7 @@ def with_changes(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dic
         for step in path:
             subtable = table.get(step, {})
             must(isinstance(subtable, Mapping), dotted, "a setting", last)
-            # A copy, as the settings given stay as they are.
+            # Copy the table, because the given settings must not change.
             copy = dict(subtable)
             table[step] = copy
             table = copy

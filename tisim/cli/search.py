@@ -1,4 +1,4 @@
-"""The commands ``tisim optimize``, ``tisim compare`` and ``tisim cache`` are those of inverse design."""
+"""The commands of inverse design: ``tisim optimize``, ``tisim compare`` and ``tisim cache``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tisim.interrupt import Interrupt
 from tisim.streams import say
 
 Executor = Annotated[
-    str, typer.Option(help="Where runs are made: batch (this process), processes:N or dask://HOST:PORT.")
+    str, typer.Option(help="Executor of the runs: batch (this process), processes:N or dask://HOST:PORT.")
 ]
 Inverse = Annotated[
     str,
@@ -42,30 +42,30 @@ Measurements = Annotated[
     Path | None,
     typer.Option(
         "--measured", metavar="FILE.csv", callback=nameable,
-        help="Measurements that a case which is calibrated is to meet, in place of its own.",
+        help="Measurements to calibrate the case against, in place of its own.",
     ),
 ]  # fmt: skip
 SearchChanges = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
+    typer.Option("--set", metavar="search.KEY=VALUE", help="Change a setting of the search. Repeatable."),
 ]
 StartingDesigns = Annotated[
     Path | None,
     typer.Option(
         "--start-from", metavar="FILE.csv", callback=nameable,
-        help="Designs to run first: a column for each gene, as in best.csv.",
+        help="Designs to run first: one column per gene, as in best.csv.",
     ),
 ]  # fmt: skip
 Experiments = Annotated[
     Path | None,
     typer.Option(
         "--experiments", metavar="FILE.csv", callback=nameable,
-        help="Designs with what was measured of them, to learn from without running them.",
+        help="Designs with measured objectives, to learn from without running them.",
     ),
 ]  # fmt: skip
 FixedGenes = Annotated[
     list[str] | None,
-    typer.Option("--fix", metavar="GENE=VALUE", help="Keep a gene at a value of its range. Repeatable."),
+    typer.Option("--fix", metavar="GENE=VALUE", help="Fix a gene at a value within its range. Repeatable."),
 ]
 
 
@@ -74,27 +74,31 @@ def optimize(
     size: Size = None,
     folder: Out = None,
     seed: Seed = None,
-    variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    variant: Annotated[
+        str | None, typer.Option(help="Name of the inverse problem, for a case with several.")
+    ] = None,
     method: Annotated[
         str | None,
         typer.Option(
-            help="genetic, gaussian-process, nsga2 or random; zohdi, restart or cma-es for one objective; or "
-            "one of a plugin."
+            help="genetic, gaussian-process, nsga2 or random; zohdi, restart or cma-es for one objective; "
+            "or a method of a plugin."
         ),
     ] = None,
-    generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
+    generations: Annotated[
+        int | None, typer.Option(help="Number of generations after the random one.")
+    ] = None,
     population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
     target: Annotated[
-        float | None, typer.Option(help="Stop at a best value as good as this; for one objective.")
+        float | None, typer.Option(help="Stop when the best value is as good as this; for one objective.")
     ] = None,
-    budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
-    budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
+    budget_evaluations: Annotated[int | None, typer.Option(help="Stop after this number of runs.")] = None,
+    budget_minutes: Annotated[float | None, typer.Option(help="Stop after this wall time.")] = None,
     start_from: StartingDesigns = None,
     experiments: Experiments = None,
     warm_start: Annotated[
         bool,
         typer.Option(
-            "--warm-start", help="Learn from all runs in the folder, and run the best of their designs first."
+            "--warm-start", help="Learn from all runs in the folder, and run their best designs first."
         ),
     ] = False,
     measured: Measurements = None,
@@ -111,7 +115,7 @@ def optimize(
 ) -> None:
     """Search for the best design of a case, or of your own problem in a Python file.
 
-    All goes to search.h5. The same command, given again, goes on where it was stopped.
+    All results are stored in search.h5. The same command, given again, resumes where it was stopped.
     """
     from tisim.optimize.beginning import Beginning
     from tisim.optimize.evaluation.executors import evaluator_for
@@ -147,25 +151,31 @@ def optimize(
         )  # fmt: skip
     if outcome.interrupted:
         err().print(
-            f"stopped; {out_folder / SEARCH_FILE} has all that is done. {resume_hint(fresh, overwrite)}"
+            f"stopped; {out_folder / SEARCH_FILE} has all finished runs. {resume_hint(fresh, overwrite)}"
         )
         raise typer.Exit(130)
     if not outcome.logbook:
         hint = resume_hint(fresh, overwrite)
-        raise RunError(f"the time was over before the first generation. {hint}")
+        raise RunError(f"the time limit was reached before the first generation. {hint}")
     if outcome.best is None:
         raise RunError(f"no design has run to its end; 'tisim cache {out_folder / SEARCH_FILE}' says why")
 
 
 def compare(
     case: Inverse,
-    methods: Annotated[str, typer.Option(help="Names with commas between.")] = "random,zohdi,cma-es,genetic",
-    evaluations: Annotated[int, typer.Option(help="Runs that every search may spend.")] = 400,
-    repeats: Annotated[int, typer.Option(help="Searches of each method.")] = 5,
-    fresh_starts: Annotated[int, typer.Option(help="Starts from which each best is run again.")] = 24,
+    methods: Annotated[
+        str, typer.Option(help="Method names, separated by commas.")
+    ] = "random,zohdi,cma-es,genetic",
+    evaluations: Annotated[int, typer.Option(help="Number of runs allowed for each search.")] = 400,
+    repeats: Annotated[int, typer.Option(help="Number of searches with each method.")] = 5,
+    fresh_starts: Annotated[
+        int, typer.Option(help="Number of held-out random starts from which each best design is run again.")
+    ] = 24,
     size: Size = None,
     folder: Out = None,
-    variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    variant: Annotated[
+        str | None, typer.Option(help="Name of the inverse problem, for a case with several.")
+    ] = None,
     measured: Measurements = None,
     fixed: FixedGenes = None,
     changes: SearchChanges = None,
@@ -180,7 +190,8 @@ def compare(
 ) -> None:
     """Compare search methods on a case, or on your own problem, at equal numbers of runs.
 
-    The same command, given again, goes on where it was stopped; other methods and numbers take in its runs.
+    The same command, given again, resumes where it was stopped; with other methods or numbers it reuses the
+    runs.
     """
     from tisim.optimize.evaluation.executors import evaluator_for
     from tisim.optimize.report import comparison
@@ -196,7 +207,7 @@ def compare(
     plan = comparison.plan(problem, base, names, evaluations, repeats, fresh_starts)
     results = []
     with (
-        # What cannot be is refused before anything in the folder is removed.
+        # Invalid arguments raise before anything in the folder is removed.
         closing(evaluator_for(problem, executor, device, precision, threads, arithmetic)) as evaluator,
         comparison.claim(out_folder, fresh, overwrite) as resume,
         Cache(out_folder / comparison.COMPARISON_FILE) as run_cache,
@@ -214,7 +225,7 @@ def compare(
                 line = f"{result.method}, search {result.repeat + 1} of {repeats}: {result.evaluations} runs"
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
-            message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all that is done."
+            message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all finished runs."
             err().print(f"{message} {resume_hint(fresh, overwrite)}")
             raise
     replace_file(out_folder / comparison.CSV, comparison.as_csv(problem, results))
@@ -225,9 +236,9 @@ def compare(
 def cache(
     file: Annotated[Path, typer.Argument(help="The search.h5 of a search.", callback=nameable)],
     verify: Annotated[
-        bool, typer.Option("--verify", help="Check every record; exit code 1 for damage.")
+        bool, typer.Option("--verify", help="Check every record; exit code 1 if any is damaged.")
     ] = False,
-    compact: Annotated[bool, typer.Option("--compact", help="Drop what is damaged or double.")] = False,
+    compact: Annotated[bool, typer.Option("--compact", help="Drop damaged and duplicate records.")] = False,
 ) -> None:
     """List the evaluations in a search's file; verify or compact it."""
     from tisim.optimize.report.cache_summary import summary

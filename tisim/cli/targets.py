@@ -1,7 +1,8 @@
-"""A command is about a case of 'tisim cases', or one of the user's own in a Python file.
+"""The target of a command: a case of 'tisim cases', or a case of the user in a Python file.
 
-Such a file is named NAME.py. Its CASE is used as those of the package ``cases`` are; instead of a CASE, or
-beside it, it may have a PROBLEM, an inverse problem by itself, and SEARCH, the settings of its search.
+Such a file is named NAME.py. Its CASE is used like the cases of the package ``cases``. Instead of CASE, or
+besides it, the file may define PROBLEM, an inverse problem without a case, and SEARCH, the settings of its
+search.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ SCENE_FILE = f"or a scene file ending in .toml, {OWN_FILE}"
 
 
 def case(target: str, alternatives: str = OWN_FILE) -> Case:
-    """Return the case of that name, or in that file; InputError where there is none.
+    """Return the case of this name or in this file; InputError if there is none.
 
-    alternatives : what may be given beside a name, for the message.
+    alternatives : the targets other than a name, for the message.
     """
     from tisim.cases.case import Case, every
 
@@ -47,9 +48,10 @@ def case(target: str, alternatives: str = OWN_FILE) -> Case:
 def inverse_problem(
     target: str, size: str | None, variant: str | None, measured: Path | None = None
 ) -> tuple[Problem, Mapping[str, Any]]:
-    """Return the inverse problem of a case or a file, and settings of its search; InputError without one.
+    """Return the inverse problem of a case or a file, and the settings of its search; InputError if there is
+    none.
 
-    measured : a file of measurements that it is to meet.
+    measured : a file of measurements to calibrate against.
     """
     if not is_python_file(target):
         return case(target, f"{OWN_FILE} or a PROBLEM").inverse(size or "default", variant, measured)
@@ -60,8 +62,8 @@ def inverse_problem(
     else:
         must(hasattr(module, "CASE"), target, "a file with a PROBLEM or a CASE", _module_names(module))
         problem, settings = case(target).inverse(size or "default", variant, measured)
-    # The whole file, and those that it may have taken something from: an objective made elsewhere from
-    # numbers that stand here is another when they change.
+    # The checksum covers all loaded files: an objective may be defined elsewhere and use numbers from this
+    # file, and it changes when they change.
     checksums = [file.checksum[:12] for file in python_file.loaded_files()]
     return dataclasses.replace(problem, code=problem.code or "-".join(checksums)), settings
 
@@ -85,5 +87,5 @@ def _problem(
 
 
 def _module_names(module: ModuleType) -> list[str]:
-    """Return the names that a file has, beside those that every module has."""
+    """Return the names defined in a file, without those that every module has."""
     return [name for name in vars(module) if not name.startswith("__")]

@@ -1,4 +1,4 @@
-"""What is wrong with the words of a command line, as tisim says it: "X must be Y; received Z"."""
+"""Error messages for wrong command-line arguments, in the form "X must be Y; received Z"."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from typer.models import ParameterInfo
 from tisim.errors import InputError, abbreviated, did_you_mean
 
 _exceptions: Any = sys.modules[typer.BadParameter.__module__]
-"""The module of typer's exceptions: its own, or that of click, by the version of typer."""
+"""The module of typer's exceptions: typer's own or click's, depending on the version."""
 UsageError: Any = _exceptions.UsageError
-"""Exception that typer raises for words that no command knows, and to show the help where there are none."""
+"""Exception that typer raises for unknown arguments, and to show the help if there are none."""
 RULES = {int: "a whole number", float: "a number", Path: "a path that this system can have"}
-"""What a word must be to be a value of these types; any word is text."""
+"""The rule for an argument of each type; text has none."""
 
 
 class Command(TyperCommand):
-    """A command whose wrong words are an InputError."""
+    """A command that raises InputError for wrong arguments."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return the words that are left, none; options and arguments are then in the context."""
+        """Return the remaining arguments, of which there are none; options and arguments are stored in the
+        context."""
         words = list(args)
         try:
             return super().parse_args(ctx, args)
@@ -35,10 +36,10 @@ class Command(TyperCommand):
 
 
 class CommandGroup(TyperGroup):
-    """All commands: the word for one of them that is unknown, or an option before it, is an InputError."""
+    """The group of all commands: an unknown command, or an option before it, is an InputError."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return the words of the command and after it."""
+        """Return the arguments from the command name on."""
         words = list(args)
         try:
             return super().parse_args(ctx, args)
@@ -46,7 +47,7 @@ class CommandGroup(TyperGroup):
             raise InputError(_fault(self, ctx, words, error)) from None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the name of the command, the command, and the words after it."""
+        """Return the name of the command, the command, and the arguments after it."""
         try:
             return super().resolve_command(ctx, args)
         except UsageError:
@@ -58,7 +59,7 @@ class CommandGroup(TyperGroup):
 
 
 def _fault(command: Any, ctx: Any, words: Sequence[str], error: Any) -> str:
-    """Return what is wrong with the words of a command, for which typer has raised this error."""
+    """Return the message for an error that typer raised on these arguments."""
     if isinstance(error, _exceptions.NoSuchOption):
         known = [
             name for parameter in command.get_params(ctx) for name in _names(parameter) if name[0] == "-"
@@ -90,17 +91,17 @@ def _is_argument(parameter: Any) -> bool:
 
 
 def _argument(parameter: Any) -> str:
-    """Return the name of an argument, as the help has it."""
+    """Return the name of an argument as shown in the help."""
     return parameter.metavar or parameter.name.upper()
 
 
 def _names(parameter: Any) -> list[str]:
-    """Return the names of a parameter as they are typed."""
+    """Return the names of a parameter as typed on the command line."""
     return [*parameter.opts, *parameter.secondary_opts]
 
 
 def _rule(command: Any, name: str) -> str:
-    """Return what a word must be to be the value of a parameter of the command."""
+    """Return the rule that values of a parameter must satisfy."""
     annotation = get_type_hints(inspect.unwrap(command.callback), include_extras=True)[name]
     kind, *declared = get_args(annotation)
     rule = next(rule for known, rule in RULES.items() if known in (kind, *get_args(kind)))

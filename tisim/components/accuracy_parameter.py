@@ -1,4 +1,4 @@
-"""What a part of a scene says about the settings that trade accuracy for time."""
+"""Accuracy parameters: settings of a part of a scene that trade accuracy for time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def three_digits(value: float) -> float:
-    """Return what a study sets a setting to, rounded so that people can read it."""
+    """Return a setting rounded to three digits, so that it is easy to read."""
     return float(f"{value:.3g}")
 
 
@@ -17,23 +17,23 @@ Part = TypeVar("Part", bound="Component")
 
 
 class AccuracyParameter:
-    """An accuracy parameter groups settings of a part that together ask for an error, each with its order.
+    """A group of settings of a part that together control an error, each with its order.
 
-    ``AccuracyParameter(error=1)``; ``AccuracyParameter(dt=2)``: the error goes as dt^2;
-    ``AccuracyParameter(longest=2, tolerance=1)``: two settings turned together. A part lists its own in
-    ``accuracy_parameters``, and ``tisim cost`` turns them.
+    ``AccuracyParameter(error=1)``: the error is proportional to the setting. ``AccuracyParameter(dt=2)``: the
+    error is proportional to dt^2. ``AccuracyParameter(longest=2, tolerance=1)``: two settings that are varied
+    together. A part lists its own in ``accuracy_parameters``, and ``tisim cost`` varies them.
 
-    converges : whether the error that the part makes vanishes with it; not so where a setting that is not
-        turned bounds it too.
+    converges : whether the error of the part vanishes with the parameter; False if another setting, which is
+        not varied, also limits the error.
     """
 
     def __init__(self, *, converges: bool = True, **orders: float) -> None:
         self.orders, self.converges = orders, converges
 
     def turned(self, part: Part, decades: float) -> Part:
-        """Return the part with settings for an error that is so many decades larger; itself for 0.
+        """Return the part with settings for an error larger by a number of decades; the part itself for 0.
 
-        Settings are rounded to three digits. Raise InputError when the part cannot have them.
+        Settings are rounded to three digits. Raise InputError if the part cannot have them.
         """
         if decades == 0:
             return part

@@ -1,4 +1,4 @@
-"""Arrays in validated plain data: checked as lists of numbers are, and then not writeable."""
+"""Arrays in validated plain data: validated like lists of numbers, and read-only."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from tisim.components.plain_numbers import broken_rule, holds_no_number
 
 
 def frozen(values: Any, kind: type | None = None) -> np.ndarray:
-    """Return a copy that is not writeable."""
+    """Return a read-only copy."""
     array = np.array(values, dtype=kind)
     array.flags.writeable = False
     return array
 
 
 def equal(a: Any, b: Any) -> bool:
-    """Return whether two values are the same: numbers, tables or lists of them, or arrays, also beside
-    lists."""
+    """Return whether two values are equal: numbers, arrays, or tables and lists of them. An array may equal a
+    list."""
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         return a.keys() == b.keys() and all(equal(value, b[key]) for key, value in a.items())
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
@@ -31,7 +31,8 @@ def equal(a: Any, b: Any) -> bool:
 
 
 def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
-    """Return an array of as many rows as are given, from such an array or from what makes the list."""
+    """Return the schema of an array with any number of rows; it accepts arrays and everything that ``listed``
+    accepts."""
 
     def validated(value: Any, as_list: Callable[[Any], Any]) -> np.ndarray:
         if rule := broken_rule(value):
@@ -44,7 +45,7 @@ def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
         elif holds_no_number(value):
             raise PydanticCustomError("numbers", "numbers")
         if isinstance(value, np.ndarray | np.generic):
-            # What is wrong with it, or how it can be read, is found out as of a list.
+            # Convert to a list, which then reports the fault or parses the values.
             value = value.tolist()
         array = np.array(as_list((value,) if isinstance(value, float | int) else value), float)
         return frozen(array.reshape(-1, *columns))
@@ -60,8 +61,8 @@ def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
 
 
 Rows = Annotated[np.ndarray, _schema(Annotated[tuple[Vector, ...], Field(min_length=1)], (3,))]
-"""Rows are an array of shape (n, 3), with at least one row."""
+"""An array of shape (n, 3) with at least one row."""
 RowsOrNone = Annotated[np.ndarray, _schema(tuple[Vector, ...], (3,))]
-"""These are an array of shape (n, 3), of any number of rows."""
+"""An array of shape (n, 3) with any number of rows."""
 Numbers = Annotated[np.ndarray, _schema(tuple[float, ...], ())]
-"""Numbers are an array of shape (n,); a single number is one of one."""
+"""An array of shape (n,); a single number becomes an array of one."""

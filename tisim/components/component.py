@@ -26,7 +26,7 @@ from tisim.errors import InputError, must, some_of
 from tisim.files import python_file
 
 Vector = tuple[float, float, float]
-"""A vector has three Cartesian components."""
+"""A vector of three Cartesian components."""
 LISTED = "'tisim effects'"
 """The command that lists all parts of a scene by name."""
 
@@ -38,16 +38,15 @@ def _encodable(text: str) -> str:
 
 
 Text = Annotated[str, AfterValidator(_encodable)]
-"""A text can be held by a file: it is without halves of surrogate pairs."""
+"""Text that UTF-8 can encode, without unpaired surrogates."""
 
 
 class Checked(BaseModel):
-    """Checked data is plain and either right or refused (InputError): frozen, no unknown keys, no NaN, no
-    infinity."""
+    """Validated plain data: frozen, without unknown keys, NaN or infinity; invalid data raise InputError."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    # ``self`` by position alone: a file can have a key of that name.
+    # ``self`` is positional-only, because a file can have a key of that name.
     def __init__(self, /, **data: Any) -> None:
         try:
             super().__init__(**data)
@@ -65,12 +64,12 @@ class Checked(BaseModel):
     @classmethod
     @functools.cache
     def numeric(cls) -> frozenset[str]:
-        """Return the names of the settings that are numbers, or lists of them."""
+        """Return the names of the settings that are numbers or lists of numbers."""
         return frozenset(name for name, info in cls.model_fields.items() if is_numeric(info.annotation))
 
     @classmethod
     def called(cls, data: Mapping[str, Any]) -> str:
-        """Return what messages call the one that is made of these values."""
+        """Return the name that messages use for an object with these values."""
         return cls.kind()
 
     @classmethod
@@ -93,7 +92,7 @@ class Component(AccuracyHints, Checked):
 
     @model_validator(mode="after")
     def _in_range(self) -> Self:
-        """Refuse magnitudes with which the arithmetic does not hold (see ranges.py)."""
+        """Raise InputError for magnitudes for which the arithmetic is invalid (see ranges.py)."""
         varying = {name for name, _, _ in self.parameters()}
         for name, info in type(self).model_fields.items():
             value, where = getattr(self, name), f"{self.label}.{name}"
@@ -104,18 +103,18 @@ class Component(AccuracyHints, Checked):
         return self
 
     def unit_as_set(self, name: str) -> str:
-        """Return the unit of a setting as it is set; by default the one that it is declared with."""
+        """Return the unit of the value of a setting; by default its declared unit."""
         return unit_of(type(self).model_fields[name])
 
     @property
     def label(self) -> str:
-        """Return what files and messages call it."""
+        """Return the name of this part in files and messages."""
         return self.called(vars(self))
 
     @classmethod
     def named(cls, kind: Any, where: str) -> type[Self]:
-        """Return the subclass of this name; raise InputError naming ``where`` and the known names
-        otherwise."""
+        """Return the subclass of this name; otherwise raise InputError, naming ``where`` and the known
+        names."""
         known = cls.known()
         rule = f"one of {some_of(known, kind, LISTED)}, or your own (--plugin, import)"
         must(isinstance(kind, str) and kind in known, where, rule, kind)
@@ -123,20 +122,20 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def known(cls) -> dict[str, type[Self]]:
-        """Return every part made after this contract that has been imported, by name; itself too if it is
-        none."""
+        """Return all imported subclasses that are not contracts, by name, including this class if it is not
+        one."""
         return {kind.kind(): kind for kind in cls.kinds()}
 
     @classmethod
     def kinds(cls) -> Iterator[type[Self]]:
-        """Yield every part made after this contract, but those of a file of which another version has been
-        loaded."""
+        """Yield this class and its subclasses, except contracts and classes from superseded versions of a
+        file."""
         for kind in (cls, *_descendants(cls)):
             if not kind.__dict__.get("contract") and not python_file.is_superseded(kind):
                 yield kind
 
     def parts(self) -> Iterator[Component]:
-        """Yield the part itself and the parts that it is made of, also those in lists."""
+        """Yield this part and all parts nested in it, including those in lists."""
         yield self
         for name in type(self).model_fields:
             value = getattr(self, name)
@@ -150,8 +149,8 @@ class Component(AccuracyHints, Checked):
     @classmethod
     @functools.cache
     def parameters(cls) -> tuple[tuple[str, FieldInfo, int], ...]:
-        """Return name, declaration and number of components of each parameter that may differ per world. They
-        are found once: a class that has been asked is complete."""
+        """Return name, declaration and number of components of each parameter that may differ per world. The
+        result is cached, so the class must be complete at the first call."""
         sizes: dict[Any, int] = {float: 1, float | None: 1, Vector: 3}
         fields = ((name, info, sizes.get(info.annotation, 0)) for name, info in cls.model_fields.items())
         return tuple(field for field in fields if field[2])
@@ -159,8 +158,8 @@ class Component(AccuracyHints, Checked):
     @classmethod
     @functools.cache
     def lists(cls) -> tuple[tuple[str, type[Component]], ...]:
-        """Return name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a
-        world may have any number of them. They are found once."""
+        """Return name and row class of each parameter that is a list of parts, ``tuple[Row, ...]``; its
+        length may differ per world. The result is cached."""
         found = []
         for name, info in cls.model_fields.items():
             row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)
@@ -170,19 +169,20 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def from_files(cls, values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:
-        """Return the parameters that a table of a scene gives, ``where`` in it, with what it names in other
-        files read from these; ``folder`` is that of the scene. By default a table names no files."""
+        """Return the parameters that a table of a scene gives, with the contents of other files that it
+        refers to. ``where`` is the path of the table in the scene, and ``folder`` the folder of the scene. By
+        default no parameter refers to a file."""
         return values
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
-        """Yield name and number of components of what kernels read of each world: the parameters, and what a
-        part makes of them besides."""
+        """Yield name and number of components of the per-world numbers that kernels read: the parameters, and
+        numbers that a part derives from them."""
         for name, _, size in cls.parameters():
             yield name, size
 
     def values(self) -> list[float]:
-        """Return the numbers of ``columns()`` in order, vectors spread out; SI units."""
+        """Return the numbers of ``columns()`` in order, with vectors flattened; SI units."""
         spread: list[float] = []
         for name, _, size in self.parameters():
             value = getattr(self, name)
@@ -190,24 +190,23 @@ class Component(AccuracyHints, Checked):
         return spread
 
     def members(self) -> dict[str, Component]:
-        """Return, by name, the parts that it is made of and that kernels read as parts of it, ``self.NAME``;
-        by default none."""
+        """Return, by name, the nested parts that kernels access as ``self.NAME``; by default none."""
         return {}
 
     def derived_rows(self) -> dict[str, list[float]]:
-        """Return, by name, rows of numbers that a kernel reads as ``self.NAME(w, k)``, made of what differs
-        per world; by default none. How long they are is compiled in."""
+        """Return, by name, rows of derived per-world numbers that a kernel reads as ``self.NAME(w, k)``; by
+        default none. The length of each row is compiled in."""
         return {}
 
     @classmethod
     def room(cls, rows: int) -> int:
-        """Return how many rows of this kind a list has room for, so that scenes with lists of like lengths
-        run as one batch."""
+        """Return the capacity of a list for this number of rows of this class. Capacities are rounded up, so
+        that scenes with lists of similar lengths can run in one batch."""
         return max(cls.least_rows, 1 << (rows - 1).bit_length())
 
     def structure(self) -> tuple[Any, ...]:
-        """Return what is compiled in: class, every option that is not a per-world parameter, room for
-        lists."""
+        """Return everything that is compiled in: the class, every option, and the capacity of lists, but no
+        per-world parameters."""
         varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
         options, members = (n for n in type(self).model_fields if n not in varying), self.members()
         fixed = tuple((n, members[n].structure() if n in members else getattr(self, n)) for n in options)
@@ -218,27 +217,27 @@ class Component(AccuracyHints, Checked):
         )
 
     def lookups(self) -> dict[str, np.ndarray]:
-        """Return the numbers that a kernel looks up, the same in every world, ``self.NAME[i, j]``; they are
-        made for what is compiled, so of the options that are no parameters. They go by name, with shape
-        (rows, columns)."""
+        """Return, by name, lookup tables of shape (rows, columns) that a kernel reads as ``self.NAME[i, j]``.
+        They are the same in every world and may depend on options only, not on parameters."""
         return {}
 
     def remarks(self) -> dict[str, str]:
-        """Return, by name, what ``tisim explain`` says of it besides its parameters; by default nothing."""
+        """Return, by name, lines that ``tisim explain`` shows in addition to the parameters; by default
+        none."""
         return {}
 
     contract: ClassVar[bool] = False
-    """A class sets this if it is no part of a scene itself, only what parts are made after."""
+    """Whether this class is only a contract for subclasses, and not itself a part of a scene."""
     requires: ClassVar[tuple[type[Component], ...]] = ()
-    """These are the effects without which this one means nothing."""
+    """Effects that a scene with this effect must have."""
     excludes: ClassVar[tuple[type[Component], ...]] = ()
-    """These are the effects that cannot be in a scene with this one."""
+    """Effects that a scene with this effect must not have."""
     precedes: ClassVar[tuple[type[Component], ...]] = ()
-    """These are the effects that must come after this one, where a scene has them."""
+    """Effects that must come after this one, if the scene has them."""
     incompatible_controls: ClassVar[tuple[str, ...]] = ()
-    """These kinds of step control do not see what this effect needs them to."""
+    """Kinds of step control that cannot be used with this effect, because they do not account for it."""
     least_rows: ClassVar[int] = 32
-    """Every list of parts of this kind has room for at least so many."""
+    """Smallest capacity of a list of parts of this class."""
 
 
 def _descendants(cls: type[Any]) -> Iterator[type[Any]]:
@@ -248,15 +247,16 @@ def _descendants(cls: type[Any]) -> Iterator[type[Any]]:
 
 
 def parameter(unit: str, text: str, default: Any = ..., **rules: Any) -> Any:
-    """Declare a physical parameter: its unit ("" for a pure number), what it is in a phrase, and its default.
+    """Declare a physical parameter: its unit ("" for a pure number), a phrase that describes it, and its
+    default.
 
-    ``rules`` are pydantic's, such as ``gt=0``; ``examples=[3e5]`` gives a value for templates where there is
-    no default.
+    ``rules`` are pydantic's, such as ``gt=0``; ``examples=[3e5]`` gives a value for templates if there is no
+    default.
 
     A float or ``Vector`` parameter may differ in every world of a batch. A kernel reads it as
-    ``self.name(w)``; a plain Python number there would be frozen into the kernel at first compile. A list of
-    parts, ``tuple[Row, ...]`` with Row a Component of such parameters, is one bound Row there. Its parameters
-    are functions of the world and the row: ``self.rows.name(w, k)``, k below ``self.rows.size(w)``.
+    ``self.name(w)``; a plain Python number would be frozen into the kernel at first compile. A list of parts,
+    ``tuple[Row, ...]`` with Row a Component of such parameters, is one bound Row in kernels. Its parameters
+    are functions of the world and the row: ``self.rows.name(w, k)``, for k below ``self.rows.size(w)``.
     """
     if not (isinstance(text, str) and text):
         raise TypeError(f"parameter must be given a text after its unit; received {text!r}")
@@ -264,10 +264,10 @@ def parameter(unit: str, text: str, default: Any = ..., **rules: Any) -> Any:
 
 
 def option(text: str, default: Any = ..., **rules: Any) -> Any:
-    """Declare what is no physical quantity, such as a method or a number of sweeps: what it is, its default.
+    """Declare an option, a setting that is not a physical quantity, such as a method or a number of sweeps.
 
-    It is the same in all worlds of a batch, and a kernel reads it as ``self.name``, compiled in. ``rules``
-    are those of ``parameter``.
+    ``text`` is a phrase that describes it. An option is the same in all worlds of a batch, and a kernel reads
+    it as ``self.name``, compiled in. ``rules`` are those of ``parameter``.
     """
     if not (isinstance(text, str) and text):
         raise TypeError(f"option must be given a text first; received {text!r}")
@@ -275,5 +275,5 @@ def option(text: str, default: Any = ..., **rules: Any) -> Any:
 
 
 def _bounded(info: FieldInfo) -> bool:
-    """Return whether the rules of a number say how large it may be."""
+    """Return whether the rules of a number set an upper limit."""
     return any(hasattr(rule, "le") or hasattr(rule, "lt") for rule in info.metadata)

@@ -1,6 +1,6 @@
-"""What parts of a scene say to ``tisim cost`` alone: nothing else asks for it.
+"""Hints that parts of a scene give to ``tisim cost`` only.
 
-A part that says nothing of this runs as well; it is only not compared.
+A part without hints runs as well, but it is not varied in a cost study.
 """
 
 from __future__ import annotations
@@ -14,15 +14,16 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 
 
 class AccuracyHints(BaseModel):
-    """These are the hints that any part of a scene gives.
+    """Hints that any part of a scene may give.
 
-    accuracy_parameters : its settings that trade accuracy for time.
-    softening : properties of materials that may be lowered for longer steps, each with the power of it that
-        the time of an impact at a given speed goes by; as {"young": 0.4}, where that is as E^-0.4. Under a
-        given load it may go by less: the overlap of Hertz's law goes as E^-2/3, so the stiffness of a
-        contact at rest as E^(2/3), and the time in which it swings as E^-1/3. All other constants stay as
-        they are, such as a cohesion, of which softer grains have more, or a spring of a bond, for which
-        longer steps may be too long: what that does is part of what is measured.
+    accuracy_parameters : settings that trade accuracy for time.
+    softening : properties of materials that may be lowered to allow longer steps. Each value is the power of
+        the property by which the duration of an impact at a given speed decreases: {"young": 0.4} for a
+        duration proportional to E^-0.4. At a given load the dependence may be weaker: the overlap in Hertz's
+        law is proportional to E^-2/3, so the stiffness of a contact at rest is proportional to E^(2/3) and
+        its oscillation period to E^-1/3. All other constants are unchanged. For example, a cohesion has more
+        effect on softer grains, and the spring of a bond may be too stiff for the longer steps; such effects
+        are part of the measured error.
     """
 
     accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = ()
@@ -30,34 +31,35 @@ class AccuracyHints(BaseModel):
 
 
 class LawHints(AccuracyHints):
-    """These are the hints that an effect gives.
+    """Hints that an effect may give.
 
-    smooth : whether its forces have derivatives of all orders on the way, without which steppers of high
-        order, and steps that follow the error, gain nothing.
+    smooth : whether its forces have derivatives of all orders along the trajectory; otherwise steppers of
+        high order, and steps that follow the error, gain nothing.
     """
 
     smooth: ClassVar[bool] = True
 
     def approximations(self, extent: float) -> tuple[Any, ...]:
-        """Return cheaper laws to try in its place, the coarsest first, for particles that are up to
-        ``extent`` (m) apart; by default none."""
+        """Return cheaper laws to try in place of this one, the coarsest first, for particles up to ``extent``
+        (m) apart; by default none."""
         return ()
 
 
 class StepperHints(AccuracyHints):
-    """These are the hints that a stepper gives."""
+    """Hints that a stepper may give."""
 
     @classmethod
     def alternatives(cls, effects: Sequence[Any], dt: float) -> tuple[Self, ...]:
-        """Return those of this kind to try in a scene of these effects, with steps of some dt (s); by default
-        none."""
+        """Return the steppers of this class to try in a scene with these effects and steps of about dt (s);
+        by default none."""
         return ()
 
     def rivals(self, effects: Sequence[Any], dt: float) -> tuple[Any, ...] | None:
-        """Return what to try beside this one; None, the default, for the alternatives of every kind."""
+        """Return the steppers to compare with this one; None, the default, for the alternatives of every
+        class."""
         return None
 
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
-        """Return how often forces were summed for a particle, the mean over particles, given the counts of a
-        run; one a step by default."""
+        """Return the number of force evaluations per particle, averaged over particles, from the counts of a
+        run; by default one per step."""
         return work["particle_steps"] / particles

@@ -1,4 +1,4 @@
-"""What points along a direction."""
+"""Parts of a scene with a direction."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from tisim.components.ranges import check_direction
 
 
 class Directed(Component):
-    """A directed part has a vector of any length that says a direction; kernels read the unit vector.
+    """A part with a vector of any length that gives a direction; kernels read the unit vector.
 
-    along : the name of the vector. unit : that of the unit vector.
+    along : the name of the vector parameter. unit : the name of the unit vector.
     """
 
     contract: ClassVar[bool] = True

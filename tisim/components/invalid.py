@@ -1,4 +1,4 @@
-"""What is wrong with plain data, for people: pydantic's report with the names, texts and units of a part."""
+"""Error messages for invalid plain data: pydantic's report with the names, texts and units of a part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def unit_of(info: FieldInfo) -> str:
 
 
 def text_of(info: FieldInfo) -> str:
-    """Return what a parameter or option is, as declared, or an empty string."""
+    """Return the declared text of a parameter or option, or an empty string."""
     return info.description or ""
 
 
@@ -50,14 +50,14 @@ _RULES = {
 
 
 FAULTS = 10
-"""A message lists this many faults, a line for each."""
+"""Largest number of faults listed in a message, one per line."""
 _CHOICE = re.compile(r"int|float|tuple\[.*\]")
-"""Pydantic adds this to the place of a fault, for each type that would have done."""
+"""Pydantic appends this to the location of a fault, for each accepted type."""
 
 
 def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, FieldInfo]) -> str:
-    """Return one line per fault of a pydantic report, "X must be Y; received Z". ``fields``: those of the
-    part."""
+    """Return one line per fault of a pydantic report, "X must be Y; received Z". ``fields``: the fields of
+    the part."""
     lines: dict[str, list[str]] = {}
     received: dict[str, str] = {}
     for fault in invalid.errors(include_url=False):
@@ -85,7 +85,7 @@ def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, F
 
 
 def _meaning(info: FieldInfo) -> str:
-    """Return what a parameter is, and its unit; in brackets."""
+    """Return the text and the unit of a parameter, in brackets."""
     what = ", ".join(filter(None, (text_of(info), unit_of(info))))
     return f" ({what})" if what else ""
 
@@ -95,11 +95,12 @@ def _is_choice(part: int | str) -> bool:
 
 
 def _named_within(name: str, loc: tuple[int | str, ...], text: str) -> list[str]:
-    """Return what a part says of itself; one of several, in a list or by name, which of them it is."""
+    """Return the messages of a part itself. For a part in a list or table, the messages also name the row."""
     if len(loc) < 2:
         return text.splitlines()
     lines = (line.partition(" must ") for line in text.splitlines())
-    # What is no property of the row by itself, such as the mass that follows from two, has no name before it.
+    # A message about several properties together, such as a mass derived from two of them, has no property
+    # name before it.
     return [
         f"{name}{'.' + what.partition('.')[2] if '.' in what else ', ' + what} must {rest}"
         for what, _, rest in lines

@@ -1,7 +1,7 @@
-"""Numbers as users give them, of NumPy too: each is the same number in plain data, or is refused.
+"""Numbers from users, including NumPy's: each is converted exactly to a plain Python number, or refused.
 
-Pydantic takes True for 1, drops the imaginary part of a complex number of NumPy, reads values under a mask
-and takes large whole numbers of NumPy through a float.
+This is done before pydantic, which takes True for 1, drops the imaginary part of NumPy's complex numbers,
+reads values under a mask and converts large NumPy integers through a float.
 """
 
 from __future__ import annotations
@@ -14,17 +14,16 @@ import numpy as np
 from tisim.errors import must
 
 DEEPEST = 3
-"""No list of numbers has lists in it deeper than this."""
+"""Deepest nesting of lists of numbers."""
 
 
 def is_numeric(annotation: Any) -> bool:
-    """Return whether a setting of this type is a number, or has fixed or any numbers of them, or may be left
-    out."""
+    """Return whether a setting of this type is a number or a tuple of numbers, possibly optional."""
     return _leaves(annotation) <= {int, float, type(None), Ellipsis} and annotation is not type(None)
 
 
 def _leaves(annotation: Any) -> set[Any]:
-    """Return the types that a type is made of."""
+    """Return the set of elementary types in a type."""
     if get_origin(annotation) is Annotated:
         return _leaves(get_args(annotation)[0])
     if get_origin(annotation) in (tuple, list, Union, types.UnionType):
@@ -33,9 +32,8 @@ def _leaves(annotation: Any) -> set[Any]:
 
 
 def plain(where: str, value: Any, depth: int = DEEPEST) -> Any:
-    """Return a number, a list or an array of numbers with what is of NumPy as numbers and lists of Python;
-    raise InputError, naming ``where``, for flags, complex numbers and what is masked. All else is as it
-    was."""
+    """Return a value with NumPy numbers and arrays converted to Python numbers and lists; other values are
+    unchanged. Raise InputError, naming ``where``, for booleans, complex numbers and masked entries."""
     rule = broken_rule(value)
     must(not rule, where, rule, value)
     if isinstance(value, np.ndarray | np.generic):
@@ -46,15 +44,15 @@ def plain(where: str, value: Any, depth: int = DEEPEST) -> Any:
 
 
 def holds_no_number(value: Any, depth: int = DEEPEST) -> bool:
-    """Return whether a list has a flag, a complex number or what is masked in it."""
+    """Return whether a value or a nested list contains a boolean, a complex number or a masked entry."""
     if isinstance(value, list | tuple) and depth > 0:
         return any(holds_no_number(one, depth - 1) for one in value)
     return bool(broken_rule(value))
 
 
 def broken_rule(value: Any) -> str:
-    """Return what a value must be that is a flag, a complex number or masked, or an array of these; an empty
-    string for all others."""
+    """Return the rule that a boolean, complex or masked value, or an array of these, breaks; an empty string
+    for all other values."""
     if isinstance(value, bool | complex):
         return "a number"
     if isinstance(value, np.ndarray | np.generic):

@@ -1,8 +1,9 @@
-"""The magnitudes that quantities may have, so that the arithmetic of the laws holds.
+"""The magnitudes that quantities may have, so that the arithmetic of the laws is valid.
 
-A volume is the cube of a length, and stands above and below the line; a moment of inertia is a mass times the
-square of a length; masses are added up and multiplied. Within these limits all of them are normal numbers of
-double precision. Other quantities may be anything but subnormal: kernels flush such numbers to zero.
+A volume is the cube of a length and occurs in numerators and denominators; a moment of inertia is a mass
+times the square of a length; masses are added and multiplied. Within these limits all results are normal
+numbers in double precision. Other quantities may have any value except subnormal numbers, which kernels flush
+to zero.
 """
 
 from __future__ import annotations
@@ -14,17 +15,18 @@ import numpy as np
 from tisim.errors import Words, must
 
 LEAST, MOST = 1e-100, 1e100
-"""Lengths (m) and masses (kg) that are not 0 have magnitudes between these."""
+"""Limits of the magnitudes of lengths (m) and masses (kg) other than 0."""
 NORMAL = float(np.finfo(np.float64).tiny), float(np.finfo(np.float64).max)
-"""The normal numbers of double precision have magnitudes between these."""
+"""Limits of the magnitudes of normal numbers in double precision."""
 WHOLE = 2**31
-"""This bounds the whole numbers and exponents that are compiled into kernels."""
+"""Bound of the integers and exponents that are compiled into kernels."""
 PARTICLES = 10**8
-"""A start can have this many particles at most."""
+"""Largest number of particles in an initial state."""
 BYTES = 300
-"""A particle takes at least this much memory, in bytes, with its fields and lists."""
+"""Least memory of a particle with its fields and lists, bytes."""
 FINE = 1e-3
-"""Rounding may shift the centres of a packing by this part of a radius: they are then apart and even."""
+"""Largest shift of the centres of a packing by rounding, relative to a radius; the packing then stays
+separated and even."""
 
 
 def limits(unit: str) -> tuple[float, float]:
@@ -41,12 +43,12 @@ def check_magnitude(what: str, unit: str, value: float | tuple[float, ...]) -> N
 
 
 def check_direction(what: str, axis: tuple[float, float, float]) -> None:
-    """Raise InputError unless the length of an axis can be divided by, as its square can."""
+    """Raise InputError unless the length of an axis, and its square, can be a divisor."""
     must(LEAST <= math.hypot(*axis) <= MOST, what, "a direction", axis)
 
 
 def check_memory(what: str, number: int, bytes_each: float = BYTES) -> None:
-    """Raise InputError, before any is allocated, unless this machine has memory for a number of things."""
+    """Raise InputError, before allocation, unless this machine has enough memory for ``number`` objects."""
     from tisim.backend import runtime
 
     there = runtime.memory()
@@ -57,8 +59,9 @@ def check_memory(what: str, number: int, bytes_each: float = BYTES) -> None:
 
 
 def check_resolved(what: str, places: np.ndarray, radius: float) -> None:
-    """Raise InputError unless rounding of the largest coordinate (m) is well below a radius (m). Further from
-    the origin, spheres that are packed would lie in one place.
+    """Raise InputError unless the rounding error of the largest coordinate (m) is well below a radius (m).
+
+    Farther from the origin, packed spheres would be rounded to the same position.
     """
     farthest = float(np.abs(places).max(initial=0.0))
     step = float(np.spacing(farthest))

@@ -1,7 +1,7 @@
-"""Parts of a scene to and from plain data, each by the name of its kind.
+"""Conversion of parts of a scene to and from plain data, in which each part has the name of its kind.
 
-JSON text of data with arrays in it is made a piece at a time. Of arrays of floats it takes a fraction of the
-time and memory that ``json.dumps`` takes of their lists: a start can have millions.
+JSON text of data with arrays is made in pieces. For arrays of floats this takes a fraction of the time and
+memory of ``json.dumps`` on nested lists; a start can have millions of rows.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tisim.errors import InputError, Words, abbreviated, must, printable
 
 Part = TypeVar("Part", bound=Component)
 HERE = Path()
-"""This is the working directory."""
+"""The working directory."""
 
 
 def load(package: ModuleType) -> None:
@@ -35,7 +35,7 @@ def load(package: ModuleType) -> None:
 
 
 def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
-    """Return a copy of a table whose keys are text; raise InputError naming ``where`` for anything else."""
+    """Return a copy of a table with text keys; raise InputError naming ``where`` for anything else."""
     must(isinstance(data, Mapping), where, what, data)
     for key in data:
         must(isinstance(key, str), f"a key of {where}", "text", key)
@@ -43,10 +43,10 @@ def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
 
 
 def from_dict(base: type[Part], data: Any, where: str, folder: Path = HERE) -> Part:
-    """Return the part that ``data["kind"]`` names; its other keys are its parameters. Text is a kind by
-    itself.
+    """Return the part of the kind ``data["kind"]``; its other keys are its parameters. A string alone names a
+    kind without parameters.
 
-    folder : that from which names of files in the data lead; the working directory unless given.
+    folder : base folder of file names in the data; the working directory unless given.
     """
     values: dict[str, Any] = {"kind": data} if isinstance(data, str) else table(data, where)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", Words("nothing"))
@@ -55,11 +55,11 @@ def from_dict(base: type[Part], data: Any, where: str, folder: Path = HERE) -> P
 
 
 def _with_parts(kind: type[Component], values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:
-    """Return the parameters of a kind, with the parts in place of the tables that name their kinds."""
+    """Return the parameters of a kind, with nested tables replaced by the parts that they describe."""
     values = kind.from_files(values, where, folder)
     listed = dict(kind.lists())
     for name, info in kind.model_fields.items():
-        # Rows of a list are all of one kind, and need no name of it.
+        # All rows of a list are of one kind, so they do not name it.
         inner = None if name in listed else _part(info.annotation)
         if name in values and inner is not None:
             values[name] = from_dict(inner, values[name], f"{where}.{name}", folder)
@@ -74,7 +74,7 @@ def _with_parts(kind: type[Component], values: dict[str, Any], where: str, folde
 
 
 def _part(annotation: Any) -> type[Component] | None:
-    """Return the kind of part that a field holds, also where it may hold none."""
+    """Return the class of the part that a field holds, which may be optional."""
     kinds = [
         t for t in (get_args(annotation) or (annotation,)) if isinstance(t, type) and issubclass(t, Component)
     ]
@@ -82,10 +82,9 @@ def _part(annotation: Any) -> type[Component] | None:
 
 
 def to_dict(part: Component, named: bool = True, arrays: bool = False) -> dict[str, Any]:
-    """Return kind and parameters of a part and of those that it is made of, without what is left at None and
-    lists that are left empty.
+    """Return kind and parameters of a part and of its nested parts, without None and empty lists.
 
-    arrays : whether arrays stay what they are; otherwise they become lists.
+    arrays : whether arrays are kept; otherwise they become lists.
     """
     dumped = part.model_dump(mode="python" if arrays else "json")
     values = {key: value for key, value in dumped.items() if value is not None}
@@ -124,50 +123,50 @@ def inline(value: Any) -> str:
         return "{" + ", ".join(f"{_key(key)} = {inline(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(inline(item) for item in value) + "]"
-    # TOML has the strings of JSON, but no pairs of surrogates, and DEL must be escaped too.
+    # TOML strings are JSON strings, but without surrogate pairs, and DEL must be escaped too.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _key(name: str) -> str:
-    """Return a key of a table: in quotes unless all of it is letters of ASCII, digits, - and _."""
+    """Return a key of a table, in quotes unless it has only ASCII letters, digits, - and _."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else inline(name)
 
 
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _DEEP = re.compile(rf"""(?<![\w."'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{64}}""")
-"""This is a dotted key of more parts than any scene has."""
+"""Pattern of a dotted key with more components than any scene has."""
 
 
 def parse(text: str) -> dict[str, Any]:
-    """Return the table that TOML text holds; ValueError or RecursionError where it cannot be read."""
-    # tomllib takes a time that grows as the square of the parts of a key: minutes for some ten thousand.
+    """Return the table in a TOML text; ValueError or RecursionError if it cannot be read."""
+    # The time of tomllib grows as the square of the number of components of a key: minutes for some ten
+    # thousand.
     if _DEEP.search(text):
         raise RecursionError("a key of too many parts")
     return tomllib.loads(text)
 
 
 def read_toml(text: str, what: str, source: str) -> dict[str, Any]:
-    """Return the table that TOML text holds; raise InputError naming ``what`` and ``source`` where it is not
-    TOML."""
+    """Return the table in a TOML text; raise InputError naming ``what`` and ``source`` if it is not TOML."""
     try:
         return parse(text)
     except RecursionError:
         raise InputError(f"{what} must be less deeply nested; received {abbreviated(source)}") from None
     except ValueError as fault:
-        # Not of the format, or a number of more digits than Python reads.
+        # Invalid TOML, or a number with more digits than Python reads.
         raise InputError(
             f"{what} must be TOML; received {abbreviated(source)} ({printable(str(fault))})"
         ) from None
 
 
 ROWS_PER_PIECE = 1 << 10
-"""A piece holds this many rows of an array."""
+"""Number of rows of an array in one piece of text."""
 PLAIN = 1e-4, 1e16
-"""Python and pydantic write these magnitudes alike, without an exponent."""
+"""Python and pydantic write magnitudes in this range identically, without an exponent."""
 
 
 def json_pieces(value: Any) -> Iterator[str]:
-    """Yield the text of ``json.dumps(value, sort_keys=True)``, where arrays stand for their lists."""
+    """Yield the text of ``json.dumps(value, sort_keys=True)``, with arrays written as lists."""
     if isinstance(value, np.ndarray):
         yield from _array(value)
     elif isinstance(value, Mapping):
@@ -191,11 +190,11 @@ def _array(array: np.ndarray) -> Iterator[str]:
 
 
 def _rows(array: np.ndarray) -> str:
-    """Return the shortest decimals that are these numbers."""
+    """Return the numbers as the shortest decimals that reproduce them."""
     numbers = np.asarray(array, float)
     size = np.abs(numbers)
     other = ((size < PLAIN[0]) & (size > 0)) | (size >= PLAIN[1])
-    # Written by Python, in the places that hold no number.
+    # These are formatted by Python and inserted in place of NaN.
     digits = [repr(number) for number in numbers[other].tolist()]
     listed = np.where(other, np.nan, numbers).tolist()
     between = to_json(listed, inf_nan_mode="constants").decode().replace(",", ", ").split("NaN")

@@ -1,6 +1,7 @@
-"""What this machine is to tisim: backend, processor, memory, versions, and what the other backend would give.
+"""A report of this machine: backend, processor, memory, versions, and the speed of the other backend.
 
-A table says whether a backend's LLVM knows this processor; steps of two scenes, timed, say what that costs.
+A table says whether the LLVM of a backend supports this processor; timed steps of two scenes show the
+consequence.
 """
 
 import importlib.metadata
@@ -28,16 +29,16 @@ from tisim.steppers import FixedStep, Verlet
 
 DEPENDENCIES = ("tisim", "taichi", "quadrants", "numpy", "h5py", "deap", "pydantic", "matplotlib")
 TIMED_SIDE = 10
-"""The scenes that are timed have as many particles along each side of a cube."""
+"""Number of particles along each side of the cube in the timed scenes."""
 BENCHMARK_SECONDS = 0.5
-"""Steps of each scene are timed for so long, wall seconds."""
+"""Wall time for which the steps of each scene are timed, s."""
 WORTH_A_CHANGE = 1.1
-"""A backend is called faster from this ratio of times on."""
+"""A backend is reported as faster if the ratio of times exceeds this."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding is a line of the report. note : what to make of it, or empty."""
+    """A line of the report. note : advice, or empty."""
 
     name: str
     value: str
@@ -45,12 +46,12 @@ class Finding:
 
 
 def charges() -> Scene:
-    """Return a scene of charges on a disturbed lattice, each of which feels all others."""
+    """Return a scene of charges on a disturbed lattice in which every pair interacts."""
     return _lattice(NearField(alpha2=1.0, strength="charge"), radius=1e-3)
 
 
 def grains() -> Scene:
-    """Return a scene of grains on a lattice, each of which touches its neighbours."""
+    """Return a scene of grains on a lattice in which each touches its neighbours."""
     return _lattice(Granular(damping=RestitutionDamping(), tangential=MindlinForce()), radius=0.51)
 
 
@@ -86,13 +87,13 @@ def step_times() -> dict[str, float]:
 def _step_time(scene: Scene) -> float:
     simulation = Simulation(scene)
     simulation.load(scene)
-    # The first ones compile, and make lists.
+    # The first steps compile kernels and build lists.
     simulation.program.advance(2)
     steps, fastest = 1, float("inf")
     end = time.perf_counter() + BENCHMARK_SECONDS
     while (began := time.perf_counter()) < end:
         simulation.program.advance(steps)
-        # The fastest, as the rest of the machine can only slow it down.
+        # The minimum is used, because other load on the machine can only slow a step.
         fastest = min(fastest, (time.perf_counter() - began) / steps)
         steps = max(1, int(BENCHMARK_SECONDS / 20 / fastest))
     simulation.close()
@@ -100,7 +101,7 @@ def _step_time(scene: Scene) -> float:
 
 
 def step_times_of(backend: str) -> dict[str, float]:
-    """Return the times of steps (s) with any backend, measured in a process of its own; none where it is not
+    """Return the times of steps (s) with any backend, measured in a separate process; empty if it is not
     installed or fails."""
     if backend not in choice.installed():
         return {}
@@ -114,14 +115,13 @@ def step_times_of(backend: str) -> dict[str, float]:
 
 
 def llvm_version() -> str:
-    """Return the version of the LLVM inside the backend, or "unknown"."""
+    """Return the version of the LLVM in the backend, or "unknown"."""
     version = getattr(ti._lib.core, "get_llvm_target_support", None)
     return str(version()) if version else "unknown"
 
 
 def findings() -> list[Finding]:
-    """Return the report. This takes some seconds, and starts nothing in this process but looks at CUDA
-    and Vulkan."""
+    """Return the report. It takes some seconds; in this process it only tests for CUDA and Vulkan."""
     cpu = processor()
     knows = support(choice.LLVM[BACKEND], cpu)
     report = [
@@ -148,7 +148,7 @@ def findings() -> list[Finding]:
 
 
 def _why() -> str:
-    """Return why this backend is in use."""
+    """Return the reason for the choice of this backend."""
     return f"named by {choice.VARIABLE}" if choice.named() else "chosen for this processor"
 
 
@@ -157,7 +157,7 @@ def _missing(name: str) -> str:
 
 
 def _advice(times: dict[str, dict[str, float]]) -> Finding:
-    """Return what the other backend would give: by its times, or by the table where it is not installed."""
+    """Return the gain from the other backend: from its times, or from the table if it is not installed."""
     other = next(name for name in choice.LLVM if name != BACKEND)
     mine, theirs = times[BACKEND], times[other]
     if not mine or not theirs:
@@ -175,12 +175,13 @@ def _advice(times: dict[str, dict[str, float]]) -> Finding:
 
 
 def _cuda() -> bool:
-    """Return whether a CUDA driver is there that a kernel could run on."""
+    """Return whether there is a CUDA driver that could run a kernel."""
     return any(Path(device).exists() for device in ("/dev/nvidia0", "/dev/dxg")) and ti._lib.core.with_cuda()
 
 
 def _vulkan() -> bool:
-    """Return whether a Vulkan driver is there; whether its loops end where they should, a start tells."""
+    """Return whether there is a Vulkan driver. Whether its loops work correctly is tested when it is
+    started."""
     return bool(ti._lib.core.with_vulkan())
 
 

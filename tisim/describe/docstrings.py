@@ -1,7 +1,7 @@
-"""What the docstring of a part says of it.
+"""Summary, body and source of a part, read from its docstring.
 
-It says what the part is in its first sentence, then its equations, indented, and what must be known of them;
-its last paragraph names the source.
+A docstring has a first sentence that says what the part is, then its equations, indented, and its
+assumptions. The last paragraph names the source.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PUBLICATIONS = {
     "L21": "T. Leps, Simulation of magnetic granular media using open source soft sphere DEM, thesis, "
     "University of Maryland (2021)",
 }
-"""These are the works that docstrings cite in short."""
+"""Works that docstrings cite in short form."""
 
 
 def summary(kind: type) -> str:
@@ -30,14 +30,15 @@ def summary(kind: type) -> str:
 
 
 def body(kind: type) -> str:
-    """Return the docstring but for its first sentence and its source."""
+    """Return the docstring without its first sentence and its source."""
     first, *rest = own_docstring(kind)[0].split("\n\n")
     opening = " ".join(first.split())[len(summary(kind)) :].lstrip(". ")
     return "\n\n".join(part for part in (opening, *rest) if part)
 
 
 def source(kind: type) -> str:
-    """Return what the docstring names as source; else the first work that its module cites in brackets."""
+    """Return the source named in the docstring; otherwise the first work that its module cites in
+    brackets."""
     if found := own_docstring(kind)[1]:
         return found
     module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
@@ -46,6 +47,6 @@ def source(kind: type) -> str:
 
 
 def own_docstring(kind: type) -> tuple[str, str]:
-    """Return the docstring of a class itself: what stands before its source, and the source."""
+    """Return the docstring of a class itself: the text before its source, and the source."""
     text, _, named = inspect.cleandoc(kind.__doc__ or "").partition("Source: ")
     return text.strip(), " ".join(named.split()).removesuffix(".")

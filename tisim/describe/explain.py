@@ -1,4 +1,5 @@
-"""What a scene is made of once compiled - effects, memory, phases of a step - and what it leaves out."""
+"""A description of a compiled scene: its effects, memory and phases of a step, and the effects it leaves
+out."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from tisim.state.fields import CORE
 
 @dataclass(frozen=True)
 class Memory:
-    """This memory is allocated for one world of the scene. bytes : its size. why : which parts need it."""
+    """Memory allocated for one world of the scene. bytes : its size. why : the parts that need it."""
 
     name: str
     bytes: int
@@ -30,14 +31,17 @@ class Memory:
 
 @dataclass(frozen=True)
 class Explanation:
-    """An explanation describes a scene, as one world of it is compiled.
+    """A description of a scene, as compiled for one world.
 
-    particles, capacity : at the start, and room for. steps : that a run takes at least. reason : why the
-    stepper is what it is, where the scene names none; else empty. critical : critical time steps (s) by
-    effect, the shortest first. materials : by name,
-    then what each two of them are to each other, by both names. memory : every allocation, fields first.
-    phases : of a step, in order; those with * are repeated until nothing waits. absent_effects : known, and
-    left out. absent_fields : (field, effects that would need it), not allocated.
+    particles, capacity : number of particles at the start, and the largest number.
+    steps : smallest number of steps of a run.
+    reason : why the stepper was chosen automatically; empty if the scene names one.
+    critical : critical time steps (s) by effect, the shortest first.
+    materials : the materials by name, then the contact properties of each two of them.
+    memory : every allocation, fields first.
+    phases : the phases of a step, in order; phases marked * are repeated until no particle waits.
+    absent_effects : known effects that the scene does not have.
+    absent_fields : (field, effects that would need it), not allocated.
     """
 
     name: str
@@ -62,7 +66,8 @@ class Explanation:
 
 
 def explain(scene: Scene) -> Explanation:
-    """Compose the scene under the running settings, look at it, and give its memory back; run nothing."""
+    """Return the explanation of a scene: it is composed with the current settings, but not run, and its
+    memory is freed."""
     simulation = Simulation(scene)
     try:
         memory = tuple(_memory(simulation, scene))
@@ -71,7 +76,7 @@ def explain(scene: Scene) -> Explanation:
         capacity, schedule = simulation.s.capacity, simulation.schedule
         precision = simulation.runtime.precision
     finally:
-        # Taichi checks the shapes of vectors at the next launch, and of these it would find none.
+        # At the next launch Taichi checks the shapes of vectors, and it would find none for these.
         simulation.s.read("count")
         simulation.close()
     absent = [kind for kind in known_effects() if kind not in {type(e) for e in scene.effects}]
@@ -95,7 +100,7 @@ def explain(scene: Scene) -> Explanation:
 
 
 def known_effects() -> list[type[Effect]]:
-    """Return every effect of the package, by name."""
+    """Return every effect of the package, sorted by name."""
     kinds_by_family = (
         reference.FAMILIES[family].kinds().values() for family in ("effects", "operators", "sources")
     )
@@ -134,8 +139,8 @@ def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tu
 
 
 def brief(explanation: Explanation) -> RenderableType:
-    """Return the explanation for one screen of a terminal: effects and materials with their parameters, the
-    stepper, and counts of the rest."""
+    """Return a short form of the explanation that fits one screen: effects and materials with their
+    parameters, the stepper, and counts of all other parts."""
     made_of = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
     made_of.add_column(no_wrap=True)
     made_of.add_column(overflow="fold")
@@ -168,24 +173,24 @@ def _head(explanation: Explanation) -> Text:
 
 def render(explanation: Explanation) -> RenderableType:
     """Return the whole explanation for a terminal."""
-    what = _table("It has", "effect", "what it is", "source")
+    what = _table("Parts of the scene", "effect", "description", "source")
     for whole in (*explanation.effects, *explanation.others):
         for part in whole.all():
             _add(what, part)
-    materials = _table("Its materials", "material", "what it is", "source")
+    materials = _table("Materials", "material", "description", "source")
     for part in explanation.materials:
         _add(materials, part)
-    memory = _table("It allocates", "", "bytes", "for")
+    memory = _table("Memory allocated", "", "bytes", "for")
     memory.columns[1].justify = "right"
     for item in explanation.memory:
         memory.add_row(item.name, f"{item.bytes:,}", item.why)
-    phases = Text.assemble(("A step runs  ", "italic"), " > ".join(explanation.phases))
-    absent = _table("It leaves out (not compiled, nothing allocated)", "effect", "what it is", "source")
+    phases = Text.assemble(("Phases of a step  ", "italic"), " > ".join(explanation.phases))
+    absent = _table("Effects left out (not compiled, nothing allocated)", "effect", "description", "source")
     for part in explanation.absent_effects:
         absent.add_row(part.name, part.summary, part.source)
     fields = [f"{name} (of {kinds_})" for name, kinds_ in explanation.absent_fields]
-    lacking = Text.assemble(("Fields it does without  ", "italic"), "; ".join(fields) or "none")
-    left_out = absent if explanation.absent_effects else Text("It leaves out no effect that tisim knows.")
+    lacking = Text.assemble(("Fields not allocated  ", "italic"), "; ".join(fields) or "none")
+    left_out = absent if explanation.absent_effects else Text("No effect of tisim is left out.")
     of_materials = (materials, "") if explanation.materials else ()
     return Group(
         _head(explanation),
@@ -205,10 +210,10 @@ def render(explanation: Explanation) -> RenderableType:
 
 
 def _time_steps(explanation: Explanation) -> RenderableType:
-    """Return the stepper, the reason for it where it was chosen, and the critical time steps."""
+    """Return the stepper, the reason if it was chosen automatically, and the critical time steps."""
     stepper = explanation.others[1].name
     why = (
-        f"{stepper}, chosen: {explanation.reason}" if explanation.reason else f"{stepper}, as the scene says"
+        f"{stepper}, chosen: {explanation.reason}" if explanation.reason else f"{stepper}, given by the scene"
     )
     head = Text.assemble(("Stepper  ", "italic"), why)
     if not explanation.critical:

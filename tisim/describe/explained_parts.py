@@ -1,4 +1,4 @@
-"""What a part of a scene is, for people: its law, its values, what it is made of; and what materials are."""
+"""Descriptions of the parts and materials of a scene: laws, values and nested parts."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from tisim.describe import docstrings, reference
 from tisim.materials.materials import HARMONIC, ContactProperties, Material, Materials, Touching
 
 Row = tuple[str, str, str, str]
-"""A row is the name, the value, the unit and the text of a number."""
+"""Name, value, unit and text of a number."""
 ROWS_SHOWN = 3
-"""This many rows of a list are shown."""
+"""Number of rows of a list that are shown."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part is an effect, the domain or the stepper of a scene, or what one of them is made of.
+    """The description of an effect, the domain or the stepper of a scene, or of a part nested in one.
 
-    name : in files. summary : one line. source : where the law is from. parameters : name, value, unit and
-    text of each. parts : what it is made of, such as the parts of a granular law.
+    name : name in files. summary : one line. source : origin of the law.
+    parameters : name, value, unit and text of each.
+    parts : nested parts, such as the parts of a granular law.
     """
 
     name: str
@@ -31,16 +32,16 @@ class Part:
     parts: tuple[Part, ...] = ()
 
     def all(self) -> Iterator[Part]:
-        """Yield it, and what it is made of."""
+        """Yield the part and all nested parts."""
         yield self
         for part in self.parts:
             yield from part.all()
 
 
 def explained(spec: Component, name: str = "") -> Part:
-    """Return what a part of a scene is, with its values and what it is made of.
+    """Return the description of a part of a scene, with its values and nested parts.
 
-    name : by which that leads to it that is made of it, such as ``granular.normal``.
+    name : dotted path of a nested part, such as ``granular.normal``.
     """
     label = name or spec.label
     made_of = tuple(
@@ -55,17 +56,17 @@ def explained(spec: Component, name: str = "") -> Part:
 
 
 def explained_kind(kind: type[Component]) -> Part:
-    """Return what a kind of part is."""
+    """Return the description of a kind of part, without values."""
     return Part(kind.kind(), docstrings.summary(kind), docstrings.source(kind), ())
 
 
 def _values(spec: Component, within: str = "") -> Iterator[Row]:
-    """Yield (name, value, unit, text) of each parameter; of a long list, of its first rows."""
+    """Yield (name, value, unit, text) of each parameter; for a long list, of its first rows only."""
     lists = dict(spec.lists())
     for name, info in type(spec).model_fields.items():
         value = getattr(spec, name)
         if name == "name":
-            continue  # It stands at the head.
+            continue  # The name is shown in the heading.
         if name in lists:
             for k, row in enumerate(value[:ROWS_SHOWN]):
                 yield from _values(row, f"{within}{name}.{k}.")
@@ -78,16 +79,16 @@ def _values(spec: Component, within: str = "") -> Iterator[Row]:
 
 
 def explained_materials(materials: Materials) -> Iterator[Part]:
-    """Yield the materials of a scene, then what each two of them are to each other where they touch."""
+    """Yield the materials of a scene, then the contact properties of each two of them."""
     for name, material in materials.named.items():
         yield Part(name, "a material", "", _given(material))
     for pair in materials.touching():
         if list(materials.named).index(pair.names[0]) <= list(materials.named).index(pair.names[1]):
-            yield Part("-".join(pair.names), "where they touch", "", (*_elastic(pair), *_mixed(pair)))
+            yield Part("-".join(pair.names), "contact properties", "", (*_elastic(pair), *_mixed(pair)))
 
 
 def _given(material: Material) -> tuple[Row, ...]:
-    """Return what is given of a material."""
+    """Return the properties that a material has."""
     return tuple(
         (name, f"{value:.6g}", unit_of(info), text_of(info).partition(";")[0])
         for name, info in type(material).model_fields.items()
@@ -108,9 +109,9 @@ def _mixed(pair: Touching) -> Iterator[Row]:
 
 
 def _origin(pair: Touching, name: str) -> str:
-    """Return where a property of a pair is from."""
+    """Return the origin of a property of a pair."""
     if pair.given is not None and getattr(pair.given, name) is not None:
         return "given for the pair"
     if getattr(pair.first, name) == getattr(pair.second, name):
-        return "that of each"
+        return "the same for both"
     return "harmonic mean" if name in HARMONIC else "geometric mean"

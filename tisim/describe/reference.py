@@ -1,6 +1,6 @@
-"""What there is to make a scene of, read from the code: ``tisim effects`` and the reference print it.
+"""The reference of all parts of a scene, read from the code for ``tisim effects`` and the documentation.
 
-A part's docstring says what it is (docstrings.py); parameters and options have their texts with them.
+The descriptions are the docstrings of the parts (docstrings.py) and the texts of parameters and options.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ from tisim.steppers.step_control import StepControl
 
 @dataclass(frozen=True)
 class Family:
-    """A family holds the parts of one sort.
+    """A family of parts, such as effects or steppers.
 
-    title : for people. base : what they are made after. place : the table of a scene file that holds one,
-    with ``NAME`` for its name where that is the key; elsewhere the name is the table's ``kind``.
+    title : heading. base : common base class.
+    place : table of a scene file that holds a part, with ``NAME`` in place of its name if the name is the
+        key; otherwise the name is the table's ``kind``.
     """
 
     title: str
@@ -51,7 +52,7 @@ class Family:
     place: str
 
     def kinds(self) -> dict[str, type[Component]]:
-        """Return those known, by name."""
+        """Return the known parts of the family, by name."""
         plugins.load_parts()
         serialization.load(packing)
         narrower = tuple(one.base for one in FAMILIES.values() if one.base in self.base.__subclasses__())
@@ -77,13 +78,13 @@ FAMILIES = {
     "pulses": Family("Pulses", Pulse, "particles.pulse"),
     "domains": Family("Domains", Domain, "domain"),
 }
-"""These are the families by name."""
+"""The families, by name."""
 
 
 @dataclass(frozen=True)
 class Declaration:
-    """A declaration is that of a parameter or option. rule : what it must be. default : as people read it; ""
-    where there is none."""
+    """The declaration of a parameter or option. rule : allowed values. default : as text; "" if there is
+    none."""
 
     name: str
     unit: str
@@ -94,11 +95,13 @@ class Declaration:
 
 @dataclass(frozen=True)
 class Entry:
-    """An entry is all that the code says of a part.
+    """The reference entry of a part.
 
-    summary : one sentence; body : the rest of its docstring, without the source. fields : (name, unit) of the
-    particle fields that it may need; needs : what else a scene must have. gives : what it counts and
-    measures. toml : a table of a scene file with all of its settings.
+    summary : first sentence of its docstring. body : the rest, without the source.
+    fields : (name, unit) of the particle fields that it may need.
+    needs : other requirements on the scene.
+    gives : its counters and measures.
+    toml : table of a scene file with all of its settings.
     """
 
     name: str
@@ -114,22 +117,22 @@ class Entry:
     toml: str
 
     def publications(self) -> list[str]:
-        """Return the works that its source cites in short, in full."""
+        """Return the full references of the works that its source cites in short form."""
         return [f"{short}: {work}" for short, work in docstrings.PUBLICATIONS.items() if short in self.source]
 
 
 def entries() -> list[Entry]:
-    """Return the entries of all parts that are known, family by family."""
+    """Return the entries of all known parts, family by family."""
     return [describe(kind, name) for name, family in FAMILIES.items() for kind in family.kinds().values()]
 
 
 def names() -> dict[str, tuple[type[Component], str]]:
-    """Return class and family of all parts that are known, by name."""
+    """Return class and family of all known parts, by name."""
     return {kind: (cls, family) for family, of in FAMILIES.items() for kind, cls in of.kinds().items()}
 
 
 def groups() -> dict[str, list[Entry]]:
-    """Return the entries of each family, and of each room within one (``contact``), by name."""
+    """Return the entries of each family, and of each subpackage of one (``contact``), by name."""
     groups: dict[str, list[Entry]] = {name: [] for name in FAMILIES}
     for entry in entries():
         groups[entry.family].append(entry)
@@ -140,8 +143,8 @@ def groups() -> dict[str, list[Entry]]:
 
 
 def find(name: str) -> Entry:
-    """Return the entry of a part by name; raise InputError with the known ones, and the nearest, for no
-    part."""
+    """Return the entry of a part by name; raise InputError, with the known and the nearest names, if there is
+    none."""
     known = names()
     if name not in known:
         rule, nearest = f"one of {', '.join(sorted(known))}", did_you_mean(name, (*known, *groups()))
@@ -197,8 +200,8 @@ def _suiting(control: Any) -> list[str]:
 
 
 def settings(kind: type[Checked]) -> tuple[Declaration, ...]:
-    """Return its parameters and options, in order, but for the name of an effect, which is that of its
-    table."""
+    """Return the parameters and options in order. The name of an effect is omitted, because it is the name of
+    its table."""
     shown = template.fields(kind) if issubclass(kind, Component) else kind.model_fields
     return tuple(_setting(name, info) for name, info in shown.items())
 
@@ -210,7 +213,7 @@ def _setting(name: str, info: FieldInfo) -> Declaration:
 
 
 def _rule(info: FieldInfo) -> str:
-    """Return what a value must be, beside what its unit says."""
+    """Return the allowed values, without those implied by the unit."""
     choices = [one for t in (info.annotation, *get_args(info.annotation)) for one in _choices(t)]
     if choices:
         return " or ".join(choices)
@@ -226,7 +229,7 @@ def _choices(annotation: Any) -> list[str]:
 
 
 def shown(value: object) -> str:
-    """Return a value as people read it."""
+    """Return a value as text."""
     if isinstance(value, Component):
         return value.kind()
     if isinstance(value, np.ndarray):

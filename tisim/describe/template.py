@@ -1,4 +1,4 @@
-"""Tables of a scene file with all settings of a part, each with its text, ready to be pasted and edited."""
+"""Tables of a scene file with all settings of a part and their texts, ready to be pasted and edited."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tisim.effects.base import Effect
 
 
 def toml(kind: type[Component], place: str, named: bool) -> str:
-    """Return the table ``[place]`` of a part, and those within it. named : whether it says its kind."""
+    """Return the table ``[place]`` of a part, and nested tables. named : whether the table has a ``kind``."""
     return "\n".join(_lines(kind, place, named))
 
 
 def fields(kind: type[Component]) -> dict[str, FieldInfo]:
-    """Return what a table says of a part; the name of an effect is that of its table."""
+    """Return the settings in the table of a part; the name of an effect is the name of its table."""
     infos = dict(kind.model_fields)
     if issubclass(kind, Effect):
         del infos["name"]
@@ -27,7 +27,7 @@ def fields(kind: type[Component]) -> dict[str, FieldInfo]:
 
 
 def _lines(kind: type[Component], place: str, named: bool, row: bool = False) -> Iterator[str]:
-    """Yield the lines of a table of a scene file with all settings of a part, and of the tables within it."""
+    """Yield the lines of a table of a scene file with all settings of a part, and of nested tables."""
     yield f"[[{place}]]" if row else f"[{place}]"
     if named:
         yield f'kind = "{kind.kind()}"'
@@ -49,7 +49,7 @@ def _lines(kind: type[Component], place: str, named: bool, row: bool = False) ->
 
 
 def example(info: FieldInfo) -> Any:
-    """Return the default of a setting, or a value that will do where it has none."""
+    """Return the default of a setting, or an example value if there is none."""
     default = None if info.is_required() else info.get_default(call_default_factory=True)
     if default is not None:
         return default

@@ -1,4 +1,4 @@
-"""The space a scene lives in: open, or a box whose opposite faces are joined along the axes of choice."""
+"""The domain of a scene: open space, or a box with opposite faces joined along chosen axes."""
 
 from __future__ import annotations
 
@@ -14,49 +14,49 @@ from tisim.errors import must
 from tisim.numerics.ieee import same
 
 Axes = tuple[bool, bool, bool]
-"""An answer for each axis: x, y and z."""
+"""A value for each axis: x, y and z."""
 NO_AXIS: Axes = (False, False, False)
 
 
 class Domain(Component):
-    """This is unbounded space, and the contract of a domain."""
+    """Unbounded space, and the contract of a domain."""
 
     contract: ClassVar[bool] = True
 
     def bounds(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Return the corners in m, shape (3,) each; None where there are none."""
+        """Return the corners in m, shape (3,) each; None if there are none."""
         return None, None
 
     def joined(self) -> Axes:
-        """Return along which axes opposite faces are joined, so that what leaves by one enters by the
-        other."""
+        """Return the axes along which opposite faces are joined, so that a particle that leaves through one
+        face enters through the other."""
         return NO_AXIS
 
     def imaged(self) -> Axes:
-        """Return along which axes particles see each other across joined faces."""
+        """Return the axes along which particles interact across joined faces."""
         return NO_AXIS
 
     def cyclic(self) -> Axes:
-        """Return along which axes a row of cells goes on across joined faces."""
+        """Return the axes along which rows of cells continue across joined faces."""
         return self.joined()
 
     def shears(self) -> bool:
-        """Return whether images move past the box."""
+        """Return whether images move relative to the box."""
         return False
 
     def edges(self, time: float) -> np.ndarray:
-        """Return the edges of the box (m) as vectors, a row for each axis, shape (3, 3): along joined axes
-        they lead from a particle to its images at a time (s)."""
+        """Return the edge vectors of the box (m) at a time (s), one row per axis, shape (3, 3). Along joined
+        axes they lead from a particle to its images."""
         low, high = self.bounds()
         return np.zeros((3, 3)) if low is None or high is None else np.diag(high - low)
 
     def streaming_velocity(self, position: np.ndarray) -> np.ndarray:
-        """Return ``streaming`` (m/s) at places (m), shape (n, 3)."""
+        """Return ``streaming`` (m/s) at positions (m), shape (n, 3)."""
         return np.zeros_like(position)
 
     @ti.func
     def wrap(self, w, r, t):
-        """Return the place (m) inside the domain, at time t (s), of a particle that has moved to r."""
+        """Return the position (m) inside the domain, at time t (s), of a particle that has moved to r."""
         return r
 
     @ti.func
@@ -66,77 +66,77 @@ class Domain(Component):
 
     @ti.func
     def lost(self, w, r):
-        """Return whether r is so far out that rounding has taken its place inside."""
+        """Return whether r is so far outside that rounding has lost its position within the box."""
         return 0
 
     @ti.func
     def separation(self, w, a, b, t):
-        """Return the vector (m) from a to b, at time t (s), as contacts and forces see it."""
+        """Return the vector (m) from a to b, at time t (s), that contacts and forces use."""
         return b - a
 
     @ti.func
     def nearest(self, w, a, b, t):
-        """Return the shortest vector (m) from a to b, at time t (s), across joined faces where there are
-        any."""
+        """Return the shortest vector (m) from a to b, at time t (s), across joined faces if there are any."""
         return b - a
 
     @ti.func
     def relative_velocity(self, s, w, i, j, separation):
-        """Return the velocity (m/s) relative to particle i of j, or of that image of it which is at
+        """Return the velocity (m/s), relative to particle i, of j or of the image of j that is at
         ``separation`` (m) from i."""
         return s.velocity[w, j] - s.velocity[w, i]
 
     @ti.func
     def shear_rate(self, w):
-        """Return the rate (1/s) at which images move past the box, over their distance."""
+        """Return the shear rate (1/s): the velocity of images relative to the box over their distance."""
         return 0.0
 
     @ti.func
     def streaming(self, w, r):
-        """Return the velocity (m/s) at r of the flow that images take part in."""
+        """Return the velocity (m/s) at r of the mean flow in which images move."""
         return ti.Vector([0.0, 0.0, 0.0])
 
     @ti.func
     def turn(self, w, a, b):
-        """Return which image of b, in faces that move past each other, is the nearest to a: -1, 0 or 1."""
+        """Return which image of b, across faces that move relative to each other, is nearest to a: -1, 0 or
+        1."""
         return 0
 
     @ti.func
     def seen_from(self, w, r, turn, t):
-        """Return the place (m) from which particles themselves are seen as their images of this ``turn`` are
-        from r."""
+        """Return the position (m) from which particles appear as their images of this ``turn`` appear from
+        r."""
         return r
 
     @ti.func
     def origin(self, w):
-        """Return the lower corner (m), where the domain is a box."""
+        """Return the lower corner (m) of a box."""
         return ti.Vector([0.0, 0.0, 0.0])
 
     @ti.func
     def side(self, w):
-        """Return the sides (m), where the domain is a box."""
+        """Return the side lengths (m) of a box."""
         return ti.Vector([0.0, 0.0, 0.0])
 
 
 class Open(Domain):
-    """The domain is all of space."""
+    """Unbounded space."""
 
 
 class Box(Domain):
-    """The domain is a box; what leaves it along a periodic axis comes back through the opposite face.
+    """A box; a particle that leaves it along a periodic axis re-enters through the opposite face.
 
-    Along any other axis space goes on beyond the faces, which hold nothing back: put walls there where grains
-    must stay. The faces then only say where a random start has room for whole spheres, what volume it is, and
-    what is drawn as the box.
+    Along any other axis space continues beyond the faces, which do not confine particles: use walls to
+    confine grains. Such faces only define the volume of the box, the region in which a random start places
+    whole spheres, and the box that is drawn.
 
-    With images, particles also see each other across joined faces: a periodic system, in which each sees the
-    nearest image of another, and no other. Two that could touch on both sides at once are refused, and so are
-    short-ranged laws that, when they begin, reach from centre to centre farther than half a side. Of a
-    force between all pairs only the part of the nearest image is summed, and it jumps where another becomes
-    the nearest.
+    With images, particles also interact across joined faces: in this periodic system each particle interacts
+    with the nearest image of every other particle only. A box is refused if two particles could touch on both
+    sides at once, or if the interaction range of a short-ranged law, between centres, exceeds half a side at
+    the start. For a force between all pairs only the contribution of the nearest image is summed, and the
+    force jumps when another image becomes the nearest.
 
-    Without images it is the control volume of Z04 section 7: a grain that leaves comes back on the other side
-    with the same velocity, and meets there whatever is there. (The paper reverses the coordinate; the two
+    Without images the box is the control volume of Z04 section 7: a grain that leaves re-enters on the other
+    side with the same velocity, and may overlap particles there. (The paper reverses the coordinate; the two
     differ by twice the overshoot, and translation keeps the particle inside.)
 
     Source: Z04 section 7.
@@ -182,13 +182,14 @@ class Box(Domain):
 
     @ti.func
     def enter(self, low, side, x):
-        """Return the place (m) of x between two faces a ``side`` apart, and how many sides up it was."""
+        """Return the position (m) of x between two faces a ``side`` apart, and the number of sides that were
+        subtracted."""
         inside, turns = x, 0.0 * x
-        # Not x - side * floor(...) for all: that would round what has not moved across a face.
+        # Only if x is outside: x - side * floor(...) would round positions that have not crossed a face.
         if not (x >= low and x < low + side):
             turns = ti.floor((x - low) / side)
             inside = x - side * turns
-            # Rounding can land exactly on the upper face, which is the lower one.
+            # Rounding can give exactly the upper face, which is identical to the lower one.
             if inside >= low + side:
                 inside = low
                 turns += 1.0
@@ -196,7 +197,7 @@ class Box(Domain):
 
     @ti.func
     def lost(self, w, r):
-        # A number so large that a thousandth of the side is below half of its last digit.
+        # The coordinate is so large that a thousandth of the side is below half a unit in the last place.
         blurred, lost = same(r + 1e-3 * self.side(w), r), 0
         for k in ti.static(range(3)):
             if ti.static(self.periodic[k]):
@@ -209,7 +210,7 @@ class Box(Domain):
 
     @ti.func
     def shortest(self, w, apart):
-        """Return the shortest vector (m) between two that are ``apart`` by at most one and a half sides."""
+        """Return the shortest image (m) of a separation vector of at most one and a half sides."""
         side, d = self.side(w), apart
         for k in ti.static(range(3)):
             if ti.static(self.periodic[k]):

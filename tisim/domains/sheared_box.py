@@ -17,26 +17,27 @@ Axis = Literal["x", "y", "z"]
 
 
 class ShearedBox(Box):
-    """The domain is a periodic box in simple shear: its images slide past it at a constant rate.
+    """A periodic box in simple shear, with images that move past it at a constant rate.
 
         u(r) = rate r_g e_f,    a(t) = L_g e_g + rate L_g t e_f
 
-    f is the axis of the flow and g that of the gradient. a(t) leads from a particle to its image one side L_g
-    up the gradient, which moves at rate L_g relative to it; at time 0 the images are in line. A particle that
-    leaves through a face across the gradient comes back through the other as the image that enters there, at
-    its place and with its velocity. So the system looks the same from each of its layers, and has no walls.
+    f is the flow axis and g the gradient axis. a(t) leads from a particle to its image one side L_g up the
+    gradient, which moves at the relative velocity rate L_g; at time 0 the images are aligned. A particle that
+    leaves through a face normal to the gradient is replaced by its image that enters through the opposite
+    face, with the position and the velocity of the image. The system is therefore equivalent in all its
+    layers and has no walls (Lees-Edwards boundary conditions).
 
-    Nothing but the images sets the particles in motion: give a start the flow u, or wait for it to spread.
-    What depends on the velocities of two particles takes that of the image. What acts on a particle by itself
-    must not tell one layer from another: gravity does not, and goes with this box; a fluid or a wall at rest
-    does, and is refused, as is what does not say that it is ``homogeneous``.
+    Only the images drive the flow: give the particles the initial velocity u, or wait until the flow has
+    developed. Laws that depend on the velocities of two particles use the velocity of the image. A law that
+    acts on single particles must be the same in all layers. Gravity is, and can be used; a fluid or a wall at
+    rest is not, and is refused, like every effect that does not declare itself ``homogeneous``.
 
     Source: A. W. Lees, S. F. Edwards, J. Phys. C 5 (1972) 1921.
     """
 
     rate: float = parameter("1/s", "shear rate", examples=[10.0])
-    flow: Axis = option("axis that images slide along", "x")
-    gradient: Axis = option("axis along which the velocity of the flow grows", "y")
+    flow: Axis = option("axis of the flow, along which images move", "x")
+    gradient: Axis = option("gradient axis, along which the velocity of the flow increases", "y")
 
     @model_validator(mode="after")
     def _shears(self) -> Self:
@@ -50,12 +51,12 @@ class ShearedBox(Box):
 
     @property
     def along(self) -> int:
-        """Return the number of the axis of the flow."""
+        """Return the index of the flow axis."""
         return "xyz".index(self.flow)
 
     @property
     def across(self) -> int:
-        """Return the number of the axis of the gradient."""
+        """Return the index of the gradient axis."""
         return "xyz".index(self.gradient)
 
     @property
@@ -93,21 +94,23 @@ class ShearedBox(Box):
 
     @ti.func
     def speed(self, w):
-        """Return the velocity (m/s), along the flow, of the image one side up the gradient."""
+        """Return the velocity (m/s), along the flow axis, of the image one side up the gradient."""
         return self.rate(w) * self.side(w)[self.across]
 
     @ti.func
     def offset(self, w, t):
-        """Return how far (m) along the flow the image one side up the gradient is, within half a side."""
+        """Return the offset (m) along the flow axis of the image one side up the gradient, within half a
+        side."""
         side = ti.cast(self.side(w), ti.f64)
         way = ti.cast(self.rate(w), ti.f64) * side[self.across] * t
         return ti.cast(way - side[self.along] * ti.round(way / side[self.along]), self.real)
 
     @ti.func
     def cross(self, w, r, t):
-        """Return the place (m) inside the box of the image of r, and how many sides up the gradient r is."""
+        """Return the position (m) inside the box of the image of r, and the number of sides that r is up the
+        gradient."""
         low, side, place = self.low(w), self.side(w), r
-        # Both come of one look at the faces: worked out twice they might be those of different images.
+        # Both are computed from one test of the faces; two tests could select different images.
         place[self.across], turns = self.enter(low[self.across], side[self.across], r[self.across])
         place[self.along] -= turns * self.offset(w, t)
         for k in ti.static(range(3)):

@@ -1,4 +1,5 @@
-"""Locks, appends and whole-file replacement leave files whole after a kill at any instant or a full disk."""
+"""Locks, appends and whole-file replacement that keep files intact if the process is killed or the disk is
+full."""
 
 from __future__ import annotations
 
@@ -17,11 +18,11 @@ except ImportError:
     fcntl = None  # type: ignore[assignment]
 
 _held: set[int] = set()
-"""The handles of the locks that this process holds."""
+"""Handles of the locks that this process holds."""
 
 
 def _after_fork() -> None:
-    """Close the locks of the parent in a child, which would hold them for as long as it lives."""
+    """Close the parent's locks in a forked child, which would otherwise hold them as long as it lives."""
     while _held:
         os.close(_held.pop())
 
@@ -30,17 +31,21 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)
 
 LOCK_TIMEOUT = 60.0
-"""This time, in s, is longer than any process at work holds a lock; one that is stopped holds it for good."""
+"""Default timeout in s, longer than any working process holds a lock; a suspended process may hold it for
+ever."""
 
 
 @contextlib.contextmanager
 def locked(path: Path, *, exclusive: bool, timeout: float | None = None) -> Iterator[int]:
-    """Hold the advisory lock of a lock file, among processes and threads; a killed holder lets go of it.
+    """Hold the advisory lock of a lock file, among processes and threads; it is released if the holder is
+    killed.
 
-    timeout : s, to wait for another holder; LOCK_TIMEOUT unless given.
-    It yields a handle of the file; of its folder, to a reader where no lock file is and none can be made.
-    A lock file stays behind on purpose: removing it would let two processes lock two different files.
-    Raise InputError where it cannot be had, RunError when another process holds it for longer.
+    timeout : time to wait for another holder, s; LOCK_TIMEOUT unless given.
+
+    Yields a handle of the file. For shared locks, if there is no lock file and none can be created, the
+    handle is of the folder. A lock file is never removed: otherwise two processes could lock two different
+    files. Raise InputError if the lock cannot be acquired, RunError if another process holds it longer than
+    the timeout.
     """
     if fcntl is None:
         raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
@@ -52,14 +57,15 @@ def locked(path: Path, *, exclusive: bool, timeout: float | None = None) -> Iter
         _wait_for_lock(handle, path, kind, LOCK_TIMEOUT if timeout is None else timeout)
         yield handle
     finally:
-        # A child that was forked meanwhile, and leaves by this way, has closed it already.
+        # A child forked in the meantime, which also leaves this context, has closed the handle already.
         if process == os.getpid():
             _held.discard(handle)
             os.close(handle)
 
 
 def _open_for_reading(path: Path) -> int:
-    """Return a handle to lock for reading: of the lock file, which may be another user's."""
+    """Return a handle for a shared lock: of the lock file, which may belong to another user, or of its
+    folder."""
     try:
         return open_descriptor(path, os.O_RDONLY)
     except FileNotFoundError:
@@ -83,14 +89,16 @@ def _wait_for_lock(handle: int, path: Path, kind: int, timeout: float) -> None:
                 raise RunError(f"{path} has been locked by another process for {timeout:g} s") from None
             time.sleep(0.002)
         except OSError as error:
-            raise InputError(f"{path} must be where files can be locked; received {error.strerror}") from None
+            raise InputError(
+                f"{path} must be on a file system with file locks; received {error.strerror}"
+            ) from None
 
 
 def append_at(path: Path, end: int, data: bytes) -> int:
-    """Cut the file at byte end, write data there and flush it to the disk; return the new end.
+    """Cut the file at byte ``end``, write data there and flush it to the disk; return the new end.
 
-    If the disk is full, the file is cut at end again and RunError raised: what was there before is whole.
-    Raise InputError when something that is no file is in its place.
+    If the disk is full, the file is cut at ``end`` again and RunError raised: earlier content is intact.
+    Raise InputError if path exists and is not a regular file.
     """
     try:
         handle = open_descriptor(path, os.O_RDWR | os.O_CREAT)
@@ -113,17 +121,19 @@ def append_at(path: Path, end: int, data: bytes) -> int:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Put data in the place of path so that path is, at every instant, the old file or a new one, whole.
+    """Replace the content of path atomically: at every instant path is either the old or the new file,
+    complete.
 
-    Writers of one path take turns: one name serves for the unfinished file, and a killed writer's is reused.
-    Raise RunError if the disk is full; path is then the old file. Raise InputError when something that is no
-    file has the unfinished one's name; a link in the place of path is replaced itself, not what it points to.
+    Writers of one path take turns: all use one name for the unfinished file, and reuse a file left by a
+    killed writer. Raise RunError if the disk is full; path is then the old file. Raise InputError if the name
+    of the unfinished file is taken by something other than a regular file. If path is a link, the link itself
+    is replaced, not its target.
     """
     new = path.with_name(temporary_name(path.name))
     try:
         while True:
             with locked(new, exclusive=True) as handle:
-                # Whoever had it before may have put it in its place; then that is the file locked here.
+                # The previous holder may have renamed it to path; then this lock is on that file.
                 if _refers_to(new, handle):
                     _write_and_rename(handle, new, path, data)
                     break
@@ -133,16 +143,16 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def temporary_name(name: str) -> str:
-    """Return what a file of this name is called while it is written."""
+    """Return the name of a file while it is being written."""
     return f"{name}.new"
 
 
 @contextlib.contextmanager
 def replacing(path: Path, new: Path) -> Iterator[None]:
-    """Let the caller write ``new``, an empty file at first; at the end put it in the place of path.
+    """Let the caller write ``new``, which is empty at first; at the end rename it to path.
 
-    Raise RunError if the disk is full; path is then the old file, and nothing unfinished is left. Raise
-    InputError when something that is no file is in the place of ``new``.
+    Raise RunError if the disk is full; path is then the old file, and no unfinished file is left. Raise
+    InputError if ``new`` exists and is not a regular file.
     """
     try:
         _create_empty(new)
@@ -156,9 +166,10 @@ def replacing(path: Path, new: Path) -> Iterator[None]:
 
 
 def _create_empty(path: Path) -> None:
-    """Make an empty file for those who write by name, in place of one that a killed process has left.
+    """Create an empty file to be opened by name, replacing one left by a killed process.
 
-    The old one may be a hard link or a symbolic one: what is written would go to what else has its name.
+    The old one is removed first: it may be a hard or symbolic link, and data would then be written to another
+    file.
     """
     if file_status(path) is not None:
         path.unlink()
@@ -173,7 +184,7 @@ def _refers_to(path: Path, handle: int) -> bool:
 
 
 def _write_and_rename(handle: int, new: Path, path: Path, data: bytes) -> None:
-    """Make data all that is in the file, on the disk, and put it in its place; take it away if that fails."""
+    """Write data to the file, flush it to the disk and rename it to path; remove it if that fails."""
     try:
         os.ftruncate(handle, 0)
         write_at(handle, data, 0)
@@ -185,7 +196,7 @@ def _write_and_rename(handle: int, new: Path, path: Path, data: bytes) -> None:
 
 
 def write_at(handle: int, data: bytes, offset: int) -> None:
-    """Write all of data into an open file from a byte on; OSError when there is no room for it."""
+    """Write all data into an open file at a byte offset; OSError if there is no space."""
     view = memoryview(data)
     while view:
         count = os.pwrite(handle, view, offset)
@@ -193,7 +204,7 @@ def write_at(handle: int, data: bytes, offset: int) -> None:
 
 
 def _sync_folder(path: Path) -> None:
-    """Flush the folder of a file to the disk: a new name is on the disk only when its folder is."""
+    """Flush the folder of a file to the disk, which makes a new file name durable."""
     handle = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -1,7 +1,7 @@
-"""HDF5 files that are written whole get a checksum behind their end, where HDF5 does not look.
+"""Checksums of complete HDF5 files, stored after the end of the HDF5 data, where HDF5 does not read.
 
-The HDF5 library, given a damaged structure, may read wrong data or never return: it must not be given one.
-The checksum is of the file, or of all of it but data that has checksums of its own.
+The HDF5 library may return wrong data or hang on a damaged file, so the checksum is verified before the file
+is opened. It covers the whole file, except data with checksums of their own.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from tisim.files.atomic import replace_file
 from tisim.files.framing import MAGIC, frame, scan
 from tisim.files.superblock import SIGNATURE
 
-OLDER_VERSION = "an older version has written it, whose files h5py still reads"
-"""Messages say this about a file that is of tisim but has no checksum."""
+OLDER_VERSION = "it was written by an older version, and h5py can read it"
+"""Message for a file of tisim that has no checksum."""
 
 
 @contextlib.contextmanager
 def create_file(path: Path) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file in memory; at the end give it its checksum and put it in the place of path.
+    """Yield a new HDF5 file in memory; at the end add its checksum and write it to path.
 
-    Raise RunError when it cannot be written; path is then what it was.
+    Raise RunError if it cannot be written; path is then unchanged.
     """
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
@@ -39,10 +39,11 @@ def create_file(path: Path) -> Iterator[h5py.File]:
 
 @contextlib.contextmanager
 def open_file(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> Iterator[h5py.File]:
-    """Yield a file that ``create_file`` has written. Raise InputError unless it is there, whole and of this
+    """Yield a file written by ``create_file``. Raise InputError unless it exists, is complete and of this
     kind.
 
-    kind : its attribute ``format``. what, rule : what it is called in messages, and what it must be.
+    kind : value of its attribute ``format``.
+    what, rule : its name in messages, and the rule that it must satisfy.
     """
     with h5py.File(io.BytesIO(read_image(path, what, rule)), "r") as file:
         must(file.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
@@ -50,10 +51,10 @@ def open_file(path: Path, what: str, kind: str, rule: str = "a file of tisim") -
 
 
 def read_image(path: Path, what: str, rule: str) -> bytes:
-    """Return the HDF5 file that was given to ``with_checksum``; raise InputError unless it is there and
-    whole.
+    """Return the HDF5 file that was given to ``with_checksum``; raise InputError unless it exists and is
+    complete.
 
-    what, rule : what it is called in messages, and what it must be.
+    what, rule : its name in messages, and the rule that it must satisfy.
     """
     content = regular_file.content(regular_file.target(path))
     if content is None:
@@ -67,14 +68,15 @@ def read_image(path: Path, what: str, rule: str) -> bytes:
 
 
 def with_checksum(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
-    """Return the file image with its checksum; data : (offset, size) in bytes of data that it leaves out."""
+    """Return the file image with its checksum. data : (offset, size) in bytes of data that the checksum
+    omits."""
     spans = sorted(data)
     trailer = {"size": len(image), "data": spans, "crc": _checksum(image, spans)}
     return image + frame(json.dumps(trailer).encode())
 
 
 def verified(content: bytes) -> bytes | None:
-    """Return the HDF5 file without its checksum; None where that is missing or damaged, or does not fit."""
+    """Return the HDF5 file without its checksum; None if the checksum is missing, damaged or wrong."""
     start = max(content.rfind(MAGIC), 0)
     payloads = scan(content[start:]).payloads
     if not content.startswith(SIGNATURE) or not payloads:
@@ -84,7 +86,7 @@ def verified(content: bytes) -> bytes | None:
         image = content[:start]
         whole = len(image) == trailer["size"] and _checksum(image, trailer["data"]) == trailer["crc"]
     except (ValueError, KeyError, TypeError):
-        # A frame, but of something else.
+        # It is a frame with other content.
         return None
     return image if whole else None
 

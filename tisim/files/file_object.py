@@ -1,4 +1,4 @@
-"""The base class of files that ``h5py.File`` reads or writes keeps the position of the next access."""
+"""Base class of file objects for ``h5py.File``; it keeps the position of the next access."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import os
 
 
 class Seekable(io.RawIOBase):
-    """A seekable file owns its handle. Subclasses say where the file ends, and access it from ``_position``
+    """A seekable file that owns its handle. Subclasses define its size, and access it at ``_position``
     (bytes)."""
 
     def __init__(self, handle: int) -> None:
         self._handle, self._position = handle, 0
 
     def _size(self) -> int:
-        """Return where the file ends, bytes."""
+        """Return the size of the file, bytes."""
         raise NotImplementedError
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:

@@ -1,4 +1,4 @@
-"""Frames: payloads with a length and a checksum, one after another in a sequence of bytes.
+"""Frames: payloads with a length and a checksum, one after another in a byte sequence.
 
 A frame is magic (4 bytes), length (u32), CRC-32 of the payload (u32), payload. The magic is not ASCII and
 payloads are, so it never occurs inside one.
@@ -16,11 +16,13 @@ _HEAD = struct.Struct("<4sII")
 
 @dataclass(frozen=True)
 class Scan:
-    """A scan holds the frames that were found in a sequence of bytes.
+    """The frames found in a byte sequence.
 
-    payloads : those of the whole frames, in order; end : byte offset after the last whole frame.
-    damaged : byte offsets where whole frames follow something that is none: not a torn tail but damage.
-    torn : number of bytes after end, left by a writer that was killed.
+    payloads : payloads of the complete frames, in order.
+    end : byte offset after the last complete frame.
+    damaged : byte offsets of invalid data that are followed by complete frames, which indicates damage and
+        not an interrupted write.
+    torn : number of bytes after ``end``, left by a writer that was killed.
     """
 
     payloads: list[bytes]
@@ -43,7 +45,7 @@ def _payload_at(data: bytes, offset: int) -> bytes | None:
 
 
 def scan(data: bytes, base: int = 0) -> Scan:
-    """Read frames from data, whose first byte lies at offset base of the file."""
+    """Read frames from data that begin at the file offset ``base``."""
     payloads: list[bytes] = []
     damaged: list[int] = []
     offset = end = 0

@@ -1,10 +1,11 @@
-"""An HDF5 file that grows: any reader can open it after every write, and a full disk ends no process.
+"""An HDF5 file that is readable after every write, also while it grows, and handles a full disk.
 
-HDF5 in its single-writer mode writes what is new before what refers to it, so a file is sound after every
-write but for its superblock: that marks the file as open, which keeps readers out for good when the writer
-is killed, and says where the file ended when it was opened. And when a write fails, HDF5 ends the process.
-So it writes to the object below, which leaves the mark out, keeps the superblock's end of the file up to
-date, and reports what could not be written to its owner and not to HDF5, for which it is kept in memory.
+HDF5 in its single-writer mode writes new data before the references to it. After every write a file is
+therefore valid, except for its superblock, which marks the file as open and has the end of the file from when
+it was opened. If the writer is killed, the mark keeps readers out for ever. Besides, HDF5 terminates the
+process if a write fails. Therefore HDF5 writes to the object below, which leaves out the mark and keeps the
+end of the file in the superblock up to date. A failed write is reported to the owner of the object and not to
+HDF5; its data is kept in memory.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from tisim.files.superblock import SIZE, superblock
 
 
 class GrowingFile(Seekable):
-    """A growing file is the HDF5 file at path, with a superblock of version 3, as h5py.File writes to it.
+    """The HDF5 file at path, with a superblock of version 3, as written by h5py.File.
 
-    failure : why something could not be written, after which nothing is; None while all is well.
+    failure : the error of the first failed write, after which nothing more is written; None before.
 
-    A process that is forked while it is open has the same file, and writes nothing to it: what HDF5 writes as
-    that process ends would be of the moment of the fork.
+    A forked process shares the open file but writes nothing to it, because HDF5 would flush its state at the
+    time of the fork when that process ends.
     """
 
     def __init__(self, path: Path) -> None:
@@ -62,12 +63,12 @@ class GrowingFile(Seekable):
         self._end = end
 
     def _record_failure(self, failure: OSError) -> None:
-        """Note the failure, and give back what was written of a piece behind the end."""
+        """Record the failure, and truncate data of an incomplete write after the end."""
         self.failure = failure
         os.ftruncate(self._handle, self._end)
 
     def truncate(self, size: int | None = None) -> int:
-        """Make the file at least this long, bytes; HDF5 asks for it once all is written."""
+        """Extend the file to at least this length, bytes; HDF5 calls it after all data is written."""
         end = self._end if size is None else size
         if self.failure is None and end > self._end and self._process == os.getpid():
             try:

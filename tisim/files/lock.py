@@ -1,7 +1,8 @@
-"""One command at a time makes files in a folder: it holds a lock for as long as it is at work.
+"""A lock on an output folder: one command at a time writes files there, and holds the lock while it works.
 
-The lock is of a file of its own, which stays (see tisim.files.atomic.locked); a killed process lets go of it.
-Commands that draw or copy what is in a folder do without, so that a run can be looked at while it goes on.
+The lock is on a separate file that is never removed (see tisim.files.atomic.locked), and is released if the
+process is killed. Commands that draw or copy results do not take it, so that a run can be viewed while it
+continues.
 """
 
 from __future__ import annotations
@@ -16,12 +17,11 @@ from tisim.files.atomic import locked
 
 LOCK = ".tisim.lock"
 AT_WORK_TIMEOUT = 1.0
-"""This time, in s, is far longer than it takes to see whether a folder is in use, for which the lock is held
-as well."""
+"""Default timeout in s. It is much longer than a test for another process, which also holds the lock."""
 
 
 def check(folder: Path, timeout: float = AT_WORK_TIMEOUT) -> None:
-    """Raise InputError where another process is at work in the folder; touch nothing."""
+    """Raise InputError if another process works in the folder; nothing is changed."""
     if regular_file.file_status(folder / LOCK) is not None:
         with acquire(folder, exclusive=False, timeout=timeout):
             pass
@@ -29,9 +29,9 @@ def check(folder: Path, timeout: float = AT_WORK_TIMEOUT) -> None:
 
 @contextmanager
 def acquire(folder: Path, *, exclusive: bool = True, timeout: float = AT_WORK_TIMEOUT) -> Iterator[None]:
-    """Hold the lock of a folder, which exists; raise InputError where another process holds it.
+    """Hold the lock of an existing folder; raise InputError if another process holds it.
 
-    exclusive : False to share it with those who only read. timeout : to wait for the other one, s.
+    exclusive : False to share the lock with readers. timeout : time to wait for another process, s.
     """
     with ExitStack() as stack:
         try:

@@ -1,8 +1,7 @@
-"""Files that tisim has written to a folder it may replace, others only with ``--overwrite``.
+"""Protection of files that tisim has not written: they are replaced only with ``--overwrite``.
 
-The marker ``.tisim`` in a folder names the files that tisim has written to it, one a line; a file that it
-does not name is of another origin. A folder without a marker may be of version 0.1.0, which made none: it is
-known by its main files.
+The marker file ``.tisim`` in a folder lists the files that tisim has written there, one per line; all other
+files are foreign. Version 0.1.0 wrote no marker: its folders are recognised by their main files.
 """
 
 from __future__ import annotations
@@ -20,17 +19,17 @@ from tisim.files.superblock import SIGNATURE
 
 MARKER = ".tisim"
 NAMES_SHOWN = 5
-"""A message spells out this many names of files at most."""
+"""Largest number of file names in a message."""
 _HEAD = 1 << 20
 """The attributes of an HDF5 file lie within this many bytes of its beginning."""
 
 
 @dataclass(frozen=True)
 class LegacyFiles:
-    """These are the names of files that version 0.1.0 left in a folder.
+    """Names of files that version 0.1.0 wrote to a folder.
 
-    main : those from which it could resume or draw; where there is one but no marker, these and the others
-    are of tisim's writing.
+    main : files from which it could resume or draw. If one of them exists without a marker, these and the
+        others are taken as written by tisim.
     """
 
     main: tuple[str, ...]
@@ -55,13 +54,14 @@ LEGACY_FILES = (
     ),
     LegacyFiles(("compare.h5", "compare.h5.journal"), ("compare.h5.lock", "compare.csv")),
 )  # fmt: skip
-"""Whatever is written to a folder first, it is all in the marker that is then made."""
+"""When a marker is created in such a folder, it lists these names too."""
 
 
 def check(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
-    """Raise InputError when files of these names would replace what tisim has not written; touch nothing.
+    """Raise InputError if files of these names would replace files that tisim has not written; nothing is
+    changed.
 
-    overwrite : replace it all the same. A link, folder, fifo or device of such a name is refused always.
+    overwrite : replace them nevertheless. A link, folder, fifo or device of such a name is always refused.
     """
     owned, foreign = _owned_names(folder), []
     for name in names:
@@ -73,9 +73,9 @@ def check(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
 
 
 def check_all(folder: Path, overwrite: bool = False) -> None:
-    """Raise InputError unless tisim has written all files in a folder; touch nothing.
+    """Raise InputError unless tisim has written all files in a folder; nothing is changed.
 
-    It is the ``check`` of a command that does not know its names before it ends.
+    This is the ``check`` of a command whose file names are known only at its end.
     """
     if overwrite or not regular_file.is_folder(folder):
         return
@@ -92,9 +92,9 @@ def check_all(folder: Path, overwrite: bool = False) -> None:
 
 
 def claim(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
-    """Make the folder, and mark it: from now on files of these names are of tisim's writing.
+    """Create the folder, and record these file names in its marker as written by tisim.
 
-    Raise InputError when one would replace another's file (see ``check``), or the folder cannot be written
+    Raise InputError if a foreign file would be replaced (see ``check``), or if the folder cannot be written
     to.
     """
     claimed = list(names)
@@ -103,22 +103,22 @@ def claim(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
     if set(claimed) <= _marked_names(folder):
         return
     with locked(folder / MARKER, exclusive=True):
-        # Another process may have written to the folder since.
+        # Another process may have written to the folder since the first check.
         check(folder, claimed, overwrite)
         content = regular_file.content(folder / MARKER) or b""
-        # The last name that a killed writer has left may lack the end of its line.
+        # The last line may lack its end if the writer was killed.
         newline = b"\n" if content and not content.endswith(b"\n") else b""
         added = sorted({*claimed, *_owned_names(folder)} - _marked_names(folder))
         append_at(folder / MARKER, len(content), newline + "".join(f"{name}\n" for name in added).encode())
 
 
 def has_results(folder: Path) -> bool:
-    """Return whether there is a file that tisim has written, by the marker."""
+    """Return whether the folder has a file that is listed in the marker."""
     return any(regular_file.exists(folder / name) for name in _marked_names(folder) - {LOCK})
 
 
 def ensure_writable(folder: Path) -> None:
-    """Make a folder, and raise InputError unless files can be made in it."""
+    """Create a folder, and raise InputError unless files can be created in it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -138,14 +138,14 @@ def _foreign_files_error(folder: Path, foreign: Sequence[str], why: str) -> Inpu
 
 
 def _owned_names(folder: Path) -> set[str]:
-    """Return names of files that tisim has written, or would have."""
+    """Return the names of files that tisim has written, or may have written."""
     marked = _marked_names(folder)
     if marked:
         return marked
     present = [
         legacy for legacy in LEGACY_FILES if any(_written_by_tisim(folder / name) for name in legacy.main)
     ]
-    # A lock file is there only where a marker was, which somebody has removed.
+    # If there is a lock file, there was a marker that somebody has removed.
     return {LOCK for _ in present} | {name for legacy in present for name in (*legacy.main, *legacy.others)}
 
 
@@ -154,6 +154,6 @@ def _marked_names(folder: Path) -> set[str]:
 
 
 def _written_by_tisim(path: Path) -> bool:
-    """Return whether tisim has written an HDF5 file or a journal; its structure is not read."""
+    """Return whether tisim has written an HDF5 file or a journal; only the first bytes are read."""
     head = regular_file.content(path, _HEAD) or b""
     return head.startswith(framing.MAGIC) or (head.startswith(SIGNATURE) and b"tisim" in head)

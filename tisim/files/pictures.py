@@ -1,7 +1,8 @@
-"""Pictures beside data: they are drawn after the data are written, and one that cannot be drawn is left out.
+"""Pictures of data: they are drawn after the data are written, and skipped if drawing fails.
 
-Matplotlib refuses to be imported where MPLBACKEND names a display that is not installed, as in a command that
-a notebook runs in another environment. Pictures go to files here, for which it needs no display.
+Importing Matplotlib fails if MPLBACKEND names a backend that is not installed, for example in a command
+started from a notebook in another environment. Pictures are written to files here, so the variable is ignored
+during the import.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 150
-"""The resolution of pictures, unless another is asked for."""
+"""Default resolution of pictures."""
 
 
 @contextmanager
 def drawing(what: str) -> Iterator[None]:
-    """Draw within this context, whatever display the environment asks for. Raise RunError, which names
-    ``what`` is drawn, for whatever goes wrong there."""
+    """Draw within this context, independent of MPLBACKEND. Raise RunError, naming ``what`` is drawn, for any
+    error."""
     try:
         _import_matplotlib()
         yield
@@ -40,7 +41,7 @@ def drawing(what: str) -> Iterator[None]:
 
 
 def image(figure: Figure, kind: str = "png", dpi: float = DOTS_PER_INCH) -> bytes:
-    """Return a figure as the bytes of a file of that kind, such as "png" or "pdf"."""
+    """Return a figure as the bytes of a file of this kind, such as "png" or "pdf"."""
     file = io.BytesIO()
     figure.savefig(file, format=kind, dpi=dpi)
     return file.getvalue()
@@ -49,7 +50,7 @@ def image(figure: Figure, kind: str = "png", dpi: float = DOTS_PER_INCH) -> byte
 def write(path: Path, draw: Callable[[], Figure], dpi: float = DOTS_PER_INCH) -> Path:
     """Draw a figure and write it, in the format of the suffix; return the path.
 
-    Raise RunError where it cannot be drawn, or the disk is full; path is then what it was.
+    Raise RunError if it cannot be drawn, or the disk is full; path is then unchanged.
     """
     with drawing(str(path)):
         content = image(draw(), path.suffix[1:] or "png", dpi)
@@ -58,10 +59,10 @@ def write(path: Path, draw: Callable[[], Figure], dpi: float = DOTS_PER_INCH) ->
 
 
 def write_beside_data(path: Path, draw: Callable[[], Figure], dpi: float = DOTS_PER_INCH) -> list[Path]:
-    """Draw and write a picture of data that are written; return its path in a list.
+    """Draw and write a picture of written data; return its path in a list.
 
-    Where it cannot be drawn or written, one line on standard error says so, and the list is empty; a picture
-    of earlier data is removed.
+    If that fails, a line is printed on standard error, the list is empty, and a picture of earlier data is
+    removed.
     """
     try:
         return [write(path, draw, dpi)]
@@ -73,7 +74,7 @@ def write_beside_data(path: Path, draw: Callable[[], Figure], dpi: float = DOTS_
 
 
 def _import_matplotlib() -> None:
-    """Import matplotlib without MPLBACKEND, and then ask for that display as the variable would have."""
+    """Import matplotlib without MPLBACKEND, then select the backend that the variable names."""
     if "matplotlib" in sys.modules:
         return
     display = os.environ.pop("MPLBACKEND", None)

@@ -1,7 +1,7 @@
-"""Python files of the user are imported under their own names, with the text that they had then.
+"""Python files of the user, imported under their own names with the text they had when first read.
 
-Pickles name a class by module and name, so a worker imports the same texts under the same names before it
-reads one. A checksum of the text tells physics and objectives of one version of a file from those of another.
+Pickles refer to a class by module and name, so a worker imports the same texts under the same names before it
+unpickles. The checksum of the text distinguishes physics and objectives of different versions of a file.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from typing import Any
 from tisim.errors import InputError, abbreviated, must, printable
 
 OWN_PACKAGES = ("tisim", "tisim.optimize", "tisim.cases")
-"""These packages have a version that says what they compute. The last two may lie beside the first."""
+"""Packages whose results are identified by their version. The last two may be installed beside the first."""
 
 
 @dataclass(frozen=True)
 class PythonFile:
-    """This is a Python file that was read.
+    """A Python file as it was read.
 
-    name : under which it is imported. path : where it was read. text : its bytes.
+    name : module name. path : location when it was read. text : its bytes.
     """
 
     name: str
@@ -43,7 +43,7 @@ class PythonFile:
 
 
 def is_own(module: str) -> bool:
-    """Return whether a module, by its name, is one of tisim's."""
+    """Return whether a module name belongs to tisim."""
     return module == "tisim" or module.startswith("tisim.")
 
 
@@ -64,10 +64,10 @@ _names: set[str] = set()
 
 
 def load(path: str | Path) -> ModuleType:
-    """Import a file under its own name, without .py; a file that has not changed since is not run again.
+    """Import a file under its own name, without .py; an unchanged file is not executed again.
 
-    Raise InputError in one line when there is no such file, it cannot be imported (which line, and why), or
-    another module has its name.
+    Raise InputError in one line if there is no such file, if it cannot be imported (with the line and the
+    reason), or if another module has its name.
     """
     file_path = Path(path)
     must(file_path.suffix == ".py" and "." not in file_path.stem, "Python file", "named NAME.py", str(path))
@@ -79,9 +79,9 @@ def load(path: str | Path) -> ModuleType:
 
 
 def install(file: PythonFile) -> ModuleType:
-    """Import a text under a name, in place of any other text that had it. Raise InputError when it cannot
-    be."""
-    # Taichi reads the source of what it compiles; without a time, it is not looked for on the disk.
+    """Import a text under a module name, replacing an earlier text. Raise InputError if that fails."""
+    # Taichi reads the source of compiled functions; without a modification time, linecache does not check the
+    # disk.
     lines = file.text.decode(errors="replace").splitlines(keepends=True)
     linecache.cache[file.path] = (len(file.text), None, lines, file.path)
     _names.add(file.name)
@@ -99,12 +99,12 @@ def unload(name: str) -> None:
 
 
 def loaded_files() -> tuple[PythonFile, ...]:
-    """Return all files of the user that have been imported, in order."""
+    """Return all imported files of the user, in order."""
     return tuple(_current.values())
 
 
 def is_superseded(kind: type) -> bool:
-    """Return whether a class is of a text that another has replaced since."""
+    """Return whether a class is from a text that was replaced by a newer one."""
     if kind.__module__ not in _names:
         return False
     return vars(sys.modules.get(kind.__module__, object)).get(kind.__name__) is not kind
@@ -113,7 +113,7 @@ def is_superseded(kind: type) -> bool:
 def module_checksums(*items: Any) -> dict[str, str]:
     """Return the checksum of each module outside of tisim that defines these functions, classes or bases.
 
-    A file that was loaded here brings those of the other loaded files that it takes something from.
+    For a file loaded here, the checksums of other loaded files that it uses are included.
     """
     result: dict[str, str] = {}
     for item in items:
@@ -140,7 +140,8 @@ def _add(module: str, item: Any, result: dict[str, str]) -> None:
 
 
 def _file_checksum(module: str, item: Any) -> str:
-    """Return the SHA-256 of the file of a module that Python imported itself, or of code of a notebook."""
+    """Return the SHA-256 of the file of a module that Python imported itself, or of the source in a
+    notebook."""
     path = getattr(sys.modules.get(module), "__file__", None)
     try:
         text = Path(path).read_bytes() if path else inspect.getsource(item).encode()
@@ -151,7 +152,7 @@ def _file_checksum(module: str, item: Any) -> str:
 
 def _read(path: Path) -> bytes:
     try:
-        # Neither a folder nor a pipe, which may never end.
+        # Folders and pipes are refused; reading a pipe may never end.
         must(path.is_file() or not path.exists(), "Python file", "a file", str(path))
         return path.read_bytes()
     except FileNotFoundError:
@@ -162,7 +163,7 @@ def _read(path: Path) -> bytes:
 
 
 def _existing_module(file: PythonFile) -> str | None:
-    """Return where the module of this name is, imported already or to be found; None where there is none."""
+    """Return the location of the module of this name, imported or importable; None if there is none."""
     if file.name in _current:
         return _current[file.name].path
     if file.name in sys.modules:
@@ -172,7 +173,7 @@ def _existing_module(file: PythonFile) -> str | None:
 
 
 class _TextLoader(importlib.abc.SourceLoader):
-    """The loader gives Python the text that was read, whatever has become of the file."""
+    """A loader that gives Python the text that was read, even if the file has changed."""
 
     def __init__(self, file: PythonFile) -> None:
         self.file = file
@@ -204,13 +205,13 @@ def _execute(file: PythonFile) -> ModuleType:
 
 
 def _imported_by_python(module: ModuleType, file: PythonFile) -> bool:
-    """Return whether Python itself has imported this text."""
+    """Return whether Python's own import system has imported this text."""
     path = getattr(module, "__file__", None)
     return file.name not in _current and path is not None and Path(path).read_bytes() == file.text
 
 
 def _import_error(file: PythonFile, error: BaseException) -> str:
-    """Return the message that a file cannot be imported: where, and why; in one line."""
+    """Return the message that a file cannot be imported, with line and reason, on one line."""
     if isinstance(error, SyntaxError) and error.filename == file.path:
         line, why = error.lineno, error.msg
     else:

@@ -1,7 +1,7 @@
-"""Regular files are opened without following a link and without waiting.
+"""Opening of regular files without following links and without blocking.
 
-A link in the place of a file of ours would have us write over what it points to; a fifo would have us wait
-for ever. Both are refused, and so is what may not be opened, in words.
+A link in place of an output file would redirect writes to its target, and a fifo would block for ever. Both
+are refused, as are files that may not be opened, with a message.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tisim.errors import InputError, printable
 
 _REFUSALS = {
     errno.ELOOP: "a symbolic link",
-    errno.EMLINK: "a symbolic link",  # what FreeBSD says
+    errno.EMLINK: "a symbolic link",  # FreeBSD's error for a link
     errno.EISDIR: "a folder",
     errno.ENXIO: "a socket or device",
     errno.ENODEV: "a device",
@@ -28,10 +28,10 @@ _WRITING = os.O_WRONLY | os.O_RDWR
 
 
 def open_descriptor(path: Path, flags: int) -> int:
-    """Return a file descriptor of the file of this name; flags : those of os.open.
+    """Return a file descriptor of the file of this name. flags : flags of os.open.
 
-    Raise InputError unless it is a regular file that may be opened, and one to be written to has no other
-    name (a hard link). Other errors (no such file, a full disk) are those of os.open.
+    Raise InputError unless it is a regular file that may be opened; a file opened for writing must not have
+    another name (hard link). Other errors (no such file, a full disk) are raised as by os.open.
     """
     _check_name(path)
     try:
@@ -49,7 +49,7 @@ def open_descriptor(path: Path, flags: int) -> int:
 
 
 def file_status(path: Path) -> os.stat_result | None:
-    """Return the os.stat_result of the file of this name, None where there is none.
+    """Return the os.stat_result of the file of this name, None if there is none.
 
     Raise InputError unless it is a regular file; see ``open_descriptor``.
     """
@@ -67,34 +67,31 @@ def file_status(path: Path) -> os.stat_result | None:
 
 
 def exists(path: Path) -> bool:
-    """Return whether anything of this name exists, links followed; raise InputError where that is
-    forbidden."""
+    """Return whether anything of this name exists, following links; raise InputError if access is denied."""
     return _stat_following_links(path) is not None
 
 
 def irregular(path: Path) -> str | None:
-    """Return in words which kind of file other than a regular one has this name, links followed; None where
-    none has."""
+    """Return the kind of a file that is not regular, as text, following links; None if it is regular or
+    missing."""
     info = _stat_following_links(path)
     return None if info is None else _irregular_kind(info)
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a folder of this name exists, links followed; raise InputError where that is
-    forbidden."""
+    """Return whether a folder of this name exists, following links; raise InputError if access is denied."""
     info = _stat_following_links(path)
     return info is not None and stat.S_ISDIR(info.st_mode)
 
 
 def target(path: Path) -> Path:
-    """Return the path that a path leads to, links followed; raise InputError where no file can have its
-    name."""
+    """Return the path with all links resolved; raise InputError if it is not a valid file name."""
     _check_name(path)
     return Path(os.path.realpath(path))
 
 
 def _check_name(path: Path) -> None:
-    """Raise InputError for a name with a NUL, which Python passes on to no system call."""
+    """Raise InputError for a name with a NUL, which Python cannot pass to system calls."""
     if "\0" in str(path):
         raise _not_regular(path, "a name with a NUL")
 
@@ -113,7 +110,7 @@ def _stat_following_links(path: Path) -> os.stat_result | None:
 
 
 def content(path: Path, most: int = -1) -> bytes | None:
-    """Return the bytes of a file, at most ``most`` from its beginning; None where there is none.
+    """Return the bytes of a file, at most ``most`` from its beginning; None if there is no file.
 
     Raise InputError unless it is a regular file that can be read; see ``open_descriptor``.
     """

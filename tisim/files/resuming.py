@@ -1,8 +1,8 @@
-"""One rule says whether a command resumes what an earlier one has left in its folder.
+"""The rule for resuming earlier work in an output folder, the same for all commands.
 
-The same command, given again, goes on where it was stopped. With ``--fresh`` it begins anew, with
-``--overwrite`` also where results are lost by that, and with ``--resume`` it has to find something to go on
-with. Whether what is there is of the same scene or search, each command sees for itself.
+By default the same command, given again, resumes where it was stopped. ``--fresh`` starts from the beginning,
+but not if results would be lost; ``--overwrite`` does so even then. ``--resume`` requires something to
+resume. Each command checks itself whether the stored work is of the same scene or search.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ from tisim.errors import Words, must
 def resumes(
     folder: Path, command: str, resumable: bool, results: str, fresh: bool | None, overwrite: bool
 ) -> bool:
-    """Return whether a command resumes what is in its folder; raise InputError where it may not, nor begin
-    anew.
+    """Return whether a command resumes the work in its folder; raise InputError if it may neither resume nor
+    start from the beginning.
 
-    command : what it makes, for messages, such as "run". resumable : whether there is something to resume.
-    results : in words, what would be lost by beginning anew; empty where that is nothing. fresh : True for
-    ``--fresh``, False for ``--resume``, None where neither is given.
+    command : product of the command, for messages, such as "run".
+    resumable : whether there is something to resume.
+    results : description of the results that would be lost by starting from the beginning; empty if there are
+        none.
+    fresh : True for ``--fresh``, False for ``--resume``, None if neither is given.
     """
     place = "output folder"
     must(fresh is not False or not overwrite, "--overwrite", "given without --resume", Words("both"))
@@ -31,9 +33,9 @@ def resumes(
 
 
 def resume_hint(fresh: bool | None, overwrite: bool, first: str = "") -> str:
-    """Return the sentence that says which command resumes one that was stopped, given its options.
+    """Return the sentence that tells how to resume a stopped command with these options.
 
-    first : what is to be done before.
+    first : an action to take before, as text.
     """
     omitted = [name for name, is_given in (("--fresh", fresh), ("--overwrite", overwrite)) if is_given]
     without = f", without {' and '.join(omitted)}" if omitted else ""

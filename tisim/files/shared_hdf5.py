@@ -1,8 +1,8 @@
-"""An HDF5 file that another process may be writing (see growing_hdf5.py) is read as a file object.
+"""A file object for reading an HDF5 file that another process may be writing (see growing_hdf5.py).
 
-A reader that has found the end of the file meets, a moment later, data behind that end. HDF5 refuses them, so
-it hears that the file ends where no file does; what is not there is then missing from a block that has a
-checksum.
+After a reader has read the end of the file from the superblock, the writer may add data beyond it, and HDF5
+refuses such data. HDF5 is therefore given an end of the file that is never reached. Data that are missing
+because of this then fail the checksum of their block.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from tisim.files.file_object import Seekable
 from tisim.files.superblock import SIZE, file_end, superblock
 
 _END_OUT_OF_REACH = 1 << 62
-"""HDF5 is given this end of the file, in bytes: it lies beyond that of any file."""
+"""The end of the file that HDF5 is given, in bytes, beyond that of any file."""
 READ_ATTEMPTS = 100
-"""A block is read at most so many times, as HDF5 does it for files that it knows to be written."""
+"""Largest number of reads of a block; HDF5 uses the same limit for files that are being written."""
 
 
 class SharedFile(Seekable):
-    """A shared file is the HDF5 file at path, whose superblock is valid, as ``h5py.File`` reads it.
+    """The HDF5 file at path with a valid superblock, as read by ``h5py.File``.
 
-    whole : whether the file is as long as its superblock says.
+    whole : whether the file is at least as long as its superblock states.
     """
 
     def __init__(self, path: Path) -> None:
         super().__init__(regular_file.open_descriptor(path, os.O_RDONLY))
         block = os.pread(self._handle, SIZE, 0)
-        # The writer makes the file longer before it says so: this order, and no other, is safe.
+        # The writer extends the file before it updates the superblock, so the superblock must be read first.
         self.whole = os.fstat(self._handle).st_size >= file_end(block)
         self._superblock = superblock(block, _END_OUT_OF_REACH)
 
@@ -44,7 +44,7 @@ class SharedFile(Seekable):
         return len(view)
 
     def _read_stable(self, size: int) -> bytes:
-        """Return bytes that are the same when they are read twice: a block may be half written at first."""
+        """Return bytes that are equal in two consecutive reads, because a block may be partly written."""
         content = b""
         for _ in range(READ_ATTEMPTS):
             previous, content = content, os.pread(self._handle, size, self._position)

@@ -1,33 +1,33 @@
-"""An HDF5 file begins with a superblock, here of version 3 (HDF5 File Format Specification 4.0, II.A)."""
+"""The superblock at the beginning of an HDF5 file, version 3 (HDF5 File Format Specification 4.0, II.A)."""
 
 from __future__ import annotations
 
 import struct
 
 _LAYOUT = struct.Struct("<8sBBBBQQQQI")
-"""A superblock holds these in order: signature, version, bytes of an offset and of a length, marks of a
-writer, base address, address of the extension, end of the file, address of the root group, checksum."""
+"""Layout of a superblock: signature, version, sizes of an offset and of a length in bytes, flags of a writer,
+base address, address of the extension, end of the file, address of the root group, checksum."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""Every HDF5 file begins with these bytes."""
+"""First bytes of every HDF5 file."""
 SIZE = _LAYOUT.size
-"""A superblock is this many bytes long."""
+"""Size of a superblock, bytes."""
 
 
 def superblock(block: bytes, end: int) -> bytes:
-    """Return the superblock of the file when it ends at this byte and nobody is writing it."""
+    """Return the superblock of the file with this end, in bytes, and no writer."""
     signature, version, offsets, lengths, _, base, extension, _, root, _ = _LAYOUT.unpack(block)
     body = _LAYOUT.pack(signature, version, offsets, lengths, 0, base, extension, end, root, 0)[:-4]
     return body + struct.pack("<I", lookup3(body))
 
 
 def is_valid(block: bytes) -> bool:
-    """Return whether this is an undamaged superblock of version 3, of a file that nobody is writing."""
+    """Return whether this is a valid superblock of version 3 of a file without a writer."""
     complete = len(block) == SIZE and block.startswith(SIGNATURE + b"\x03")
     return complete and block == superblock(block, file_end(block))
 
 
 def file_end(block: bytes) -> int:
-    """Return where the file ends, by its superblock, bytes."""
+    """Return the end of the file according to its superblock, bytes."""
     return int(_LAYOUT.unpack(block)[7])
 
 

@@ -1,4 +1,4 @@
-"""Shapes, such as a plane that bounds grains or a ball that is filled, each defined once for all rooms."""
+"""Geometric shapes, such as planes for walls and balls for regions, shared by all packages."""
 
 import lazy_loader
 

@@ -7,14 +7,15 @@ from tisim.geometry.revolved import Barrel
 
 @ti.func
 def cylinder_distance(rho, outward, end, upward, radius):
-    """Return the distance (m) of a place from the surface of a solid cylinder, negative inside, and the unit
-    vector along which it grows; on the axis, inside, those of the nearer end.
+    """Return the distance (m) of a point from the surface of a solid cylinder, negative inside, and its
+    gradient, a unit vector; on the axis, inside, those of the nearer end.
 
-    rho, outward : m, distance from the axis, and the unit vector from there. end, upward : m, distance beyond
-    the plane of the nearer end, negative before it, and its unit normal. radius : m.
+    rho, outward : distance from the axis, m, and the unit vector away from it.
+    end, upward : distance beyond the plane of the nearer end, m, negative inside, and its unit normal.
+    radius : m.
     """
     side = rho - radius
-    # Inside, the nearer of side and end; on the axis there is no way to the side.
+    # Inside, use the nearer of side and end; on the axis the direction to the side is undefined.
     sideways = side >= end and rho > 0.0
     distance, normal = ti.select(sideways, side, end), ti.select(sideways, outward, upward)
     if side > 0.0 and end > 0.0:

@@ -13,7 +13,7 @@ class Disc(RevolvedSurface):
     """A flat disc, such as the bottom of a silo or a piston."""
 
     centre: Vector = parameter("m", "centre", (0.0, 0.0, 0.0))
-    normal: Vector = parameter("", "direction of the normal; either will do", (0.0, 0.0, 1.0))
+    normal: Vector = parameter("", "direction of the normal; the sign does not matter", (0.0, 0.0, 1.0))
     radius: float = parameter("m", "radius", examples=[0.1], gt=0)
 
     @model_validator(mode="after")

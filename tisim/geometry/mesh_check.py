@@ -1,4 +1,4 @@
-"""What is to be known of a mesh before grains meet it: whether it is closed, and what is suspect in it."""
+"""Checks of a mesh before use: whether it is closed, and whether it has defects."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class MeshCheck:
-    """A mesh check counts, of a mesh whose vertices at one place are one.
+    """Counts of the elements and defects of a mesh, in which vertices at equal positions are merged.
 
-    triangles : with an area. degenerate : faces without one, which are left out. duplicates : faces of the
-    same vertices as one before. open_edges : of one face only. shared_edges : of more than two.
-    turned_edges : of two faces of which one is turned over.
+    triangles : faces with an area.
+    degenerate : faces without area, which are left out.
+    duplicates : faces with the same vertices as an earlier face.
+    open_edges : edges of only one face.
+    shared_edges : edges of more than two faces.
+    turned_edges : edges of two faces of opposite orientation.
     """
 
     triangles: int
@@ -34,7 +37,7 @@ class MeshCheck:
         once = faces[whole][first]
         ways = np.concatenate([once[:, [0, 1]], once[:, [1, 2]], once[:, [2, 0]]])
         edges, edge, count = np.unique(np.sort(ways, axis=1), axis=0, return_inverse=True, return_counts=True)
-        # Two faces of one orientation go along their edge in opposite ways.
+        # Two faces of equal orientation traverse their common edge in opposite directions.
         onward = np.bincount(edge.reshape(-1), ways[:, 0] < ways[:, 1], minlength=len(edges))
         return cls(
             triangles=int(whole.sum()),
@@ -46,17 +49,17 @@ class MeshCheck:
         )
 
     def suspect(self) -> str:
-        """Return what is suspect, in words; empty if nothing is."""
+        """Return a description of the defects; empty if there are none."""
         found = {
             "without area, which are left out": self.degenerate,
-            "that are there twice": self.duplicates,
+            "that are duplicates": self.duplicates,
         }
         return " and ".join(f"{number} faces {what}" for what, number in found.items() if number)
 
     def __str__(self) -> str:
         parts = [f"{self.triangles} triangles"]
         parts.append("closed" if not self.open_edges else f"open, with {self.open_edges} edges of one face")
-        turned = f"{self.turned_edges} edges where it turns over"
+        turned = f"{self.turned_edges} edges between faces of opposite orientation"
         parts.append(turned if self.turned_edges else "of one orientation")
         parts += [f"{self.shared_edges} edges of more than two faces"] if self.shared_edges else []
         return "; ".join([*parts, *filter(None, [self.suspect()])])

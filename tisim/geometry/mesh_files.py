@@ -1,7 +1,7 @@
-"""Files of triangle meshes: STL and OBJ are read here, other formats by meshio.
+"""Reading of triangle meshes: STL and OBJ are read here, other formats by meshio.
 
-A mesh that is read as another surface is worse than none: grains fall through a hole that nobody sees. So
-each statement of a file is checked, and a file that is damaged or cut short is refused with the line.
+A misread mesh is dangerous, because grains would fall through an unnoticed hole. Each statement of a file is
+therefore checked, and a file that is damaged or truncated is refused with the line number.
 """
 
 from __future__ import annotations
@@ -26,17 +26,19 @@ from tisim.geometry.polygons import MOST_CORNERS, triangulated
 from tisim.geometry.triangle_grid import MOST_LISTED
 
 MOST_BYTES = 2**31
-"""A larger file is not read: as text, MOST_LISTED triangles take about 1 GB."""
+"""Largest file that is read, bytes: as text, MOST_LISTED triangles take about 1 GB."""
 Mesh = tuple[np.ndarray, np.ndarray]
-"""The places of vertices, shape (n, 3), and the vertices of each triangle, from 0, shape (triangles, 3)."""
+"""The positions of vertices, shape (n, 3), and the vertex indices of each triangle, from 0, shape (triangles,
+3)."""
 
 STL_HEADER, STL_FACET = 84, 50
-"""Sizes in a binary STL, bytes: 80 of comment and 4 of the number of facets, then each facet."""
+"""Sizes in a binary STL, bytes: a header of 80 bytes of comment and 4 for the number of facets, then each
+facet."""
 _VERTEX = ("vertex", "number", "number", "number")
 FACET = ("facet", "normal", "", "", "", "outer", "loop", *_VERTEX, *_VERTEX, *_VERTEX, "endloop", "endfacet")
-"""The words of a facet in a text STL. Its normal may be any: some programs write -1.#IND for a sliver."""
+"""The words of a facet in a text STL. Its normal is ignored: some programs write -1.#IND for a sliver."""
 UTF_8, UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
-"""Byte order marks that a text may begin with."""
+"""Byte order marks with which a text may begin."""
 OBJ_FACES = ("f", "fo")
 OBJ_IGNORED = frozenset(
     (
@@ -63,23 +65,23 @@ with redirect_stdout(sys.stderr), numpy.errstate(all="ignore"):
 sys.stdout.buffer.write(archive.getvalue())
 """
 READING_TIME, READING_RATE = 20.0, 1e5
-"""meshio has so long to read a file, s, and besides at this rate, byte/s."""
+"""Time limit for meshio: a constant, s, plus the size of the file divided by a rate, byte/s."""
 
 
 class MeshFile:
-    """A mesh file, which messages call by ``where`` in the scene."""
+    """A mesh file; messages refer to it by ``where``, its path in the scene."""
 
     def __init__(self, path: Path, where: str) -> None:
         self.path, self.where = path, where
         self.private = False
 
     def read(self) -> Mesh:
-        """Return the mesh; raise InputError if the file is not one, or is damaged."""
-        # A fifo would have us wait for ever, and a device may have no end.
+        """Return the mesh; raise InputError if the file is not a mesh, or is damaged."""
+        # Reading a fifo could block for ever, and a device may have no end.
         other = regular_file.irregular(self.path)
         if other is not None:
             self.refuse("a regular file", other)
-        # A surface of a scene that others wrote may be a link to a private file, which is not quoted.
+        # A scene from another user may link to a private file, so its content is not quoted in messages.
         self.private = self.path.resolve().suffix.lower() != self.path.suffix.lower()
         try:
             size = self.path.stat().st_size
@@ -126,7 +128,7 @@ class MeshFile:
             head, size = file.read(STL_HEADER), self.path.stat().st_size
         count = int.from_bytes(head[80:], "little")
         whole = STL_HEADER + STL_FACET * count
-        # The size tells: there are binary files that begin with "solid".
+        # The size identifies a binary file, because some binary files begin with "solid".
         if len(head) == STL_HEADER and size == whole:
             return self._binary_stl(count)
         text = head.removeprefix(UTF_8).lstrip().lower()
@@ -154,7 +156,7 @@ class MeshFile:
             return not any(part.strip(b"\0 \r\n\t") for part in iter(lambda: file.read(2**20), b""))
 
     def _text_stl(self) -> Mesh:
-        """Read a text of one solid or of several; within them, line breaks are blanks like others."""
+        """Read a text with one or more solids; within a solid, line breaks are ordinary whitespace."""
         corners, words, lines = array("d"), list[str](), list[int]()
         inside, last = False, 0
         for last, line in self._text("an STL file"):
@@ -162,7 +164,7 @@ class MeshFile:
             opening = " ".join(parts[:2]).lower()
             ends = opening.startswith(("endsolid", "end solid"))
             if ends or parts[0].lower() == "solid":
-                # The rest of these lines is the name of the solid.
+                # The rest of such a line is the name of the solid.
                 if words or inside != ends:
                     self.refuse("an STL file of solids with whole facets", repr(line), last)
                 inside = not ends
@@ -179,7 +181,7 @@ class MeshFile:
         return _separate(np.frombuffer(corners, float).reshape(-1, 3))
 
     def _facet(self, words: list[str], lines: list[int], corners: array[float]) -> None:
-        """Add the corners of the facet that these words begin with."""
+        """Add the corners of the facet at the beginning of these words."""
         for word, rule, line in zip(words, FACET, lines, strict=False):
             if rule == "number":
                 if not NUMBER_WORD.fullmatch(word):
@@ -212,8 +214,8 @@ class MeshFile:
         return places, triangulated(places, polygons)
 
     def _statements(self) -> Iterator[tuple[int, str]]:
-        """Yield the statements of an OBJ file with their lines, without comments; a line that ends in a
-        backslash goes on in the next."""
+        """Yield the statements of an OBJ file with their line numbers, without comments; a line that ends in
+        a backslash continues in the next."""
         begun, first = "", 0
         for number, line in self._text("an OBJ file"):
             first = first if begun else number
@@ -228,7 +230,8 @@ class MeshFile:
             self.refuse("an OBJ file that ends after a statement", repr(begun), first)
 
     def _polygon(self, words: list[str], known: int, statement: str, line: int) -> list[int]:
-        """Return the vertices of a polygon, from 0; ``known`` : how many vertices stand before it."""
+        """Return the vertex indices of a polygon, from 0; ``known`` : number of vertices defined before
+        it."""
         found = [CORNER_WORD.fullmatch(word) for word in words]
         forms = {(word.count("/"), "//" in word) for word in words}
         if len(words) > MOST_CORNERS:
@@ -254,7 +257,7 @@ class MeshFile:
             self.refuse("a mesh of vertices with three coordinates", f"shape {points.shape}")
         triangles = [np.empty((0, 3), int)]
         for kind, corners in blocks.items():
-            # Without the others there would be holes in it.
+            # Leaving out other elements would leave holes in the surface.
             if kind not in ("triangle", "quad", "polygon"):
                 self.refuse("of triangles or other polygons alone", kind)
             if corners.ndim != 2 or not 3 <= corners.shape[1] <= MOST_CORNERS:
@@ -266,8 +269,8 @@ class MeshFile:
         return points, np.concatenate(triangles)
 
     def _arrays(self) -> bytes:
-        """Return what meshio reads, as an archive of NumPy."""
-        # By a process of its own: of a file that is cut short, some readers wait for the rest for ever.
+        """Return the arrays read by meshio, as a NumPy archive."""
+        # meshio runs in a separate process, because some of its readers never return for a truncated file.
         limit = READING_TIME + self.path.stat().st_size / READING_RATE
         surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = (sys.executable, "-P", "-c", BY_MESHIO, str(self.path))
@@ -286,5 +289,5 @@ def _own(count: int, first: int = 1) -> str:
 
 
 def _separate(corners: np.ndarray) -> Mesh:
-    """Return a mesh of triangles with vertices of their own, which are their corners."""
+    """Return a mesh of triangles in which each corner is a separate vertex."""
     return corners, np.arange(len(corners)).reshape(-1, 3)

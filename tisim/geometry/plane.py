@@ -1,4 +1,4 @@
-"""A plane, and the side of it on which particles are."""
+"""A plane with particles on one side."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from tisim.geometry.shape import SEAM, Shape, same_line
 
 
 class Plane(Directed, Shape):
-    """An infinite plane; particles are on the side that its normal points to.
+    """An infinite plane; particles are on the side to which its normal points.
 
     Its signed distance is d(r) = (r - point) . normal / |normal|.
     """
 
     along: ClassVar[str] = "normal"
     unit: ClassVar[str] = "direction"
-    # What a grain remembers of each wall takes memory, for every wall that there is room for.
+    # The contact history of a grain takes memory for each wall in the capacity of the list.
     least_rows: ClassVar[int] = 8
 
-    point: Vector = parameter("m", "a point of the plane", (0.0, 0.0, 0.0))
+    point: Vector = parameter("m", "a point on the plane", (0.0, 0.0, 0.0))
     normal: Vector = parameter("", "direction of the normal, towards the particles", (0.0, 0.0, 1.0))
 
     @classmethod
@@ -38,7 +38,7 @@ class Plane(Directed, Shape):
         return [*super().values(), math.fsum(map(mul, self.point, self.unit_vector()))]
 
     def ends_at(self, low: np.ndarray, high: np.ndarray, reach: float) -> np.ndarray:
-        # One that leans along an axis meets the faces there at different places.
+        # An inclined plane meets opposite faces of the box at different positions.
         normal = np.array(self.normal)
         leans: np.ndarray = np.abs(normal) > SEAM * np.linalg.norm(normal)
         return leans
@@ -52,5 +52,5 @@ class Plane(Directed, Shape):
 
     @ti.func
     def distance(self, w, k, r):
-        """Return the signed distance (m) of r from plane k, positive where particles are."""
+        """Return the signed distance (m) of r from plane k, positive on the side of particles."""
         return r.dot(self.direction(w, k)) - self.offset(w, k)

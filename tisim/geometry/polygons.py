@@ -1,4 +1,4 @@
-"""Polygons of a mesh cut into triangles."""
+"""Triangulation of mesh polygons."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from tisim.geometry.directions import across
 
 MOST_CORNERS = 1000
-"""A polygon of more corners is refused: to cut one takes a time that grows with their cube."""
+"""Largest number of corners of a polygon; the time of triangulation grows with its cube."""
 
 
 def triangulated(vertices: np.ndarray, polygons: Sequence[Sequence[int]]) -> np.ndarray:
-    """Return the triangles of polygons, by vertices (m, shape (n, 3)), shape (triangles, 3).
+    """Return the triangles of polygons as indices of vertices (m, shape (n, 3)), shape (triangles, 3).
 
-    A polygon that is not convex is cut too; one that is not flat, along its plane in the mean.
+    Polygons need not be convex. A polygon that is not flat is triangulated in its mean plane.
     """
     triangles: list[list[int]] = []
     for polygon in polygons:
@@ -24,7 +24,8 @@ def triangulated(vertices: np.ndarray, polygons: Sequence[Sequence[int]]) -> np.
 
 
 def _ears(vertices: np.ndarray, polygon: list[int]) -> list[list[int]]:
-    """Return the triangles of a polygon: corners with no other vertex in them are cut off, one by one.
+    """Return the triangles of a polygon by ear clipping: corners that contain no other vertex are cut off one
+    by one.
 
     Source: G. H. Meisters, Am. Math. Monthly 82 (1975) 648.
     """
@@ -39,7 +40,7 @@ def _ears(vertices: np.ndarray, polygon: list[int]) -> list[list[int]]:
             if _is_ear(flat, ear, [m for m in ring if m not in ear]):
                 break
         else:
-            # None is left where sides cross or lie in each other.
+            # There is no ear if sides cross or overlap.
             k, ear = 1, (ring[0], ring[1], ring[2])
         cut.append(ear)
         del ring[k]
@@ -53,12 +54,12 @@ def _is_ear(flat: np.ndarray, ear: tuple[int, int, int], others: list[int]) -> b
         return False
     p = flat[others]
     within = (_turn(a, b, p) >= 0.0) & (_turn(b, c, p) >= 0.0) & (_turn(c, a, p) >= 0.0)
-    # A side to a hole goes there and back, so vertices of it may be at one place.
+    # A bridge to a hole is traversed in both directions, so several vertices may have the same position.
     same = (p[:, None] == flat[list(ear)]).all(axis=2).any(axis=1)
     return not (within & ~same).any()
 
 
 def _turn(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Return twice the areas of triangles a, b, p in a plane, negative where they go clockwise."""
+    """Return twice the signed areas of triangles a, b, p in a plane, negative if clockwise."""
     areas: np.ndarray = (b[0] - a[0]) * (p[:, 1] - a[1]) - (b[1] - a[1]) * (p[:, 0] - a[0])
     return areas

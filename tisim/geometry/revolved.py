@@ -18,18 +18,18 @@ from tisim.geometry.surface import Surface
 
 
 class RevolvedSurface(Surface):
-    """This is the contract of a surface that a line from (rho_1, 0) to (rho_2, L) describes as it turns about
-    an axis, with discs at both ends where it is closed.
+    """Contract of a surface of revolution, which a line from (rho_1, 0) to (rho_2, L) sweeps around an axis,
+    with discs at both ends if closed.
 
-    rho is the distance from the axis, z the place along it. Of r = (rho, z) the nearest place is in the plane
-    through r and the axis: (rho_1, 0) + u (rho_2 - rho_1, L), with u that of the foot on the line, within 0
-    and 1.
+    rho is the distance from the axis and z the coordinate along it. The point nearest to r = (rho, z) is in
+    the plane through r and the axis: (rho_1, 0) + u (rho_2 - rho_1, L), with u of the foot of the
+    perpendicular, clamped to 0..1.
     """
 
     contract: ClassVar[bool] = True
 
     def generator(self) -> tuple[Vector, Vector, float, float, float]:
-        """Return where the axis begins (m), its direction, L, rho_1 and rho_2 (m)."""
+        """Return the start of the axis (m), its direction, L, rho_1 and rho_2 (m)."""
         raise NotImplementedError
 
     @classmethod
@@ -46,7 +46,7 @@ class RevolvedSurface(Surface):
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
         origin, direction, length, low, high = self.generator()
         axis = np.array(direction) / math.hypot(*direction)
-        # So far a circle about the axis reaches along each coordinate, over its radius.
+        # Extent of a circle about the axis along each coordinate, relative to its radius.
         wide = np.sqrt(np.maximum(0.0, 1.0 - axis**2))
         ends = np.array([np.array(origin), np.array(origin) + length * axis])
         sides = np.array([low, high])[:, None] * wide
@@ -62,7 +62,7 @@ class RevolvedSurface(Surface):
         out = places - np.array(origin)
         z = out @ axis
         rho = np.linalg.norm(out - z[:, None] * axis, axis=1)
-        # Each face as it is met in the plane through the axis: from where to where, along rho and z.
+        # Sections of the faces in a half-plane through the axis: start and end points in rho and z.
         lines = ((low, 0.0, high, length), (0.0, 0.0, low, 0.0), (0.0, length, high, length))
         least: np.ndarray = np.full(len(places), np.inf)
         for near, begin, far, end in lines[: self.face_count]:
@@ -78,14 +78,14 @@ class RevolvedSurface(Surface):
         z = out.dot(axis)
         across = out - z * axis
         rho = across.norm()
-        # From the axis it is as far in any direction.
+        # On the axis all directions are equally far.
         away = ti.select(rho > 0.0, across / ti.select(rho > 0.0, rho, 1.0), self.side(w, k))
-        # The lateral face, else the disc at the end, from the axis out.
+        # Face 0 is the lateral face, the others are end discs from the axis outwards.
         low, high = self.low_radius(w, k), self.high_radius(w, k)
         begin, end = ti.select(c == 2, length, 0.0), ti.select(c == 1, 0.0, length)
         near, far = ti.select(c == 0, low, 0.0), ti.select(c == 1, low, high)
         wide, tall = far - near, end - begin
-        # At the apex of a cone the disc is a place.
+        # At the apex of a cone the disc is a point.
         square = wide * wide + tall * tall
         u = ((rho - near) * wide + (z - begin) * tall) / ti.select(square > 0.0, square, 1.0)
         u = ti.min(ti.max(u, 0.0), 1.0)
@@ -93,12 +93,12 @@ class RevolvedSurface(Surface):
 
 
 class Barrel(RevolvedSurface):
-    """This is the contract of a surface around a part of an axis, which may be closed at both ends."""
+    """Contract of a surface around a section of an axis, which may be closed at both ends."""
 
     contract: ClassVar[bool] = True
 
-    start: Vector = parameter("m", "where the axis begins", (0.0, 0.0, 0.0))
-    end: Vector = parameter("m", "where the axis ends", examples=[(0.0, 0.0, 1.0)])
+    start: Vector = parameter("m", "start of the axis", (0.0, 0.0, 0.0))
+    end: Vector = parameter("m", "end of the axis", examples=[(0.0, 0.0, 1.0)])
     closed: bool = option("whether there are discs at both ends", False)
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""A box along the axes, or the cylinder along z or the ball that touches its faces."""
+"""A box along the axes, and the cylinder along z and the ball inscribed in it."""
 
 import math
 from typing import Literal
@@ -8,23 +8,23 @@ from tisim.numerics import elementary
 
 BoxShape = Literal["box", "cylinder", "ball"]
 ROUND: dict[BoxShape, tuple[int, int, int]] = {"box": (0, 0, 0), "cylinder": (1, 1, 0), "ball": (1, 1, 1)}
-"""These are, of each shape, 1 for the axes along which it is round, and 0 for the others."""
+"""For each shape, 1 for the axes along which it is round, 0 for the others."""
 PART: dict[BoxShape, float] = {"box": 1.0, "cylinder": math.pi / 4, "ball": math.pi / 6}
-"""A shape has this part of the volume of the box whose faces it touches."""
+"""Volume of each shape relative to its bounding box."""
 
 
 @ti.pyfunc
 def volume(shape: ti.template(), side):  # type: ignore[valid-type]
-    """Return the volume (m^3) of a shape in a box of these sides (m), in kernels and in Python."""
+    """Return the volume (m^3) of a shape in a box with these sides (m); for kernels and Python."""
     return ti.static(PART[shape]) * side[0] * side[1] * side[2]
 
 
 @ti.pyfunc
 def contains(rounded, half, away):
-    """Return whether a place is in a shape or on its surface, in kernels and of NumPy arrays in Python.
+    """Return whether a point is in a shape or on its surface; for kernels, and for NumPy arrays in Python.
 
-    rounded : as in ``ROUND``. half : m, half the sides of its box. away : m, from its centre, first by
-    component.
+    rounded : as in ``ROUND``. half : half the sides of its box, m. away : position relative to its centre, m,
+        with components along the first axis.
     """
     square, inside = 0.0 * away[0], True
     for axis in ti.static(range(3)):
@@ -35,8 +35,8 @@ def contains(rounded, half, away):
 
 @ti.func
 def point(shape: ti.template(), half, u):  # type: ignore[valid-type]
-    """Return a place (m) from the centre of a shape, evenly in it by three numbers in 0..1; half : m, half
-    the sides of its box."""
+    """Return a uniformly distributed point (m) in a shape, relative to its centre, from three numbers in
+    0..1. half : half the sides of its box, m."""
     place = half * (2.0 * u - 1.0)
     if ti.static(shape != "box"):
         angle = 2.0 * ti.math.pi * u[1]

@@ -10,11 +10,11 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Component
 
 SEAM = 1e-6
-"""What ends within this part of a box's side of a face ends at the face."""
+"""Relative tolerance, in sides of a box, within which the end of a shape counts as at a face."""
 
 
 def same_line(place: np.ndarray, direction: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> bool:
-    """Return whether a place lies on an axis through ``centre``, and a direction along it."""
+    """Return whether a point lies on an axis through ``centre``, and a direction is parallel to it."""
     away = np.cross(place - centre, axis)
     size = np.linalg.norm(np.abs(place) + np.abs(centre))
     lies = np.linalg.norm(away) <= SEAM * size
@@ -22,29 +22,31 @@ def same_line(place: np.ndarray, direction: np.ndarray, centre: np.ndarray, axis
 
 
 class Shape(Component):
-    """A shape tells how far a place is from its surface. Most are rows of lists, as those of walls."""
+    """A shape defines the distance of points from its surface. Most shapes are rows of lists, such as
+    walls."""
 
     contract: ClassVar[bool] = True
 
     @classmethod
     def room(cls, rows: int) -> int:
-        # A kind of which there is none costs nothing.
+        # A kind of shape without rows takes no memory.
         return super().room(rows) if rows else 0
 
     def distances(self, places: np.ndarray) -> np.ndarray:
-        """Return the distance (m) of each of some places (m, shape (n, 3)) from its surface, positive where
-        particles are, shape (n,); by default infinite, so that a start is not checked for overlaps with a
-        shape that does not tell it."""
+        """Return the distance (m) of each position (m, shape (n, 3)) from its surface, positive on the side
+        of particles, shape (n,). The default is infinite, which disables the check of a start for overlaps
+        with the shape."""
         return np.full(len(places), np.inf)
 
     def extent(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the lowest and the highest coordinates (m, shape (3,)) that it reaches; None for one without
-        end, and for one that does not tell."""
+        """Return the lowest and the highest coordinates (m, shape (3,)) of the shape; None if it is unbounded
+        or does not define them."""
         return None
 
     def ends_at(self, low: np.ndarray, high: np.ndarray, reach: float) -> np.ndarray:
-        """Return along which axes it ends, or bends, within reach (m) of two faces, at low and high (m, shape
-        (3,)), shape (3,): an image of it at the other face would then be felt."""
+        """Return the axes along which the shape ends, or bends, within reach (m) of the faces at low and high
+        (m, shape (3,)), shape (3,). Particles there would have to interact with its image at the opposite
+        face."""
         if (extent := self.extent()) is None:
             return np.zeros(3, bool)
         slack = SEAM * (high - low)
@@ -52,10 +54,10 @@ class Shape(Component):
         return near & ~((extent[0] <= low + slack) & (extent[1] >= high - slack))
 
     def turns_into_itself(self, centre: np.ndarray, axis: np.ndarray) -> bool:
-        """Return whether it is the same at any angle about an axis in a direction through a place (m)."""
+        """Return whether the shape is symmetric under all rotations about an axis through a point (m)."""
         return False
 
     @ti.func
     def distance(self, w, k, r):
-        """Return the distance (m) of r from shape k of world w, positive where particles are."""
+        """Return the distance (m) of r from shape k of world w, positive on the side of particles."""
         return 0.0 * r[0]

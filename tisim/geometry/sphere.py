@@ -10,11 +10,11 @@ from tisim.geometry.surface import Surface
 
 @ti.func
 def ball_distance(r, centre, radius):
-    """Return the distance (m) of r (m) from the surface of a ball, negative inside, and the unit vector along
-    which it grows."""
+    """Return the distance (m) of r (m) from the surface of a ball, negative inside, and its gradient, a unit
+    vector."""
     d = r - centre
     size = d.norm()
-    # From the centre it is as far in any direction.
+    # At the centre all directions are equally far.
     up = ti.Vector([0.0, 0.0, 1.0 + 0.0 * size])
     return size - radius, ti.select(size > 0.0, d / ti.select(size > 0.0, size, 1.0), up)
 
@@ -22,7 +22,7 @@ def ball_distance(r, centre, radius):
 class SphericalSurface(Surface):
     """The surface of a sphere, with particles within or around it.
 
-    Its place nearest to r is c + R (r - c) / |r - c|.
+    The point nearest to r is c + R (r - c) / |r - c|.
     """
 
     centre: Vector = parameter("m", "centre c", (0.0, 0.0, 0.0))

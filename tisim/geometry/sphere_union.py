@@ -1,10 +1,10 @@
-"""Volume, centre and inertia of a union of spheres, of which what several share counts once.
+"""Volume, centre and inertia of a union of spheres, in which overlapping regions count once.
 
-Integrals over the body are integrals over its surface (Gauss), which is what each sphere has outside all
-others. A sphere is cut into rings of one height u along an axis; on a ring the others leave arcs, whose ends
-are known. Between the heights at which arcs begin, end or meet the integrals over arcs are smooth but for
-roots at the ends, which a sine in place of the height takes away: Gauss-Legendre quadrature then converges
-exponentially.
+Integrals over the body are converted to integrals over its surface (Gauss). The surface consists of the part
+of each sphere outside all others. A sphere is cut into rings of constant height u along an axis; the other
+spheres leave arcs of each ring, with known ends. Between the heights at which arcs begin, end or meet, the
+integrals over arcs are smooth except for square roots at the interval ends. Replacing the height by a sine
+removes these, so that Gauss-Legendre quadrature converges exponentially.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 HEIGHTS, ARC_NODES = 32, 10
-"""Nodes of Gauss-Legendre between two heights, and on an arc of at most a quarter turn: what comes of them is
-right to some parts of 1e7, and to 1e-9 where no ring of a sphere all but vanishes
-(tests/geometry/test_sphere_union.py)."""
+"""Gauss-Legendre nodes between two heights, and on an arc of at most a quarter turn. The relative error is a
+few 1e-7, and 1e-9 if no ring of a sphere nearly vanishes (tests/geometry/test_sphere_union.py)."""
 
 
 class Solid(NamedTuple):
-    """A solid of density 1 kg/m^3 has a volume (m^3), a centre of mass (m), shape (3,), and an inertia tensor
-    about that (m^5), shape (3, 3)."""
+    """Properties of a solid of density 1 kg/m^3: volume (m^3), centre of mass (m), shape (3,), and inertia
+    tensor about it (m^5), shape (3, 3)."""
 
     volume: float
     centre: np.ndarray
@@ -29,9 +28,9 @@ class Solid(NamedTuple):
 
 
 def sphere_union(centre: np.ndarray, radius: np.ndarray) -> Solid:
-    """Return the solid that is the union of spheres at ``centre`` (m), shape (n, 3), of ``radius`` (m), shape
-    (n,)."""
-    # One that is there twice would have all of its surface counted twice.
+    """Return the solid that is the union of spheres at ``centre`` (m), shape (n, 3), with ``radius`` (m),
+    shape (n,)."""
+    # The surface of a duplicate sphere would be counted twice.
     centre, radius = np.split(np.unique(np.column_stack([centre, radius]), axis=0), [3], axis=1)
     radius, middle = radius[:, 0], centre.mean(axis=0)
     place = centre - middle
@@ -53,19 +52,19 @@ def sphere_union(centre: np.ndarray, radius: np.ndarray) -> Solid:
 
 
 def _near(place: np.ndarray, radius: np.ndarray, i: int) -> np.ndarray:
-    """Return which others overlap sphere i, shape (n,)."""
+    """Return which other spheres overlap sphere i, shape (n,)."""
     near: np.ndarray = np.linalg.norm(place - place[i], axis=1) < radius + radius[i]
     near[i] = False
     return near
 
 
 def _exposed(place: np.ndarray, radius: np.ndarray, i: int) -> tuple[np.ndarray, ...]:
-    """Return places (m), normals and areas (m^2) of nodes on what sphere i has outside the others: shape
-    (m, 3), (m, 3) and (m,)."""
+    """Return positions (m), normals and areas (m^2) of quadrature nodes on the exposed surface of sphere i:
+    shape (m, 3), (m, 3) and (m,)."""
     near = _near(place, radius, i)
     apart, others = place[i] - place[near], radius[near]
     distance = np.linalg.norm(apart, axis=1)
-    # A normal n points into another sphere where n.apart < limit.
+    # A normal n points into another sphere if n.apart < limit.
     limit = (others**2 - radius[i] ** 2 - distance**2) / (2 * radius[i])
     height, weight = _heights(apart, limit, distance)
     begin, end = _arcs(apart, limit, height)
@@ -80,14 +79,14 @@ def _exposed(place: np.ndarray, radius: np.ndarray, i: int) -> tuple[np.ndarray,
 
 
 def _normals(height: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Return unit vectors of these heights along z and angles around it, shape (..., 3)."""
+    """Return unit vectors with these heights along z and angles around it, shape (..., 3)."""
     ring = np.sqrt(1 - height**2)
     x, y, z = np.broadcast_arrays(ring * np.cos(angle), ring * np.sin(angle), height)
     return np.stack([x, y, z], axis=-1)
 
 
 def _heights(apart: np.ndarray, limit: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes in the height of a unit sphere, from -1 to 1, and their weights."""
+    """Return quadrature nodes in the height of a unit sphere, from -1 to 1, and their weights."""
     breaks = [-1.0, 1.0]
     for k in range(len(apart)):
         if abs(limit[k]) < distance[k]:
@@ -103,7 +102,7 @@ def _heights(apart: np.ndarray, limit: np.ndarray, distance: np.ndarray) -> tupl
 
 
 def _meetings(a: np.ndarray, b: np.ndarray, p: float, q: float) -> list[float]:
-    """Return the heights at which n.a = p and n.b = q, of unit vectors n: two, or none."""
+    """Return the heights of the unit vectors n with n.a = p and n.b = q: two, or none."""
     across = np.cross(a, b)
     square = across @ across
     if square <= 1e-24 * (a @ a) * (b @ b):
@@ -117,8 +116,8 @@ def _meetings(a: np.ndarray, b: np.ndarray, p: float, q: float) -> list[float]:
 
 
 def _arcs(apart: np.ndarray, limit: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where arcs begin and end (rad) on the ring of each height, shape (heights, arcs): those between
-    the ends of arcs within others and the quarters of a turn. Some are of no length."""
+    """Return the start and end angles (rad) of arcs on the ring at each height, shape (heights, arcs). Rings
+    are divided at the ends of arcs inside other spheres and at quarter turns. Some arcs have zero length."""
     ring = np.sqrt(1 - height**2)[:, None] * np.linalg.norm(apart[:, :2], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         cosine = (limit - height[:, None] * apart[:, 2]) / ring

@@ -1,4 +1,4 @@
-"""The contract of surfaces that have two sides."""
+"""The contract of two-sided surfaces."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from tisim.geometry.shape import Shape
 
 
 class Surface(Shape):
-    """A surface is a thin sheet that particles touch from either side, and at its rims.
+    """A thin sheet that particles touch from either side, and at its rims.
 
-    So a cylinder is a drum for the particles within and a rod for those around it. It has faces, such as the
-    lateral face and the two ends of a cylinder, and tells of each which of its places is nearest.
+    A cylinder, for example, is a drum for particles inside and a rod for particles around it. A surface has
+    faces, such as the lateral face and the two ends of a cylinder, and defines the nearest point of each.
     """
 
     contract: ClassVar[bool] = True
@@ -21,7 +21,7 @@ class Surface(Shape):
 
     @property
     def face_count(self) -> int:
-        """Return how many faces it has."""
+        """Return the number of faces."""
         return 1
 
     @classmethod
@@ -34,7 +34,7 @@ class Surface(Shape):
 
     @ti.func
     def nearest(self, w, k, c, r):
-        """Return the place (m) nearest to r on face c of surface k; c is below ``faces(w, k)``."""
+        """Return the point (m) nearest to r on face c of surface k; c is below ``faces(w, k)``."""
         return r
 
     @ti.func

@@ -1,8 +1,8 @@
-"""Cells in which triangles near a place are found, and how far away they are elsewhere.
+"""A grid of cells for finding triangles near a point, and a lower bound of their distance elsewhere.
 
-A small triangle is listed in all cells that its box reaches into. A large one, such as a facet from end to
-end of a sheet that lies aslant, would fill most of the grid: it is listed in the cells that it meets itself,
-which are found by halving its box.
+A small triangle is listed in all cells that its bounding box overlaps. For a large one, such as a facet
+across an inclined sheet, this would be most of the grid. It is therefore listed only in the cells that it
+intersects, which are found by bisection of its bounding box.
 """
 
 from __future__ import annotations
@@ -14,25 +14,27 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 CELLS = 2**20
-"""A grid has at most so many cells."""
+"""Largest number of cells of a grid."""
 MOST_LISTED = 2**22
-"""All cells together list at most so many triangles: 34 MB, and numbers that single precision tells apart."""
+"""Largest number of entries in all cell lists: 34 MB, and indices that are exact in single precision."""
 WIDTH = 1.5
-"""A cell is so many times as wide as the triangles are in the mean."""
+"""Width of a cell relative to the mean width of the triangles."""
 LARGE_SPAN = 64
-"""A triangle whose box reaches into more cells than this is large."""
+"""A triangle is large if its bounding box overlaps more cells than this."""
 CELL_MARGIN = 1e-6
-"""Cells are taken to be wider by this part, as places round."""
+"""Relative enlargement of cells, to allow for rounding of positions."""
 
 
 @dataclass(frozen=True)
 class TriangleGrid:
-    """A triangle grid lists with each cell the triangles that may reach into it.
+    """A grid that lists for each cell the triangles that may intersect it.
 
-    low : corner of the grid, m. width : of a cell, m. dims : cells along each axis. first : the first cell of
-    each triangle along each axis, shape (triangles, 3); -1 of large ones. begin : where the list of each cell
-    begins in ``members``, with the end of the last. clear : how far (m) each place of a cell is from all
-    triangles at least.
+    low : corner of the grid, m.
+    width : width of a cell, m.
+    dims : number of cells along each axis.
+    first : first cell of each triangle along each axis, shape (triangles, 3); -1 for large triangles.
+    begin : start of the list of each cell in ``members``, followed by the end of the last list.
+    clear : lower bound of the distance (m) from any point of a cell to all triangles.
     """
 
     low: np.ndarray
@@ -51,7 +53,7 @@ class TriangleGrid:
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         width = WIDTH * float(np.sqrt(area / len(corners)))
         reach = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
-        # One that reaches across a number of cells meets as many at least.
+        # A triangle that spans a number of cells intersects at least this number.
         width = max(width, float(reach.sum()) / CELLS)
         while np.prod((high - low) / width + 1) > CELLS:
             width *= 2 ** (1 / 3)
@@ -60,7 +62,7 @@ class TriangleGrid:
         cells, members, first, dims = listed
         order = np.argsort(cells, kind="stable")
         counts = np.bincount(cells, minlength=int(np.prod(dims)))
-        # Two places in cells whose centres are so far apart are nearer by a diagonal at most.
+        # Two points in cells are nearer than the cell centres by at most a diagonal.
         apart = distance_transform_edt(counts.reshape(dims) == 0)
         clear = width * np.maximum(apart - np.sqrt(3.0), 0.0).ravel()
         begin = np.concatenate([[0], np.cumsum(counts)])
@@ -68,7 +70,7 @@ class TriangleGrid:
 
 
 class _Listing:
-    """A listing finds the cells of each triangle in a grid of a width (m)."""
+    """Finds the cells of each triangle in a grid with a cell width (m)."""
 
     def __init__(self, corners: np.ndarray, low: np.ndarray, high: np.ndarray, width: float) -> None:
         self.corners, self.low, self.width = corners, low, width
@@ -79,8 +81,8 @@ class _Listing:
         )
 
     def pairs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return cell and triangle of each pair of the two that meet, the first cells of triangles, and the
-        number of cells along each axis; None where there are too many pairs."""
+        """Return cell and triangle index of each intersecting pair, the first cells of triangles, and the
+        number of cells along each axis; None if there are too many pairs."""
         number = (self.last - self.first + 1).prod(axis=1)
         large = number > LARGE_SPAN
         found, total = [], int(number[~large].sum())
@@ -101,7 +103,7 @@ class _Listing:
         return index
 
     def _in_boxes(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pairs of some triangles with all cells that their boxes reach into."""
+        """Return the pairs of some triangles with all cells that their bounding boxes overlap."""
         spans = self.last[which] - self.first[which] + 1
         number = spans.prod(axis=1)
         row = np.repeat(np.arange(len(which)), number)
@@ -111,8 +113,8 @@ class _Listing:
         return self._index(self.first[which[row]] + np.stack([x, y, z], axis=1)), which[row]
 
     def _by_halves(self, which: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield the pairs of some triangles with the cells that they meet: blocks of cells are halved, and
-        those left out that a triangle does not meet."""
+        """Yield the pairs of some triangles with the cells that they intersect. Blocks of cells are bisected,
+        and blocks that a triangle does not intersect are discarded."""
         self.axes, self.number = self._parting(which), np.zeros(len(self.corners), int)
         self.number[which] = np.arange(len(which))
         waiting = [(which, self.first[which], self.last[which])] if len(which) else []
@@ -120,7 +122,7 @@ class _Listing:
             triangle, first, last = waiting.pop()
             half = len(triangle) // 2
             if half >= MOST_LISTED // 32:
-                # In parts, the last one first: so what waits takes little memory.
+                # Split into parts and process the last one first, to limit the memory of pending blocks.
                 parts = (slice(None, half), slice(half, None))
                 waiting += [(triangle[part], first[part], last[part]) for part in parts]
                 continue
@@ -137,7 +139,7 @@ class _Listing:
                 waiting.append((np.concatenate([triangle, triangle]), *blocks))
 
     def _meet(self, triangle: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Return whether triangles meet blocks of cells: unless an axis parts them.
+        """Return which triangles intersect blocks of cells, by the separating axis test.
 
         Source: T. Akenine-Moeller, J. Graphics Tools 6 (2001) 29.
         """
@@ -152,8 +154,8 @@ class _Listing:
         return meets
 
     def _parting(self, which: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Return the axes that may part some triangles from blocks along x, y and z, each with where the
-        triangles begin and end along it."""
+        """Return the possible separating axes of some triangles and blocks along x, y and z, each with the
+        range of the triangles along it."""
         corners = self.corners[which]
         sides = np.roll(corners, -1, axis=1) - corners
         axes = [np.cross(sides[:, 0], sides[:, 1])]

@@ -1,4 +1,4 @@
-"""A surface made of triangles, such as that of an STL file."""
+"""A surface made of triangles, such as from an STL file."""
 
 import hashlib
 import warnings
@@ -19,22 +19,22 @@ from tisim.geometry.shape import SEAM, Shape
 from tisim.geometry.triangle_grid import MOST_LISTED, TriangleGrid
 
 MOST_DISTANCES = 2_000_000
-"""Where places and triangles make more pairs, ``distances`` says of all places that they are far away."""
+"""For more pairs of positions and triangles, ``distances`` returns infinity for all positions."""
 
 PAIRS_AT_ONCE = 100_000
-"""``distances`` works on so many pairs of a place and a triangle at a time: some 10 MB."""
+"""Number of pairs of a position and a triangle that ``distances`` processes at a time, about 10 MB."""
 
 
 class TriangulatedSurface(Shape):
-    """A surface of triangles, with particles on either side of it, such as that of an STL file.
+    """A surface of triangles, with particles on either side of it, such as from an STL file.
 
-    The same in all worlds of a batch. ``TriangulatedSurface.read("drum.stl", scale=1e-3)`` reads a file;
-    triangles without area are left out. In a scene file ``surface = {kind = "triangulated_surface",
-    file = "drum.stl", scale = 1e-3}`` does; the name leads from the folder of that file. Particles find those
-    near them in a grid of cells.
+    It is the same in all worlds of a batch. ``TriangulatedSurface.read("drum.stl", scale=1e-3)`` reads a
+    file; triangles without area are left out. In a scene file, use ``surface = {kind =
+    "triangulated_surface", file = "drum.stl", scale = 1e-3}``, with a path relative to the folder of the
+    scene file. Particles find nearby triangles in a grid of cells.
     """
 
-    vertices: Rows = parameter("m", "places of the vertices", examples=[((0, 0, 0), (1, 0, 0), (0, 1, 0))])
+    vertices: Rows = parameter("m", "positions of the vertices", examples=[((0, 0, 0), (1, 0, 0), (0, 1, 0))])
     faces: Rows = parameter(
         "", "indices of the three vertices of each triangle, from 0", examples=[((0, 1, 2),)]
     )
@@ -45,12 +45,12 @@ class TriangulatedSurface(Shape):
 
     @classmethod
     def read(cls, path: str | Path, scale: float = 1.0, where: str = "surface") -> Self:
-        """Return the surface in a file: STL, OBJ, or another format if meshio is there to read it, such as
-        PLY; ``scale`` is the length of its unit in m. Polygons are cut into triangles.
+        """Return the surface in a file: STL, OBJ, or another format, such as PLY, if meshio is installed.
+        ``scale`` is the length of the unit of the file in m. Polygons are cut into triangles.
 
-        InputError, which calls the surface ``where``, is raised for a file that is damaged or cut short, for
-        faces other than polygons, and for a scale that is not above 0. Of faces that are there twice or have
-        no area a MeshWarning tells.
+        InputError, naming the surface ``where``, is raised if the file is damaged or truncated, if faces are
+        not polygons, and if the scale is not above 0. A MeshWarning is given for faces that are duplicates or
+        have no area.
         """
         must(is_number(scale) and scale > 0, f"{where}.scale", "a number of m above 0", scale)
         places, faces = MeshFile(Path(path), where).read()
@@ -92,7 +92,7 @@ class TriangulatedSurface(Shape):
         return hash(self.structure())
 
     def corners(self) -> np.ndarray:
-        """Return the corners of the triangles that have an area, m, shape (triangles, 3, 3)."""
+        """Return the corners of the triangles with an area, m, shape (triangles, 3, 3)."""
         corners: np.ndarray = self.vertices[self.faces.astype(int)]
         sides = corners[:, 1:] - corners[:, :1]
         return corners[np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) > 0]
@@ -132,7 +132,7 @@ class TriangulatedSurface(Shape):
         least: np.ndarray = np.full(len(places), np.inf)
         if len(places) * len(corners) > MOST_DISTANCES:
             return least
-        # In blocks: a loop over triangles, or over places, takes a minute where there are 10^5 of them.
+        # Process blocks: a loop over single triangles or positions would take a minute for 10^5 of them.
         block = max(1, PAIRS_AT_ONCE // max(1, len(places)))
         for first in range(0, len(corners), block):
             least = np.minimum(least, _distances(corners[first : first + block], places))
@@ -140,7 +140,7 @@ class TriangulatedSurface(Shape):
 
     @ti.func
     def nearest(self, m, r):
-        """Return the place (m) nearest to r on triangle m."""
+        """Return the point (m) nearest to r on triangle m."""
         tr = ti.static(self.triangles)
         a = ti.Vector([tr[m, 0], tr[m, 1], tr[m, 2]])
         b = ti.Vector([tr[m, 3], tr[m, 4], tr[m, 5]])
@@ -162,7 +162,7 @@ class TriangulatedSurface(Shape):
 
     @ti.func
     def cell(self, r):
-        """Return the cell along each axis that is nearest to r."""
+        """Return the indices of the cell nearest to r."""
         at = ti.Vector([0, 0, 0])
         for a in ti.static(range(3)):
             index = (r[a] - self.grid[0, a]) / self.grid[0, 3]
@@ -172,7 +172,7 @@ class TriangulatedSurface(Shape):
 
     @ti.func
     def clearance(self, r):
-        """Return a distance (m) that r is from all triangles at least."""
+        """Return a lower bound of the distance (m) from r to all triangles."""
         dims, at, beside = self.cells(), self.cell(r), 0.0 * r
         for a in ti.static(range(3)):
             low = self.grid[0, a]
@@ -183,10 +183,10 @@ class TriangulatedSurface(Shape):
 
     @ti.func
     def search(self, r, reach, best, search: ti.template(), found, number):  # type: ignore[valid-type]
-        """Return what ``search.consider`` makes of all triangles that may be within ``reach`` (m) of r, one
-        after another, from ``best`` on; see tisim/effects/walls/wall_search.py."""
+        """Return the result of ``search.consider``, called for all triangles that may be within ``reach`` (m)
+        of r, one after another, starting from ``best``; see tisim/effects/walls/wall_search.py."""
         dims, low, high = self.cells(), self.cell(r - reach), self.cell(r + reach)
-        # With nothing within reach there is no cell to look at.
+        # If reach is not positive, no cell is searched.
         for x in range(low[0], ti.select(reach > 0.0, high[0] + 1, low[0])):
             for y, z in ti.ndrange((low[1], high[1] + 1), (low[2], high[2] + 1)):
                 index = (x * dims[1] + y) * dims[2] + z
@@ -199,16 +199,17 @@ class TriangulatedSurface(Shape):
 
     @ti.func
     def is_new(self, m, x, y, z, low):
-        """Return whether triangle m, which may be in several of the cells from ``low`` on, has not been in
-        those before x, y, z."""
+        """Return whether triangle m, which may be listed in several of the cells from ``low`` on, was in none
+        of the cells before x, y, z."""
         first = [ti.max(ti.cast(self.first[m, axis], ti.i32), low[axis]) for axis in ti.static(range(3))]
-        # A large one is not in all cells of its box, and is looked at in each that has it.
+        # A large triangle is not in all cells of its bounding box, so it is considered in each cell that
+        # lists it.
         large = self.first[m, 0] < 0.0
         return large or (x == first[0] and y == first[1] and z == first[2])
 
 
 def _distances(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the distance (m) of each place (m, shape (n, 3)) from the nearest of some triangles."""
+    """Return the distance (m) of each position (m, shape (n, 3)) from the nearest of some triangles."""
     sides = np.roll(corners, -1, axis=1) - corners
     normals = np.cross(sides[:, 0], sides[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -227,7 +228,7 @@ def _distances(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 @ti.func
 def nearest_on_triangle(a, b, c, r):
-    """Return the place nearest to r on the triangle a, b, c.
+    """Return the point nearest to r on the triangle a, b, c.
 
     Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """

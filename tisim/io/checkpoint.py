@@ -1,9 +1,9 @@
-"""A simulation is saved between two steps, and resumed from there to the same bits.
+"""Checkpoints: a simulation is saved between two steps and resumed with bitwise identical results.
 
-A checkpoint holds every particle field, the clock, the books and the counters of every world. Pair lists are
-not in it: they are made anew, and results do not depend on when that was. A world that has failed is in it
-at its last good step, and why it has failed is found again when it is restored. Where a step is under way it
-holds besides where worlds were before.
+A checkpoint holds every particle field, the clock, the state of each world and its counters. Pair lists are
+not saved: they are rebuilt, and results do not depend on the time of a rebuild. A failed world is saved at
+its last good step, and its failure is found again after restoring. If a step is under way in some world, the
+checkpoint also holds the state before that step.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ BEFORE_STEP = "before"
 
 
 def _identity(simulation: Simulation) -> dict[str, Any]:
-    """Return what a checkpoint must have in common with the simulation it is restored to."""
+    """Return the properties that must be equal in a checkpoint and in the simulation that it is restored
+    to."""
     return {
         "scenes": json.dumps([scene.digest() for scene in simulation.scenes]),
         **simulation.runtime.settings,
@@ -45,7 +46,7 @@ def _identity(simulation: Simulation) -> dict[str, Any]:
 def save(simulation: Simulation, path: str | Path) -> None:
     """Write a checkpoint of a loaded simulation that is between two steps.
 
-    At every instant, path is what it was before or the whole new file. Raise RunError when the disk is full.
+    At every instant, path is either the old or the complete new file. Raise RunError if the disk is full.
     """
     simulation.s.check()
     with checksum.create_file(Path(path)) as file:
@@ -63,10 +64,10 @@ def save(simulation: Simulation, path: str | Path) -> None:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A snapshot holds the particles of each world at the time of a checkpoint.
+    """The particles of each world at the time of a checkpoint.
 
-    times : s, shape (worlds,). steps : number taken until then, shape (worlds,). states : for each world the
-    arrays of its live particles by field name, SI; shape (n,) or (n, 3).
+    times : s, shape (worlds,). steps : number of steps taken, shape (worlds,).
+    states : for each world the arrays of its particles by field name, SI; shape (n,) or (n, 3).
     """
 
     times: np.ndarray
@@ -75,9 +76,9 @@ class Snapshot:
 
 
 def snapshot(path: str | Path) -> Snapshot:
-    """Return the particles that a checkpoint holds; where a step is under way, those from before that step.
+    """Return the particles in a checkpoint; if a step is under way, their state before that step.
 
-    Raise InputError when the file is no checkpoint, or is cut short or damaged.
+    Raise InputError if the file is not a checkpoint, is truncated or damaged.
     """
     with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         group, worlds = file.get(BEFORE_STEP, file), len(json.loads(file.attrs["scenes"]))
@@ -91,7 +92,7 @@ def snapshot(path: str | Path) -> Snapshot:
         counts, times, steps = (books[name][:worlds] for name in ("count", "time", "steps"))
         fits = bool(((counts >= 0) & (counts <= shape[1])).all())
         must(fits, "checkpoint's count", f"between 0 and {shape[1]}", counts.tolist())
-        # Sorted in memory: what is shown is in the order of ids.
+        # Particles may be sorted by position in memory; a snapshot is in the order of ids.
         by_id = bool(file.attrs.get("sorted", False))
         orders = [np.argsort(arrays["id"][w, :n]) if by_id else np.arange(n) for w, n in enumerate(counts)]
         states = tuple({k: v[w, order] for k, v in arrays.items()} for w, order in enumerate(orders))
@@ -99,10 +100,10 @@ def snapshot(path: str | Path) -> Snapshot:
 
 
 def restore(simulation: Simulation, path: str | Path) -> None:
-    """Bring a simulation, loaded with the same scenes, to where the checkpoint was saved.
+    """Restore a simulation, loaded with the same scenes, to the state in a checkpoint.
 
-    Raise InputError when the file is no checkpoint, is cut short or damaged, or is of other scenes, another
-    precision or another capacity; the simulation is then as it was.
+    Raise InputError if the file is not a checkpoint, is truncated or damaged, or is of other scenes, another
+    precision or another capacity; the simulation is then unchanged.
     """
     simulation.s.check()
     with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
@@ -123,7 +124,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
 
 
 def _read(group: h5py.Group, names: Iterable[str]) -> Arrays:
-    """Return data sets of a checkpoint by name."""
+    """Return the named data sets of a checkpoint."""
     for name in names:
         must(
             isinstance(group.get(name), h5py.Dataset),
@@ -135,7 +136,8 @@ def _read(group: h5py.Group, names: Iterable[str]) -> Arrays:
 
 
 class PeriodicCheckpoint(Observer):
-    """This observer saves a checkpoint now and then, so that a killed run can be resumed from the last.
+    """An observer that saves a checkpoint at intervals, so that a killed run can be resumed from the last
+    one.
 
     seconds : wall time between two checkpoints, s.
     """

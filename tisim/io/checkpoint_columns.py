@@ -1,7 +1,7 @@
-"""What a checkpoint holds is asked for shape and range before kernels see it.
+"""Validation of the arrays in a checkpoint: their shapes and ranges are checked before kernels use them.
 
-A checksum tells damage, not a file of another program: a count beyond the memory has kernels read what is
-not there.
+A checksum detects damage, but not a file written by another program. For example, a count above the capacity
+would make kernels read outside of the memory.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from tisim.state.fields import Field
 from tisim.state.status import WORLD_COUNTERS, WorldStatus
 
 ROUNDED_PART = 1e-9
-"""What time has been rounded by is far below this part of it."""
+"""Bound of the relative rounding error of times."""
 Columns = Mapping[str, np.ndarray]
 
 
 def check_columns(columns: Columns, own: Columns, fields: Sequence[Field], worlds: int) -> None:
-    """Raise InputError unless columns of a checkpoint may take the place of a simulation's own.
+    """Raise InputError unless columns of a checkpoint may replace those of a simulation.
 
-    own : those of the simulation, loaded with the same scenes, by name; the first ``worlds`` of each are in
-    use. fields : of its particles.
+    own : columns of the simulation, loaded with the same scenes, by name; the first ``worlds`` rows are in
+        use.
+    fields : particle fields.
     """
     for name, there in own.items():
         column = columns[name]
@@ -59,7 +60,7 @@ def _check_times(columns: Columns, own: Columns, worlds: int) -> None:
 
 
 def _check_particles(columns: Columns, fields: Sequence[Field], w: int, capacity: int) -> None:
-    """Check what the particles of a world carry, those apart that are only of use to a stepper."""
+    """Check the particle fields of a world, except scratch fields of the stepper."""
     n = int(columns["count"][w])
     there = columns["mass"][w, :n] != 0
     for field in fields:
@@ -67,7 +68,7 @@ def _check_particles(columns: Columns, fields: Sequence[Field], w: int, capacity
         if not field.scratch:
             check_field(field, values, len(values), "checkpoint")
         if field.lookup or (field.name.startswith("clump_") and field.integer):
-            # They say where in memory something is.
+            # These values are indices into memory.
             _within({field.name: values}, field.name, -capacity, capacity)
 
 

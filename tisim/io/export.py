@@ -1,4 +1,4 @@
-"""Frames of a run are written for other programs: VTK (ParaView), extended XYZ (OVITO, ASE), or H5MD."""
+"""Export of the frames of a run to VTK (ParaView), extended XYZ (OVITO, ASE) or H5MD."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from tisim.scene.initial_state import Arrays
 
 FORMATS = ("vtk", "xyz", "h5md")
 _OVITO_NAMES = {"position": "pos", "velocity": "velo"}
-"""OVITO has names of its own for these quantities; the keys are their names here."""
+"""OVITO's names of these quantities; the keys are their names in tisim."""
 _VERTEX = 1
-"""This is the number of the VTK cell type that has one point."""
+"""Number of the VTK cell type with one point."""
 _VTK_TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 
 
@@ -32,9 +32,12 @@ def export(
 ) -> Path:
     """Write all frames and worlds of a trajectory.h5 or result.h5; return the file to open.
 
-    kind : "vtk", a .pvd with the times and a .vtu for each frame; "xyz", one extended XYZ file; "h5md", the
-    file again, once all of it has been found undamaged. A world of several has its number in the name.
-    progress : called with the finished fraction, 0..1. Raise InputError for another format, or no such file.
+    kind : "vtk", a .pvd with the times and a .vtu for each frame; "xyz", one extended XYZ file; "h5md", a
+        copy of the file, after its checksums are verified. If there are several worlds, file names have the
+        index of the world.
+    progress : called with the finished fraction, 0..1.
+
+    Raise InputError for another format, or if there is no such file.
     """
     check(file, kind)
     if kind == "h5md":
@@ -59,7 +62,7 @@ def check(file: Path, kind: str) -> None:
 
 
 def _first_frame(file: Path) -> Frame:
-    """Return the first frame of the first world that has one; raise InputError where none has."""
+    """Return the first frame of the first world with frames; raise InputError if there is none."""
     for world in range(world_count(file)):
         with frames(file, world) as trajectory:
             if len(trajectory):
@@ -68,7 +71,7 @@ def _first_frame(file: Path) -> Frame:
 
 
 def file_names(file: Path, kind: str) -> list[str]:
-    """Return the names of all files that ``export`` makes."""
+    """Return the names of all files that ``export`` writes."""
     if kind == "h5md":
         return [f"{file.stem}_copy.h5"]
     result, count = [], world_count(file)
@@ -129,7 +132,7 @@ def _vtu(arrays: Arrays) -> bytes:
 
 
 def _data_array(parent: ElementTree.Element, name: str, values: np.ndarray) -> None:
-    """Add an array as base64 of the number of bytes and the bytes, little-endian."""
+    """Add an array in base64: the number of bytes, then the data, little-endian."""
     little_endian = np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<"), copy=False))
     element = ElementTree.SubElement(
         parent, "DataArray", type=_VTK_TYPES[little_endian.dtype.str[1:]], Name=name, format="binary"
@@ -146,11 +149,11 @@ def _xml(root: ElementTree.Element) -> bytes:
 
 
 def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, name: str) -> Path:
-    """Write extended XYZ: for each frame the number of particles, a line of keys, a line for each particle.
+    """Write extended XYZ: for each frame the number of particles, a line of keys, and one line per particle.
 
-    All particles are of the species X, which is no element. Positions are in m, not in the Angstrom that
-    chemistry takes for granted; the key Units has the unit of each column: "pos:m velo:m/s mass:kg", and
-    "1" where there is none, with dots within a unit.
+    All particles have the species X, which is not an element. Positions are in m, and not in Angstrom as is
+    common in chemistry. The key Units has the unit of each column, "pos:m velo:m/s mass:kg", with dots inside
+    compound units, and "1" for pure numbers.
     """
     path = folder / f"{name}.xyz"
     temporary = path.with_name(temporary_name(path.name))
@@ -166,7 +169,7 @@ def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
 
 
 def _lattice(domain: Domain, time: float) -> str:
-    """Return the keys that say what the box is at a time (s); none in open space."""
+    """Return the keys that describe the box at a time (s); an empty string in open space."""
     low, _ = domain.bounds()
     if low is None:
         return ""
@@ -177,7 +180,7 @@ def _lattice(domain: Domain, time: float) -> str:
 
 
 def _columns(arrays: Arrays) -> tuple[list[list[float]], str]:
-    """Return columns of numbers, and what they are; position comes first, names are those of OVITO."""
+    """Return columns of numbers, and their Properties key; position comes first, with OVITO's names."""
     columns: list[list[float]] = []
     properties = ["species:S:1"]
     for name in _column_order(arrays):
@@ -189,7 +192,7 @@ def _columns(arrays: Arrays) -> tuple[list[list[float]], str]:
 
 
 def _units(trajectory: Frames, arrays: Arrays) -> str:
-    """Return the unit of each quantity, as the key Units says it."""
+    """Return the value of the key Units, with the unit of each quantity."""
     units_of_fields = units(trajectory.scene)
     spelling = {
         name: units_of_fields.get(name, "").replace(" ", ".") or "1" for name in _column_order(arrays)
@@ -202,7 +205,7 @@ def _column_order(arrays: Arrays) -> list[str]:
 
 
 def _h5md(file: Path, out: Path) -> Path:
-    """Write a copy; a world that has no frame yet is there with its scene."""
+    """Write a copy; it includes worlds without frames, with their scenes."""
     scenes = []
     for world in range(world_count(file)):
         with frames(file, world) as trajectory:

@@ -1,10 +1,10 @@
-"""Trajectories are laid out as H5MD 1.1 (P. de Buyl, P. H. Colberg and F. Hoefling, Comput. Phys. Commun. 185
+"""The layout of trajectories: H5MD 1.1 (P. de Buyl, P. H. Colberg and F. Hoefling, Comput. Phys. Commun. 185
 (2014) 1546, and nongnu.org/h5md).
 
-The parts of the specification in use are the metadata, the units module, observables, and groups of particles
-whose number varies: entries whose id is the fill value are placeholders. Beyond it, the group ``parameters``,
-which is for what programs add, has the scenes as TOML and checksums of all that frames hold: HDF5 1.10 and
-later check the structure of a file but not the data in it.
+The following parts of the specification are used: metadata, the units module, observables, and particle
+groups with a variable number of particles, in which entries with the fill value as id are placeholders. In
+addition, the group ``parameters``, reserved for programs, has the scenes as TOML and checksums of all frame
+data, because HDF5 1.10 and later verify the structure of a file but not its data.
 """
 
 from __future__ import annotations
@@ -26,25 +26,24 @@ from tisim.state.fields import Field
 
 VERSION = (1, 1)
 ABSENT = -1
-"""This id is that of an entry that is no particle; its other values are not-a-number, or 0 where they are
-integers."""
+"""The id of a placeholder entry; its other values are NaN, or 0 for integers."""
 ASCII = h5py.string_dtype("ascii")
 CHUNK = 1 << 16
-"""This many particles of a frame are stored, and compressed, together."""
+"""Number of particles of a frame that are stored and compressed in one chunk."""
 CHUNK_ROWS = 1024
-"""Times and checksums of this many frames are stored together."""
+"""Number of frames whose times and checksums are stored in one chunk."""
 SCENES, CHECKSUMS = "parameters/scenes", "parameters/checksums"
 OBSERVABLES = "observables"
-"""This group has what effects measure of each world, such as forces on walls, under its group's name."""
+"""Group with the measures of each world, such as forces on walls, under the name of its particle group."""
 
 
 def group_names(worlds: int) -> list[str]:
-    """Return the names of the groups of particles for a number of worlds."""
+    """Return the names of the particle groups for a number of worlds."""
     return ["all"] if worlds == 1 else [f"world_{index}" for index in range(worlds)]
 
 
 def write_metadata(file: h5py.File, version: str) -> None:
-    """Write the group ``h5md``: who made the file, by which program and by which rules."""
+    """Write the group ``h5md``: author, program and version of the format."""
     group = file.create_group("h5md")
     group.attrs.create("version", VERSION, dtype=np.int32)
     group.create_group("author").attrs["name"] = np.bytes_(_author())
@@ -63,7 +62,7 @@ def _author() -> str:
 
 
 def unit_string(text: str) -> str:
-    """Return a unit as the units module writes it: "kg/m^3" is "kg m-3"."""
+    """Return a unit in the notation of the units module: "kg/m^3" becomes "kg m-3"."""
     symbols = []
     for sign, part in zip((1, -1), text.split("/", 1), strict=False):
         for symbol, power in re.findall(r"([A-Za-z]+)(?:\^?(-?\d+))?", part):
@@ -73,18 +72,17 @@ def unit_string(text: str) -> str:
 
 
 def write_box(group: h5py.Group, domain: Domain) -> None:
-    """Write the group ``box``. Along an axis that is periodic, positions are those of the image in the
-    domain.
+    """Write the group ``box``. Along a periodic axis, positions are those of the image inside the domain.
 
-    Beyond the specification, ``origin`` is the lower corner of the domain, m. Edges that change with time are
-    an element of ``create_elements``.
+    In addition to the specification, ``origin`` is the lower corner of the domain, m. Time-dependent edges
+    are created by ``create_edges``.
     """
     low, high = domain.bounds()
     box = group.create_group("box")
     box.attrs.create("dimension", 3, dtype=np.int32)
     box.attrs["boundary"] = np.array([b"periodic" if joined else b"none" for joined in domain.joined()])
     if low is not None and high is not None:
-        # Within the header of the dataset, of which HDF5 checks the checksum.
+        # The data are in the header of the dataset, which has a checksum that HDF5 verifies.
         compact = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         compact.set_layout(h5py.h5d.COMPACT)
         fixed = {"origin": low} if domain.shears() else {"edges": high - low, "origin": low}
@@ -96,7 +94,7 @@ def write_box(group: h5py.Group, domain: Domain) -> None:
 
 
 def create_elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: Any) -> None:
-    """Create an empty time-dependent element for each field, all on the ``step`` and ``time`` of position."""
+    """Create an empty time-dependent element for each field; all share ``step`` and ``time`` of position."""
     for field in fields:
         element = group.create_group(field.name)
         if field.name == "position":
@@ -118,8 +116,8 @@ def create_elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int,
 
 
 def create_edges(group: h5py.Group) -> None:
-    """Create an empty element for edges of the box that change with time, the vectors of each frame as rows,
-    on the ``step`` and ``time`` of position."""
+    """Create an empty element for time-dependent edges of the box, with edge vectors as rows; it shares
+    ``step`` and ``time`` of position."""
     edges = group.create_group("box/edges")
     edges["step"], edges["time"] = group["position/step"], group["position/time"]
     value = edges.create_dataset(
@@ -129,8 +127,8 @@ def create_edges(group: h5py.Group) -> None:
 
 
 def create_observables(file: h5py.File, name: str, unit_of: Mapping[str, str]) -> None:
-    """Create an empty observable for each measure of the world of a group of particles, given their units, on
-    the ``step`` and ``time`` of its positions."""
+    """Create an empty observable for each measure of the world of a particle group, given their units; they
+    share ``step`` and ``time`` of position."""
     position = file[f"particles/{name}/position"]
     for measure, unit in unit_of.items():
         observable = file.create_group(f"{OBSERVABLES}/{name}/{measure}")
@@ -142,7 +140,7 @@ def create_observables(file: h5py.File, name: str, unit_of: Mapping[str, str]) -
 
 
 def write_scene(file: h5py.File, name: str, text: str) -> None:
-    """Write the scene of a group of particles, as TOML."""
+    """Write the scene of a particle group, as TOML."""
     data = text.encode()
     array = np.frombuffer(data, np.uint8)
     dataset = file.create_dataset(f"{SCENES}/{name}", data=array, chunks=True, compression="gzip")
@@ -150,7 +148,7 @@ def write_scene(file: h5py.File, name: str, text: str) -> None:
 
 
 def read_scene(file: h5py.File, name: str) -> str:
-    """Return the TOML that ``write_scene`` has written; raise InputError when it is damaged."""
+    """Return the TOML written by ``write_scene``; raise InputError if it is damaged."""
     dataset = file[f"{SCENES}/{name}"]
     text = dataset[:].tobytes()
     intact = zlib.crc32(text) == dataset.attrs["crc32"]
@@ -159,20 +157,20 @@ def read_scene(file: h5py.File, name: str) -> str:
 
 
 def create_checksums(file: h5py.File, name: str) -> h5py.Dataset:
-    """Create the dataset of two numbers for each frame: its ``clock_checksum`` and ``frame_checksum``."""
+    """Create the dataset of two checksums per frame: ``clock_checksum`` and ``frame_checksum``."""
     return file.create_dataset(
         f"{CHECKSUMS}/{name}", (0, 2), np.uint32, maxshape=(None, 2), chunks=(CHUNK_ROWS, 2)
     )
 
 
 def clock_checksum(step: int, time: float, measures: Mapping[str, float]) -> int:
-    """Return the CRC-32 of a frame's step and time (s), and of its measures, by name."""
+    """Return the CRC-32 of the step, the time (s) and the measures of a frame."""
     numbers = (measures[name] for name in sorted(measures))
     return zlib.crc32(struct.pack(f"<qd{len(measures)}d", step, time, *numbers))
 
 
 def frame_checksum(clock: int, arrays: Arrays) -> int:
-    """Return the CRC-32 of a frame: of its clock, whose checksum is given, and of its arrays, by name."""
+    """Return the CRC-32 of the arrays of a frame, starting from the checksum of its clock."""
     crc = clock
     for name in sorted(arrays):
         crc = zlib.crc32(arrays[name].tobytes(), crc)

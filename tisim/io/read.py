@@ -1,4 +1,4 @@
-"""Whatever a run has written is read back, and recognised by what is in the file."""
+"""Reading of any file written by a run; the kind of file is recognised from its content."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ from tisim.scene.scene import Scene
 READABLE = (
     "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
 )
-"""These are the files that ``read`` reads, as messages list them."""
+"""The files that ``read`` can read, as listed in messages."""
 SEARCH_FORMAT = "tisim evaluations"
-"""The format of a search.h5 begins with this, which a room above defines; a test holds them together."""
+"""Start of the format attribute of a search.h5. It is defined in the package of searches; a test checks that
+both agree."""
 
 
 def read(path: str | Path) -> Any:
-    """Return what a file or folder holds that a run has written.
+    """Return the content of a file or folder written by a run.
 
-    - The folder of a run, or a result.h5: its ``Result``, whole. The folder of a study: as its cost.h5.
-    - A trajectory.h5, also while it grows: a ``RecordedTrajectory``, whose frames are read when asked for.
-    - A checkpoint.h5: a ``Snapshot``, the state of each world and when that was.
+    - The folder of a run, or a result.h5: its ``Result``, complete. The folder of a study: as its cost.h5.
+    - A trajectory.h5, also while it grows: a ``RecordedTrajectory``, whose frames are read on access.
+    - A checkpoint.h5: a ``Snapshot``, the state and the time of each world.
     - A cost.h5: the rows of a study, a list of ``tisim.accuracy`` Rows.
     - A scene as TOML: a ``Scene``. A versions.json: a dict.
 
-    Raise InputError when it is anything else, is not there, or is damaged.
+    Raise InputError if it is anything else, does not exist, or is damaged.
     """
     must(isinstance(path, str | os.PathLike), "path", "text or a pathlib.Path", path)
     file_path = Path(path)
     if regular_file.is_folder(file_path):
         files = [file_path / name for name in ("result.h5", "cost.h5")]
         file = next((file for file in files if regular_file.exists(file)), None)
-        rule = "one with a whole run or study (what an interrupted run has left is read file by file)"
+        rule = "one with a whole run or study (the files of an interrupted run are read one by one)"
         if file is None:
             raise InputError(f"folder must be {rule}; received {str(path)!r}")
         return read(file)
@@ -56,7 +57,7 @@ def read(path: str | Path) -> Any:
 
 
 def _read_hdf5(path: Path) -> Any:
-    """Return what is in an HDF5 file that is written whole."""
+    """Return the content of an HDF5 file that is written at once."""
     from tisim.accuracy import storage
 
     with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", READABLE)), "r") as file:
@@ -73,7 +74,7 @@ def _read_hdf5(path: Path) -> Any:
 
 
 def _read_text(path: Path) -> Any:
-    """Return what is in a text file: JSON or TOML."""
+    """Return the content of a text file: JSON or TOML."""
     content = regular_file.content(regular_file.target(path)) or b""
     try:
         text = content.decode()

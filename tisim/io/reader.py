@@ -1,4 +1,4 @@
-"""Frames of a run are read: those of a trajectory, or the start and the end of a result.h5."""
+"""Reading of frames of a run: from a trajectory, or the start and the end of a result.h5."""
 
 from __future__ import annotations
 
@@ -26,24 +26,26 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
 TIME_ROUNDING = 1e-9
-"""The sum of the steps of a duration may fall short of it by this fraction."""
+"""Relative rounding error allowed for the sum of all steps compared with the duration."""
 RESULT = "tisim run 1"
-"""This is the format of a result.h5."""
+"""The format attribute of a result.h5."""
 FILE_READ_ATTEMPTS, RETRY_PAUSE = 5, 0.01
-"""A file is read at most so many times while it looks damaged, as it may be half written, with so much time,
-in s, between them."""
+"""Largest number of attempts to read a file that looks damaged, because it may be in the middle of a write,
+and the pause between attempts, s."""
 Clock = tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, np.ndarray]]
-"""A clock holds steps, times (s) and checksums of the frames of a trajectory, and their measures by name."""
+"""Steps, times (s) and checksums of the frames of a trajectory, and their measures by name."""
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame holds the particles at a time.
+    """The particles at one time.
 
-    time : s. step : number of steps that the run has taken. arrays : by field name, shape (n,) or (n, 3), SI.
-    measures : what effects measure of the world at that time, by name, such as ``floor_force_z``, SI; none in
-    a result.h5.
+    time : s.
+    step : number of steps that the run has taken.
+    arrays : by field name, shape (n,) or (n, 3), SI.
+    measures : quantities of the world that effects measure, by name, such as ``floor_force_z``, SI; empty in
+        a result.h5.
     """
 
     time: float
@@ -53,18 +55,18 @@ class Frame:
 
 
 class Frames:
-    """Frames of one world in an open file are read one at a time: ``len``, index, iteration.
+    """The frames of one world in an open file, read on access: ``len``, index, iteration.
 
-    Reading raises InputError where the file is damaged.
+    Reading raises InputError if the file is damaged.
     """
 
     def __init__(self, file: _RetryingFile, world: str | None) -> None:
-        """Take the frames of a world. world : the name of its group; None in a result.h5."""
+        """world : name of the group of the world; None in a result.h5."""
         self._file, self._world = file, world
 
     @cached_property
     def scene(self) -> Scene:
-        """Return the scene that was run."""
+        """Return the scene of the run."""
         return Scene.from_dict(tomllib.loads(self._file.read(self._read_scene)))
 
     def _read_scene(self, file: h5py.File) -> str:
@@ -79,8 +81,8 @@ class Frames:
 
     @cached_property
     def measures(self) -> dict[str, np.ndarray]:
-        """Return what effects have measured of the world in each frame, by name, such as ``floor_force_z``,
-        shape (frames,), SI; nothing of a result.h5."""
+        """Return the measures of the world in each frame, by name, such as ``floor_force_z``, shape
+        (frames,), SI; empty for a result.h5."""
         return {} if self._world is None else self._clock[3]
 
     @cached_property
@@ -90,7 +92,7 @@ class Frames:
     def _read_clock(self, file: h5py.File) -> Clock:
         position = file[f"particles/{self._world}/position"]
         steps = position["step"][:]
-        # A killed run may have left a last row that has no step yet.
+        # A killed run may have left a last row without a step.
         count = len(steps) - int(len(steps) > 0 and steps[-1] == h5md.ABSENT)
         times, checksums = position["time"][:count], file[f"{h5md.CHECKSUMS}/{self._world}"][:count]
         observables = file.get(f"{h5md.OBSERVABLES}/{self._world}", {})
@@ -108,7 +110,7 @@ class Frames:
 
     @property
     def missing(self) -> str:
-        """Return a sentence on the missing frames of an unfinished run; it is empty for a finished one."""
+        """Return a sentence about the missing frames of an unfinished run; it is empty for a finished one."""
         reached, end = float(self.times[-1]) if len(self) else 0.0, self.scene.duration
         if reached >= end * (1 - TIME_ROUNDING):
             return ""
@@ -122,7 +124,7 @@ class Frames:
         return self._file.read(lambda file: read(file, k))
 
     def _read_end(self, file: h5py.File, k: int) -> Frame:
-        """Return the start (k = 0) or the end (k = 1) of a result.h5."""
+        """Return the start (k = 0) or the end (k = 1) from a result.h5."""
         arrays = {name: np.asarray(values) for name, values in file[("start", "end")[k]].items()}
         return Frame(float(self.times[k]), int(k and file["work"].attrs["steps"]), arrays)
 
@@ -147,7 +149,7 @@ class Frames:
 def frames(path: str | Path, world: int = 0) -> Iterator[Frames]:
     """Yield the frames of a world in a trajectory, or in a result.h5 (its start and end).
 
-    The run may be going on, or have been killed. Raise InputError when there is no such file or world.
+    The run may be in progress, or have been killed. Raise InputError if there is no such file or world.
     """
     with _open_file(Path(path)) as file:
         names = file.read(_world_groups)
@@ -163,7 +165,7 @@ def world_count(path: str | Path) -> int:
 
 @contextmanager
 def refuse_damage() -> Iterator[None]:
-    """Turn the errors of HDF5 at a damaged file into an InputError."""
+    """Convert the errors of HDF5 for a damaged file to InputError."""
     try:
         yield
     except InputError:
@@ -173,19 +175,19 @@ def refuse_damage() -> Iterator[None]:
 
 
 class _RetryingFile:
-    """A retrying file reads an HDF5 file through ``source``, and reads it again where it looks damaged."""
+    """An HDF5 file read through ``source``, with retries if it looks damaged."""
 
     def __init__(self, source: io.IOBase) -> None:
         self._source = source
         self._file: h5py.File | None = None
 
-    # HDF5 calls ``source``, in which no signal may be raised: HDF5 would swallow it.
+    # HDF5 calls ``source``. A signal handler must not raise there, because HDF5 would discard the exception.
     @defer_signals()
     def read(self, extract: Callable[[h5py.File], T]) -> T:
-        """Return what ``extract`` takes from the file; raise InputError where that is damaged.
+        """Return the value that ``extract`` reads from the file; raise InputError if the data is damaged.
 
-        A writer that comes between two reads of one structure leaves HDF5 with what looks like damage; then
-        HDF5 begins anew.
+        If a write happens between two reads of one structure, it looks damaged to HDF5; the file is then
+        opened again.
         """
         for attempts_left in reversed(range(FILE_READ_ATTEMPTS)):
             try:
@@ -208,7 +210,7 @@ class _RetryingFile:
 
 @contextmanager
 def _open_file(path: Path) -> Iterator[_RetryingFile]:
-    """Yield the file, once the checksum of its superblock or of all of it has been verified."""
+    """Yield the file after the checksum of its superblock, or of the whole file, is verified."""
     rule, real = "a trajectory.h5 or result.h5 of a run", regular_file.target(path)
     head = regular_file.content(real, SIZE)
     must(head is not None and head.startswith(SIGNATURE), "file", rule, str(path))
@@ -225,7 +227,7 @@ def _open_file(path: Path) -> Iterator[_RetryingFile]:
 
 
 def _check_creator(file: h5py.File, path: Path, rule: str) -> None:
-    """Raise InputError unless tisim has written a trajectory, with checksums."""
+    """Raise InputError unless the file is a trajectory written by tisim, with checksums."""
     creator = file.get("h5md/creator")
     must(creator is not None and creator.attrs.get("name") == b"tisim", "file", rule, str(path))
     if h5md.CHECKSUMS not in file:
@@ -234,5 +236,5 @@ def _check_creator(file: h5py.File, path: Path, rule: str) -> None:
 
 
 def _world_groups(file: h5py.File) -> list[str | None]:
-    """Return the groups of particles of the worlds in a trajectory; None for that in a result.h5."""
+    """Return the particle groups of the worlds in a trajectory; [None] for a result.h5."""
     return [None] if "start" in file else list(h5md.group_names(len(file["particles"])))

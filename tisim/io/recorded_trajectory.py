@@ -1,4 +1,4 @@
-"""A trajectory that a run has written, or still writes, is a sequence of frames for each of its worlds."""
+"""A trajectory file, complete or still being written, as a sequence of frames for each of its worlds."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from tisim.scene.scene import Scene
 
 
 class RecordedWorld(Sequence[Frame]):
-    """The frames of a world are a sequence in the order of their times: ``len``, index, slice, iteration.
+    """The frames of a world, a sequence in order of time: ``len``, index, slice, iteration.
 
-    A frame is read when it is asked for; what a run that goes on adds is seen when ``len`` is asked anew.
+    Frames are read on access. Frames that a running simulation adds are included when ``len`` is called
+    again.
     """
 
     def __init__(self, path: Path, world: int) -> None:
@@ -35,7 +36,7 @@ class RecordedWorld(Sequence[Frame]):
 
     @cached_property
     def scene(self) -> Scene:
-        """Return the scene that was run."""
+        """Return the scene of the run."""
         with self._frames() as sequence:
             return sequence.scene
 
@@ -47,8 +48,8 @@ class RecordedWorld(Sequence[Frame]):
 
     @property
     def measures(self) -> dict[str, np.ndarray]:
-        """Return what effects have measured of the world in each frame, by name, such as ``floor_force_z``,
-        shape (frames,), SI."""
+        """Return the measures of the world in each frame, by name, such as ``floor_force_z``, shape
+        (frames,), SI."""
         with self._frames() as sequence:
             return sequence.measures
 
@@ -73,15 +74,15 @@ class RecordedWorld(Sequence[Frame]):
 
 
 class RecordedTrajectory(RecordedWorld):
-    """This is the file of a trajectory. With a single world it is the sequence of its frames; with several,
-    each of ``worlds`` is one.
+    """A trajectory file. With one world it is the sequence of its frames; with several, each item of
+    ``worlds`` is a sequence.
 
-    Without ``with``, the file is opened for each thing asked for, or once for a loop. While a ``with`` lasts
-    it stays open, and has the frames that it had then.
+    Without ``with``, the file is opened for each access, or once for a loop. Within a ``with`` statement it
+    stays open, and has the frames that existed when it was opened.
     """
 
     def __init__(self, path: str | Path) -> None:
-        """Raise InputError when there is no such file."""
+        """Raise InputError if there is no such file."""
         super().__init__(Path(path).absolute(), 0)
         count = world_count(self._path)
         self.worlds: list[RecordedWorld] = [RecordedWorld(self._path, w) for w in range(count)]

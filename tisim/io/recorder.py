@@ -1,4 +1,4 @@
-"""The observer that writes a trajectory while a simulation runs decides when frames are due."""
+"""The observer that writes frames to a trajectory during a run."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ if TYPE_CHECKING:
 
 
 class Recorder(Observer):
-    """This observer writes the frames that are due, and has worlds wait for those that come."""
+    """An observer that writes a frame of each world when it is due, and pauses worlds at these times."""
 
     def __init__(self, trajectory: Trajectory, simulation: Simulation, indices: Sequence[int]) -> None:
-        """Record a trajectory. indices : of the scenes of the trajectory, one for each world of the loaded
-        simulation."""
+        """Record a trajectory.
+
+        indices : for each world of the loaded simulation, the index of its scene in the trajectory.
+        """
         self.trajectory, self.indices = trajectory, list(indices)
         self.interval = [trajectory.recording.interval(scene) for scene in simulation.scenes]
         self.last = [_last_time(trajectory.groups[index]) for index in self.indices]
-        # A run that goes on may owe the frame of the time where it goes on: the disk was full.
+        # A resumed run may lack the frame of the time at which it resumes, if the disk was full.
         self.due = np.array(
             [
                 0.0 if last < 0 else next_due(last, interval)
@@ -56,6 +58,6 @@ class Recorder(Observer):
 
 
 def _last_time(group: h5py.Group) -> float:
-    """Return the time of the last frame, s; below 0 when there is none."""
+    """Return the time of the last frame, s; negative if there is none."""
     times = group["position/time"]
     return float(times[-1]) if len(times) else -1.0

@@ -1,4 +1,4 @@
-"""What users ask to have recorded of a run."""
+"""The trajectory that a user requests from a run."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tisim.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Recording:
-    """This is a trajectory to record: ``frames`` evenly over the duration, or one frame ``every`` so much
-    time (s).
+    """A trajectory to record: ``frames`` at equal intervals over the duration, or a frame ``every`` time
+    interval (s).
 
-    The start and the end are recorded always; with ``frames`` the start is one more.
+    The start and the end are always recorded; the start is not counted in ``frames``.
     """
 
     path: Path | str
@@ -46,15 +46,15 @@ class Recording:
         return self.every if self.every is not None else scene.duration / (self.frames or 1)
 
     def create(self, scenes: Sequence[Scene], real: str = "f64") -> Trajectory:
-        """Create the file for these scenes, in place of any before."""
+        """Create the file for these scenes, replacing an earlier one."""
         return Trajectory(self, scenes, real)
 
     @contextmanager
     def observer(self, simulation: Simulation, resume: bool = False) -> Iterator[Recorder]:
-        """Yield the observer, to give to each ``run``, that writes all worlds of a loaded simulation.
+        """Yield an observer, to be passed to each ``run``, that writes all worlds of a loaded simulation.
 
-        The file is created, in place of any before. resume : True to append to the file that a stopped run
-        has left, for a simulation with one world.
+        The file is created, replacing an earlier one. resume : True to append to the file of a stopped run,
+        for a simulation with one world.
         """
         scenes, real = simulation.scenes, simulation.runtime.precision
         if resume:
@@ -69,7 +69,7 @@ class Recording:
 def recording_from_options(
     path: Path, frames: int | None, every: float | None, resume: bool
 ) -> Recording | None:
-    """Return the recording that the options of a command ask for; None when they ask for none."""
+    """Return the recording requested by the options of a command; None if there is none."""
     if frames is None and every is None:
         resumable = resume and regular_file.exists(path)
         rule = "given as before, to go on with trajectory.h5 (or give --fresh)"

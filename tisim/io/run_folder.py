@@ -1,10 +1,10 @@
-"""A run writes result.h5, scene.toml, versions.json and cloud.png to its folder; trajectory.h5 if asked.
+"""The folder of a run: result.h5, scene.toml, versions.json and cloud.png, and trajectory.h5 if requested.
 
-result.h5 is written after the other data, so a folder that holds one holds a whole run; only the picture
-comes after it. Its groups ``start`` and ``end`` have one array per particle quantity, shape (n,) or (n, 3),
-with its unit; ``work`` has the counts, ``measures``
-what effects keep of the world; the attributes say how the run ended and under which settings, and hold the
-scene as TOML. A checksum of the whole file stands behind its end (see checksum.py).
+result.h5 is written after the other data, so a folder with this file holds a complete run; only the picture
+is written later. Its groups ``start`` and ``end`` have one array per particle quantity, shape (n,) or (n, 3),
+with its unit; ``work`` has the counters and ``measures`` the measures of the world. The attributes hold the
+status of the run, its settings, and the scene as TOML. A checksum of the whole file follows the HDF5 data
+(see checksum.py).
 """
 
 from __future__ import annotations
@@ -39,16 +39,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
-"""These are the names of the files that are about one run, in the order in which a new run removes them:
-without the result the folder is that of an interrupted run, and a checkpoint is of use only with the frames
-before it."""
+"""Files of one run, in the order in which a new run removes them: without result.h5 the folder is one of an
+interrupted run, and a checkpoint is useful only with the earlier frames."""
 RUN_FILES = (*DATA, lock.LOCK)
-"""These are the names of all files that a run writes."""
+"""Names of all files that a run writes."""
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """This is the folder that a run writes to."""
+    """The output folder of a run."""
 
     path: Path
 
@@ -65,10 +64,12 @@ class RunFolder:
         return self.path / "checkpoint.h5"
 
     def check(self, scene: Scene, fresh: bool | None = None, overwrite: bool = False) -> bool:
-        """Return whether a run of a scene resumes what is here (see ``resuming.resumes``); touch nothing.
+        """Return whether a run of a scene resumes the work in this folder (see ``resuming.resumes``); nothing
+        is changed.
 
-        Raise InputError when a run is under way here, or writing here would lose what is not to be lost.
-        Frames of a run that was killed before its first checkpoint are not: the same scene makes them again.
+        Raise InputError if another run is in progress here, or if writing would destroy results. Frames of a
+        run that was killed before its first checkpoint may be overwritten, because the same scene reproduces
+        them.
         """
         lock.check(self.path)
         return self._check(scene, fresh, overwrite)
@@ -84,7 +85,7 @@ class RunFolder:
         return resume
 
     def _has_frames_of(self, scene: Scene) -> bool:
-        """Return whether the trajectory here is of this scene alone."""
+        """Return whether the trajectory in this folder is of this scene only."""
         try:
             with frames(self.trajectory) as trajectory:
                 return world_count(self.trajectory) == 1 and trajectory.scene.digest() == scene.digest()
@@ -93,22 +94,22 @@ class RunFolder:
 
     @contextmanager
     def claim(self, scene: Scene, fresh: bool | None = None, overwrite: bool = False) -> Iterator[bool]:
-        """Make the folder, mark it as one of tisim's, and hold its lock.
+        """Create the folder, mark it as tisim's, and hold its lock.
 
-        It yields whether the run resumes what is here. Where it does not, what an earlier one has left is
-        removed, so that nothing of it is taken for the new one's, even if that is killed. Raise InputError
-        where ``check`` raises it, and where the folder cannot be made or locked.
+        Yields whether the run resumes earlier work. If it does not, the files of an earlier run are removed,
+        so that they cannot be taken for results of the new run, even if that is killed. Raise InputError as
+        ``check`` does, and if the folder cannot be created or locked.
         """
         ownership.claim(self.path, RUN_FILES, overwrite)
         with lock.acquire(self.path):
-            resume = self._check(scene, fresh, overwrite)  # another run may have come and gone since then
+            resume = self._check(scene, fresh, overwrite)  # another run may have finished in the meantime
             for name in () if resume else DATA:
                 (self.path / name).unlink(missing_ok=True)
             yield resume
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what a result depends on beside its scene."""
+    """Return the versions of the software on which a result depends."""
     return {
         "tisim": version.__version__,
         "backend": runtime.backend(),
@@ -121,11 +122,12 @@ def versions() -> dict[str, str]:
 
 
 def write(result: Result, folder: RunFolder) -> list[Path]:
-    """Write all files of a run, in place of any before; return their paths. Raise RunError on a full disk.
+    """Write all files of a run, replacing earlier ones; return their paths. Raise RunError if the disk is
+    full.
 
-    The picture comes last: where it cannot be drawn, that is said on standard error, and it is left out.
+    The picture is written last; if drawing fails, a message is printed on standard error and it is left out.
     """
-    # It may have been removed while the run went on.
+    # The folder may have been removed during the run.
     folder.path.mkdir(parents=True, exist_ok=True)
     folder.result.unlink(missing_ok=True)
     paths = {name: folder.path / name for name in ("scene.toml", "versions.json")}
@@ -146,7 +148,7 @@ def _cloud(result: Result) -> Figure:
 
 
 def write_result(result: Result, path: Path) -> None:
-    """Write the result.h5 of a run, in place of any before. Raise RunError on a full disk."""
+    """Write the result.h5 of a run, replacing an earlier one. Raise RunError if the disk is full."""
     with checksum.create_file(path) as file:
         file.attrs.update({
             "format": RESULT, "scene": result.scene.to_toml(), "ok": result.status.ok,
@@ -161,8 +163,8 @@ def write_result(result: Result, path: Path) -> None:
 
 
 def read_result(path: Path) -> Result:
-    """Return the Result that ``write_result`` has written, to the bit. Raise InputError unless it is
-    whole."""
+    """Return the Result written by ``write_result``, bitwise equal. Raise InputError unless the file is
+    intact."""
     with checksum.open_file(path, "result", RESULT) as file, refuse_damage():
         arrays = {
             group: {name: np.asarray(values) for name, values in file[group].items()}
@@ -182,7 +184,7 @@ def read_result(path: Path) -> Result:
 
 
 def units(scene: Scene) -> dict[str, str]:
-    """Return the unit of each quantity that particles of a scene have, by name."""
+    """Return the unit of each particle quantity of a scene, by name."""
     fields = resolve_fields((*SHARED, *needed_fields(scene.acting(), scene.stepper)))
     return {field.name: field.unit for field in fields}
 

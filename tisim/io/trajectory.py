@@ -1,14 +1,14 @@
-"""A trajectory, the particles of a run at many times, is written to an H5MD file during the run.
+"""Writing of a trajectory, the particles of a run at many times, to an H5MD file during the run.
 
-A frame is the state at the end of the first step at or after each wanted time; the steps are those of a run
-without a trajectory. The file has a group of particles for each scene: ``all``, or ``world_0`` and so on.
-Particles are in the order of their ids; a frame with fewer particles than another is filled up (see h5md.py).
-The observables of the group are what effects measure of its world, such as the forces on walls.
+A frame is the state at the end of the first step at or after each requested time; recording does not change
+the steps. The file has a group of particles for each scene: ``all``, or ``world_0`` and so on. Particles are
+in the order of their ids; frames with fewer particles are padded (see h5md.py). The observables of a group
+are the measures of its world, such as forces on walls.
 
-The file can be read after every single write, by any reader, so also after the run was killed (see
-growing_hdf5.py); one that comes in the midst of a write must come again, as reader.py does. ``step`` grows
-last, so what it counts is whole. The file is made under another name, with room for frames and none in it,
-and then put in its place.
+The file can be read after every single write by any reader, so also after the run was killed (see
+growing_hdf5.py). A reader that meets an unfinished write must retry, as reader.py does. ``step`` is extended
+last, so all frames that it counts are complete. The file is created under a temporary name, with all datasets
+but no frames, and then renamed.
 """
 
 from __future__ import annotations
@@ -43,20 +43,21 @@ if TYPE_CHECKING:
     from tisim.io.recording import Recording
 
 LIBVER = ("v110", "v110")
-"""These versions of HDF5 can read the file; earlier ones have no checksums of its structure."""
+"""Oldest and newest HDF5 version of the file format; earlier versions have no checksums of the file
+structure."""
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class Trajectory:
-    """This is the file that frames are written to, for scenes that run one after another or side by side.
+    """A file that frames are written to, for scenes that run one after another or side by side.
 
     It is a context manager: without ``with``, ``close`` must be called.
     """
 
     def __init__(self, recording: Recording, scenes: Sequence[Scene], real: str = "f64") -> None:
-        """Make the file, in place of any before. real : "f64" or "f32".
+        """Create the file, replacing an earlier one. real : "f64" or "f32".
 
-        Raise InputError when it cannot be made, RunError when the disk is full.
+        Raise InputError if it cannot be created, RunError if the disk is full.
         """
         self.recording, self.scenes, self.path = recording, list(scenes), Path(recording.path)
         self.fields = [recorded_fields(scene) for scene in scenes]
@@ -68,12 +69,13 @@ class Trajectory:
             self._finish()
             raise
 
-    # HDF5 calls GrowingFile, in which no signal may be raised: HDF5 could not close the file any more.
+    # HDF5 calls GrowingFile. A signal handler must not raise there, because HDF5 could then not close the
+    # file.
     @defer_signals()
     def _open(self) -> None:
         self.disk = self._resources.enter_context(GrowingFile(self.path))
         self.file = self._resources.enter_context(h5py.File(self.disk, "r+", libver=LIBVER))
-        # From here on nothing can be added but rows.
+        # From here on only rows can be added.
         self.file.swmr_mode = True
         names = h5md.group_names(len(self.scenes))
         self.groups = [self.file[f"particles/{name}"] for name in names]
@@ -102,9 +104,9 @@ class Trajectory:
 
     @classmethod
     def resume(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
-        """Open the file that a stopped run has left, less its frames after ``time`` (s), or create one.
+        """Open the file of a stopped run without its frames after ``time`` (s), or create one.
 
-        Raise InputError when the file is damaged, or of another scene; it is then as it was.
+        Raise InputError if the file is damaged, or of another scene; it is then unchanged.
         """
         path = Path(recording.path)
         if not regular_file.exists(path):
@@ -128,7 +130,8 @@ class Trajectory:
 
     @defer_signals()
     def write(self, index: int, frame: Frame) -> None:
-        """Add a frame of the scene of this index; raise RunError when the disk is full. Ctrl-C waits."""
+        """Add a frame of the scene with this index; raise RunError if the disk is full. Ctrl-C is
+        deferred."""
         group, count = self.groups[index], len(frame.arrays["id"])
         order = np.argsort(frame.arrays["id"], kind="stable")
         row = group["position/step"].shape[0]
@@ -151,7 +154,7 @@ class Trajectory:
             observable[row] = measures[name]
             self._flush(observable)
         clock = h5md.clock_checksum(frame.step, frame.time, measures)
-        # The step comes last: it says that the row is whole.
+        # The step is written last: it marks the row as complete.
         for column, entry in (
             (self.checksums[index], (clock, h5md.frame_checksum(clock, arrays))),
             (group["position/time"], frame.time),
@@ -175,7 +178,7 @@ class Trajectory:
         self._resources.close()
 
     def close(self) -> None:
-        """Finish the file; raise RunError when not all could be written."""
+        """Finish the file; raise RunError if some data could not be written."""
         self._finish()
         self._check()
 
@@ -190,9 +193,9 @@ class Trajectory:
             self._check()
 
     def recorder(self, simulation: Simulation, indices: Sequence[int]) -> Recorder:
-        """Return the observer, to give to ``run``, that writes frames of a loaded simulation.
+        """Return an observer, to be passed to ``run``, that writes frames of a loaded simulation.
 
-        indices : of the scenes of the file, one for each world of the simulation.
+        indices : for each world of the simulation, the index of its scene in the file.
         """
         return Recorder(self, simulation, indices)
 
@@ -209,6 +212,6 @@ def _replace(path: Path, image: bytes) -> None:
 
 
 def recorded_fields(scene: Scene) -> tuple[Field, ...]:
-    """Return the quantities in a trajectory of a scene: all but what particles remember of each other."""
+    """Return the fields in a trajectory of a scene: all except contact histories and scratch fields."""
     fields = resolve_fields(needed_fields(scene.acting(), scene.stepper))
     return tuple(field for field in fields if not (field.slots or field.scratch))

@@ -1,4 +1,4 @@
-"""What parts have in common that go by the materials of a scene, such as laws between two that touch."""
+"""Base classes of parts that depend on the materials of a scene, such as contact laws."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from tisim.materials.materials import Material, Materials, Touching
 
 
 class UsesMaterials(Component):
-    """This is the contract of a part that goes by the materials of its scene."""
+    """Contract of a part that depends on the materials of its scene."""
 
     contract: ClassVar[bool] = True
     _materials: Materials = PrivateAttr(default=Materials({}, {}))
 
     def with_materials(self, materials: Materials) -> Self:
-        """Return it with the materials of a scene, and so the parts of this contract that it is made of."""
+        """Return a copy with the materials of a scene, also set in all nested parts of this contract."""
         parts = {name: getattr(self, name) for name in type(self).model_fields}
         update = {
             name: part.with_materials(materials)
@@ -32,21 +32,23 @@ class UsesMaterials(Component):
         return made
 
     def check_materials(self, materials: Materials) -> None:
-        """Raise InputError unless the materials of a scene have what it needs."""
+        """Raise InputError unless the materials of a scene have the properties that the part needs."""
 
 
 class MaterialLaw(UsesMaterials):
-    """This is the contract of a part of a law whose numbers depend on the materials that touch.
+    """Contract of a part of a law with coefficients that depend on the two materials in contact.
 
-    uses : names of the properties of materials that it needs. ``mix`` makes its numbers of those of two
-    materials; kernels read them as ``self.NAME(w, pair)``, with ``pair`` of ``material_pair``.
+    uses : names of the material properties that it needs.
+
+    ``mix`` computes the coefficients from two materials; kernels read them as ``self.NAME(w, pair)``, with
+    ``pair`` from ``material_pair``.
     """
 
     contract: ClassVar[bool] = True
     uses: ClassVar[tuple[str, ...]] = ()
 
     def mix(self, pair: Touching) -> dict[str, float]:
-        """Return its numbers for two materials, by name, the same names for all."""
+        """Return the coefficients for two materials by name, with the same names for all pairs."""
         return {}
 
     def check_materials(self, materials: Materials) -> None:
@@ -79,7 +81,7 @@ class MaterialLaw(UsesMaterials):
 
     @ti.func
     def material_pair(self, s, w, i, j):
-        """Return the number of the pair of materials of i and j."""
+        """Return the index of the pair of materials of i and j."""
         pair = 0
         if ti.static(self.several):
             pair = s.material[w, i] * self.number_of_materials + s.material[w, j]

@@ -1,4 +1,4 @@
-"""Materials by name, and what two of them are to each other where they touch."""
+"""Materials by name, and their properties in contact."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ def _harmonic(a: float, b: float) -> float:
 
 
 class ContactProperties(Component):
-    """Contact properties are those that a pair of materials has; of two materials each is mixed by the rule
-    that its text states."""
+    """Properties of the contact of two materials, each mixed from the two by the rule stated in its text."""
 
     contract: ClassVar[bool] = True
 
@@ -71,17 +70,17 @@ class ContactProperties(Component):
 
 
 HARMONIC = ("stiffness", "rolling_stiffness", "twisting_stiffness")
-"""These properties of two materials are mixed by the harmonic mean, 2 k_i k_j / (k_i + k_j), twice the
-stiffness of two springs in series: two grains of one material then touch with its own k. The others are mixed
-by the geometric mean."""
+"""These properties are mixed by the harmonic mean, 2 k_i k_j / (k_i + k_j). It is twice the stiffness of two
+springs in series, so that two grains of one material are in contact with its own k. All other properties are
+mixed by the geometric mean."""
 
 
 class Material(ContactProperties):
-    """A material is a named set of what grains and walls are made of.
+    """A named set of properties of grains and walls.
 
-    Laws of contact say which of these they need; the rest may be left out. Of two materials the elastic
-    constants are combined as Hertz and Mindlin have it; the others are mixed by the rules that their texts
-    state, unless the scene gives them for the pair (``MaterialPair``).
+    Contact laws state which of these they need; the others may be omitted. The elastic constants of two
+    materials are combined as in Hertz and Mindlin contact. Other properties are mixed by the rules in their
+    texts, unless the scene gives them for the pair (``MaterialPair``).
     """
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
@@ -100,15 +99,15 @@ class Material(ContactProperties):
 
 
 class MaterialPair(ContactProperties):
-    """A pair of materials has, where they touch, what is given here in place of what a rule would mix.
+    """Contact properties of two materials that replace the mixed values.
 
-    It is named after both, with a hyphen between them, such as "steel-rubber", in either order.
+    The key is both names with a hyphen between them, such as "steel-rubber", in either order.
     """
 
 
 @dataclass(frozen=True)
 class Touching:
-    """This is what two materials that touch are to each other; a property of theirs is ``mixed``."""
+    """Two materials in contact; ``mixed`` gives a property of the pair."""
 
     names: tuple[str, str]
     first: Material
@@ -116,7 +115,7 @@ class Touching:
     given: MaterialPair | None
 
     def mixed(self, name: str) -> float:
-        """Return a property of the pair: as it is given, or by its rule."""
+        """Return a property of the pair: the given value, or the mixed one."""
         own = None if self.given is None else getattr(self.given, name)
         if own is not None:
             return float(own)
@@ -125,7 +124,7 @@ class Touching:
         return float(a if a == b else rule(a, b))
 
     def elastic(self) -> list[tuple[float, float]]:
-        """Return E (Pa) and nu of each, where they are given."""
+        """Return E (Pa) and nu of each material that has both."""
         sides = ((side.young, side.poisson) for side in (self.first, self.second))
         return [(young, nu) for young, nu in sides if young is not None and nu is not None]
 
@@ -140,7 +139,8 @@ class Touching:
         return 1.0 / sum(2 * (2 - nu) * (1 + nu) / young for young, nu in self.elastic())
 
     def lacking(self, name: str) -> Iterator[str]:
-        """Yield those of the two materials that do not have what the pair would need of them."""
+        """Yield the names of those of the two materials that lack a property that is not given for the
+        pair."""
         if self.given is None or getattr(self.given, name, None) is None:
             for label, material in zip(self.names, (self.first, self.second), strict=True):
                 if getattr(material, name) is None:
@@ -152,7 +152,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 @dataclass(frozen=True)
 class Materials:
-    """These are the materials of a scene, in order, and what is given of pairs of them."""
+    """The materials of a scene, in order, and the given properties of pairs."""
 
     named: Mapping[str, Material]
     pairs: Mapping[str, MaterialPair]
@@ -180,7 +180,8 @@ class Materials:
             seen.add(frozenset(both))
 
     def index(self, name: Any, where: str) -> int:
-        """Return the index of a material, by name or number; raise InputError naming ``where`` for none."""
+        """Return the index of a material, by name or number; raise InputError naming ``where`` if there is
+        none."""
         names = list(self.named)
         if isinstance(name, str):
             rule = f"one of the materials of the scene ({', '.join(names) or 'none'})"
@@ -193,7 +194,7 @@ class Materials:
         return int(name)
 
     def touching(self) -> list[Touching]:
-        """Return what each is to each other: that of materials i and j of n is at i n + j."""
+        """Return all ordered pairs of materials; materials i and j of n have the index i n + j."""
         return [self._touch(a, b) for a in self.named for b in self.named]
 
     def _touch(self, a: str, b: str) -> Touching:

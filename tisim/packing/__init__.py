@@ -1,4 +1,4 @@
-"""Starting configurations: where particles lie."""
+"""Initial configurations: positions and sizes of particles."""
 
 import lazy_loader
 

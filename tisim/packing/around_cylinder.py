@@ -1,4 +1,4 @@
-"""Where particles lie at the start beside a cylinder (B16 Fig. 6.2)."""
+"""Random initial positions of spheres around a cylinder (B16 Fig. 6.2)."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from tisim.geometry.directions import along_axis
 from tisim.packing.placement import Placement
 
 MAX_ROUNDS = 200
-"""The region counts as full after so many rounds, each of as many tries as there are spheres."""
+"""The region counts as full after this number of rounds; each round has as many insertion trials as there are
+spheres."""
 
 
 class RandomAroundCylinder(Placement):
-    """Spheres lie at random and wholly inside a layer around a cylinder, or a part of it.
+    """Spheres at random positions completely inside a layer around a cylinder, or a part of the layer.
 
-    The layer is what a cylinder that is larger by its thickness on all sides has more. Its part "side" lies
-    beside the lateral surface, "top" beyond both ends, from the axis to the outer side; "all" is both. The
-    paper draws how its regions SIDE and TOP lie and says how wide they are in a figure only; here they are as
-    wide as the caller says, and together leave nothing out.
+    The layer is the difference between the cylinder and one that is larger by ``thickness`` on all sides. The
+    part "side" is beside the lateral surface; "top" is beyond both ends, from the axis to the outer radius;
+    "all" is both. The paper draws its regions SIDE and TOP and gives their widths only in a figure; here the
+    caller sets the width, and the two parts together fill the layer.
 
     Source: B16 section 6.3.
     """
@@ -58,7 +59,7 @@ class RandomAroundCylinder(Placement):
         farthest = np.abs(self.centre) + self.radius + self.length / 2 + self.thickness
         check_resolved("places around the cylinder", farthest, radius)
         most = self.volume() / (4 / 3 * np.pi * radius**3)
-        rule = f"at most what finds room around the cylinder, less than {most:.4g}"
+        rule = f"at most the number that fits around the cylinder, less than {most:.4g}"
         must(number <= most, "cloud.number", rule, number)
         generator = np.random.default_rng([seed, 0x6C61796572])
         centres = np.empty((0, 3))
@@ -70,15 +71,17 @@ class RandomAroundCylinder(Placement):
                 break
         else:
             raise InputError(
-                f"cloud.number must be at most what finds room around the cylinder, {len(centres)} here; "
+                "cloud.number must be at most the number that fits around the cylinder, "
+                f"{len(centres)} here; "
                 f"received {number}"
             )
         return along_axis(centres, self.axis) + np.asarray(self.centre)
 
     def _tries(self, number: int, radius: float, generator: np.random.Generator) -> np.ndarray:
-        """Return points (m) of the part, evenly, in a frame whose z axis is that of the cylinder."""
+        """Return uniformly distributed points (m) of the part, in a frame with z along the cylinder axis."""
         inner, outer = self.radius + radius, self.radius + self.thickness - radius
-        # Half of what lies beside, with the corners where they belong to the part; then what lies beyond.
+        # Half of the region beside the cylinder, including corners that belong to the part; then the region
+        # beyond the ends.
         height = self.length / 2 + (-radius if self.part == "side" else radius)
         depth = self.thickness - 2 * radius
         side = (self.part != "top") * (outer**2 - inner**2) * height
@@ -93,7 +96,7 @@ class RandomAroundCylinder(Placement):
 
 
 def _without_overlaps(points: np.ndarray, distance: float) -> np.ndarray:
-    """Return the points (m) without those nearer than a distance (m) to one that comes before."""
+    """Return the points (m) without those nearer than a distance (m) to an earlier point."""
     free = np.ones(len(points), bool)
     for i, j in sorted(cKDTree(points).query_pairs(distance)):
         free[j] &= not free[i]

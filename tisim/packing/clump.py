@@ -1,4 +1,4 @@
-"""Rigid clumps of spheres: what one is like, and the particles that some of them are."""
+"""Rigid clumps of spheres: templates, and the particles of clumps."""
 
 from __future__ import annotations
 
@@ -19,16 +19,19 @@ from tisim.errors import Words, must
 from tisim.geometry.sphere_union import sphere_union
 
 SYMMETRIC, ROUNDED = 1e-9, 1e-12
-"""An inertia tensor is symmetric to the first part of it. Axes are principal where all off them is below the
-second, and a sphere on its own is where its centre is off by less than that of its radius."""
+"""Relative tolerances: for the symmetry of an inertia tensor; and for off-diagonal elements below which axes
+are principal, and for the offset of a single sphere from the centre of mass, relative to its radius."""
 
 
 class ClumpBody(NamedTuple):
-    """A clump body is what a clump is in motion.
+    """The mass properties of a clump.
 
-    mass : kg. volume : of the union of its spheres (m^3). moments : principal moments of inertia (kg m^2),
-    shape (3,). axes : the principal axes in the template, as columns, shape (3, 3). places : of its spheres
-    from the centre of mass, along these axes (m), shape (n, 3). masses : of the spheres (kg), shape (n,).
+    mass : kg.
+    volume : volume of the union of its spheres (m^3).
+    moments : principal moments of inertia (kg m^2), shape (3,).
+    axes : the principal axes in the template, as columns, shape (3, 3).
+    places : positions of its spheres from the centre of mass along the principal axes (m), shape (n, 3).
+    masses : masses of its spheres (kg), shape (n,).
     """
 
     mass: float
@@ -40,17 +43,18 @@ class ClumpBody(NamedTuple):
 
 
 class Clump(Component):
-    """A clump is a rigid body made of spheres, which may overlap: a template, of which a scene can have many.
+    """A rigid body made of spheres, which may overlap: a template for any number of clumps in a scene.
 
-    Of a given density it is the union of its spheres: what several share counts once, in its mass, its centre
-    and its inertia. Or its mass and inertia are given, and the centres of spheres are those from its centre
-    of mass. Laws act on the spheres. These have parts of its mass, nearest to those of their volumes
-    (relative entropy) such that the weight acts at the centre of mass.
+    With a given density, the body is the union of its spheres: overlapping regions count once in its mass,
+    centre and inertia. Alternatively the mass and the inertia are given, and the centres of spheres are
+    relative to the centre of mass. Laws act on the spheres. The mass of the body is divided among them, as
+    close as possible to the ratio of their volumes (minimum relative entropy) under the constraint that
+    gravity acts at the centre of mass.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
     centres: Rows = parameter("m", "centres of its spheres", examples=[((0.0, 0.0, 0.0), (1e-3, 0.0, 0.0))])
-    radii: Numbers = parameter("m", "radii of its spheres, one for all or one of each", examples=[(1e-3,)])
+    radii: Numbers = parameter("m", "radii of its spheres, one for all or one for each", examples=[(1e-3,)])
     density: float | None = parameter("kg/m^3", "density of the body", None, gt=0, examples=[2500.0])
     mass: float | None = parameter("kg", "mass of the body, instead of a density", None, gt=0)
     inertia: Rows | None = parameter(
@@ -96,7 +100,7 @@ class Clump(Component):
 
     @cached_property
     def body(self) -> ClumpBody:
-        """Return its mass, its inertia, and where its spheres are in it."""
+        """Return its mass, its inertia and the positions of its spheres."""
         solid = sphere_union(self.centres, self.radius)
         if self.density is not None:
             mass, inertia = self.density * solid.volume, self.density * solid.inertia
@@ -110,14 +114,15 @@ class Clump(Component):
 
 
 def length(places: np.ndarray, radii: np.ndarray) -> float:
-    """Return the largest distance (m) from surface to surface across spheres at places (m, shape (n, 3))."""
+    """Return the largest distance (m) between opposite surfaces of any two spheres at positions (m, shape (n,
+    3))."""
     apart = np.linalg.norm(places[:, None] - places[None], axis=2) + radii[:, None] + radii[None]
     return float(apart.max(initial=0.0))
 
 
 def _principal(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return principal moments and axes, as columns that make a right-handed system; those of the template
-    where these are principal already."""
+    """Return principal moments and axes, as columns of a right-handed system; the template axes if these are
+    already principal."""
     off = np.abs(inertia - np.diag(np.diag(inertia))).max()
     if off <= ROUNDED * np.abs(inertia).max():
         return np.diag(inertia).copy(), np.eye(3)
@@ -127,14 +132,12 @@ def _principal(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _shares(places: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return parts of 1, above 0, whose centre is 0: of all such the nearest to those of the volumes by
-    relative entropy, s_i = v_i exp(l.r_i) / sum_j v_j exp(l.r_j)."""
+    """Return positive mass fractions of the spheres whose centre of mass is 0. They are the closest to the
+    volume fractions in relative entropy, s_i = v_i exp(l.r_i) / sum_j v_j exp(l.r_j)."""
     scale = np.linalg.norm(places, axis=1).max()
     if len(places) == 1:
         centred = bool(scale <= ROUNDED * radius[0])
-        must(
-            centred, "clump.centres", "0, where mass and inertia of one sphere are given", places[0].tolist()
-        )
+        must(centred, "clump.centres", "0 if mass and inertia of one sphere are given", places[0].tolist())
         return np.ones(1)
     r, weights = places / scale, np.log(radius**3 / (radius**3).sum())
     found = minimize(
@@ -158,11 +161,15 @@ def clump_columns(
     orientation: Any = (1.0, 0.0, 0.0, 0.0),
     angular_velocity: Any = (0.0, 0.0, 0.0),
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return the quantities of the particles that clumps are, by name, and the number of particles of each.
+    """Return the particle quantities of clumps by name, and the number of particles of each clump.
 
-    clumps : the template of each, or of all. position : centres of mass, m, shape (n, 3). velocity : of
-    these, m/s. orientation : quaternions w, x, y, z by which the template is turned, shape (n, 4).
-    angular_velocity : rad/s, in space. Of these three one row may stand for all.
+    clumps : the template of each, or one for all.
+    position : centres of mass, m, shape (n, 3).
+    velocity : velocities of the centres of mass, m/s.
+    orientation : quaternions w, x, y, z by which the template is rotated, shape (n, 4).
+    angular_velocity : in the space frame, rad/s.
+
+    Velocity, orientation and angular_velocity may be a single row for all clumps.
     """
     place = _rows("position", position, 3)
     n = len(place)
@@ -207,8 +214,8 @@ def clump_columns(
 
 
 def sphere_columns(mass: np.ndarray) -> dict[str, np.ndarray]:
-    """Return what particles of these masses (kg) that are of no clump have in place of the quantities of
-    clumps, by name."""
+    """Return the clump quantities, by name, of particles with these masses (kg) that do not belong to a
+    clump."""
     n = len(mass)
     none = {name: np.full(n, -1) for name in ("clump", "clump_member", "clump_first")}
     vectors = ("offset", "position", "velocity", "angular_momentum", "inertia")
@@ -224,7 +231,7 @@ def sphere_columns(mass: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _rows(name: str, values: Mapping[str, Any] | Any, columns: int, n: int | None = None) -> np.ndarray:
-    """Return an array of rows; one row stands for all of n."""
+    """Return an array of rows; a single row is repeated n times."""
     try:
         rows = np.atleast_2d(np.asarray(values, float))
     except (TypeError, ValueError):

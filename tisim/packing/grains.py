@@ -1,4 +1,4 @@
-"""What grains are drawn from: classes of a mixture, each with its sizes, its density and its share."""
+"""Classes of grains in a mixture, each with its sizes, density and share."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from tisim.packing.sizes import SizeDistribution
 
 
 class GrainClass(Component):
-    """A class of grains is one of those that a mixture is made of.
+    """A class of grains, one component of a mixture.
 
-    A class with a share x of the mass, density rho and sizes with the mean <r^3> over their number has
-    x / (rho <r^3>) of the number of grains, up to a factor that is the same for all classes. Where it has a
-    shape, its grains are rigid clumps like that, of any size: the radius of one is that of a ball of the same
-    volume.
+    In a class with a share x of the mass, density rho and number-averaged cube of the radius <r^3>, the
+    number of grains is proportional to x / (rho <r^3>), with the same factor for all classes. If it has a
+    clump shape, its grains are rigid clumps of this shape, scaled to their size: the radius of a grain is the
+    radius of a ball of equal volume.
     """
 
     sizes: SizeDistribution = option("sizes of its grains", examples=[EqualSizes(radius=1e-3)])
     density: float = parameter("kg/m^3", "density of its grains", examples=[2500.0], gt=0)
     share: float = parameter(
-        "", "its share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
+        "", "share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
     )
     clump: Clump | None = option(
-        "shape of its grains, a rigid clump, whose size and mass do not count; spheres unless given", None
+        "shape of its grains, a rigid clump, whose size and mass have no effect; spheres by default", None
     )
     material: Text | None = option(
-        "material of its grains; unless given, that of the cloud, or the first of the scene", None
+        "material of its grains; by default the material of the cloud, or the first of the scene", None
     )
     quantities: Mapping[Text, float | Vector] = option(
         "further fields of its grains by name, in SI, such as temperature", default_factory=dict
@@ -58,8 +58,8 @@ class GrainClass(Component):
         return self
 
     def spheres(self) -> np.ndarray:
-        """Return the spheres of a grain of the radius 1: place from the centre of mass along the principal
-        axes, radius, and part of the mass; shape (n, 5)."""
+        """Return the spheres of a grain of radius 1: position from the centre of mass along the principal
+        axes, radius, and mass fraction; shape (n, 5)."""
         if self.clump is None:
             return np.array([[0.0, 0.0, 0.0, 1.0, 1.0]])
         body, size = self.clump.body, self._clump_radius()
@@ -72,24 +72,24 @@ class GrainClass(Component):
         return self.clump.body.moments / (self.clump.body.mass * self._clump_radius() ** 2)
 
     def outer_radius(self) -> float:
-        """Return how far a grain of radius 1 reaches from its centre of mass."""
+        """Return the largest distance from the centre of mass to the surface of a grain of radius 1."""
         spheres = self.spheres()
         return float((np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]).max())
 
     def _clump_radius(self) -> float:
-        """Return the radius (m) of a ball of the volume of the clump as it is given."""
+        """Return the radius (m) of a ball with the volume of the template clump."""
         assert self.clump is not None
         return float(np.cbrt(self.clump.body.volume * 3 / (4 * np.pi)))
 
     def number(self) -> float:
-        """Return how many grains it has for each kg of share."""
+        """Return its number of grains per kg of share."""
         return self.share / (self.density * 4 / 3 * np.pi * self.sizes.mean_cube())
 
 
 def draw(classes: Sequence[GrainClass], number: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the class, by its index, and the radius (m) of each of a number of grains, drawn independently.
+    """Return the class index and the radius (m) of each of a number of grains, drawn independently.
 
-    They depend on the arguments alone, and the first of many are those of few.
+    The result depends on the arguments only; for a larger number, the first grains are the same.
     """
     uniform = np.random.Generator(np.random.Philox(key=[seed, GRAIN_SIZES])).random((number, 2))
     counts = np.array([one.number() for one in classes])
@@ -107,15 +107,15 @@ def masses(classes: Sequence[GrainClass], which: np.ndarray, radius: np.ndarray)
 
 
 def quantity(classes: Sequence[GrainClass], name: str, which: np.ndarray) -> np.ndarray:
-    """Return a quantity that all classes give, for grains of these classes."""
+    """Return a quantity given by all classes, for grains of these classes."""
     return np.array([one.quantities[name] for one in classes], float)[which]
 
 
 def class_materials(
     classes: Sequence[GrainClass], materials: Materials, otherwise: int = 0
 ) -> np.ndarray | None:
-    """Return the index of the material of each class, ``otherwise`` where it has none of its own; None where
-    no class has one. Raise InputError for one that the scene does not have."""
+    """Return the index of the material of each class, ``otherwise`` for classes without a material; None if
+    no class has one. Raise InputError for a material that the scene does not have."""
     if all(one.material is None for one in classes):
         return None
     indices = [
@@ -126,8 +126,8 @@ def class_materials(
 
 
 def check_quantities(classes: Sequence[GrainClass], taken: Collection[str]) -> None:
-    """Raise InputError unless all classes give the same quantities, with as many components, and none that
-    is given otherwise."""
+    """Raise InputError unless all classes give the same quantities, with equal numbers of components, and
+    none that is also given elsewhere."""
     for k, one in enumerate(classes):
         names, where = sorted(one.quantities), f"grains.{k}.quantities"
         must(names == sorted(classes[0].quantities), where, "those of the other classes", ", ".join(names))

@@ -1,4 +1,4 @@
-"""Where particles lie at the start in a duct whose width changes along it."""
+"""Random initial positions of spheres in a duct with a variable radius."""
 
 from __future__ import annotations
 
@@ -16,28 +16,29 @@ from tisim.errors import InputError, must
 from tisim.packing.placement import Placement
 
 MOST_FILLED = 0.5
-"""Spheres fill at most this part of a duct: near a random close packing none can be pushed aside."""
+"""Largest volume fraction of spheres in a duct; near random close packing, overlaps cannot be removed."""
 MOST_PUSHES = 2000
-"""Spheres are pushed apart so many times at most."""
+"""Largest number of rounds of pushing spheres apart."""
 CLEARANCE = 0.01
-"""They are pushed this part of their radii farther than apart, so that the last overlaps vanish soon."""
+"""Spheres are pushed apart to this gap, relative to their radii, so that the last overlaps vanish soon."""
 
 
 class RandomInDuct(Placement):
-    """Spheres lie at random and wholly inside an upright round duct whose radius changes along it.
+    """Spheres at random positions completely inside an upright round duct with a radius that varies along it.
 
-    They fill at most half of it. The duct has ``radii`` at ``heights`` above its lower end, and is conical
-    between them; its axis is along z. Where the domain is periodic along z, its length is that of the domain,
-    and it goes on across the faces, with one radius at both ends; else spheres lie within its ends.
-    Places are drawn evenly, and then overlaps with each other and with the wall are pushed apart until there
-    are none. It is no random sequential addition, which ends below 0.38, and earlier beside walls.
+    They fill at most half of its volume. The duct has ``radii`` at ``heights`` above its lower end, and is
+    conical in between; its axis is along z. If the domain is periodic along z, the duct must have the length
+    of the domain and equal radii at both ends, and continues across the faces; otherwise spheres lie between
+    its ends. Positions are drawn uniformly, and then overlapping spheres are pushed apart and away from the
+    wall until no overlaps remain. The method is not limited to the saturation fraction of random sequential
+    addition, 0.38, which is even lower near walls.
     """
 
     centre: Vector = parameter("m", "middle of the lower end", (0.0, 0.0, 0.0))
     heights: tuple[float, ...] = parameter(
-        "m", "heights at which the radius is given, rising from 0", examples=[(0.0, 0.01, 0.03)]
+        "m", "heights at which the radius is given, increasing from 0", examples=[(0.0, 0.01, 0.03)]
     )
-    radii: tuple[float, ...] = parameter("m", "radius at each of them", examples=[(0.005, 0.01, 0.01)])
+    radii: tuple[float, ...] = parameter("m", "radius at each height", examples=[(0.005, 0.01, 0.01)])
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -50,7 +51,7 @@ class RandomInDuct(Placement):
         return self
 
     def volume(self) -> float:
-        """Return the volume of the duct, m^3: that of truncated cones."""
+        """Return the volume of the duct, m^3, as a sum of truncated cones."""
         a, b = np.array(self.radii[:-1]), np.array(self.radii[1:])
         return float((np.pi / 3 * np.diff(self.heights) * (a * a + a * b + b * b)).sum())
 
@@ -69,7 +70,7 @@ class RandomInDuct(Placement):
         check_resolved("places in the duct", np.abs(self.centre) + length, float(radii.min()))
         endless = domain.imaged()[2]
         if endless:
-            side, rule = float(domain.edges(0.0)[2, 2]), "that of the box along z, which is periodic"
+            side, rule = float(domain.edges(0.0)[2, 2]), "the side of the box along z, which is periodic"
             must(abs(side - length) <= 1e-9 * side, "length of the duct", f"{side:g} m, {rule}", length)
             rule = "equal at both ends in a box that is periodic along z"
             must(self.radii[0] == self.radii[-1], "duct.radii", rule, self.radii)
@@ -82,7 +83,7 @@ class RandomInDuct(Placement):
         raise InputError(f"volume fraction must be {rule}; received {fraction:.4g}")
 
     def _anywhere(self, number: int, generator: np.random.Generator) -> np.ndarray:
-        """Return places (m), even over the duct."""
+        """Return uniformly distributed positions (m) in the duct."""
         widest, kept = max(self.radii), np.empty((0, 3))
         while len(kept) < number:
             tried = generator.uniform(
@@ -93,8 +94,8 @@ class RandomInDuct(Placement):
         return kept[:number]
 
     def _push_apart(self, places: np.ndarray, radii: np.ndarray, wider: np.ndarray, endless: bool) -> bool:
-        """Push spheres that overlap, as wide as ``wider`` (m), apart and off the wall; return whether any of
-        them overlapped or was in the wall."""
+        """Push spheres apart and off the wall to the distances for radii ``wider`` (m); return whether any
+        with the actual ``radii`` overlapped another or the wall."""
         length = self.heights[-1]
         tree = cKDTree(places, boxsize=[0.0, 0.0, length] if endless else None)
         i, j = tree.query_pairs(2 * float(wider.max()), output_type="ndarray").T
@@ -111,13 +112,13 @@ class RandomInDuct(Placement):
             np.add.at(places, j, push)
             inward, depth = self._off_wall(places, endless)
             places += np.maximum(wider - depth, 0.0)[:, None] * inward
-            # Rounding can put a place on the upper end, which a periodic tree refuses.
+            # Rounding can give a position at exactly the upper end, which a periodic tree does not accept.
             places[:, 2] = np.where(endless, places[:, 2] % length % length, places[:, 2])
         return overlapped
 
     def _off_wall(self, places: np.ndarray, endless: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return the direction away from the nearest place of the wall, and how far inside the wall places
-        are (m), negative outside; the ends are part of it unless the duct is endless."""
+        """Return the direction away from the nearest point of the wall, and the distance of positions from it
+        (m), negative outside; the ends belong to the wall unless the duct is endless."""
         rho = np.hypot(places[:, 0], places[:, 1])
         here = np.stack([rho, places[:, 2]], axis=1)
         corners = np.stack([self.radii, self.heights], axis=1)

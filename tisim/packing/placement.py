@@ -1,4 +1,4 @@
-"""Where spheres lie at the start: at random in a domain, a box, a ball or a cylinder, or on a lattice."""
+"""Initial positions of spheres: random in a domain, a box, a ball or a cylinder, or on a lattice."""
 
 from __future__ import annotations
 
@@ -20,38 +20,38 @@ from tisim.packing.tried_places import Packing
 
 
 class Placement(Component):
-    """This is the contract of a placement, which gives places to spheres."""
+    """Contract of a placement, which gives initial positions to spheres."""
 
     contract: ClassVar[bool] = True
 
     def sites(self) -> int | None:
-        """Return how many spheres it has room for; None where any number may be asked for."""
+        """Return the number of spheres that it can place; None if there is no fixed number."""
         return None
 
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
-        """Return centres, shape (n, 3) in m, of spheres of these radii (m), shape (n,), that do not overlap.
+        """Return centres, shape (n, 3) in m, of non-overlapping spheres with these radii (m), shape (n,).
 
-        InputError is raised when there is no room for them. The centres depend on the arguments alone.
+        InputError is raised if there is not enough space. The centres depend on the arguments only.
         """
         raise NotImplementedError(f"{type(self).__name__} must define centres")
 
 
 class RandomSequential(Placement):
-    """This is the contract of a placement by random sequential addition, within a region.
+    """Contract of a placement by random sequential addition within a region.
 
-    The spheres of all worlds of a batch are placed side by side, on all threads, where they lie by
-    themselves.
+    In a batch, the spheres of all worlds are placed in parallel; the result for each world is the same as
+    alone.
     """
 
     contract: ClassVar[bool] = True
 
     def region(self, radii: np.ndarray, domain: Domain) -> Region:
-        """Return the region of the centres of the largest of these spheres (m), as ``inside_box``,
-        ``inside_round`` or ``in_domain`` of ``tisim.packing.region`` makes it."""
+        """Return the region of the centres of the largest of these spheres (m), from ``inside_box``,
+        ``inside_round`` or ``in_domain`` of ``tisim.packing.region``."""
         raise NotImplementedError(f"{type(self).__name__} must define region")
 
     def packing(self, radii: np.ndarray, domain: Domain, seed: int) -> Packing:
-        """Return what ``centres`` places."""
+        """Return the packing that ``centres`` places."""
         return Packing(radii, self.region(radii, domain), seed)
 
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
@@ -59,10 +59,10 @@ class RandomSequential(Placement):
 
 
 class RandomInDomain(RandomSequential):
-    """Spheres lie at random with their centres anywhere in the domain, by random sequential addition.
+    """Spheres with random centres in the domain, by random sequential addition.
 
-    They may reach over faces of the domain that are joined, and across these they keep apart where particles
-    see each other there. Along an axis that is not periodic they lie wholly within the faces.
+    They may extend across periodic faces of the domain, and do not overlap images if particles interact with
+    images. Along a non-periodic axis they are completely inside the faces.
 
     Source: Z04 section 8.
     """
@@ -72,7 +72,7 @@ class RandomInDomain(RandomSequential):
 
 
 class RandomInBox(RandomSequential):
-    """Spheres lie at random and wholly inside a box, by random sequential addition."""
+    """Spheres at random positions completely inside a box, by random sequential addition."""
 
     low: Vector = parameter("m", "lower corner of the box", examples=[(0.0, 0.0, 0.0)])
     high: Vector = parameter("m", "upper corner of the box", examples=[(0.01, 0.01, 0.01)])
@@ -82,7 +82,7 @@ class RandomInBox(RandomSequential):
 
 
 class RandomInBall(RandomSequential):
-    """Spheres lie at random and wholly inside a ball, by random sequential addition.
+    """Spheres at random positions completely inside a ball, by random sequential addition.
 
     Source: Z16 sections 6.1, 9.
     """
@@ -96,7 +96,7 @@ class RandomInBall(RandomSequential):
 
 
 class RandomInCylinder(RandomSequential):
-    """Spheres lie at random and wholly inside a cylinder, by random sequential addition."""
+    """Spheres at random positions completely inside a cylinder, by random sequential addition."""
 
     centre: Vector = parameter("m", "centre of the cylinder", (0.0, 0.0, 0.0))
     axis: Vector = parameter("", "direction of the axis, of any length but 0", (0.0, 0.0, 1.0))
@@ -119,7 +119,7 @@ class RandomInCylinder(RandomSequential):
 
 
 class Lattice(Placement):
-    """Spheres lie on a simple cubic lattice, or one that is stretched along the axes.
+    """Spheres on a simple cubic lattice, or one with different spacings along the axes.
 
     Give the spacing or the size, not both. An axis with one site has size 0.
 
@@ -128,9 +128,9 @@ class Lattice(Placement):
 
     shape: tuple[int, int, int] = option("number of sites along x, y and z", examples=[(3, 3, 3)])
     spacing: float | None = parameter(
-        "m", "distance of neighbours, the same along all axes", None, gt=0, examples=[1e-2]
+        "m", "distance between neighbours, the same along all axes", None, gt=0, examples=[1e-2]
     )
-    size: Vector | None = parameter("m", "distance of the first site from the last one along each axis", None)
+    size: Vector | None = parameter("m", "distance between the first and the last site along each axis", None)
     centre: Vector = parameter("m", "centre of the lattice", (0.0, 0.0, 0.0))
 
     @model_validator(mode="after")
@@ -149,7 +149,7 @@ class Lattice(Placement):
         return math.prod(self.shape)
 
     def steps(self) -> np.ndarray:
-        """Return the distance of neighbours along each axis, m, shape (3,)."""
+        """Return the distance between neighbours along each axis, m, shape (3,)."""
         gaps = np.maximum(np.asarray(self.shape) - 1, 1)
         return np.full(3, self.spacing) if self.size is None else np.asarray(self.size) / gaps
 
@@ -157,7 +157,7 @@ class Lattice(Placement):
         radius = float(radii.max())
         several = np.asarray(self.shape) > 1
         closest = self.steps()[several].min(initial=np.inf)
-        # Touching is allowed, to rounding.
+        # Sites may touch, within rounding.
         rule = f"at least a diameter, {2 * radius:g} m, apart"
         must(bool(closest >= 2 * radius * (1 - 1e-12)), "lattice sites", rule, float(closest))
         half = (np.asarray(self.shape) - 1) / 2 * self.steps()

@@ -1,10 +1,10 @@
-"""Random sequential addition: spheres placed one after another at random, where they do not overlap.
+"""Random sequential addition: spheres are placed one after another at random positions without overlap.
 
-Of unlike ones the largest come first, which leave room for the small ones between them.
+Spheres of different sizes are placed in order of decreasing size, because small ones fit between large ones.
 
-B. Widom, J. Chem. Phys. 44 (1966) 3888. The start of Z04 section 8 ("initially non-intersecting") and of
-Z16 section 9. Equal spheres jam at a volume fraction of 0.3841 in the bulk (G. Zhang and S. Torquato,
-Phys. Rev. E 88 (2013) 053312), at less between walls.
+B. Widom, J. Chem. Phys. 44 (1966) 3888. It gives the start of Z04 section 8 ("initially non-intersecting")
+and of Z16 section 9. Equal spheres jam at a volume fraction of 0.3841 in the bulk (G. Zhang and S. Torquato,
+Phys. Rev. E 88 (2013) 053312), and earlier between walls.
 """
 
 from __future__ import annotations
@@ -24,19 +24,20 @@ from tisim.packing.saturation import fill
 from tisim.packing.tried_places import Packing, everywhere
 
 SATURATION_FRACTION = 0.3841
-"""At this volume fraction no further sphere fits, in the bulk."""
+"""Saturation volume fraction of equal spheres in the bulk."""
 SPHERES_AT_ONCE = 300_000
-"""So many spheres are placed in one go, which bounds the memory that it takes, and how long it is."""
+"""Largest number of spheres placed in one kernel launch, which limits its memory and duration."""
 _placed_ahead: ContextVar[Mapping[Any, np.ndarray] | None] = ContextVar("_placed_ahead", default=None)
-"""These are the centres of packings that were made side by side, in the thread that makes starts of them."""
+"""Centres of packings that were placed in parallel beforehand, for the thread that creates the starts."""
 
 
 def place(radii: np.ndarray, region: Region, seed: int) -> np.ndarray:
-    """Return centres, shape (n, 3) in m, of spheres of these radii (m), shape (n,), none overlapping.
+    """Return centres, shape (n, 3) in m, of non-overlapping spheres with these radii (m), shape (n,).
 
-    region : of the centres of the largest. Depends on the arguments alone, not on device or threads. Equal
-    spheres go up to saturation. InputError, which says the volume fraction reached, when no further sphere
-    fits.
+    region : region of the centres of the largest spheres.
+
+    The result depends on the arguments only, not on device or threads. Equal spheres can be placed up to
+    saturation. InputError, with the volume fraction reached, if no further sphere fits.
     """
     packing = Packing(radii, region, seed)
     refuse(packing)
@@ -57,8 +58,8 @@ def place(radii: np.ndarray, region: Region, seed: int) -> np.ndarray:
 
 
 def refuse(packing: Packing) -> None:
-    """Raise InputError where no choice of places would do, before any is tried: a few spheres can exceed the
-    limit of many."""
+    """Raise InputError, before any trial, if no arrangement of the spheres is possible. The limit allows for
+    small numbers, which can exceed the saturation fraction of many spheres."""
     runtime.current()
     region, count, largest = packing.region, len(packing.radii), float(packing.radii.max())
     smallest = float(packing.radii.min())
@@ -71,9 +72,10 @@ def refuse(packing: Packing) -> None:
 
 @contextmanager
 def placed_side_by_side(packings: Sequence[Packing]) -> Iterator[None]:
-    """Place the spheres of all packings on all threads; within, ``place`` finds them there, in this thread.
+    """Place the spheres of all packings in parallel; within this context ``place`` uses these results, in
+    this thread.
 
-    It leaves to ``place`` what that refuses, and to go on with those that have not found room for all.
+    Impossible packings are left to ``place`` to refuse, and incomplete ones to continue.
     """
     new = {packing.key(): packing for packing in packings if _possible(packing)}
     ahead: dict[Any, np.ndarray] = {}
@@ -95,7 +97,7 @@ def _possible(packing: Packing) -> bool:
 
 
 def _portions(packings: Mapping[Any, Packing]) -> Iterator[list[Any]]:
-    """Yield the keys of packings of SPHERES_AT_ONCE spheres at most, or of one."""
+    """Yield the keys of packings in groups of at most SPHERES_AT_ONCE spheres, or of one packing."""
     some: list[Any] = []
     spheres = 0
     for key, packing in packings.items():

@@ -1,4 +1,4 @@
-"""Where the centres of a random packing may lie."""
+"""The region for the centres of spheres in a random packing."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ ALL_AXES: Axes = (True, True, True)
 
 @dataclass(frozen=True)
 class Region:
-    """A region is a box ``low``..``high`` (m, shape (3,) each) of the centres of spheres, or what is round
-    within it (``tisim.geometry.round_box``).
+    """A box ``low``..``high`` (m, shape (3,) each) for the centres of spheres, or a round shape inscribed in
+    it (``tisim.geometry.round_box``).
 
-    periodic : along which axes spheres see each other across opposite faces. walled : the axes along which
-    spheres lie wholly inside a container, so that centres of smaller ones lie farther out. volume : m^3, of
-    the container that volume fractions are of.
+    periodic : axes along which spheres interact across opposite faces.
+    walled : axes along which spheres are completely inside a container, so that centres of smaller spheres
+        lie farther out.
+    volume : volume of the container, to which volume fractions refer, m^3.
     """
 
     low: np.ndarray
@@ -33,31 +34,31 @@ class Region:
 
     @property
     def side(self) -> np.ndarray:
-        """Return the lengths of the box along the axes, m, shape (3,)."""
+        """Return the side lengths of the box, m, shape (3,)."""
         return self.high - self.low
 
     def reachable_volume(self, radius: float) -> float:
-        """Return the volume that spheres of ``radius`` (m) with centres in the region can take up, m^3."""
+        """Return the volume that spheres of ``radius`` (m) with centres in the region can occupy, m^3."""
         sides = np.where(self.periodic, self.side, self.side + 2 * radius)
         return float(round_box.volume(self.shape, sides))
 
     def for_radius(self, radius: float, smaller: float) -> Region:
-        """Return the region of spheres that are smaller (m) than those of ``radius`` (m) that it is of."""
+        """Return the region for spheres of radius ``smaller`` (m); this region is for ``radius`` (m)."""
         wider = np.where(self.walled, radius - smaller, 0.0)
         return replace(self, low=self.low - wider, high=self.high + wider)
 
 
 def box(low: np.ndarray, high: np.ndarray, periodic: Axes = NO_AXIS) -> Region:
-    """Return the region of centres anywhere in a box low..high (m); spheres may reach over its faces."""
+    """Return the region of centres anywhere in a box low..high (m); spheres may extend beyond its faces."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     wide = bool((high > low).all())
-    must(wide, "box", "wider than nothing in each direction", (high - low).tolist())
+    must(wide, "box", "of positive width in each direction", (high - low).tolist())
     return Region(low, high, float(np.prod(high - low)), periodic)
 
 
 def in_domain(domain: Domain, radius: float) -> Region:
-    """Return the region of spheres of ``radius`` (m) in a domain with bounds: they may reach over faces that
-    are joined, and lie wholly within the others."""
+    """Return the region for spheres of ``radius`` (m) in a bounded domain: they may extend across joined
+    faces, and are completely inside the others."""
     low, high = domain.bounds()
     if low is None or high is None:
         raise InputError("domain must be bounded to hold a random cloud; received an open one")
@@ -74,7 +75,7 @@ def in_domain(domain: Domain, radius: float) -> Region:
 
 
 def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
-    """Return the region of spheres of ``radius`` (m) wholly inside a box low..high (m)."""
+    """Return the region for spheres of ``radius`` (m) completely inside a box low..high (m)."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     room = bool((high - low > 2 * radius).all())
     must(room, "box", f"wider than a sphere, {2 * radius:g} m, in each direction", (high - low).tolist())
@@ -82,8 +83,8 @@ def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
 
 
 def inside_round(shape: round_box.BoxShape, centre: Vector, half: Vector, radius: float) -> Region:
-    """Return the region of spheres of ``radius`` (m) wholly inside a cylinder or ball about ``centre`` (m);
-    half : m, half the sides of its box."""
+    """Return the region for spheres of ``radius`` (m) completely inside a cylinder or ball around ``centre``
+    (m). half : half the sides of its box, m."""
     sizes = half[0] if shape == "ball" else (half[0], 2 * half[2])
     larger = "larger" if shape == "ball" else "wider and longer"
     must(min(half) > radius, shape, f"{larger} than a sphere, of radius {radius:g} m", sizes)

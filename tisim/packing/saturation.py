@@ -1,9 +1,10 @@
-"""What room random sequential addition has left, down to none: the packing is then saturated.
+"""Completion of random sequential addition up to saturation, when no space is left.
 
-G. Zhang and S. Torquato, Phys. Rev. E 88 (2013) 053312: space is cut into voxels, those that lie wholly
-within a diameter of a centre are dropped, and places are tried in the others only. Where tries fail, voxels
-are cut in eight. A centre that is uniform in the voxels left is uniform in the room left, so this is the same
-process as trying places everywhere, without the tries that cannot succeed.
+G. Zhang and S. Torquato, Phys. Rev. E 88 (2013) 053312. Space is divided into voxels. Voxels that lie
+completely within a diameter of a centre are dropped, and insertion trials are made in the others only. If
+trials fail, each voxel is split into eight. A trial position that is uniform in the remaining voxels and
+succeeds is uniform in the remaining free space. The process is therefore equivalent to trials everywhere,
+without those that cannot succeed.
 """
 
 from __future__ import annotations
@@ -17,34 +18,36 @@ from tisim.geometry import round_box
 from tisim.packing.region import Region
 
 FIRST_VOXEL_SIDE = 0.5
-"""The side of the first voxels is so long at most, in diameters of a sphere."""
+"""Largest side of the first voxels, in sphere diameters."""
 VOXELS_PER_BLOCK = 200_000
-"""So many voxels are worked on at once, which bounds the memory that it takes."""
+"""Number of voxels processed at once, which limits the memory."""
 NEAREST_CENTRES = 4
-"""So many centres, those nearest to the voxel that it was cut from, are asked whether they cover a voxel;
-what is missed for the moment is found in a finer cut."""
+"""Number of nearest centres that are tested for covering a voxel; voxels missed by this test are found after
+further splitting."""
 MAX_CUTS = 40
-"""Voxels are cut so many times at most; their side is then below the rounding of a diameter."""
+"""Largest number of splittings; the side of a voxel is then below the rounding error of a diameter."""
 
 
 def fill(
     centres: np.ndarray, count: int, diameter: float, region: Region, generator: np.random.Generator
 ) -> np.ndarray:
-    """Return centres, shape (n, 3), m: those given, and more until there are ``count`` or no room is left."""
+    """Return centres, shape (n, 3), m: the given ones, and more until there are ``count`` or no space is
+    left."""
     return _Voids(np.asarray(centres, float), diameter, region).fill(count, generator)
 
 
 class _Voids:
-    """The voids are the voxels left. index : their indices, shape (m, 3); voxel k spans index_k step ..
-    (index_k + 1) step.
+    """The remaining voxels.
 
-    Places are counted from the lower corner of the region, m.
+    index : indices of voxels, shape (m, 3); voxel k spans index_k step .. (index_k + 1) step.
+
+    Positions are relative to the lower corner of the region, m.
     """
 
     def __init__(self, centres: np.ndarray, diameter: float, region: Region) -> None:
         self.diameter, self.region = diameter, region
         self.half, self.rounded = region.side / 2, round_box.ROUND[region.shape]
-        # A side of 0 is, for a tree, that of an axis along which nothing is periodic.
+        # A periodic tree takes a side of 0 as a non-periodic axis.
         self.box = np.where(region.periodic, region.side, 0.0)
         self.places = centres - region.low
         self.tree = self._tree(self.places)
@@ -56,7 +59,7 @@ class _Voids:
         ])  # fmt: skip
 
     def _tree(self, places: np.ndarray) -> cKDTree:
-        # Rounding can put a centre on the upper face, which a periodic tree refuses.
+        # Rounding can put a centre on the upper face, which a periodic tree does not accept.
         inside = np.where(self.region.periodic, places % self.region.side, places)
         return cKDTree(inside, boxsize=self.box if self.box.any() else None)
 
@@ -75,7 +78,7 @@ class _Voids:
         return self.region.low + self.places
 
     def _try(self, tries: int, generator: np.random.Generator) -> np.ndarray:
-        """Return the places of ``tries`` that are free, taken one after another; shape (n, 3), m."""
+        """Return the free positions among ``tries`` random ones, accepted in order; shape (n, 3), m."""
         voxel = self.index[generator.integers(len(self.index), size=tries)]
         places = (voxel + generator.random((tries, 3))) * self.step
         places = places[round_box.contains(self.rounded, self.half, (places - self.half).T)]
@@ -84,8 +87,7 @@ class _Voids:
         return places[self._first_come(places)]
 
     def _first_come(self, places: np.ndarray) -> np.ndarray:
-        """Return which places are taken when each, in turn, is taken if no earlier one is within a
-        diameter."""
+        """Return which positions are accepted, in order, if no earlier accepted one is within a diameter."""
         accepted = np.ones(len(places), dtype=bool)
         if len(places):
             pairs = self._tree(places).query_pairs(self.diameter, output_type="ndarray")
@@ -101,7 +103,7 @@ class _Voids:
         self.index = np.concatenate([self._outside(block, added) for block in _blocks(self.index)])
 
     def _split_cells(self) -> None:
-        """Cut each voxel in eight, and keep what may hold a further centre."""
+        """Split each voxel into eight, and keep those that may hold a further centre."""
         parents, coarse = self.index, self.step
         self.step = coarse / 2
         eighths = np.indices((2, 2, 2)).reshape(3, -1).T
@@ -119,7 +121,7 @@ class _Voids:
         self.index = np.concatenate(children)
 
     def _outside(self, index: np.ndarray, tree: cKDTree) -> np.ndarray:
-        """Return the voxels that the nearest centre of a tree does not cover."""
+        """Return the voxels that are not covered by their nearest centre in a tree."""
         middle = (index + 0.5) * self.step
         distance, nearest = tree.query(middle, distance_upper_bound=self.diameter)
         close = np.flatnonzero(np.isfinite(distance))
@@ -127,13 +129,13 @@ class _Voids:
         return np.delete(index, close[covered], axis=0)
 
     def _is_covered(self, middle: np.ndarray, centre: np.ndarray) -> np.ndarray:
-        """Return whether all of a voxel lies within a diameter of a centre: its farthest corner does."""
+        """Return whether a whole voxel, and so its farthest corner, lies within a diameter of a centre."""
         apart = np.abs(middle - centre)
         apart = np.minimum(apart, np.abs(self.box - apart))
         return np.asarray(((apart + self.step / 2) ** 2).sum(axis=-1) < self.diameter**2)
 
     def _within(self, index: np.ndarray) -> np.ndarray:
-        """Return the voxels that reach into the region."""
+        """Return the voxels that overlap the region."""
         gap = np.maximum(np.abs((index + 0.5) * self.step - self.half) - self.step / 2, 0.0)
         return index[round_box.contains(self.rounded, self.half, gap.T)]
 

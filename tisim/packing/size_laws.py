@@ -1,4 +1,4 @@
-"""The size distributions: equal, uniform, normal, lognormal, Weibull's, and one that sieves have measured."""
+"""Size distributions: equal, uniform, normal, lognormal, Weibull, and a sieve curve."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from tisim.errors import Words, must
 from tisim.packing.sizes import By, SizeDistribution
 
 NODES = 1000
-"""A curve has so many nodes evenly in the logarithm of the radius, and as many evenly in what passes."""
+"""Number of nodes of a curve at equal intervals of log radius, and of additional nodes at equal intervals of
+the passing fraction."""
 
 
 class EqualSizes(SizeDistribution):
-    """All grains have one radius."""
+    """All grains have the same radius."""
 
-    by: By = option("what the parts are of, which is all the same here", "number")
+    by: By = option("quantity of the distribution: number, volume or mass; no effect here", "number")
     radius: float = parameter("m", "radius of the grains", examples=[1e-3], gt=0)
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -28,7 +29,7 @@ class EqualSizes(SizeDistribution):
 
 
 class TruncatedSizes(SizeDistribution):
-    """Sizes lie between two radii; what a law says of others is left out, and the rest made whole."""
+    """Contract of a size law that is truncated to an interval of radii and renormalised."""
 
     contract: ClassVar[bool] = True
 
@@ -44,12 +45,12 @@ class TruncatedSizes(SizeDistribution):
         return self
 
     def cumulative(self, radius: np.ndarray) -> np.ndarray:
-        """Return the part that is no larger, by the law without bounds."""
+        """Return the fraction of grains up to a radius, by the law without bounds."""
         raise NotImplementedError(f"{type(self).__name__} must define cumulative")
 
     def quantile(self, part: np.ndarray) -> np.ndarray:
-        """Return the radius (m) that a part, above 0 and below 1, is no larger than, by the law without
-        bounds."""
+        """Return the radius (m) up to which a fraction, above 0 and below 1, of the grains lies, by the law
+        without bounds."""
         raise NotImplementedError(f"{type(self).__name__} must define quantile")
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -62,7 +63,7 @@ class TruncatedSizes(SizeDistribution):
 
 
 class UniformSizes(TruncatedSizes):
-    """All radii between two are as frequent, by number or by volume."""
+    """Uniform distribution of radii between two bounds, by number or by volume."""
 
     def cumulative(self, radius: np.ndarray) -> np.ndarray:
         return (radius - self.smallest) / (self.largest - self.smallest)
@@ -72,11 +73,11 @@ class UniformSizes(TruncatedSizes):
 
 
 class NormalSizes(TruncatedSizes):
-    """Radii are normally distributed, q(r) ~ exp(-(r - mean)^2 / (2 deviation^2)), between two bounds."""
+    """Normal distribution of radii, q(r) ~ exp(-(r - mean)^2 / (2 deviation^2)), between two bounds."""
 
-    mean: float = parameter("m", "mean radius, were there no bounds", examples=[1e-3], gt=0)
+    mean: float = parameter("m", "mean radius without the bounds", examples=[1e-3], gt=0)
     deviation: float = parameter(
-        "m", "standard deviation of the radius, were there no bounds", examples=[2e-4], gt=0
+        "m", "standard deviation of the radius without the bounds", examples=[2e-4], gt=0
     )
 
     def cumulative(self, radius: np.ndarray) -> np.ndarray:
@@ -87,17 +88,17 @@ class NormalSizes(TruncatedSizes):
 
 
 class LognormalSizes(TruncatedSizes):
-    """Logarithms of radii are normally distributed, between two bounds.
+    """Lognormal distribution of radii, between two bounds.
 
         q(ln r) ~ exp(-ln(r / median)^2 / (2 ln(ratio)^2))
 
-    By number and by volume it is a law of this form, with the same ratio, where there are no bounds: that of
-    the volume has a median larger by exp(3 ln(ratio)^2).
+    Without bounds, the distributions by number and by volume both have this form with the same ratio; the
+    median by volume is larger by the factor exp(3 ln(ratio)^2).
 
     Source: T. Hatch, S. P. Choate, J. Franklin Inst. 207 (1929) 369.
     """
 
-    median: float = parameter("m", "radius that half of it is no larger than", examples=[1e-3], gt=0)
+    median: float = parameter("m", "median radius without the bounds", examples=[1e-3], gt=0)
     ratio: float = parameter(
         "", "geometric standard deviation: the radius at 84.1 % over the median", examples=[1.3], gt=1
     )
@@ -110,14 +111,16 @@ class LognormalSizes(TruncatedSizes):
 
 
 class WeibullSizes(TruncatedSizes):
-    """Radii are distributed as Weibull's law has it, which by volume is that of Rosin and Rammler.
+    """Weibull distribution of radii between two bounds; by volume it is the Rosin-Rammler distribution.
 
         passing(r) = 1 - exp(-(r / scale)^shape)
 
     Source: P. Rosin, E. Rammler, J. Inst. Fuel 7 (1933) 29; W. Weibull, J. Appl. Mech. 18 (1951) 293.
     """
 
-    scale: float = parameter("m", "radius that 63.2 % is no larger than", examples=[1e-3], gt=0)
+    scale: float = parameter(
+        "m", "radius at a passing fraction of 63.2 %, without the bounds", examples=[1e-3], gt=0
+    )
     shape: float = parameter("", "exponent, larger for narrower distributions", examples=[4.0], gt=0)
 
     def cumulative(self, radius: np.ndarray) -> np.ndarray:
@@ -128,17 +131,16 @@ class WeibullSizes(TruncatedSizes):
 
 
 class SieveCurve(SizeDistribution):
-    """Sizes are those of a sieve curve: diameters of openings, and the part that passes each.
+    """Sizes from a sieve curve: diameters of openings, and the fraction that passes each.
 
-    Nothing passes the first sieve, and all the last. In between the curve is a straight line from sieve to
-    sieve, over the diameter.
+    Nothing passes the first sieve, and everything the last. In between, the curve is linear in the diameter.
     """
 
     diameters: tuple[float, ...] = parameter(
-        "m", "diameters of the openings, rising", examples=[(1e-3, 2e-3, 4e-3)]
+        "m", "diameters of the openings, increasing", examples=[(1e-3, 2e-3, 4e-3)]
     )
     passing: tuple[float, ...] = parameter(
-        "", "part that passes each, from 0 to 1", examples=[(0.0, 0.4, 1.0)]
+        "", "fraction that passes each, from 0 to 1", examples=[(0.0, 0.4, 1.0)]
     )
 
     @model_validator(mode="after")

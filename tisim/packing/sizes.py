@@ -1,4 +1,4 @@
-"""The contract of size distributions, and how sizes are drawn from any of them."""
+"""The contract of size distributions, and the sampling of sizes from them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ By = Literal["number", "volume", "mass"]
 
 
 class SizeDistribution(Component):
-    """A size distribution says which part of some grains has which radii.
+    """Contract of a distribution of radii, by number, volume or mass.
 
-    It is that of their number, or that of their volume or mass, which are one as all of a class have one
-    density: what sieves and weighing give. Classes of other densities have their ``share`` of the mass. Parts
-    by volume q_3 and by number q_0 are bound by
+    Distributions by volume and by mass are equal, because all grains of a class have the same density; they
+    are the result of sieving and weighing. Classes with other densities have their own ``share`` of the mass.
+    The densities by volume, q_3, and by number, q_0, are related by
 
         q_0(r) = q_3(r) / r^3 / integral of q_3(r) / r^3
 
-    so of two radii with the same part of the volume, the smaller one has more grains by the cube of their
-    ratio. Between nodes, which each distribution lays as densely as it takes, a density is constant in what
-    the distribution is of.
+    For equal volume fractions, the number of grains is therefore inversely proportional to the cube of the
+    radius. Each distribution provides nodes of sufficient density. Between nodes the density is constant in
+    the quantity of the distribution.
 
     Source: T. Allen, Particle Size Measurement (1997), chapter 2.
     """
@@ -30,22 +30,22 @@ class SizeDistribution(Component):
     contract: ClassVar[bool] = True
 
     by: By = option(
-        "what the parts are of: the number of grains, their volume, or their mass", examples=["volume"]
+        "quantity of the distribution: the number of grains, their volume, or their mass", examples=["volume"]
     )
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return radii (m), rising, and the part, 0 to 1, of the number, volume or mass that is no larger
-        than each."""
+        """Return radii (m), increasing, and the cumulative fraction, 0 to 1, of number, volume or mass up to
+        each."""
         raise NotImplementedError(f"{type(self).__name__} must define nodes")
 
     def table(self) -> np.ndarray:
-        """Return radii (m), and the part of the number of grains that is no larger; shape (nodes, 2)."""
+        """Return radii (m) and the cumulative fraction of the number of grains; shape (nodes, 2)."""
         radius, passing = self.nodes()
         counts = np.diff(passing) * self._counts_per_part(radius)
         return np.column_stack([radius, np.concatenate([[0.0], np.cumsum(counts)]) / counts.sum()])
 
     def radii(self, uniform: np.ndarray) -> np.ndarray:
-        """Return the radii (m) below which are these parts, 0 to 1, of the number of grains."""
+        """Return the radii (m) at these cumulative fractions, 0 to 1, of the number of grains."""
         table = self.table()
         at = np.clip(np.searchsorted(table[:, 1], uniform, side="right") - 1, 0, len(table) - 2)
         (a, first), (b, last) = table[at].T, table[at + 1].T
@@ -58,7 +58,7 @@ class SizeDistribution(Component):
         a, b, part = radius[:-1], radius[1:], np.diff(passing)
         if self.by == "number":
             return float((part * (a + b) / 2).sum())
-        # The means between two nodes of r/r^3, and of 1/r^3.
+        # The means between two nodes of r/r^3 and of 1/r^3.
         return float((part / (a * b)).sum() / (part * self._counts_per_part(radius)).sum())
 
     def mean_cube(self) -> float:
@@ -70,7 +70,7 @@ class SizeDistribution(Component):
         return float(1 / (part * self._counts_per_part(radius)).sum())
 
     def _counts_per_part(self, radius: np.ndarray) -> np.ndarray:
-        """Return how many grains a part has between two nodes, up to a factor: the mean there of 1, or of
-        1/r^3."""
+        """Return the number of grains per fraction between two nodes, up to a factor: the mean there of 1, or
+        of 1/r^3."""
         a, b = radius[:-1], radius[1:]
         return np.ones(len(a)) if self.by == "number" else (a + b) / (2 * a**2 * b**2)

@@ -1,4 +1,5 @@
-"""Random sequential addition by trying places everywhere; packings are made side by side, one a thread."""
+"""Random sequential addition by insertion trials everywhere; packings are made in parallel, one per
+thread."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +16,13 @@ from tisim.packing.region import Region
 from tisim.program.launches import iterations_of_task
 
 MAX_CONSECUTIVE_FAILURES = 5_000
-"""After so many failures in a row places are no longer tried everywhere, only where there is room."""
+"""After this number of consecutive failures, trials are made only in the remaining free space."""
 MAX_CELLS = 128
-"""The list of neighbours has so many cells along an axis at most: 8 MB of them, for a million spheres."""
+"""Largest number of cells of the neighbour list along an axis: 8 MB for a million spheres."""
 CELLS_OF_A_SPHERE = 8
-"""A level has about so many cells for each sphere at most."""
+"""Approximate largest number of cells of a level per sphere."""
 MAX_LEVELS = 12
-"""Spheres of half the size have smaller cells; from the size ratio 2^11 on no smaller ones."""
+"""Each level of cells is for spheres of half the size; there are none for size ratios above 2^11."""
 
 
 @in_taichi_thread
@@ -36,14 +37,17 @@ def _add(
     seeds: ti.types.ndarray(),  # type: ignore[valid-type]
     task: ti.i32,
 ):
-    """Place the spheres of each packing, whose radii never rise.
+    """Place the spheres of each packing, ordered by decreasing radius.
 
-    spheres : the radius of each, then its centre. chains : its level, and the one before it in its cell.
-    levels : the first cell of each, and how many it has along each axis. heads : the last member of each
-    cell; -1 where there is none. packings : the first sphere of each, the one after the last, its first
-    level, and then how many found room. regions : the corner and sides of the region of the largest sphere,
-    and of the smallest, and whether each axis is periodic, round and walled. task : a thread takes so many
-    iterations of a loop at least (tisim/program/launches.py).
+    spheres : radius and centre of each sphere.
+    chains : level of each sphere, and the previous sphere in its cell.
+    levels : first cell of each level, and its number of cells along each axis.
+    heads : last sphere in each cell; -1 if there is none.
+    packings : first sphere of each packing, the one after the last, its first level, and then the number of
+        spheres placed.
+    regions : corner and sides of the region of the largest sphere, and of the smallest, and for each axis
+        whether it is periodic, round and walled.
+    task : smallest number of loop iterations that a thread takes (tisim/program/launches.py).
     """
     for iteration in range(packings.shape[0] * task):
         if iteration % task == 0:
@@ -62,7 +66,7 @@ def _placed(
     seed,
     p,
 ):
-    """Place the spheres of a packing; return how many found room."""
+    """Place the spheres of a packing; return the number placed."""
     low, side = _row(regions, p, 0), _row(regions, p, 1)
     widest_low, widest_side = _row(regions, p, 2), _row(regions, p, 3)
     periodic, rounded, walled = _row(regions, p, 4), _row(regions, p, 5), _row(regions, p, 6)
@@ -85,7 +89,7 @@ def _placed(
                 x = low - wider + u * (side + 2.0 * wider)
                 place = (x - widest_low) / widest_side
                 free = True
-                # From the cell itself on: most places that are taken are found to be so there.
+                # Start from the cell itself, in which most overlaps are found.
                 for k in range(27 * (level + 1)):
                     m, turn = lowest + level - k // 27, (k + 13) % 27
                     dims = ti.Vector([levels[m, 1], levels[m, 2], levels[m, 3]])
@@ -124,9 +128,9 @@ def _row(array: ti.template(), p, k):  # type: ignore[valid-type]
 
 @dataclass(frozen=True, eq=False)
 class Packing:
-    """A packing is of spheres of these radii (m), shape (n,), at least one, by the random numbers of a seed.
+    """A packing of at least one sphere, with radii (m), shape (n,), and a random seed.
 
-    region : of the centres of the largest.
+    region : region of the centres of the largest spheres.
     """
 
     radii: np.ndarray
@@ -135,29 +139,30 @@ class Packing:
 
     @cached_property
     def order(self) -> np.ndarray:
-        """The order in which the spheres are placed: the largest first."""
+        """The order in which spheres are placed: the largest first."""
         return np.argsort(-self.radii, kind="stable")
 
     @property
     def equal(self) -> bool:
-        """Whether all spheres are of one radius."""
+        """Whether all spheres have the same radius."""
         return bool((self.radii == self.radii[0]).all())
 
     def fraction(self, count: int) -> float:
-        """Return the part of the region's container that the first ``count`` spheres to be placed take up."""
+        """Return the volume fraction of the first ``count`` spheres in order of placement, in the region's
+        container."""
         return float((4 / 3 * np.pi * self.radii**3)[self.order][:count].sum()) / self.region.volume
 
     def generator(self) -> np.random.Generator:
-        """Return a generator of further random numbers, for what trying places everywhere leaves."""
+        """Return a generator of further random numbers, for completing a packing after trials everywhere."""
         return np.random.Generator(np.random.Philox(key=[self.seed, SEQUENTIAL_ADDITION]))
 
     def key(self) -> tuple[bytes, bytes, int]:
-        """Return what decides where the spheres lie."""
+        """Return a key of everything that determines the positions of the spheres."""
         return self.radii.tobytes(), self.rows.tobytes(), self.seed
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """What ``regions`` of the kernel has of it, shape (7, 3)."""
+        """Row of the packing in ``regions`` of the kernel, shape (7, 3)."""
         region = self.region
         widest = region.for_radius(float(self.radii.max()), float(self.radii.min()))
         axes = (region.periodic, round_box.ROUND[region.shape], region.walled)
@@ -165,8 +170,8 @@ class Packing:
 
 
 def everywhere(packings: Sequence[Packing]) -> list[np.ndarray]:
-    """Return of each packing the centres, m, shape (placed, 3), of the first spheres of its order, which are
-    found by trying places in all of its region."""
+    """Return for each packing the centres, m, shape (placed, 3), of the spheres that were placed by trials in
+    its whole region, in order of placement."""
     grids = [_cells(packing) for packing in packings]
     radii = [packing.radii[packing.order] for packing in packings]
     ends, lowest = np.cumsum([len(one) for one in radii]), np.cumsum([0, *map(len, grids)])[:-1]
@@ -186,15 +191,16 @@ def everywhere(packings: Sequence[Packing]) -> list[np.ndarray]:
 
 
 def _levels(radii: np.ndarray) -> np.ndarray:
-    """Return the level of each sphere, whose radii never rise: those of half the size have smaller cells."""
+    """Return the level of each sphere, given decreasing radii: spheres of half the size have smaller
+    cells."""
     return np.minimum(np.log2(radii[0] / radii), MAX_LEVELS - 1).astype(np.int32)
 
 
 def _cells(packing: Packing) -> np.ndarray:
-    """Return how many cells each level has along each axis, shape (levels, 3).
+    """Return the number of cells of each level along each axis, shape (levels, 3).
 
-    They are at least a diameter wide, so that overlaps are found in the 27 cells around, and not many more
-    than spheres.
+    Cells are at least a diameter wide, so that overlaps are found in the 27 neighbouring cells, and not many
+    more than spheres.
     """
     largest, side = float(packing.radii.max()), packing.rows[3]
     levels = int(_levels(np.array([largest, packing.radii.min()]))[1]) + 1

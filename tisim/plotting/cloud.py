@@ -1,4 +1,4 @@
-"""A picture of a cloud: its start and its end on one scale, grains as spheres of their size, and walls."""
+"""A picture of a cloud: its start and end at the same scale, with grains as shaded spheres, and walls."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
 PIXELS = 1400
-"""A panel is drawn this many pixels wide, twice as many as are shown, so that edges are smooth."""
+"""Width of a panel in pixels, twice the width that is shown, to smooth edges."""
 SMALLEST = 4.0
-"""A grain has at least this radius in those pixels: a smaller one would not be seen."""
+"""Smallest radius of a grain in these pixels, so that it is visible."""
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
-"""The viewer stands in this direction: its angle to x in the xy plane and above it, rad."""
+"""Direction of the viewer: azimuth from x in the xy plane, and elevation, rad."""
 GRAIN_COLOUR = (0.36, 0.55, 0.73)
-"""Grains without a temperature have this colour: red, green and blue, 0..1."""
+"""Colour of grains without a temperature: red, green and blue, 0..1."""
 WALL_COLOUR = "0.55"
-"""Outlines of walls have this grey; grains are in front of them."""
+"""Grey level of wall outlines, which are drawn behind grains."""
 GRAVITY_COLOUR = "#b3413e"
-"""The arrow of gravity has this colour."""
-# Without its black end, against which neither shade nor edge of a cold grain would show.
+"""Colour of the arrow of gravity."""
+# The black end is left out, because cold grains would show neither shading nor edges.
 HEAT = ListedColormap(colormaps["inferno"](np.linspace(0.17, 0.97, 256)))
 
 _TOWARDS = np.array([
@@ -41,7 +41,7 @@ _TOWARDS = np.array([
 _RIGHT = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0.0])
 _UP = np.cross(_TOWARDS, _RIGHT)
 PROJECTION = np.stack([_RIGHT, _UP, _TOWARDS], axis=1)
-"""A point times this is right, up and towards the viewer."""
+"""Matrix that projects a point to coordinates right, up and towards the viewer."""
 _LIGHT = np.array([-0.45, 0.6, 0.66])
 
 
@@ -53,12 +53,12 @@ def cloud(result: Result) -> Figure:
 def start_and_end(
     states: tuple[Arrays, Arrays], times: tuple[float, float], scene: Scene, last: str = "end"
 ) -> Figure:
-    """Draw two states (at times in s) side by side on one scale, seen from one side without perspective.
+    """Draw two states (at times in s) side by side at the same scale, in a projection without perspective.
 
-    last : what the second is called.
+    last : title of the second.
 
-    Grains are coloured by temperature where they have one. A grain too small to be seen is drawn as a dot.
-    Walls are drawn as outlines, where their motion has them at the time.
+    Grains are coloured by temperature if they have one. Very small grains are drawn as dots. Walls are drawn
+    as outlines, at their positions at the given time.
     """
     figure = empty(10.4, 5.0, pad=0.1)
     axes = figure.subplots(1, 2)
@@ -77,14 +77,14 @@ def start_and_end(
 
 
 def caption(state: Arrays, time: float) -> str:
-    """Return time (s), number and mean radius of the grains."""
+    """Return a caption with the time (s), and the number and mean radius of the grains."""
     n = len(state["radius"])
     size = f", mean radius {si(float(state['radius'].mean()), 'm')}" if n else ""
     return f"t = {si(time, 's')}: {n} grain{'s' * (n != 1)}{size}"
 
 
 def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = None) -> None:
-    """Draw what the colours mean: beside axes, or in a place of its own."""
+    """Draw the colour bar: beside axes, or in given axes."""
     at = {"ax": beside, "shrink": 0.72, "pad": 0.01} if place is None else {"cax": place}
     bar = figure.colorbar(ScalarMappable(norm, HEAT), **at)
     bar.set_label("temperature (K)")
@@ -92,8 +92,8 @@ def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = Non
 
 
 def temperatures(states: Sequence[Arrays]) -> Normalize | None:
-    """Return the scale of temperature over all states; logarithmic when it spans much; None where one has
-    none."""
+    """Return the temperature scale over all states, logarithmic for a wide range; None if a state has no
+    temperature."""
     some = [state for state in states if len(state["radius"])]
     if not some or any("temperature" not in state for state in some):
         return None
@@ -101,7 +101,7 @@ def temperatures(states: Sequence[Arrays]) -> Normalize | None:
     low, high = float(values.min()), float(values.max())
     if low > 0 and high > 20 * low:
         return LogNorm(low, high)
-    # A scale finer than a hundredth would colour what does not differ.
+    # A scale finer than a hundredth would exaggerate negligible differences.
     least = max(0.01 * abs(low), 1e-9) / 2
     middle = (low + high) / 2
     return Normalize(min(low, middle - least), max(high, middle + least))
@@ -109,24 +109,24 @@ def temperatures(states: Sequence[Arrays]) -> Normalize | None:
 
 def heat_colours(state: Arrays, norm: Normalize | None) -> np.ndarray | None:
     """Return the colour of each grain by its temperature, red, green and blue, shape (n, 3); None without a
-    scale of it."""
+    scale."""
     return None if norm is None or not len(state["radius"]) else HEAT(norm(state["temperature"]))[:, :3]
 
 
 def project(points: np.ndarray) -> np.ndarray:
-    """Return the coordinates right, up and towards the viewer for points of shape (n, 3). m."""
+    """Return the coordinates right, up and towards the viewer of points (m), shape (n, 3)."""
     return np.asarray(points) @ PROJECTION
 
 
 def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
-    """Return the corners of the box as seen, shape (8, 3); none in open space. m."""
+    """Return the projected corners of the box (m), shape (8, 3); empty in open space."""
     if low is None or high is None:
         return np.empty((0, 3))
     return project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
 
 
 def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.ndarray]:
-    """Return the outlines of the walls at a time (s) as seen, m; planes end around the grains of all
+    """Return the projected outlines of the walls at a time (s), m; planes are cut around the grains of all
     states."""
     place, size = (np.concatenate([state[name] for state in states]) for name in ("position", "radius"))
     if not len(size):
@@ -136,14 +136,14 @@ def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.nda
 
 
 def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, float]:
-    """Return a ``view`` that all states are seen in."""
+    """Return a ``view`` that contains all states."""
     both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
     return view(both, box)
 
 
 def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
-    """Return left, bottom and side of a square that holds all grains and the box; one of 1 m where there is
-    nothing. m."""
+    """Return left, bottom and side (m) of a square that contains all grains and the box; of side 1 m if there
+    are none."""
     if not len(state["radius"]) and not len(box):
         return -0.5, -0.5, 1.0
     projected, radius = project(state["position"]), state["radius"][:, None]
@@ -158,9 +158,9 @@ def panel(
     axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray,
     colour: np.ndarray | None = None, walls: Sequence[np.ndarray] = (),
 ) -> None:  # fmt: skip
-    """Draw a state as seen in a square of ``view``, in a box of ``corners``, with lines of ``walls_at``.
+    """Draw a state in a square from ``view``, with a box from ``corners`` and lines from ``walls_at``.
 
-    colour : of each grain, red, green and blue, shape (n, 3); one for all unless given.
+    colour : red, green and blue of each grain, shape (n, 3); the same for all by default.
     """
     left, bottom, side = square
     if colour is None:
@@ -178,15 +178,15 @@ def panel(
 
 
 def gravity(scene: Scene) -> np.ndarray:
-    """Return the acceleration of all gravity in a scene, m/s^2; 0 where there is none."""
+    """Return the sum of the accelerations of gravity in a scene, m/s^2; 0 if there are none."""
     accelerations = [effect.acceleration for effect in scene.effects if isinstance(effect, Gravity)]
     return np.sum([(0.0, 0.0, 0.0), *accelerations], axis=0)
 
 
 def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray, share: float = 0.07) -> None:
-    """Draw the axes of space in the lower right of a panel, and the direction of gravity where there is some.
+    """Draw the coordinate axes in the lower right of a panel, and the direction of gravity if there is any.
 
-    share : of the panel's side, the length of an arrow.
+    share : length of an arrow relative to the side of the panel.
     """
     left, bottom, side = square
     length = share * side
@@ -203,15 +203,15 @@ def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray,
 
 
 def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: float) -> np.ndarray:
-    """Return an image of shaded spheres, hidden where another is in front. RGBA, shape (pixels, pixels, 4) /
-    2."""
+    """Return an image of shaded spheres with hidden surfaces removed, RGBA, shape (PIXELS / 2, PIXELS / 2,
+    4)."""
     scale = PIXELS / side
     depth = np.full((PIXELS, PIXELS), -np.inf)
     image = np.zeros((PIXELS, PIXELS, 4))
     for (x, y, z), r, rgb in zip(
         projected * scale, np.maximum(radius * scale, SMALLEST), colour, strict=True
     ):
-        # One beyond the square has no pixels: nothing from an end to that end.
+        # A grain outside of the square has an empty range of pixels.
         (i0, i1), (j0, j1) = (np.clip([int(a - r), int(a + r) + 2], 0, PIXELS) for a in (y, x))
         v, u = np.mgrid[i0:i1, j0:j1] + 0.5
         u, v = (u - x) / r, (v - y) / r
@@ -220,7 +220,7 @@ def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: f
         front = (w2 > 0) & (z + r * w > depth[i0:i1, j0:j1])
         depth[i0:i1, j0:j1][front] = (z + r * w)[front]
         lit = np.clip(u * _LIGHT[0] + v * _LIGHT[1] + w * _LIGHT[2], 0.0, 1.0)[..., None]
-        # Dark grains keep an outline to be seen by; the glint tells a sphere from a disc.
+        # Dark grains keep a visible outline; the highlight distinguishes a sphere from a disc.
         shade = np.clip((0.42 + 0.58 * lit) * (0.1 + 0.9 * rgb) + 0.35 * lit**24, 0.0, 1.0)
         image[i0:i1, j0:j1, :3][front] = shade[front]
         image[i0:i1, j0:j1, 3][front] = 1.0
@@ -231,7 +231,7 @@ def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: f
 
 
 def _edges(axis: Axes, corners: np.ndarray) -> None:
-    """Draw the twelve edges of the box; those that meet in its farthest corner run behind the grains."""
+    """Draw the twelve edges of the box; the three at its farthest corner are behind the grains."""
     farthest = int(np.argmin(corners[:, 2]))
     for a, b in itertools.combinations(range(8), 2):
         if bin(a ^ b).count("1") == 1:

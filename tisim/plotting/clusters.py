@@ -1,4 +1,4 @@
-"""A picture of clusters: particles in the colours of theirs, and outlines of what holds them."""
+"""A picture of clusters: particles coloured by cluster, and outlines of the region that they occupy."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
 CLUSTER_COLOURS = colormaps["tab20"](np.arange(20))[:, :3]
-"""Clusters next to each other in size have unlike ones of these colours."""
+"""Colours of clusters, such that clusters adjacent in size have different colours."""
 SINGLE = (0.88, 0.88, 0.88)
-"""Particles that are bound to none are of this grey."""
+"""Grey of particles without bonds."""
 
 
 def clusters(
     state: Arrays, cluster: np.ndarray, scene: Scene, ellipsoid: Ellipsoid | None = None, hull: bool = False
 ) -> Figure:
-    """Draw the particles of a state, seen from one side without perspective: grey those that are alone in
-    their clusters, the others in the colour of theirs.
+    """Draw the particles of a state in a projection without perspective: single particles in grey, others in
+    the colour of their cluster.
 
-    cluster : the number of that of each, as ``tisim.analysis.labels`` returns it. ellipsoid : around all,
-    drawn as its outline. hull : whether the outline of the convex hull of the spheres is drawn.
+    cluster : cluster number of each particle, as returned by ``tisim.analysis.labels``.
+    ellipsoid : an ellipsoid around all particles, drawn as its outline.
+    hull : whether to draw the outline of the convex hull of the spheres.
     """
     figure = empty(5.6, 5.4)
     axis = figure.subplots()
@@ -52,8 +53,7 @@ def clusters(
 
 
 def cluster_colours(cluster: np.ndarray) -> np.ndarray:
-    """Return the colour of each particle by the number of its cluster, grey of those that are alone; shape
-    (n, 3)."""
+    """Return the colour of each particle by its cluster number, grey for single particles; shape (n, 3)."""
     size = np.bincount(cluster)
     rank = np.empty(len(size), int)
     rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
@@ -63,8 +63,8 @@ def cluster_colours(cluster: np.ndarray) -> np.ndarray:
 
 
 def _silhouette(ellipsoid: Ellipsoid) -> np.ndarray:
-    """Return the outline of an ellipsoid as seen, m, shape (n, 2): the image of a circle by the root of
-    M M^T, where M has the semi-axes as seen."""
+    """Return the projected outline of an ellipsoid, m, shape (n, 2): the image of a circle under the square
+    root of M M^T, with M of the projected semi-axes."""
     seen = PROJECTION[:, :2].T @ (ellipsoid.axes.T * ellipsoid.semi_axes)
     squares, axes = np.linalg.eigh(seen @ seen.T)
     circle = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
@@ -72,7 +72,7 @@ def _silhouette(ellipsoid: Ellipsoid) -> np.ndarray:
 
 
 def _outline(state: Arrays) -> np.ndarray:
-    """Return the outline of the convex hull of spheres as seen, m, shape (n, 2)."""
+    """Return the projected outline of the convex hull of spheres, m, shape (n, 2)."""
     circle = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
     rims = project(state["position"])[:, None, :2] + state["radius"][:, None, None] * circle
     points = rims.reshape(-1, 2)

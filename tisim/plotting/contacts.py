@@ -1,4 +1,4 @@
-"""A figure of the contacts of grains: how many each has, and which way they point."""
+"""A figure of the contacts of grains: coordination numbers and contact directions."""
 
 from __future__ import annotations
 
@@ -13,22 +13,27 @@ from tisim.errors import must
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 ROSE_SECTORS = 24
-"""A rose has so many sectors."""
+"""Number of sectors of a rose diagram."""
 
 
 def fabric(
     position: np.ndarray, pairs: np.ndarray, sides: Sides = None, plane: tuple[int, int] = (0, 1)
 ) -> Figure:
-    """Draw how many contacts grains have, as fractions of all; and the rose of their directions in a plane of
-    two axes, 0 to 2 for x to z, with that of the fabric tensor.
+    """Draw the distribution of contact numbers as fractions of all grains, and a rose diagram of contact
+    directions in the plane of two axes (0 to 2 for x to z) with the density given by the fabric tensor.
 
         E(theta) = 1 + 2 (F_aa - F_bb) cos(2 theta) + 4 F_ab sin(2 theta),    F_aa + F_bb = 1
 
-    E is the density of directions over that of contacts which favour none. Contacts count by the square of
-    the part of their direction that lies in the plane, so F is that of all contacts, there.
+    E is the density of directions relative to isotropic contacts. Each contact is weighted by the squared
+    in-plane component of its direction, so F is the in-plane part, normalised, of the fabric tensor of all
+    contacts.
 
-    position : m, shape (n, 3). pairs : those in contact, shape (m, 2). sides : those of a periodic box.
-    InputError where there are no pairs, or no such plane.
+    position : m, shape (n, 3).
+    pairs : pairs in contact, shape (m, 2).
+    sides : side lengths of a periodic box.
+
+    InputError if there are no pairs, or the axes are invalid.
+
     Source: L. Rothenburg and R. J. Bathurst, Geotechnique 39 (1989) 601.
     """
     must({*plane} in ({0, 1}, {0, 2}, {1, 2}), "plane", "two of 0, 1, 2", plane)
@@ -50,7 +55,7 @@ def fabric(
     rose.bar(middle, 2 * np.pi * density, width=2 * np.pi / ROSE_SECTORS, color=AXIS_COLOURS[0], alpha=0.6)
     theta = np.linspace(-np.pi, np.pi, 361)
     smooth = planar_density(fabric_tensor(position, pairs, sides), plane, theta)
-    # Below 0, where contacts favour one direction, two terms say nothing.
+    # For strong anisotropy the two-term expansion becomes negative and is meaningless there.
     rose.plot(theta, np.maximum(smooth, 0.0), color=AXIS_COLOURS[1])
     rose.set_yticks([1.0])
     rose.set_xticks(np.pi / 2 * np.arange(4), [f"{sign}{'xyz'[k]}" for sign in ("", "-") for k in plane])
@@ -60,7 +65,7 @@ def fabric(
 
 
 def planar_density(tensor: np.ndarray, plane: tuple[int, int], theta: np.ndarray) -> np.ndarray:
-    """Return E at angles (rad) from the first axis of a plane to the second, of a fabric tensor (3, 3)."""
+    """Return E at angles (rad) from the first axis of a plane to the second, for a fabric tensor (3, 3)."""
     within = tensor[np.ix_(plane, plane)] / tensor[plane, plane].sum()
     return np.asarray(
         1 + 2 * (within[0, 0] - within[1, 1]) * np.cos(2 * theta) + 4 * within[0, 1] * np.sin(2 * theta)

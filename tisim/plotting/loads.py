@@ -1,4 +1,4 @@
-"""Forces and torques on walls and driven groups against time, and how far servos have moved."""
+"""Forces and torques on walls and driven groups against time, and the travel of servos."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from tisim.io.reader import Frames
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity
 
 FORCE_SUFFIX = "_force_x"
-"""Measures of bodies have names of which one ends so."""
+"""Suffix of one of the measures of each body."""
 
 
 def bodies(frames: Frames) -> list[str]:
-    """Return the names of the bodies whose forces a trajectory of 2 frames or more has, in the order of
-    the alphabet."""
+    """Return the names of the bodies with recorded forces, in alphabetical order; empty for fewer than 2
+    frames."""
     measures = frames.measures
     names = [name.removesuffix(FORCE_SUFFIX) for name in measures if name.endswith(FORCE_SUFFIX)]
     return [name for name in names if len(frames) > 1 and resultant_units(name).keys() <= measures.keys()]
 
 
 def loads(frames: Frames) -> Figure:
-    """Draw force and torque of the particles on each of the ``bodies`` against time, and the travel of each
-    that has a servo."""
+    """Draw force and torque of the particles on each of the ``bodies`` against time, and the travel of bodies
+    with a servo."""
     names, series = bodies(frames), frames.measures
     driven = any(f"{name}_travel" in series for name in names)
     figure = empty(10.8 if driven else 7.2, 2.8 * len(names), pad=0.08)
@@ -34,7 +34,7 @@ def loads(frames: Frames) -> Figure:
     for name, (force, torque, *travel) in zip(names, panels, strict=True):
         for panel, what, unit in ((force, "force", "N"), (torque, "torque", "N m")):
             for axis, colour in zip("xyz", AXIS_COLOURS, strict=True):
-                # Dashes, so that a line under the last one is seen.
+                # Dashes keep a line below visible.
                 dashes = "--" if axis == "z" else "-"
                 _draw(panel, frames.times, series[f"{name}_{what}_{axis}"], dashes, color=colour, label=axis)
             quantity(panel.yaxis, f"{what} on {name}", unit)

@@ -1,4 +1,4 @@
-"""Figures of what ``tisim.analysis`` measures: flow curves, neighbours by distance, chains and profiles."""
+"""Figures of results of ``tisim.analysis``: flow curves, radial distributions, chains and profiles."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def flow_curve(
     fits: tuple[BinghamFit | HerschelBulkleyFit, ...] = (),
     error: np.ndarray | None = None,
 ) -> Figure:
-    """Draw shear stresses (Pa) against shear rates (1/s), and the laws that fit them with 95 % intervals.
+    """Draw shear stresses (Pa) against shear rates (1/s), and fitted laws with 95 % confidence intervals.
 
-    error : half widths of the bars, Pa.
+    error : half-lengths of the error bars, Pa.
     """
     figure = empty(5.6, 3.8)
     axis = figure.subplots()
@@ -53,8 +53,8 @@ def _law(fit: BinghamFit | HerschelBulkleyFit) -> str:
 
 
 def neighbours(edges: np.ndarray, distribution: np.ndarray, diameter: float | None = None) -> Figure:
-    """Draw a radial distribution function over distances between edges (m); over the ``diameter`` (m) of
-    particles, where it is given."""
+    """Draw a radial distribution function over distances between edges (m), in units of the ``diameter`` (m)
+    of particles if it is given."""
     figure = empty(5.6, 3.4)
     axis = figure.subplots()
     axis.axhline(1.0, color="0.6", lw=0.9, ls="--")
@@ -73,16 +73,16 @@ def neighbours(edges: np.ndarray, distribution: np.ndarray, diameter: float | No
 
 
 def chain_lengths(cluster: np.ndarray) -> Figure:
-    """Draw which fraction of particles is in clusters of each number, and of that or more, given the cluster
-    of each."""
+    """Draw the fraction of particles in clusters of each size, and of at least this size, given the cluster
+    of each particle."""
     sizes = np.bincount(np.bincount(cluster))
     number = np.arange(1, len(sizes))
     share = number * sizes[1:] / len(cluster)
     figure = empty(5.6, 3.4)
     axis = figure.subplots()
-    axis.bar(number, share, width=0.8, color=AXIS_COLOURS[0], label="in clusters of so many")
+    axis.bar(number, share, width=0.8, color=AXIS_COLOURS[0], label="in clusters of this size")
     least = share[::-1].cumsum()[::-1]
-    axis.step(number, least, where="mid", color=AXIS_COLOURS[1], label="of so many or more")
+    axis.step(number, least, where="mid", color=AXIS_COLOURS[1], label="of this size or larger")
     axis.set(xlabel="particles of a cluster", ylabel="fraction of particles", ylim=(0, 1.05))
     axis.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     axis.legend(frameon=False, fontsize=8)
@@ -93,14 +93,14 @@ def chain_lengths(cluster: np.ndarray) -> Figure:
 def profiles(
     edges: np.ndarray, columns: Mapping[tuple[str, str], np.ndarray], name: str = "height"
 ) -> Figure:
-    """Draw profiles over layers between edges (m): a panel for each quantity, (name, unit) -> values; what
-    the place is called stands along the upright axis."""
+    """Draw profiles over layers between edges (m), with a panel for each quantity, (name, unit) -> values.
+    name : label of the vertical axis."""
     figure = empty(1.2 + 2.7 * len(columns), 3.8)
     panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
     middle = (np.asarray(edges)[1:] + np.asarray(edges)[:-1]) / 2
     for axis, ((what, unit), values) in zip(panels, columns.items(), strict=True):
         axis.plot(values, middle, "o-", ms=4, lw=1.0, color=AXIS_COLOURS[0])
-        # A prefix before a power of a unit would be taken for that of all of it.
+        # A prefix before a power of a unit would be ambiguous.
         if unit and "^" not in unit:
             quantity(axis.xaxis, what, unit)
         else:

@@ -1,4 +1,4 @@
-"""A moving picture of a run: its frames one after another, as .gif or .mp4."""
+"""A movie of a run, as .gif or .mp4."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from tisim.plotting import cloud
 from tisim.scene.initial_state import Arrays
 
 SIDE = 5.0
-"""The picture has sides of this length, inches."""
+"""Side of the picture, inches."""
 DPI = 110
-"""The picture has this many pixels per inch."""
+"""Pixels per inch."""
 
 
 def movie(
     frames: Frames, path: Path, rate: int = 20, progress: Callable[[float], None] = lambda fraction: None
 ) -> None:
-    """Write a moving picture of all frames, ``rate`` of them a second, in place of any before.
+    """Write a movie of all frames, ``rate`` of them per second, replacing an earlier one.
 
-    path : ends in .gif, or in .mp4 where ffmpeg is installed; raise InputError otherwise. progress : called
-    with the finished fraction, 0..1.
+    path : ends in .gif, or in .mp4 if ffmpeg is installed; raise InputError otherwise.
+    progress : called with the finished fraction, 0..1.
     """
     writer = check(frames, path, rate)
     coloured, ranges = _scales(frames)
@@ -41,7 +41,7 @@ def movie(
     if coloured is not None:
         side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
         cloud.scale(figure, None, coloured, side)
-    # Between the caption and what is drawn, where it covers neither grains nor their scale.
+    # The text is between the caption and the drawing, and covers neither grains nor the colour scale.
     figure.text(0.5, 0.935, frames.missing, ha="center", fontsize=7)
     unfinished = path.with_name(while_drawn(path))
     try:
@@ -60,31 +60,31 @@ def movie(
 
 
 def while_drawn(path: Path) -> str:
-    """Return what the file is called while it is not whole; its end says what it is to those who write it."""
+    """Return the name of the unfinished file; its suffix still tells the writer the format."""
     return f"{path.stem}.new{path.suffix}"
 
 
 def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
-    """Return what writes such a file; raise InputError when there is no movie to make, or nothing to make it
-    with."""
+    """Return the writer for such a file; raise InputError if there are not enough frames, or no writer is
+    available."""
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
     must(len(frames) > 1, "file", "one with 2 frames or more", Words(f"{len(frames)} frames"))
     if path.suffix == ".mp4":
         if not FFMpegWriter.isAvailable():
-            raise InputError(f"movie must be a .gif where ffmpeg is not installed; received {path.name!r}")
+            raise InputError(f"movie must be a .gif if ffmpeg is not installed; received {path.name!r}")
         return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
     must(path.suffix == ".gif", "movie", "a .gif or .mp4 file", path.name)
     return PillowWriter(fps=rate)
 
 
 def walls_of_all(frames: Frames, ranges: Arrays) -> list[np.ndarray]:
-    """Return the outlines of walls as seen at the times of all frames, m: what shakes may be farther out
-    between the first and the last."""
+    """Return the projected outlines of walls at the times of all frames, m, because moving walls may extend
+    farther between the first and the last frame."""
     return [line for t in frames.times for line in cloud.walls_at(frames.scene, [ranges], float(t))]
 
 
 def _scales(frames: Frames) -> tuple[cloud.Normalize | None, Arrays]:
-    """Return the scale of temperature, and the farthest reaches of the cloud, over all frames."""
+    """Return the temperature scale and the extent of the cloud over all frames."""
     position, radius, heat = [], [], []
     for frame in frames:
         arrays = frame.arrays

@@ -1,4 +1,4 @@
-"""What all figures have in common."""
+"""Style shared by all figures."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter
 
 TIME = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
-"""These colours of time are even to the eye, and without the end that is lost on white."""
+"""Perceptually uniform colours for time, without the end that is too light on white."""
 AXIS_COLOURS = ("#4477aa", "#cc6677", "#228833")
-"""These are the colours of x, y and z; everybody can tell them apart (P. Tol's bright set)."""
+"""Colours of x, y and z, also for colour-blind readers (P. Tol's bright set)."""
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-"""These are the prefixes of a unit by power of ten."""
+"""Prefixes of a unit by power of ten."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 WIDE = 30.0
-"""An axis is logarithmic where its largest value is more than this many times its smallest."""
+"""An axis is logarithmic if the ratio of its largest to its smallest value exceeds this."""
 
 
 def empty(width: float, height: float, pad: float | None = None) -> Figure:
-    """Return an empty figure, inches; ``pad``: room above and below its axes, inches."""
+    """Return an empty figure of a size in inches. ``pad`` : space above and below its axes, inches."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=pad), facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
 
 def plain(axis: Axes) -> None:
-    """Leave axes below and on the left only, and a light grid behind what is drawn."""
+    """Keep only the lower and left spines, with a light grid behind the data."""
     axis.spines[["top", "right"]].set_visible(False)
     axis.grid(color="0.92", lw=0.8)
     axis.set_axisbelow(True)
 
 
 def letters(panels: Iterable[Axes], size: float = 10) -> None:
-    """Write (a), (b), ... before the titles of a figure's panels, at their left edges; size: of type,
+    """Write (a), (b), ... before the titles of a figure's panels, at their left edges. size : font size,
     points."""
     for letter, axis in zip(ascii_lowercase, panels, strict=False):
         title = f"({letter}) {axis.get_title()}".rstrip()
@@ -51,12 +51,12 @@ def letters(panels: Iterable[Axes], size: float = 10) -> None:
 
 
 def legend_beside(axis: Axes) -> None:
-    """Put a legend off the data, at the right of the panel."""
+    """Put a legend to the right of the panel."""
     axis.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def legend_above(axis: Axes, columns: int = 3) -> None:
-    """Put a legend off the data, above the panel at its right."""
+    """Put a legend above the panel, at its right."""
     axis.legend(
         frameon=False, fontsize=8, ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 1.0),
         borderaxespad=0.1,
@@ -70,8 +70,8 @@ def si(value: float, unit: str) -> str:
 
 
 def quantity(axis: Axis, name: str, unit: str) -> None:
-    """Label an axis with a quantity and its unit, with the prefix that suits its limits: "time (ms)"; with a
-    power of ten where there is no prefix: "kinetic energy (10⁻²⁴ J)"."""
+    """Label an axis with a quantity and its unit, with a prefix that suits its limits, "time (ms)"; or with a
+    power of ten if there is no prefix, "kinetic energy (10⁻²⁴ J)"."""
     power = _thousands(float(np.abs(axis.get_view_interval()).max()))
     factor = PREFIXES[power] if power in PREFIXES else superscripts(f"10^{power} ")
     axis.set_major_formatter(
@@ -81,18 +81,18 @@ def quantity(axis: Axis, name: str, unit: str) -> None:
 
 
 def superscripts(text: str) -> str:
-    """Return units as they are printed: "m^3/s" is "m³/s"."""
+    """Return units with superscripts: "m^3/s" is "m³/s"."""
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), text)
 
 
 def symbols(text: str) -> str:
-    """Return a label with its symbols as they are printed: "b_f" has a subscript, and "Pi" is the letter."""
+    """Return a label with typeset symbols: "b_f" has a subscript, and "Pi" is the Greek letter."""
     greek = re.sub(r"\bPi\b", "\N{GREEK CAPITAL LETTER PI}", superscripts(text))
     return re.sub(r"\b([A-Za-z])_(\w+)\b", r"$\1_{\2}$", greek)
 
 
 def scale_of(values: np.ndarray) -> str:
-    """Return the scale of an axis for values: "log" where they span decades and are positive, else
+    """Return the scale of an axis for values: "log" if they are positive and span a wide range, else
     "linear"."""
     wide = values.size and values.min() > 0 and values.max() > WIDE * values.min()
     return "log" if wide else "linear"
@@ -104,5 +104,5 @@ def _power(value: float) -> int:
 
 
 def _thousands(value: float) -> int:
-    """Return the power of a thousand, as one of ten, that leaves a value at least 1 and below 1000."""
+    """Return the power of ten, a multiple of 3, that leaves a value at least 1 and below 1000."""
     return 3 * int(np.floor(np.log10(abs(value) * (1 + 1e-12)) / 3)) if value else 0

@@ -1,4 +1,4 @@
-"""Standard pictures of a run's file: the cloud at its start and end, and quantities against time."""
+"""Standard pictures of a run: the cloud at its start and end, and quantities against time."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, pla
 
 @dataclass(frozen=True)
 class TimeSeries:
-    """A time series is what is drawn against time, with a value for each frame. Of no particles the centre of
-    gravity is not-a-number, and its shift is from where it was first.
+    """Time series of a run, one value per frame.
 
-    In a sheared box velocities, also those of the kinetic energy, are relative to the flow of its images.
-
-    time : s. kinetic_energy : J. number : of particles.
-    shift : of the centre of gravity from where it began, m, shape (frames, 3).
+    time : s.
+    kinetic_energy : J.
+    number : number of particles.
+    shift : displacement of the centre of gravity, m, shape (frames, 3).
     drift : velocity of the centre of gravity, m/s, shape (frames, 3).
+
+    In a sheared box all velocities, including those in the kinetic energy, are relative to the flow of its
+    images. Without particles the centre of gravity is NaN; its displacement is from its first known position.
     """
 
     time: np.ndarray
@@ -34,7 +36,7 @@ class TimeSeries:
 
 
 def history(frames: Frames) -> TimeSeries:
-    """Return the time series of all frames, each of which is read once."""
+    """Return the time series of all frames; each frame is read once."""
     energy, centre, drift, number = [], [], [], []
     for frame in frames:
         mass, velocity = frame.arrays["mass"].astype(float), frame.arrays["velocity"].astype(float)
@@ -43,19 +45,19 @@ def history(frames: Frames) -> TimeSeries:
         centre.append(_mean(frame.arrays["position"], mass))
         drift.append(_mean(velocity, mass))
         number.append(len(mass))
-    # From the first frame that has particles on.
+    # Relative to the first frame with particles.
     begun = int(np.argmax(np.array(number) > 0))
     shift = np.array(centre) - centre[begun]
     return TimeSeries(frames.times, np.array(energy), shift, np.array(drift), np.array(number))
 
 
 def _mean(values: np.ndarray, mass: np.ndarray) -> np.ndarray:
-    """Return the mean of vectors by mass; not-a-number of none."""
+    """Return the mass-weighted mean of vectors; NaN if there are none."""
     return np.average(values, axis=0, weights=mass) if len(mass) else np.full(3, np.nan)
 
 
 def clouds(frames: Frames) -> Figure:
-    """Draw the first and the last frame side by side. Raise InputError when there is none."""
+    """Draw the first and the last frame side by side. Raise InputError if there are no frames."""
     must(len(frames) > 0, "file", "one with a frame", Words("one with none yet"))
     first, last = frames[0], frames[-1]
     states, times = (first.arrays, last.arrays), (first.time, last.time)
@@ -63,19 +65,20 @@ def clouds(frames: Frames) -> Figure:
 
 
 def mark_missing(figure: Figure, frames: Frames) -> Figure:
-    """Return the figure, with what frames are missing below it where the run has not reached its end."""
+    """Return the figure; if the run has not reached its end, a note about missing frames is added below
+    it."""
     if frames.missing:
         figure.supxlabel(frames.missing, fontsize=10, color=AXIS_COLOURS[1])
     return figure
 
 
 def quantities(frames: Frames) -> Figure:
-    """Draw kinetic energy, centre of gravity and number of particles against time; raise InputError for under
-    2 frames.
+    """Draw kinetic energy, centre of gravity and number of particles against time; raise InputError for fewer
+    than 2 frames.
 
-    Where particles re-enter through opposite faces, the centre of gravity jumps with them; its velocity is
-    drawn instead, and in a sheared box what is drawn is relative to the flow. A number of particles that
-    stays the same is written above.
+    In a periodic domain the centre of gravity jumps when particles cross a face, so its velocity is drawn
+    instead; in a sheared box velocities are relative to the flow. A constant number of particles is written
+    in the title.
     """
     must(
         len(frames) > 1,
@@ -87,11 +90,11 @@ def quantities(frames: Frames) -> Figure:
     changes = bool(np.ptp(series.number))
     figure = empty(7.2, 7.6 if changes else 5.6, pad=0.08)
     energy, centre, *more = axes = figure.subplots(3 if changes else 2, 1, sharex=True)
-    # A dot for each frame where the eye can tell them apart; those at the sides are whole.
+    # Mark frames with dots if there are few; dots at the edges are not clipped.
     dots = {"marker": "o", "markersize": 3, "clip_on": False} if len(series.time) <= 60 else {}
     energy.plot(series.time, series.kinetic_energy, color=AXIS_COLOURS[0], **dots)
     if scale_of(series.kinetic_energy[series.kinetic_energy > 0]) == "log":
-        # A start at rest has no place on it.
+        # Zero energy of a start at rest cannot be shown on a logarithmic axis.
         energy.set_yscale("log", nonpositive="mask")
     else:
         energy.set_ylim(0, 1.08 * series.kinetic_energy.max() or 1.0)
@@ -100,7 +103,7 @@ def quantities(frames: Frames) -> Figure:
     jumps = any(frames.scene.domain.joined())
     for k, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         values = (series.drift if jumps else series.shift)[:, k]
-        # Dashes, so that a line under the last one is seen.
+        # Dashes keep a line below visible.
         centre.plot(series.time, values, "--" if name == "z" else "-", color=colour, label=name, **dots)
     what = ("velocity", "m/s") if jumps else ("shift", "m")
     quantity(centre.yaxis, f"{what[0]} of the\ncentre of gravity{relative}", what[1])

@@ -1,4 +1,4 @@
-"""Outlines of walls in pictures: rims and edges of their shapes, where their motion has them at a time."""
+"""Outlines of walls in pictures: rims and edges of their shapes at their positions at a given time."""
 
 from __future__ import annotations
 
@@ -26,23 +26,24 @@ from tisim.geometry.triangles import TriangulatedSurface
 from tisim.scene.scene import Scene
 
 Line = np.ndarray
-"""A line is the places that it goes through, m, shape (n, 3)."""
+"""Points of a line, m, shape (n, 3)."""
 AROUND = np.linspace(0, 2 * np.pi, 73)
-"""A circle goes through places at these angles, rad."""
+"""Angles of the points of a circle, rad."""
 FOLD = np.cos(np.radians(15))
-"""An edge between two triangles whose normals have a smaller cosine is drawn."""
+"""An edge between two triangles is drawn if the cosine of the angle between their normals is below this."""
 MARGIN = 0.1
-"""Planes are drawn so far beyond the box around the grains, in parts of its diagonal."""
+"""Planes are drawn this far beyond the bounding box of the grains, relative to its diagonal."""
 FAR = 5.0
-"""A shape that is so many times as far away as that diagonal is left out."""
+"""A shape farther away than this, relative to the diagonal, is left out."""
 
 
 def outlines(scene: Scene, time: float, low: np.ndarray, high: np.ndarray, towards: np.ndarray) -> list[Line]:
     """Return the outlines of the walls of a scene at a time (s), around grains in a box (m).
 
-    towards : direction to the viewer. Planes end at others of their body, or a bit beyond the box. Bodies
-    whose motion follows from forces are left out, as the time does not say where they are; so are shapes
-    far away.
+    towards : direction to the viewer.
+
+    Planes end at other planes of their body, or slightly beyond the box. Bodies whose motion depends on
+    forces are left out, because the time does not determine their position; shapes far away are left out too.
     """
     middle, size = (low + high) / 2, float(np.linalg.norm(high - low))
     around = np.array(list(product(*zip(low - MARGIN * size, high + MARGIN * size, strict=True))))
@@ -50,7 +51,7 @@ def outlines(scene: Scene, time: float, low: np.ndarray, high: np.ndarray, towar
     for walls in (effect for effect in scene.effects if isinstance(effect, Walls)):
         if walls.motion.quantities:
             continue
-        # What there is in space, the box and the viewer, as it is among the shapes of the body.
+        # The box and the direction of the viewer in the frame of the body.
         inside = placed(walls.motion, around, -time)
         viewer = placed(walls.motion, np.array([towards, 0 * towards]), -time)
         faces = [(np.array(p.point), np.array(p.normal) / np.linalg.norm(p.normal)) for p in walls.planes]
@@ -65,8 +66,8 @@ def outlines(scene: Scene, time: float, low: np.ndarray, high: np.ndarray, towar
 
 @singledispatch
 def placed(motion: Motion, points: np.ndarray, time: float) -> np.ndarray:
-    """Return where places of a body (m) are at a time (s); of -time, where places in space are among its
-    shapes."""
+    """Return the positions of points of a body (m) at a time (s). With -time, points in space are transformed
+    to the frame of the body."""
     raise NotImplementedError(f"where {motion.kind()} has a body is not known from the time")
 
 
@@ -93,7 +94,7 @@ def _(motion: Rotation, points: np.ndarray, time: float) -> np.ndarray:
 
 
 def _plane(k: int, faces: list[tuple[np.ndarray, np.ndarray]], inside: np.ndarray) -> Iterator[Line]:
-    """Yield the outline of plane k of those of a body, as far as it lies in the box around some places."""
+    """Yield the outline of plane k of the planes of a body, clipped to the bounding box of some points."""
     point, normal = faces[k]
     low, high = inside.min(axis=0), inside.max(axis=0)
     size, middle = np.linalg.norm(high - low), (low + high) / 2
@@ -107,7 +108,7 @@ def _plane(k: int, faces: list[tuple[np.ndarray, np.ndarray]], inside: np.ndarra
 
 
 def _clipped(polygon: np.ndarray, side: np.ndarray) -> np.ndarray:
-    """Return what of a polygon is where ``side``, which is linear, is above 0.
+    """Return the part of a polygon in which ``side``, a linear function given at its corners, is positive.
 
     Source: I. E. Sutherland and G. W. Hodgman, Commun. ACM 17 (1974) 32.
     """
@@ -124,8 +125,8 @@ def _clipped(polygon: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 @singledispatch
 def outline(shape: Shape, towards: np.ndarray) -> list[Line]:
-    """Return the rims and edges of a shape, and how it ends for who looks at it from ``towards``; none of a
-    plane, which has none."""
+    """Return the rims, edges and silhouette of a shape seen from the direction ``towards``; empty for a
+    plane."""
     return []
 
 
@@ -163,7 +164,7 @@ def _(shape: BoxSurface, towards: np.ndarray) -> list[Line]:
 
 @outline.register
 def _(shape: TriangulatedSurface, towards: np.ndarray) -> list[Line]:
-    """Its rims, and its edges but those between triangles that lie in a plane, all but."""
+    """Return its rims and edges, except edges between nearly coplanar triangles."""
     corners = shape.corners()
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -181,7 +182,7 @@ def _(shape: TriangulatedSurface, towards: np.ndarray) -> list[Line]:
 def _barrel(
     start: np.ndarray, end: np.ndarray, radii: tuple[float, float], towards: np.ndarray
 ) -> list[Line]:
-    """Return the circles at both ends, and the two lines that bound what is between, seen from a side."""
+    """Return the circles at both ends, and the two silhouette lines between them."""
     axis = end - start
     rims = [_circle(at, axis, radius) for at, radius in zip((start, end), radii, strict=True) if radius > 0]
     side = np.cross(axis, towards)

@@ -1,12 +1,11 @@
-"""Assertions for tests of one's own laws, operators and steppers, given a scene that has them.
-
-    from tisim.testing import assert_contracts
+"""Assertions for tests of custom laws, operators and steppers, given a scene that uses them.
 
     def test_contracts():
         assert_contracts(scene)
 
-Each function raises AssertionError, and names what breaks the contract of tisim/effects/base or
-tisim/steppers/base.py. The scene should have particles that meet; a few particles and steps are enough.
+Each function raises AssertionError with a description of the violation of the contract in tisim/effects/base
+or tisim/steppers/base.py. The scene should have particles that interact; a few particles and steps are
+sufficient.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""One assertion holds a scene to all that the contracts promise."""
+"""One assertion that checks all contracts of a scene."""
 
 from tisim.scene.scene import Scene
 from tisim.testing.fields import assert_fields
@@ -8,7 +8,7 @@ from tisim.testing.reach import assert_reach
 
 
 def assert_contracts(scene: Scene) -> None:
-    """Assert that ``assert_fields``, ``assert_reach``, ``assert_pair_forces`` and ``assert_lists`` hold of a
+    """Assert that ``assert_fields``, ``assert_reach``, ``assert_pair_forces`` and ``assert_lists`` pass for a
     scene."""
     assert_fields(scene)
     assert_reach(scene)

@@ -1,4 +1,4 @@
-"""Effects must declare the particle fields that they read or write."""
+"""Test that effects declare the particle fields that they read or write."""
 
 import itertools
 from typing import Any
@@ -20,9 +20,9 @@ from tisim.testing.uncompiled import allocated, offered
 def assert_fields(scene: Scene) -> None:
     """Assert that every effect of a scene declares the particle fields that it reads or writes.
 
-    A field that another effect happens to declare would be there in this scene, and missing in the next.
-    Fields of the effects that it requires, or refers to in ``connect``, are there whenever it is; ``force``
-    and ``torque`` it may read where it checks first whether they exist.
+    An undeclared field may exist in this scene because another effect declares it, and be missing in another
+    scene. Fields of effects that it requires, or refers to in ``connect``, always exist. It may read
+    ``force`` and ``torque`` if it first checks that they exist.
     """
     with allocated(scene) as allocation:
         effects = allocation.assembly.effects
@@ -40,9 +40,9 @@ def assert_fields(scene: Scene) -> None:
 
 
 def _related(effect: Bound[Effect], peers: Peers) -> list[Bound[Effect]]:
-    """Return an effect, and all those that it, or one of these, requires or refers to."""
+    """Return an effect, and all effects that it requires or refers to, directly or indirectly."""
     related = [effect]
-    # The list grows while it is gone through.
+    # The list grows during the loop.
     for member in related:
         attributes = [value if isinstance(value, tuple) else (value,) for value in vars(member).values()]
         required = peers.of(*member.data.requires)
@@ -53,7 +53,7 @@ def _related(effect: Bound[Effect], peers: Peers) -> list[Bound[Effect]]:
 
 @ti.data_oriented
 class _DeclaredState:
-    """The state as an effect may see it has the particle fields that it and its related effects declare."""
+    """A view of the state with only the particle fields that an effect and its related effects declare."""
 
     def __init__(self, s: State, effects: list[Bound[Effect]]) -> None:
         self.s = s
@@ -81,7 +81,7 @@ class _DeclaredState:
 
 @ti.data_oriented
 class _Hooks:
-    """All hooks of an effect that read or write particles are compiled, and never run."""
+    """Kernel that compiles, and never runs, all hooks of an effect that read or write particles."""
 
     def __init__(self, view: _DeclaredState, effect: Bound[Effect]) -> None:
         self.s = view

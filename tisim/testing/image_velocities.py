@@ -1,4 +1,5 @@
-"""Pair laws must take the velocity of an image from the state: it is not that of the particle."""
+"""Test that pair laws take the velocity of an image, which differs from that of its particle, from the
+state."""
 
 from typing import Any
 
@@ -10,12 +11,12 @@ from tisim.backend.taichi import ti
 from tisim.state.state import State
 
 STEPS_OF_SPEED = 8
-"""Velocities are multiples of a power of two by this part of it: sums of a few of them are exact."""
+"""Velocities are multiples of a power of two divided by this, so that sums of a few of them are exact."""
 
 
 @ti.data_oriented
 class ImageVelocities:
-    """This is the domain of a scene, but each particle is seen as an image that moves past it.
+    """The domain of a scene, but with each particle seen as an image that moves relative to it.
 
     extra : velocity of the image of each particle relative to it, along each axis, m/s.
     """
@@ -38,8 +39,8 @@ class ImageVelocities:
         return v
 
     def set(self, s: State, speed: float, moving: bool) -> None:
-        """Give the images velocities of about this speed (m/s), and these to the particles too; where images
-        are ``moving``, particles have others, and images make up for it."""
+        """Give images velocities of about this speed (m/s), and the particles the same; if images are
+        ``moving``, particles have other velocities, and ``extra`` is the difference."""
         unit = 2.0 ** np.round(np.log2(speed or 1.0)) / STEPS_OF_SPEED
         rng = np.random.default_rng(1)
         seen, extra = unit * rng.integers(-STEPS_OF_SPEED, STEPS_OF_SPEED + 1, (2, self.capacity, 3))
@@ -49,10 +50,10 @@ class ImageVelocities:
 
 
 def assert_same(label: str, here: np.ndarray, there: np.ndarray) -> None:
-    """Assert that a law gives the same between particles and between images that move as these do.
+    """Assert that a law gives the same result for particles and for images with equal velocities.
 
     here, there : force, torque and torque on the other, each of three components, by index of the particle,
-    of the other one and of the call.
+        of the other one and of the call.
     """
     groups = (*here.shape[:3], 3, 3)
     size = np.abs(here.reshape(groups)).max(axis=4, keepdims=True)

@@ -1,4 +1,4 @@
-"""A scene must come to the same end with cell lists as with a check of all pairs."""
+"""Test that a scene ends in the same state with cell lists and with a check of all pairs."""
 
 import numpy as np
 
@@ -9,13 +9,12 @@ from tisim.scene.scene import Scene
 
 
 def assert_lists(scene: Scene, simulation: Simulation | None = None) -> None:
-    """Assert that a scene comes to the same end, to rounding, with cell lists and with a check of all pairs.
+    """Assert that a scene ends in the same state, to rounding, with cell lists and with a check of all pairs.
 
-    It does not where a law has too short a ``reach``, or where a stepper or an operator moves particles and
-    does not say how far. The lengths of its steps must not depend on which pairs are checked.
+    It fails if the ``reach`` of a law is too short, or if a stepper or an operator moves particles without
+    reporting the distance. The step sizes must not depend on the pairs that are checked.
 
-    simulation : a simulation of two worlds that is compiled for the structure of the scene; one is made
-    unless it is given.
+    simulation : a simulation of two worlds compiled for the structure of the scene; created if not given.
     """
     control = scene.stepper.control
     must(not control.watches_pairs, "step control", "one that does not look at pairs", control.kind())
@@ -33,8 +32,8 @@ def assert_lists(scene: Scene, simulation: Simulation | None = None) -> None:
 
 
 def _assert_equal(simulation: Simulation, when: str) -> None:
-    """Assert that the worlds with and without lists agree, to rounding that steps have had time to
-    magnify."""
+    """Assert that the worlds with and without lists agree, allowing for rounding errors amplified by the
+    steps."""
     with_lists, all_pairs = simulation.results()
     received, expected = len(with_lists.state["mass"]), len(all_pairs.state["mass"])
     rule = f"{when} there must be {expected} particles as with a check of all pairs"
@@ -47,6 +46,6 @@ def _assert_equal(simulation: Simulation, when: str) -> None:
         allowed += 100 * precision * np.abs(values).max(initial=0.0)
         off = np.abs(values - others).max(initial=0.0)
         assert off <= allowed, (
-            f"{name} {when} must be with lists what it is with a check of all pairs, within {allowed:g}; "
+            f"{name} {when} must be the same with lists as with a check of all pairs, within {allowed:g}; "
             f"received one that is off by {off:g}"
         )

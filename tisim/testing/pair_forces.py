@@ -1,5 +1,4 @@
-"""Pair forces must write nothing, and be the same whichever way they are asked for, and of images that
-move."""
+"""Test that pair forces write nothing, and that all ways of evaluating them agree, also for moving images."""
 
 from typing import Any
 
@@ -17,22 +16,24 @@ from tisim.testing.image_velocities import ImageVelocities, assert_same
 from tisim.testing.uncompiled import started
 
 TOUCHING = 0.9
-"""A law is evaluated where two particles are in the scene, and on the same line at this part of the distance
-at which they touch."""
+"""Second distance at which a law is evaluated, relative to the contact distance; the first is that in the
+scene."""
 COMPARED_AT = (0.5, 1.0, 2.0)
-"""The force by the inverse of the distance is compared at these distances, relative to that in the scene."""
+"""Distances, relative to the one in the scene, at which the force from the inverse distance is compared."""
 
 
 @in_taichi_thread
 def assert_pair_forces(scene: Scene) -> None:
-    """Assert that each pair force of a scene writes nothing, takes velocities from ``s.relative_velocity``
-    alone, if it is ``homogeneous``, and comes to the same by ``pair_force_by_inverse``, if it defines that:
-    to rounding, and to 0 at no inverse at all.
+    """Assert that each pair force of a scene satisfies its contract.
 
-    Several pairs are computed at once, and some twice: what a law writes would be counted twice, or be lost.
-    Images in a sheared box have other velocities than their particles. A law is evaluated for each two
-    particles where they are at the start of the scene, with velocities of that size; derived quantities are
-    taken to be 1.
+    It must write nothing. If it is ``homogeneous``, it must take velocities only from
+    ``s.relative_velocity``. If it defines ``pair_force_by_inverse``, this must agree with ``pair_force`` to
+    rounding, and be 0 for an inverse distance of 0.
+
+    Several pairs are computed in parallel, and some twice, so that a write by a law would be counted twice or
+    lost. Images in a sheared box have other velocities than their particles. A law is evaluated for each two
+    particles at their initial positions, with velocities of the magnitude in the start; derived quantities
+    are set to 1.
     """
     with started(scene) as (allocation, start):
         s, n = allocation.s, len(start["radius"])
@@ -51,19 +52,21 @@ def assert_pair_forces(scene: Scene) -> None:
 
 
 def _written_nothing(s: State, call: "_Calls", duration: float) -> list[np.ndarray]:
-    """Return what a law gives for pairs that remember nothing, and something; it must write nothing."""
+    """Return the results of a law for pairs without and with a contact history, after checking that it writes
+    nothing."""
     before, label = s.image(), call.effect.data.label
     found = [call.results(remembered, duration) for remembered in (0.0, 1.0)]
     for name, values in s.image().items():
         same = np.array_equal(values, before[name], equal_nan=values.dtype.kind == "f")
-        assert same, f"{label} must write nothing between two particles; received another {name}"
+        assert same, f"{label} must write nothing between two particles; received a changed {name}"
     return found
 
 
 def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
-    """forces : of each two particles and factor by distance, by its inverse, and by an inverse of 0."""
+    """forces : for each two particles and each factor, from the distance, from its inverse, and from an
+    inverse of 0."""
     by_distance, by_inverse, by_none = (forces[..., k, :] for k in range(3))
-    # Forces that pass through 0 at some distance are compared with what they are at others.
+    # A force that passes through 0 at some distance is compared relative to its size at other distances.
     size = np.abs(by_distance).max(axis=(2, 3), keepdims=True)
     wrong = ~(np.abs(by_inverse - by_distance) <= np.sqrt(np.finfo(forces.dtype).eps) * size)
     for i, j, k, c in np.argwhere(wrong)[:1]:
@@ -73,14 +76,14 @@ def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
         )
     for i, j, k, c in np.argwhere(by_none != 0)[:1]:
         raise AssertionError(
-            f"{effect.data.label}.pair_force_by_inverse must be 0 where the inverse is; "
+            f"{effect.data.label}.pair_force_by_inverse must be 0 if the inverse is 0; "
             f"received {by_none[i, j, k, c]:g} N on particle {i} by {j} along axis {c}"
         )
 
 
 @ti.data_oriented
 class _Calls:
-    """This kernel asks a law for each two particles of the first world, at two distances."""
+    """Kernel that evaluates a law for each two particles of the first world, at two distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect, self.found, builder = s, effect, ti.field(s.real), Builder()
@@ -107,7 +110,7 @@ class _Calls:
         apart = s.position[0, j] - s.position[0, i]
         length, touching = apart.norm(), ti.cast(TOUCHING, s.real) * (s.radius[0, i] + s.radius[0, j])
         past = ti.Vector.zero(s.real, self.memory) + ti.cast(remembered, s.real)
-        # A loop, so that the law is compiled once.
+        # A loop is used so that the law is compiled once.
         for k in range(2):
             distance = ti.select(k == 0, length, touching)
             force, turn, back, _ = self.effect.interaction(
@@ -121,8 +124,8 @@ class _Calls:
 
 @ti.data_oriented
 class _ByInverse:
-    """This kernel evaluates a law for each two particles of the first world, given distances and given their
-    inverse."""
+    """Kernel that evaluates a law for each two particles of the first world, from distances and from inverse
+    distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect, self.number = s, effect, len(COMPARED_AT)
@@ -134,8 +137,8 @@ class _ByInverse:
         self.factor.from_numpy(np.array(COMPARED_AT))
 
     def forces(self) -> np.ndarray:
-        """Return the forces by index of the particle, of the other one, of the factor and of the way, (...,
-        3)."""
+        """Return the forces by index of the particle, of the other one, of the factor and of the way of
+        evaluation, (..., 3)."""
         self.measure()
         found = self.force.to_numpy()
         return found.reshape(*found.shape[:3], 3, 3)

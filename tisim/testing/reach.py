@@ -1,4 +1,4 @@
-"""Short-ranged laws must be 0 beyond their reach."""
+"""Test that short-ranged laws are 0 beyond their interaction range."""
 
 from typing import Any
 
@@ -16,19 +16,19 @@ from tisim.testing.uncompiled import started
 
 WITHIN = 0.9
 FARTHER = (1.001, 1.1, 2.0, 10.0, 100.0)
-"""A law is evaluated at these distances of two centres, relative to the distance of its reach."""
+"""Distances between centres at which a law is evaluated, relative to its interaction range."""
 RADIUS_FACTORS = np.array([1.0, 1 / 2, 1 / 3])
-"""A law is also evaluated with the radii of the scene times these factors, one particle after another."""
+"""A law is also evaluated with the radii of the scene times these factors, used in turn for the particles."""
 
 
 @in_taichi_thread
 def assert_reach(scene: Scene) -> dict[str, float]:
-    """Assert that each short-ranged law does nothing to two particles that are farther apart than its reach.
+    """Assert that each short-ranged law is 0 for two particles farther apart than its interaction range.
 
-    It is evaluated with the radii of the scene, and with others, equal and unequal, along the line between
-    each two particles; derived quantities are taken to be 1. The return value has, for each such law by its
-    name, the largest value within its reach (N or N m, or in the unit of the quantity that it sets): where
-    this is 0, the scene shows nothing of the law.
+    It is evaluated with the radii of the scene, and with other radii, equal and unequal, along the line
+    between each two particles; derived quantities are set to 1. The return value has, for each such law by
+    name, the largest value within its range (N or N m, or in the unit of the quantity that it sets). If this
+    is 0, the scene does not test the law.
     """
     largest: dict[str, float] = {}
     with started(scene) as (allocation, start):
@@ -52,16 +52,16 @@ def assert_reach(scene: Scene) -> dict[str, float]:
 
 @ti.data_oriented
 class _Distances:
-    """This kernel evaluates a short-ranged law for each pair of the first world, at some distances."""
+    """Kernel that evaluates a short-ranged law for each pair of the first world, at some distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect, self.force = s, effect, isinstance(effect.data, PairForce)
         self.memory = max(1, getattr(effect.data, "memory", 0))
-        # Where the distance is that of the reach, a law may find it just within by rounding.
+        # At exactly the interaction range, rounding may put the pair just inside it.
         at = 1.0 + 1e3 * float(np.finfo(np.float64 if s.real == ti.f64 else np.float32).eps)
         self.factors = (WITHIN, at, *FARTHER)
         self.number = len(self.factors)
-        # In a field: a loop over constants would compile the law for each of them.
+        # The factors are in a field, because a loop over constants would compile the law for each of them.
         self.factor, self.size, builder = ti.field(ti.f64), ti.field(s.real), Builder()
         builder.dense(ti.i, self.number).place(self.factor)
         builder.dense(ti.ijk, (s.capacity, s.capacity, self.number)).place(self.size)
@@ -92,7 +92,8 @@ class _Distances:
 
     @ti.func
     def effect_size(self, i, j, separation, distance):
-        """How much i and j do to each other; no length: in f32 the square of a small force is nothing."""
+        """Return the largest component of the interaction of i and j; not a norm, because in f32 the square
+        of a small force underflows."""
         s, total = self.s, 0.0 * distance
         if ti.static(self.force):
             past = ti.Vector.zero(s.real, self.memory)

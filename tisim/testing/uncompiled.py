@@ -1,4 +1,4 @@
-"""A scene gets its memory on the device, and nothing of it is compiled but what an assertion needs."""
+"""Allocation of a scene on the device without compiling its program, for assertions."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -39,6 +39,6 @@ def started(scene: Scene) -> Iterator[tuple[Allocation, Arrays]]:
 
 
 def offered(effect: Bound[Effect], *names: str) -> tuple[Callable[..., Any], ...]:
-    """Return those methods of these names that an effect defines, and its contract leaves empty."""
+    """Return the methods with these names that an effect defines and that are empty in its contract."""
     data = effect.data
     return tuple(getattr(effect, name) for name in names if hasattr(data, name) and data.offers(name))

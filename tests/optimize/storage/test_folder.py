@@ -271,7 +271,10 @@ def test_a_folder_of_before_markers_goes_on_and_unrelated_files_do_not_matter(op
 def test_time_over_in_the_first_generation_says_how_to_go_on(optimize, tmp_path):
     code, err = optimize("--budget-minutes", 1e-9)
     assert code == 1
-    assert "the time was over before the first generation. To go on, give the same command again." in err
+    assert (
+        "the time limit was reached before the first generation. To go on, give the same command again."
+        in err
+    )
     assert optimize()[0] == 0
 
 
