@@ -23,6 +23,9 @@ from tisim.optimize.surrogate.selection import beaten_by
 
 _CONFIDENCE = 1.0
 """Distance of the confidence bound for several costs from the mean, in standard deviations."""
+_LARGEST_IMPROVEMENT = 3.0
+"""Largest predicted improvement that counts, in standard deviations. A process through values without noise
+underestimates its error; among designs that all improve by more than this, the most uncertain one is run."""
 _MONTE_CARLO = 4000
 """Number of sample points for a hypervolume of three costs or more."""
 _MOST_RANKED = 1500
@@ -50,7 +53,8 @@ class Worth:
         """Return the worth of designs from mean and standard deviation of their costs, both (m,
         objectives)."""
         if means.shape[1] == 1:
-            return log_expected_improvement(means[:, 0], deviations[:, 0], self.best[0])
+            least = self.best[0] - _LARGEST_IMPROVEMENT * deviations[:, 0]
+            return log_expected_improvement(np.maximum(means[:, 0], least), deviations[:, 0], self.best[0])
         return self.volume.improvement(means - _CONFIDENCE * deviations)
 
     def of(self, points: Array) -> Array:

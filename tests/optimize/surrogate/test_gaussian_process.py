@@ -81,6 +81,17 @@ def test_expected_improvement_is_the_integral(z):
         assert found == pytest.approx(np.log(value), rel=1e-6)
 
 
+def test_of_designs_that_improve_for_sure_the_most_uncertain_is_worth_most():
+    """The predicted improvements are 40, 10, 2 and 1 standard deviations."""
+    worth = worth_of([(0.0,), (1.0,), (2.0,)])
+    deviations = np.array([0.01, 0.02, 0.02, 0.02])
+    means = worth.best[0] - np.array([40, 10, 2, 1]) * deviations
+    found = worth(means[:, None], deviations[:, None])
+    assert list(np.argsort(-found)) == [1, 2, 0, 3]
+    exact = log_expected_improvement(means[2:], deviations[2:], worth.best[0])
+    assert found[2:] == pytest.approx(exact)
+
+
 def test_the_hypervolume_that_a_design_adds_is_counted_right():
     """Two costs, exactly: a front of (0, 1), (0.4, 0.4), (1, 0), and areas that are counted by hand."""
     worth = worth_of([(0.0, 1.0), (0.4, 0.4), (1.0, 0.0)])
