@@ -51,7 +51,7 @@ def parts() -> str:
     ]
     entries = [one for one in reference.entries() if one.kind.__module__.startswith("tisim.")]
     for name, family in reference.FAMILIES.items():
-        lines += ["", f"## {family.title}", "", "| name | what it is |", "|---|---|"]
+        lines += ["", f"## {family.title}", "", "| name | description |", "|---|---|"]
         lines += [
             f"| `{one.name}` | {one.summary.replace('|', chr(92) + '|')} |"
             for one in entries
@@ -80,7 +80,7 @@ def rst(text: str) -> list[str]:
 
 
 def _items(paragraph: str) -> Iterator[str]:
-    """Lines of a paragraph; where it explains names, ``name : what it is``, an item of a list for each."""
+    """Lines of a paragraph; a list with an item for each name if it describes names, ``name : description``."""
     if not re.search(r"^[\w, ]+ : ", paragraph, re.M):
         yield from map(plain, paragraph.splitlines())
         return
@@ -133,7 +133,7 @@ def _heading(text: str, line: str) -> list[str]:
 def _family(name: str, title: str, base: type, entries: list[Entry]) -> Iterator[str]:
     yield from _heading(title, "=")
     rows = [(f":ref:`{one.name}`", plain(one.summary), plain(one.source)) for one in entries]
-    yield from _grid(("name", "what it is", "source"), rows)
+    yield from _grid(("name", "description", "source"), rows)
     yield from (".. toctree::", "   :hidden:", "", *(f"   {name}/{one.name}" for one in entries), "")
     if _home(base) is None:
         yield from _heading("The contract", "-")
@@ -188,7 +188,7 @@ def _settings(settings: tuple[Declaration, ...]) -> Iterator[str]:
             (f"``{one.name}``", *map(plain, (one.unit, one.default or "(required)", one.rule, one.text)))
             for one in settings
         ]
-        yield from _grid(("parameter", "unit", "default", "must be", "what it is"), rows)
+        yield from _grid(("parameter", "unit", "default", "must be", "description"), rows)
 
 
 def _toml(entry: Entry) -> Iterator[str]:
