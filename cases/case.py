@@ -13,14 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tisim.cases.statistics import Claim, Shown
-from tisim.optimize.problem.problem import Problem
-
 from tisim import InputError, Scene, cases
 from tisim.accuracy import Quantity
+from tisim.cases.statistics import Claim, Shown
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.io.reader import Frames
+from tisim.optimize.problem.problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,6 +14,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+
+from tisim.errors import InputError, Words, is_number, must
+from tisim.files import regular_file
+from tisim.files.atomic import replace_file
 from tisim.optimize.beginning import Beginning
 from tisim.optimize.designs_csv import (
     GENERATION,
@@ -38,10 +42,6 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.settings import METHOD, Settings, fit, identity
 from tisim.optimize.surrogate.ranking import best
 from tisim.optimize.tables import error_of
-
-from tisim.errors import InputError, Words, is_number, must
-from tisim.files import regular_file
-from tisim.files.atomic import replace_file
 
 SAME = 1e-9
 """A told design counts as an asked one if every gene agrees within this tolerance, as a fraction of its

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from tisim.numerics.skewed import Moments
+from tisim.numerics.statistics import CONFIDENCE
 from tisim.optimize.evaluation.ensemble import Ensemble
 from tisim.optimize.hall_of_fame import not_dominated
 from tisim.optimize.methods.individual import Individual
@@ -18,9 +20,6 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.settings import Settings
 from tisim.optimize.surrogate.noise import moments
 from tisim.optimize.surrogate.ranking import best
-
-from tisim.numerics.skewed import Moments
-from tisim.numerics.statistics import CONFIDENCE
 
 FEWEST_FRESH = 4
 """Held-out starts of each design of a front, if the budget does not allow more."""

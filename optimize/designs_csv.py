@@ -13,13 +13,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tisim.errors import InputError, is_number, must
+from tisim.files import regular_file
 from tisim.optimize.problem.gene_values import Named
 from tisim.optimize.problem.given_genes import FixedGene
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.tables import ERROR, FRESH_STARTS, HIGH, LOW
-
-from tisim.errors import InputError, is_number, must
-from tisim.files import regular_file
 
 MOST_ROWS = 10_000
 """The largest number of designs that are read from a file."""

@@ -11,13 +11,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
+from tisim.errors import InputError, abbreviated, must
 from tisim.optimize.designs_csv import Given, cell_of, check_headings, design_of, naming, rows
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.tables import ERROR, error_of
-
-from tisim.errors import InputError, abbreviated, must
 
 DEVIATION = "std. deviation"
 """The end of the heading of the standard deviation between starts."""

@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
-from tisim.optimize.problem.problem import Problem
 
 import tisim
 from tisim.backend import runtime
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
+from tisim.optimize.problem.problem import Problem
 from tisim.scene.scene import PHYSICS_VERSION
 
 RECORD_FORMAT = "tisim fitness record 1"

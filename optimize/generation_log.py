@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.problem import Problem
 

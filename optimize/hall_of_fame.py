@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from deap import tools
+
 from tisim.optimize.methods.individual import Individual
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from deap import tools
 from numpy.typing import NDArray
+
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.frames import data_frame

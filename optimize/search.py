@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from tisim.errors import RunError
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.conclusion import concluded, proven, reserve
 from tisim.optimize.evaluation.ensemble import Ensemble
@@ -28,8 +29,6 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.search_records import searches, store
 from tisim.optimize.settings import Settings, fit, identity
 from tisim.optimize.storage.cache import Cache
-
-from tisim.errors import RunError
 
 MOST_REFUSED = 200
 """A search ends if the scene function has refused its first designs, this number or more, and accepted

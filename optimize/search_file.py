@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tisim.errors import must
+from tisim.files.regular_file import is_folder
 from tisim.optimize.frames import data_frame
 from tisim.optimize.search_folder import SEARCH_FILE
 from tisim.optimize.search_records import searches
@@ -16,9 +19,6 @@ from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE, descriptions
 from tisim.optimize.storage.runs_table import RunsTable
 from tisim.optimize.tables import error_of
-
-from tisim.errors import must
-from tisim.files.regular_file import is_folder
 
 if TYPE_CHECKING:
     from pandas import DataFrame

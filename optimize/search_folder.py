@@ -26,17 +26,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tisim.optimize.search_records import searches
-from tisim.optimize.settings import IDENTITY_FORMAT, of_the_problem, search_name
-from tisim.optimize.storage.cache import Cache
-from tisim.optimize.storage.record import canonical
-
 from tisim import InputError
 from tisim.errors import abbreviated, must
 from tisim.files import lock, ownership, regular_file
 from tisim.files.atomic import locked, replace_file
 from tisim.files.regular_file import file_status
 from tisim.files.resuming import resumes
+from tisim.optimize.search_records import searches
+from tisim.optimize.settings import IDENTITY_FORMAT, of_the_problem, search_name
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.record import canonical
 
 SEARCH_FILE = "search.h5"
 """Name of the cache file of a search."""

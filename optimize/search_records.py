@@ -9,6 +9,8 @@ from dataclasses import fields
 from typing import Any
 
 import deap
+
+from tisim.io.run_folder import versions
 from tisim.optimize.experiments import table_of
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.problem import Problem
@@ -16,8 +18,6 @@ from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE
 from tisim.optimize.storage.record import canonical
 from tisim.optimize.tables import best_columns, logbook_columns, units
-
-from tisim.io.run_folder import versions
 
 WARM_START = "warm_start"
 """Name of the table of the known designs of a warm start; its checksum has this key in an identity."""

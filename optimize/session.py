@@ -11,6 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+
+from tisim.backend import runtime
+from tisim.console import err, print_stopping
+from tisim.console import out as standard_output
+from tisim.errors import must
+from tisim.files import lock, pictures
+from tisim.files.atomic import replace_file
+from tisim.files.ownership import claim
+from tisim.interrupt import Interrupt
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.designs_csv import Given
 from tisim.optimize.evaluation.executors import evaluator_for
@@ -33,15 +42,6 @@ from tisim.optimize.search_folder import (
 from tisim.optimize.settings import Settings, fit, identity, proposed
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.warm_start import warmed
-
-from tisim.backend import runtime
-from tisim.console import err, print_stopping
-from tisim.console import out as standard_output
-from tisim.errors import must
-from tisim.files import lock, pictures
-from tisim.files.atomic import replace_file
-from tisim.files.ownership import claim
-from tisim.interrupt import Interrupt
 
 
 def run(

@@ -8,14 +8,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic import Field, SerializeAsAny, model_validator
+
+from tisim.components.component import Checked
+from tisim.errors import must
 from tisim.optimize.beginning import Beginning
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.methods.base import SearchMethod, code_of, every, find
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.record import canonical
-
-from tisim.components.component import Checked
-from tisim.errors import must
 
 METHOD = "genetic"
 """The default search method."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from deap import tools
+
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.calls import constraint_value

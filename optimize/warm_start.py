@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tisim.errors import InputError, is_number
 from tisim.optimize.beginning import Beginning
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.experiments import restored
@@ -31,8 +33,6 @@ from tisim.optimize.storage.record import canonical
 from tisim.optimize.storage.runs_table import RunsTable
 from tisim.optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
 from tisim.optimize.surrogate.selection import representative
-
-from tisim.errors import InputError, is_number
 
 
 def warmed(

@@ -4,10 +4,10 @@ problem."""
 import os
 
 import pytest
-from tisim.cases.case import every
 
 from tests.judged import check_message
 from tisim import InputError
+from tisim.cases.case import every
 
 ANGLES = "quantity,value,uncertainty\n"
 WRONG_ANGLES = {

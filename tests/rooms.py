@@ -152,10 +152,9 @@ class Passage:
 
 def passages(folder: Path) -> Iterator[str]:
     """The passages of a run of agglomeration, with its second scene, and of a search of one design."""
-    from tisim.cases.case import every
-
     import tisim
     from tisim import optimize
+    from tisim.cases.case import every
 
     tisim.init("cpu", threads=1)
     case = every()["agglomeration"]

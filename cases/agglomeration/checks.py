@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from tisim.cases.agglomeration import field_checks
-from tisim.cases.agglomeration import scene as agglomeration
-from tisim.cases.case import Check
 
 import tisim
 from tisim import Particles, Result, Scene
+from tisim.cases.agglomeration import field_checks
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.case import Check
 from tisim.effects import Agglomeration, Effect, Heating, Impact
 from tisim.operators import Fragmentation
 from tisim.scene.initial_state import Arrays

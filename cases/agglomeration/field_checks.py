@@ -22,12 +22,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.constants import epsilon_0, mu_0
-from tisim.cases.agglomeration import fields
-from tisim.cases.agglomeration import scene as agglomeration
-from tisim.cases.case import Check
 
 import tisim
 from tisim import Particles, Scene
+from tisim.cases.agglomeration import fields
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.case import Check
 from tisim.effects import CARBONYL_IRON, Agglomeration, Impact
 from tisim.steppers import FixedStep, Stepper, Verlet
 

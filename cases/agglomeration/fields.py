@@ -21,9 +21,9 @@ import math
 from collections.abc import Mapping
 
 from scipy.constants import epsilon_0, mu_0
-from tisim.optimize.problem.genome import Gene
 
 from tisim.effects import CARBONYL_IRON, DipoleDipole, Effect, FroehlichMoment, Lorentz, NearField
+from tisim.optimize.problem.genome import Gene
 from tisim.packing import EqualSizes, GrainClass
 from tisim.sources import ElectricField, MagneticField
 from tisim.steppers import ApproachTime, Stepper, Verlet

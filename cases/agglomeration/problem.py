@@ -4,14 +4,14 @@ without charges and fields."""
 from __future__ import annotations
 
 import numpy as np
+
+from tisim import Result
 from tisim.cases.agglomeration.fields import FIELD_GENES
 from tisim.cases.agglomeration.scene import SIZES, TITLE, scene
 from tisim.cases.case import size_named
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.problem import Problem
-
-from tisim import Result
-from tisim.errors import must
 from tisim.plotting.cloud import cloud
 
 GENES = (

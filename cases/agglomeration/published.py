@@ -13,12 +13,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from tisim.cases.agglomeration.problem import cost
-from tisim.cases.agglomeration.published_strings import PUBLISHED_COSTS, designs
-from tisim.cases.agglomeration.scene import scene
 
 import tisim
 from tisim import Scene
+from tisim.cases.agglomeration.problem import cost
+from tisim.cases.agglomeration.published_strings import PUBLISHED_COSTS, designs
+from tisim.cases.agglomeration.scene import scene
 from tisim.numerics.statistics import half_width
 from tisim.steppers import ApproachTime, Verlet
 

@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tisim import Box, Cloud, Scene
 from tisim.cases.agglomeration import fields
 from tisim.cases.agglomeration.published_strings import designs
 from tisim.cases.case import Size, size_named
-
-from tisim import Box, Cloud, Scene
 from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
 from tisim.operators import Cooling, Fragmentation
 from tisim.steppers import ApproachTime, Verlet

@@ -26,17 +26,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
+
+import tisim
+from tisim import Scene, optimize
+from tisim.analysis import Mean
 from tisim.cases.agglomeration import fields
 from tisim.cases.agglomeration.problem import GENES, UNBREAKABLE, cost, problem
 from tisim.cases.agglomeration.scene import BEST, SIZES, scene
 from tisim.cases.case import size_named
 from tisim.cases.runs import OTHER_STARTS, sound
-from tisim.optimize import Gene, Genome, Problem
-
-import tisim
-from tisim import Scene, optimize
-from tisim.analysis import Mean
 from tisim.numerics.statistics import CONFIDENCE
+from tisim.optimize import Gene, Genome, Problem
 from tisim.plotting.style import empty, legend_above, plain
 
 KINDS_OF_GENES: Mapping[str, tuple[Gene, ...]] = {

@@ -3,10 +3,9 @@ the heap, over random starts."""
 
 from __future__ import annotations
 
-from tisim.cases.avalanche.measures import grains_volume, heap_volume, overlap, repose
-
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
+from tisim.cases.avalanche.measures import grains_volume, heap_volume, overlap, repose
 
 
 def width(result: Result) -> float:

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
-from tisim.cases.avalanche.measures import diameter
-from tisim.cases.avalanche.scene import time_unit
 
 from tisim import Scene
+from tisim.cases.avalanche.measures import diameter
+from tisim.cases.avalanche.scene import time_unit
 from tisim.effects import Translation, Walls
 from tisim.io.reader import Frames
 from tisim.plotting.style import empty, letters

@@ -7,6 +7,9 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+
+from tisim import Particles, Result, Scene, run
+from tisim.analysis import Mean
 from tisim.cases.avalanche.comparison import of, steeper_by
 from tisim.cases.avalanche.measures import load_on_walls
 from tisim.cases.avalanche.published import SLOPES, larger
@@ -16,9 +19,6 @@ from tisim.cases.avalanche.sizes import DEFAULT
 from tisim.cases.avalanche.stages import Avalanche, avalanches
 from tisim.cases.case import Check
 from tisim.cases.statistics import Claim, Shown
-
-from tisim import Particles, Result, Scene, run
-from tisim.analysis import Mean
 from tisim.steppers import FixedStep, Verlet
 
 CHECKED_SEEDS = 6

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
+
 from tisim.cases.avalanche.comparison import of
 from tisim.cases.avalanche.measures import filled_parts, profile
 from tisim.cases.avalanche.published import SLOPES
@@ -18,7 +19,6 @@ from tisim.cases.avalanche.scene import DIAMETERS, FLUX
 from tisim.cases.avalanche.sizes import SIZES
 from tisim.cases.avalanche.stages import Avalanche, avalanches
 from tisim.cases.case import size_named
-
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain

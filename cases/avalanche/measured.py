@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from tisim.cases.granular_bench import measured
 from tisim.cases.granular_bench.measured import Measurement
-
 from tisim.errors import InputError, must
 
 ANGLE_UNITS = {"angle_of_repose": "degrees"}

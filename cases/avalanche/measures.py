@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
-from tisim.cases.avalanche.scene import GRAVITY
 
 from tisim import InputError, Result
 from tisim.analysis import largest_overlap, slope_angles, surface_profile
+from tisim.cases.avalanche.scene import GRAVITY
 from tisim.scene.initial_state import Arrays
 
 SAMPLES = 8

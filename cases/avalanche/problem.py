@@ -17,6 +17,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+
+from tisim import Result, Scene
 from tisim.cases.avalanche.measured import MeasuredProfile, Target, read
 from tisim.cases.avalanche.measures import profile, repose
 from tisim.cases.avalanche.scene import IRON_DESIGN, TITLE, scene
@@ -24,13 +26,11 @@ from tisim.cases.avalanche.sizes import SIZES
 from tisim.cases.case import searched_size, size_named
 from tisim.cases.granular_bench.measured import Measurement
 from tisim.cases.runs import OTHER_STARTS
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.problem.statistic import Misfit
-
-from tisim import Result, Scene
-from tisim.errors import must
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("calibrate",)

@@ -8,10 +8,10 @@ import math
 import numpy as np
 from scipy.constants import mu_0
 from scipy.linalg import eigvalsh
-from tisim.cases.avalanche.scene import CUTOFF, DENSITY, FLUX, GRAVITY, SUSCEPTIBILITY
-from tisim.cases.dipoles import attraction_in_line
 
 from tisim.analysis import nearest_image
+from tisim.cases.avalanche.scene import CUTOFF, DENSITY, FLUX, GRAVITY, SUSCEPTIBILITY
+from tisim.cases.dipoles import attraction_in_line
 from tisim.scene.initial_state import Arrays
 
 CONTRAST = SUSCEPTIBILITY / (3 + SUSCEPTIBILITY)

@@ -16,11 +16,11 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+
+from tisim import Box, Cloud, GrainClass, Material, Particles, RandomInBox, Scene
 from tisim.cases.avalanche.sizes import SIZES, Cell
 from tisim.cases.case import size_named
 from tisim.cases.granular_bench.closed_forms import hertz_duration, reduced
-
-from tisim import Box, Cloud, GrainClass, Material, Particles, RandomInBox, Scene
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import (
     SJKR,

@@ -11,12 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tisim import Result, run
 from tisim.cases.avalanche.measures import grains_volume, heap_volume, overlap, repose, two_slopes
 from tisim.cases.avalanche.scene import LATEST, scene
 from tisim.cases.avalanche.sizes import Cell
 from tisim.cases.runs import sound
-
-from tisim import Result, run
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.scene.initial_state import Arrays
 

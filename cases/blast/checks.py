@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+
+from tisim import Result, run
 from tisim.cases.blast.accuracy import half_axes
 from tisim.cases.blast.scene import AIR, ENERGY, FLUX, MASS, RADIUS, SPECIFIC_CHARGE, SPEED, scene
 from tisim.cases.blast.shape import ellipsoid
 from tisim.cases.case import Check
-
-from tisim import Result, run
 
 
 def _speed(result: Result) -> float:

@@ -12,13 +12,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from tisim import Recording, run
 from tisim.cases.blast import scene as blast
 from tisim.cases.blast.accuracy import half_axes
 from tisim.cases.blast.shape import contacts, extents
 from tisim.cases.case import size_named
 from tisim.cases.runs import sound
-
-from tisim import Recording, run
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frame, Frames, frames
 from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel

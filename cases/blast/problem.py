@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+
+from tisim import Result, Scene
 from tisim.cases.blast import scene as blast
 from tisim.cases.blast.shape import ball, ellipsoid, moments, principal_half_axes
 from tisim.cases.case import size_named
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.problem import Problem
-
-from tisim import Result, Scene
-from tisim.errors import must
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("ellipsoid",)

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tisim.cases.case import Size, size_named
 
 from tisim import Blast, Cloud, RandomInBall, Scene
+from tisim.cases.case import Size, size_named
 from tisim.effects import (
     ChowDrag,
     Contact,

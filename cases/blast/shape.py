@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
-from tisim.cases.blast.scene import SPECIFIC_CHARGE, SPEED
 
+from tisim.cases.blast.scene import SPECIFIC_CHARGE, SPEED
 from tisim.scene.initial_state import Arrays
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from tisim.cases.capture.statistics import fraction
-
 from tisim import Scene
 from tisim.accuracy import Quantity
+from tisim.cases.capture.statistics import fraction
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:

@@ -11,6 +11,9 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from tisim import Result
+from tisim.analysis import Mean
 from tisim.cases.capture import scene as capture
 from tisim.cases.capture.statistics import (
     ANGLES,
@@ -23,9 +26,6 @@ from tisim.cases.capture.statistics import (
     mean,
     results,
 )
-
-from tisim import Result
-from tisim.analysis import Mean
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.plotting.style import empty, legend_beside, letters, plain
 

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+
+from tisim import Scene
 from tisim.cases.capture import curves
 from tisim.cases.capture import scene as capture
 from tisim.cases.capture.statistics import MICRO
-
-from tisim import Scene
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames
 from tisim.plotting.style import TIME, empty, letters, plain

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from itertools import islice, product
 
 import numpy as np
+
+from tisim import Cloud, RandomInBox, Scene
 from tisim.cases.capture.scene import (
     DENSITY,
     DIAMETER,
@@ -19,8 +21,6 @@ from tisim.cases.capture.scene import (
     TEMPERATURE,
     VISCOSITY,
 )
-
-from tisim import Cloud, RandomInBox, Scene
 from tisim.components.component import Vector
 from tisim.effects import LangevinMoment, Magnetophoresis
 from tisim.errors import must

@@ -16,14 +16,14 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+
+from tisim import Result
 from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
 from tisim.cases.capture.scene import SATURATION_MAGNETISATION
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
-
-from tisim import Result
-from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain
 from tisim.sources import MagneticCylinders, UniformFlow
 

@@ -12,9 +12,9 @@ radius wide and together form the layer around the cylinder; ``part`` chooses on
 from __future__ import annotations
 
 import numpy as np
-from tisim.cases.case import Size, size_named
 
 from tisim import Cloud, RandomAroundCylinder, Scene
+from tisim.cases.case import Size, size_named
 from tisim.components.component import Vector
 from tisim.effects import FixedMoment, Magnetophoresis
 from tisim.operators import Capture

@@ -12,13 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
+from tisim import Result, Scene, run
+from tisim.analysis import Mean
 from tisim.cases.capture import scene as capture
 from tisim.cases.case import Check
 from tisim.cases.runs import sound
 from tisim.cases.statistics import Claim
-
-from tisim import Result, Scene, run
-from tisim.analysis import Mean
 from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
 

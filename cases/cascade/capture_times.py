@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from tisim.cases.cascade.scene import Cascade
-from tisim.cases.runs import sound
 
 from tisim import run
+from tisim.cases.cascade.scene import Cascade
+from tisim.cases.runs import sound
 from tisim.engine.batches import Progress
 
 CAPTURED_SHARE = 0.9

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from tisim.analysis import Mean
 from tisim.cases.cascade.capture_times import CAPTURED_SHARE, captured_at, time_to
 from tisim.cases.cascade.scene import STAGE, Cascade, Orientation
 from tisim.cases.cascade.statistics import OFF, ORIENTATIONS, PUBLISHED_TIMES, RANDOM
-
-from tisim.analysis import Mean
 from tisim.engine.batches import Progress
 from tisim.plotting.style import empty, legend_beside, letters, plain
 

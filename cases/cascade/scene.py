@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from tisim.cases.capture import scene as capture
-from tisim.cases.case import Size, size_named
 
 from tisim import RandomAroundCylinder, Scene
+from tisim.cases.capture import scene as capture
+from tisim.cases.case import Size, size_named
 from tisim.sources import MagneticCylinders
 
 Orientation = Literal["optimal", "directions", "angles"]

@@ -6,12 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from tisim.analysis import Mean
 from tisim.cases.capture.statistics import CHECK_REPEATS
 from tisim.cases.cascade.capture_times import CAPTURED_SHARE, captured_at, time_to
 from tisim.cases.cascade.scene import STAGE, Cascade, Orientation
 from tisim.cases.statistics import Claim
-
-from tisim.analysis import Mean
 
 PUBLISHED_TIMES = {25: (1100.0, 500.0), 125: (12.5, 5.5)}
 """The time to 90 %, s, of random and optimal cascades by radius in nm (B16 section 6.4.5)."""

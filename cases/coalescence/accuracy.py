@@ -3,11 +3,10 @@ clusters, the density of the asteroid and the largest overlap, over random start
 
 from __future__ import annotations
 
-from tisim.cases.coalescence.measures import Asteroid, Gathering
-
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 from tisim.analysis import largest_overlap
+from tisim.cases.coalescence.measures import Asteroid, Gathering
 
 
 def overlap(result: Result) -> float:

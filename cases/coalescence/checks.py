@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+
+from tisim.analysis import Mean
 from tisim.cases.case import Check
 from tisim.cases.coalescence.published import (
     AXES,
@@ -22,8 +24,6 @@ from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisati
 from tisim.cases.coalescence.scaling import critical_spin, mean_density
 from tisim.cases.coalescence.scene import DEFAULT, scene
 from tisim.cases.statistics import Claim, Shown
-
-from tisim.analysis import Mean
 
 ROUNDING = 1e-11
 """Largest change of a momentum, relative to the sum of its magnitudes over the grains."""

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from tisim.analysis import voronoi_by_shell
 from tisim.cases.coalescence.measures import clusters_of, part
 from tisim.cases.coalescence.published import (
     DENSITY,
@@ -27,8 +29,6 @@ from tisim.cases.coalescence.scaling import (
     surface_weight,
 )
 from tisim.cases.coalescence.scene import SIZES
-
-from tisim.analysis import voronoi_by_shell
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, directions, panel, project
 from tisim.plotting.clusters import cluster_colours

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from scipy.constants import G
+
 from tisim.cases.coalescence.published import (
     AXES,
     DENSITY,

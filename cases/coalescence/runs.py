@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
+
+from tisim import Scene, Simulation
 from tisim.cases.case import Size
 from tisim.cases.coalescence.measures import Asteroid, Conserved, Gathering
 from tisim.cases.coalescence.published import MAGNETISATIONS, NUMBER
 from tisim.cases.coalescence.scene import scale_of, scene
 from tisim.cases.runs import sound
-
-from tisim import Scene, Simulation
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 from scipy.constants import G
+
 from tisim.cases.dipoles import attraction_in_line
 
 PACKED = 0.6

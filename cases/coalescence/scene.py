@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 from scipy.constants import Boltzmann
+
+from tisim import Material, Particles, Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.coalescence import published
 from tisim.cases.coalescence.published import DENSITY, DIAMETERS, POISSON, SPACING
 from tisim.cases.coalescence.scaling import sphere_mass
 from tisim.cases.granular_bench.closed_forms import hertz_duration, reduced
-
-from tisim import Material, Particles, Scene
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import (
     DMT,

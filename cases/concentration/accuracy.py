@@ -3,11 +3,10 @@ positions, over random starts."""
 
 from __future__ import annotations
 
-from tisim.cases.concentration.statistics import chain
-
 from tisim import Scene
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import usual
+from tisim.cases.concentration.statistics import chain
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:

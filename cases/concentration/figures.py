@@ -14,13 +14,13 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
+
+from tisim import Recording, run
+from tisim.analysis import head_to_tail, labels
 from tisim.cases.capture.statistics import MICRO
 from tisim.cases.concentration import scene as concentration
 from tisim.cases.concentration.scene import coupling
 from tisim.cases.concentration.statistics import CAPTURE, chain, held_fraction
-
-from tisim import Recording, run
-from tisim.analysis import head_to_tail, labels
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames, frames
 from tisim.plotting.style import empty, letters, plain

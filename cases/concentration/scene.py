@@ -19,10 +19,10 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.constants import Boltzmann, mu_0
-from tisim.cases.capture import scene as capture
-from tisim.cases.case import Size, size_named
 
 from tisim import Cloud, RandomInBox, Scene
+from tisim.cases.capture import scene as capture
+from tisim.cases.case import Size, size_named
 from tisim.effects import FixedMoment, Magnetophoresis, Mie, TruncatedDipoleDipole
 from tisim.operators import Capture
 from tisim.sources import MagneticCylinders, MagneticField

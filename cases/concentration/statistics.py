@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+
+from tisim import Result, RunError
+from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 from tisim.cases.capture.statistics import grouped
 from tisim.cases.case import Check
 from tisim.cases.concentration import scene as concentration
 from tisim.cases.concentration.scene import chain_length, coupling
 from tisim.cases.statistics import Claim
-
-from tisim import Result, RunError
-from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 from tisim.scene.initial_state import Arrays
 
 GAMMA = {25: 1.0, 125: 825.0}

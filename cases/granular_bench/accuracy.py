@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from tisim import Scene
+from tisim.accuracy import Quantity
 from tisim.cases.granular_bench.bed import centre_height, side_load
 from tisim.cases.granular_bench.measures import discharge, repose
 from tisim.cases.runs import overlap
-
-from tisim import Scene
-from tisim.accuracy import Quantity
 from tisim.operators import Passage
 
 

@@ -10,10 +10,10 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
-from tisim.cases.granular_bench.impacts import by_id, simulation_of
-from tisim.cases.runs import sound
 
 from tisim import Material, Particles, Scene
+from tisim.cases.granular_bench.impacts import by_id, simulation_of
+from tisim.cases.runs import sound
 from tisim.effects import DMT, JKR, CapillaryBridge, Effect, Granular, HertzMaterial
 from tisim.steppers import FixedStep, Verlet
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from tisim.cases.granular_bench.closed_forms import beam_deflection
 
 from tisim import Particles, Scene
+from tisim.cases.granular_bench.closed_forms import beam_deflection
 from tisim.effects import Lorentz, ParallelBond
 from tisim.sources import ElectricField
 from tisim.steppers import FixedStep, Verlet

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.constants import g as STANDARD_GRAVITY
+
+from tisim import Result, Scene
 from tisim.cases.granular_bench.closed_forms import hertz_duration, reduced
 from tisim.cases.granular_bench.scene import (
     DENSITY,
@@ -18,8 +20,6 @@ from tisim.cases.granular_bench.scene import (
     grain_material,
     grains,
 )
-
-from tisim import Result, Scene
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import Gravity, Walls
 from tisim.geometry import CylindricalSurface, Plane

@@ -17,12 +17,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.constants import g as STANDARD_GRAVITY
-from tisim.cases.granular_bench.measures import discharge, heap, repose
-from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
-from tisim.cases.runs import sound
 
 from tisim import Result, run
 from tisim.analysis import Mean
+from tisim.cases.granular_bench.measures import discharge, heap, repose
+from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
+from tisim.cases.runs import sound
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, panel, walls_at
 from tisim.plotting.style import empty, letters, plain

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+
+from tisim import Scene, run
 from tisim.cases.case import Check
 from tisim.cases.granular_bench import adhesion, beams, motions, particle_tests
 from tisim.cases.granular_bench.closed_forms import (
@@ -24,8 +26,6 @@ from tisim.cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, f
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
 from tisim.cases.granular_bench.shear_cell import expected_ratio, sheared_beds
 from tisim.cases.runs import sound
-
-from tisim import Scene, run
 
 BOUND = 1e-3
 """Largest error of an impact in 800 steps, relative to the approach speed."""

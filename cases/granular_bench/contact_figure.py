@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from tisim import run
 from tisim.cases.granular_bench import adhesion, beams, motions, particle_tests
 from tisim.cases.granular_bench.checks import rebounds
 from tisim.cases.granular_bench.closed_forms import (
@@ -28,8 +30,6 @@ from tisim.cases.granular_bench.impacts import (
 )
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
 from tisim.cases.runs import sound
-
-from tisim import run
 from tisim.plotting.style import empty, letters, plain
 
 PANEL_COLOURS = ("#4477aa", "#cc6677", "#228833", "#aa7733", "#882255")

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from matplotlib.figure import Figure
+
 from tisim.cases.case import size_named
 from tisim.cases.granular_bench.beds import bed_figure, beds, table
 from tisim.cases.granular_bench.contact_figure import contact_figure
 from tisim.cases.granular_bench.scene import BED, SIZES
 from tisim.cases.granular_bench.shear_cell import sheared_beds
 from tisim.cases.granular_bench.shear_figure import FRACTIONS, shear_figure, shear_table
-
 from tisim.engine.batches import Progress
 from tisim.errors import must
 

@@ -13,11 +13,11 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
+
+from tisim import Material, Particles, Result, Scene, Simulation
 from tisim.cases.granular_bench.closed_forms import hertz_depth, hertz_duration, reduced
 from tisim.cases.granular_bench.substances import SUBSTANCES
 from tisim.cases.runs import sound
-
-from tisim import Material, Particles, Result, Scene, Simulation
 from tisim.effects import Granular, HertzMaterial, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
 from tisim.steppers import FixedStep, Verlet

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+
 from tisim.cases.granular_bench.impacts import ParticleImpact
 from tisim.cases.granular_bench.substances import SUBSTANCES
 

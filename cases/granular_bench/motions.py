@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from tisim.cases.granular_bench.closed_forms import hertz_force, hertz_overlap
 
 from tisim import Material, Particles, Scene
+from tisim.cases.granular_bench.closed_forms import hertz_force, hertz_overlap
 from tisim.effects import (
     Granular,
     Gravity,

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from tisim.cases.granular_bench.impacts import ParticleImpact
 
 RESTITUTIONS = (0.2, 0.4, 0.6, 0.8, 1.0)

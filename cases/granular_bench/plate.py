@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 from scipy.constants import g as STANDARD_GRAVITY
-from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 
 from tisim import Particles, Result, Scene
+from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 from tisim.effects import PrescribedMotion, Translation, Walls
 from tisim.geometry import Disc
 from tisim.operators import PeakHeight

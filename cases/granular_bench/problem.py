@@ -17,19 +17,18 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from tisim import Result, Scene
 from tisim.cases.case import searched_size, size_named
 from tisim.cases.granular_bench.measured import QUANTITY_UNITS, Measured, Measurement, read
 from tisim.cases.granular_bench.measures import discharge, repose
 from tisim.cases.granular_bench.plate import rebound, scene_with_plate, sliding
 from tisim.cases.granular_bench.scene import SIZES, TITLE
 from tisim.cases.runs import OTHER_STARTS
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.problem.statistic import Misfit
-
-from tisim import Result, Scene
-from tisim.errors import must
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("calibrate",)

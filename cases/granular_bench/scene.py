@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from tisim.cases.case import Size
 
 from tisim import Cloud, GrainClass, Material, RandomInCylinder, Scene
+from tisim.cases.case import Size
 from tisim.effects import (
     Granular,
     Gravity,

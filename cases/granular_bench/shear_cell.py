@@ -16,11 +16,11 @@ from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
-from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, POISSON, SPREAD
-from tisim.cases.runs import sound
 
 from tisim import Box, Cloud, GrainClass, Material, Particles, Result, Scene, Simulation
 from tisim.analysis import solid_fraction
+from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, POISSON, SPREAD
+from tisim.cases.runs import sound
 from tisim.effects import (
     Granular,
     HertzMaterial,

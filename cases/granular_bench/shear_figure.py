@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+
 from tisim.cases.granular_bench.scene import DIAMETER
 from tisim.cases.granular_bench.shear_cell import CELL_SIDES, ShearedBed, expected_ratio
-
 from tisim.plotting.cloud import common, corners, panel
 from tisim.plotting.style import TIME, empty, letters, plain
 

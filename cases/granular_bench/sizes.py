@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from tisim import Scene
 from tisim.cases.case import size_named
 from tisim.cases.granular_bench.bed import bed
 from tisim.cases.granular_bench.scene import BED, SIZES, scene
-
-from tisim import Scene
 
 
 def scene_for(size: str, seed: int) -> Scene:

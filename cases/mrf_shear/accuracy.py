@@ -3,11 +3,10 @@ largest overlap."""
 
 from __future__ import annotations
 
-from tisim.cases.mrf_shear.measures import shear_stress
-from tisim.cases.runs import overlap
-
 from tisim import Scene
 from tisim.accuracy import Quantity
+from tisim.cases.mrf_shear.measures import shear_stress
+from tisim.cases.runs import overlap
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:

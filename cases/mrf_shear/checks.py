@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+
+from tisim import Result
+from tisim.analysis import Mean
 from tisim.cases.case import Check
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.flow_curve import AS_PUBLISHED, COMPARED, MIXED, VARIATIONS, Curve
@@ -14,9 +17,6 @@ from tisim.cases.mrf_shear.runs import cells, paired
 from tisim.cases.mrf_shear.scene import LOWER, RATES, UPPER
 from tisim.cases.runs import overlap
 from tisim.cases.statistics import Claim, Shown
-
-from tisim import Result
-from tisim.analysis import Mean
 
 CHECK_STARTS = 3
 """Number of starts of each setting."""

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from tisim import Result, run
 from tisim.cases.case import size_named
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.flow_curve import Curve, by_field, by_part, flow_curve, table
 from tisim.cases.mrf_shear.measures import order
 from tisim.cases.mrf_shear.runs import magnetised, paired
 from tisim.cases.mrf_shear.scene import RATES, SIZES
-
-from tisim import Result, run
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.plotting.cloud import corners, panel, view

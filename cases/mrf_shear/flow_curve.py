@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+
+from tisim import Result
+from tisim.analysis import BinghamFit, Estimate, Mean, fit_bingham
 from tisim.cases.mrf_shear.grains import mixture
 from tisim.cases.mrf_shear.measures import flux, shear_rate, shear_stress
 from tisim.cases.mrf_shear.runs import Settings, cells
 from tisim.cases.mrf_shear.scene import RATES
-
-from tisim import Result
-from tisim.analysis import BinghamFit, Estimate, Mean, fit_bingham
 from tisim.effects import CARBONYL_IRON
 from tisim.engine.batches import Progress
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tisim import GrainClass
 from tisim.cases.mixtures import classes
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.published import MICRO
-
-from tisim import GrainClass
 from tisim.effects import CARBONYL_IRON
 
 DENSITY = CARBONYL_IRON.density

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from tisim.cases.mrf_shear.regime import magnetisation
-from tisim.cases.mrf_shear.scene import LOWER, UPPER
 
 from tisim import Result
 from tisim.analysis import (
@@ -16,6 +14,8 @@ from tisim.analysis import (
     mean_coordination,
     periodic_sides,
 )
+from tisim.cases.mrf_shear.regime import magnetisation
+from tisim.cases.mrf_shear.scene import LOWER, UPPER
 from tisim.domains.domain import Domain
 from tisim.effects import PrescribedMotion, StokesDrag, Translation
 from tisim.operators import JoinGroup

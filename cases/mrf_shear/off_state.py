@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+
 from tisim.cases.mrf_shear import published
 
 RANDOM_PACKING = 0.64

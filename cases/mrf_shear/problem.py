@@ -12,17 +12,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+
+from tisim import Cloud, Result, Scene
 from tisim.cases.case import searched_size
 from tisim.cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS, mixture
 from tisim.cases.mrf_shear.measures import extent, flux, shear_stress, volume_fraction
 from tisim.cases.mrf_shear.off_state import off_state_viscosity
 from tisim.cases.mrf_shear.scene import SEARCHED, SIZES, SWEPT, TITLE, scene
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
-
-from tisim import Cloud, Result, Scene
-from tisim.errors import must
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("front", "bounded", "field")

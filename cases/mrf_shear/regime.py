@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from scipy.constants import mu_0
+
 from tisim.cases.coalescence.scaling import attraction, sphere_mass
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.grains import DENSITY, LARGE_RADIUS
 from tisim.cases.mrf_shear.scene import RATES, SUSCEPTIBILITY
 from tisim.cases.statistics import Shown
-
 from tisim.effects import CARBONYL_IRON
 
 DIAMETER = 2 * LARGE_RADIUS

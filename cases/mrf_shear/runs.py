@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from tisim.cases.mrf_shear.measures import shear_stress
-from tisim.cases.mrf_shear.scene import MAGNETISING_TIME, scene
-from tisim.cases.runs import sound
 
 from tisim import Result, Scene, run
 from tisim.analysis import Mean
+from tisim.cases.mrf_shear.measures import shear_stress
+from tisim.cases.mrf_shear.scene import MAGNETISING_TIME, scene
+from tisim.cases.runs import sound
 from tisim.engine.batches import Progress
 
 Settings = Mapping[str, Any]

@@ -14,13 +14,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
+from tisim import Box, Cloud, GrainClass, Material, RandomInDomain, Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.mixtures import magnetorheological
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.grains import DENSITY, MONODISPERSE, number_of, smallest
 from tisim.cases.mrf_shear.published import MICRO
-
-from tisim import Box, Cloud, GrainClass, Material, RandomInDomain, Scene
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import Vector
 from tisim.effects import (

@@ -3,11 +3,10 @@ largest overlap, over random starts."""
 
 from __future__ import annotations
 
-from tisim.cases.coalescence.accuracy import overlap
-from tisim.cases.coalescence.measures import Asteroid
-
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
+from tisim.cases.coalescence.accuracy import overlap
+from tisim.cases.coalescence.measures import Asteroid
 
 
 def density(result: Result) -> float:

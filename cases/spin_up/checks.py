@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+
+from tisim.analysis import Mean
 from tisim.cases.case import Check
 from tisim.cases.coalescence.measures import Conserved
 from tisim.cases.coalescence.published import MAGNETISATIONS
@@ -15,8 +17,6 @@ from tisim.cases.spin_up.regime import regime
 from tisim.cases.spin_up.scene import DEFAULT
 from tisim.cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
 from tisim.cases.statistics import Claim, Shown
-
-from tisim.analysis import Mean
 
 ROUNDING = 1e-11
 """Largest change of a momentum, relative to the sum of its magnitudes over the grains."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+
 from tisim.cases.coalescence.figures import NO_BOX, NO_GRAVITY, SEMI_AXES, close_up, moved
 from tisim.cases.coalescence.published import MAGNETISATIONS
 from tisim.cases.coalescence.runs import of_all_magnetisations
@@ -16,7 +17,6 @@ from tisim.cases.coalescence.scaling import critical_spin
 from tisim.cases.spin_up.published import DISRUPTION
 from tisim.cases.spin_up.scene import SIZES
 from tisim.cases.spin_up.stages import SEEDS, SpinStep, SpinUp, spin_ups
-
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import directions, view
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain

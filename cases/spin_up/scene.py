@@ -14,11 +14,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tisim import Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.coalescence import scene as coalescence
 from tisim.cases.coalescence.published import DIAMETERS, MAGNETISATIONS
-
-from tisim import Scene
 
 TITLE = "A rubble pile of magnetised grains is spun up until it breaks"
 

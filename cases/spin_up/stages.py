@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+
+from tisim import Simulation
 from tisim.cases.coalescence.measures import Asteroid, Conserved, body, clusters_of, part
 from tisim.cases.coalescence.published import MAGNETISATIONS
 from tisim.cases.runs import sound
 from tisim.cases.spin_up.scene import scene
-
-from tisim import Simulation
 from tisim.engine.batches import Progress
 from tisim.engine.particle_state import ParticleState
 from tisim.scene.initial_state import Arrays

@@ -3,11 +3,10 @@ field, and the largest overlap."""
 
 from __future__ import annotations
 
-from tisim.cases.runs import overlap
-from tisim.cases.valve.measures import flow_rate
-
 from tisim import Scene
 from tisim.accuracy import Quantity
+from tisim.cases.runs import overlap
+from tisim.cases.valve.measures import flow_rate
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:

@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+
+from tisim.analysis import Mean
 from tisim.cases.case import Check
 from tisim.cases.statistics import Claim, Shown
 from tisim.cases.valve.measures import drag_pressure, held_pressure, unhindered_rate
 from tisim.cases.valve.runs import ARRESTED, Flow, left, left_of
 from tisim.cases.valve.sizes import GRADIENT, LENGTH
 from tisim.cases.valve.studies import ValveRuns, by_throat
-
-from tisim.analysis import Mean
 
 STARTS = 6
 """Number of starts of each valve. The narrow one has twice this number, with and without a field, and the one

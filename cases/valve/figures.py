@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
+
 from tisim.cases.valve.measures import clusters, drag_pressure, duct_of, held_pressure, oil_of
 from tisim.cases.valve.runs import ARRESTED, Flow, left
 from tisim.cases.valve.sizes import THROATS, D
 from tisim.cases.valve.studies import ValveRuns, by_field, by_throat
-
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.constants import mu_0
+
+from tisim import Cloud, Result, Scene
+from tisim.analysis import contacts, labels, periodic_sides
 from tisim.cases.dipoles import attraction_in_line
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct
 from tisim.cases.valve.scene import mean_radius
-
-from tisim import Cloud, Result, Scene
-from tisim.analysis import contacts, labels, periodic_sides
 from tisim.effects import Walls
 from tisim.scene.initial_state import Arrays
 from tisim.sources import ConstrictionFlow

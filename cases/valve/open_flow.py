@@ -8,6 +8,7 @@ Krieger and Dougherty. It does not depend on the size of grains; only jams do.
 from __future__ import annotations
 
 import numpy as np
+
 from tisim.cases.mrf_shear.off_state import RANDOM_PACKING, relative_viscosity
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from tisim import Result, Scene
 from tisim.cases.case import searched_size
 from tisim.cases.mrf_shear.grains import equal
 from tisim.cases.mrf_shear.scene import SWEPT
@@ -23,12 +24,10 @@ from tisim.cases.valve.open_flow import open_flow
 from tisim.cases.valve.runs import ARRESTED
 from tisim.cases.valve.scene import TITLE, scene
 from tisim.cases.valve.sizes import GRADIENT, SEARCHED, SIZES, D
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
-
-from tisim import Result, Scene
-from tisim.errors import must
 from tisim.plotting.cloud import cloud
 from tisim.sources import MagneticField
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from tisim.cases.runs import sound
-from tisim.cases.valve.measures import duct_of, rate
 
 from tisim import Observer, Result, Scene, Simulation
 from tisim.analysis import Mean
+from tisim.cases.runs import sound
+from tisim.cases.valve.measures import duct_of, rate
 from tisim.engine.batches import Progress
 from tisim.sources import MagneticField
 

@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+
+from tisim import Box, Cloud, GrainClass, Scene
 from tisim.cases.case import size_named
 from tisim.cases.mixtures import VALVE_GRAINS
 from tisim.cases.mrf_shear import published as shear
@@ -21,8 +23,6 @@ from tisim.cases.mrf_shear.scene import SUSCEPTIBILITY, iron
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct
 from tisim.cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
-
-from tisim import Box, Cloud, GrainClass, Scene
 from tisim.effects import (
     Granular,
     HertzMaterial,

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
 from tisim.cases.mrf_shear.grains import equal
 from tisim.cases.valve import published
 from tisim.cases.valve.runs import Flow, Settings, flows
 from tisim.cases.valve.scene import FIELD, scene
 from tisim.cases.valve.sizes import FINE_DIAMETER, THROATS, D
-
 from tisim.engine.batches import Progress
 
 FLUXES = (published.FLUX, 0.27)

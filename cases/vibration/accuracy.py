@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from tisim.cases.vibration.closed_forms import response
 
 from tisim import Open, Result, Scene
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import displacement
+from tisim.cases.vibration.closed_forms import response
 from tisim.effects import Lorentz, PairForce, Tether
 from tisim.operators import PeakDisplacement
 from tisim.scene.initial_state import Arrays

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
 from tisim.cases.case import size_named
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.accuracy import constants
@@ -23,7 +24,6 @@ from tisim.cases.vibration.response import (
     fast_scenes,
     slow_scenes,
 )
-
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
 from tisim.plotting.style import empty, legend_above, letters, plain, quantity

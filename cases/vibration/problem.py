@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+
+from tisim import Result, Scene
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.closed_forms import resonances
 from tisim.cases.vibration.response import peak
 from tisim.cases.vibration.scene import CHARGE, FIELD, MASS
+from tisim.errors import must
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.problem import Problem
-
-from tisim import Result, Scene
-from tisim.errors import must
 
 VARIANTS = ("resonate", "avoid")
 """The inverse problems: the largest and the smallest response to a given drive."""

@@ -15,12 +15,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.signal.windows import blackmanharris
+
+from tisim import Recording, Scene, run
 from tisim.cases.runs import sound
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.closed_forms import resonances, response
 from tisim.cases.vibration.scene import CHARGE, CYCLOTRON, FIELD, MASS, STIFFNESS
-
-from tisim import Recording, Scene, run
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames, frames
 from tisim.plotting.time_series import history

@@ -17,9 +17,9 @@ field that the paper discusses do not occur in the centre of gravity.
 from __future__ import annotations
 
 import numpy as np
-from tisim.cases.case import Size, size_named
 
 from tisim import Cloud, Lattice, Scene
+from tisim.cases.case import Size, size_named
 from tisim.effects import Lorentz, NearField, Tether, TruncatedNearField
 from tisim.operators import PeakDisplacement
 from tisim.sources import ElectricField, MagneticField

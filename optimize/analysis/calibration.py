@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
+
+from tisim.errors import Words, must
 from tisim.optimize.analysis.misfit_shape import (
     NEAR_CHI2,
     ONE_GENE_95,
@@ -29,8 +31,6 @@ from tisim.optimize.problem.gene_values import Value, brief
 from tisim.optimize.problem.genes import Searched
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.problem.statistic import Misfit
-
-from tisim.errors import Words, must
 
 Array = NDArray[np.float64]
 

@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.stats import qmc, sobol_indices, uniform
+
+from tisim.errors import Words, must
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.gene_values import Value
@@ -28,8 +30,6 @@ from tisim.optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_n
 from tisim.optimize.surrogate.draws import Draws
 from tisim.optimize.surrogate.gaussian_process import GaussianProcess
 from tisim.optimize.surrogate.selection import representative
-
-from tisim.errors import Words, must
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,11 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field, model_validator
+
+from tisim.components.component import Checked
+from tisim.errors import must
+from tisim.numerics.skewed import Moments, shared_skewness
+from tisim.numerics.statistics import CONFIDENCE, half_width
 from tisim.optimize.evaluation.estimate import FitnessEstimate, converged_after
 from tisim.optimize.evaluation.runs import Evaluator, Runs, Sample
 from tisim.optimize.problem.objective import Objective
@@ -16,11 +21,6 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.problem.statistic import Others
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.record import canonical
-
-from tisim.components.component import Checked
-from tisim.errors import must
-from tisim.numerics.skewed import Moments, shared_skewness
-from tisim.numerics.statistics import CONFIDENCE, half_width
 
 Design = Mapping[str, Any]
 Report = Callable[[float], None]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tisim.optimize.problem.objective import Objective
-from tisim.optimize.problem.statistic import NO_OTHERS, Others
 
 from tisim.numerics.statistics import CONFIDENCE
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.statistic import NO_OTHERS, Others
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+
+from tisim import InputError, RunError
 from tisim.optimize.problem.calls import FaultyProblem, constraint_value, make_scene, values_of
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.record import Record, canonical, evaluation_key
-
-from tisim import InputError, RunError
 
 if TYPE_CHECKING:
     from tisim import Result, Scene

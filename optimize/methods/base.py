@@ -13,13 +13,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
+from tisim.components.component import Checked
+from tisim.errors import must
 from tisim.optimize import methods
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
 from tisim.optimize.problem.problem import checksum_of
-
-from tisim.components.component import Checked
-from tisim.errors import must
 
 
 class SearchMethod(ABC):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from deap import base, tools
+
 from tisim.optimize.methods.breeding_settings import Breeding
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import SearchBox

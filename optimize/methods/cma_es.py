@@ -8,11 +8,11 @@ import numpy as np
 from deap import cma
 from numpy.typing import NDArray
 from pydantic import Field
+
+from tisim.components.component import Checked
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
-
-from tisim.components.component import Checked
 
 EDGE = 0.05
 """Distance from a bound within which the mapping is bent, as a fraction of the range."""

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 from scipy.stats import qmc
+
+from tisim.components.component import Checked
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
@@ -14,8 +16,6 @@ from tisim.optimize.surrogate.acquisition import Worth
 from tisim.optimize.surrogate.belief import Belief
 from tisim.optimize.surrogate.gaussian_process import Array
 from tisim.optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
-
-from tisim.components.component import Checked
 
 _ROUNDS, _DRAWN = 6, 200
 """Number of rounds in which the best candidates are varied, and number of variations in each."""

@@ -8,6 +8,9 @@ from typing import ClassVar
 import numpy as np
 from deap import tools
 from pydantic import Field, model_validator
+
+from tisim.components.component import Checked
+from tisim.errors import must
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.gaussian_process import missing, sobol
 from tisim.optimize.methods.individual import Individual
@@ -17,9 +20,6 @@ from tisim.optimize.surrogate.acquisition import Worth
 from tisim.optimize.surrogate.belief import Belief
 from tisim.optimize.surrogate.gaussian_process import Array
 from tisim.optimize.surrogate.trust_region import SAME_PLACE, TrustRegion
-
-from tisim.components.component import Checked
-from tisim.errors import must
 
 _GROWTH = 20
 """A generation has at least 1 / this of the number of known designs, to limit the share of time for refitting

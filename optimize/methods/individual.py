@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 
 from deap import base
+
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.problem.constraint import InequalityConstraint
 from tisim.optimize.problem.feasibility import total_violation

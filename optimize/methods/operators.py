@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from deap import base, tools
 from pydantic import Field, model_validator
+
+from tisim import InputError
+from tisim.components.component import Checked
+from tisim.errors import Words, must
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.methods.random_state import OwnRandom
 from tisim.optimize.problem.calls import function_name
 from tisim.optimize.problem.problem import checksum_of
 from tisim.optimize.surrogate.gaussian_process import Array
-
-from tisim import InputError
-from tisim.components.component import Checked
-from tisim.errors import Words, must
 
 _PREFIXES = {"select": "sel", "mate": "cx", "mutate": "mut"}
 """The operators of a genetic algorithm, and the prefixes of their names in deap.tools."""

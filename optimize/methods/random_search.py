@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
+
+from tisim.components.component import Checked
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
-
-from tisim.components.component import Checked
 
 
 class RandomSearchOptions(Checked):

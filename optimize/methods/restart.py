@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pydantic import Field
+
 from tisim.optimize.methods.breeding_settings import Breeding
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.methods.zohdi import Zohdi

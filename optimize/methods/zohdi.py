@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from deap import tools
+
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.breeding import Breeder
 from tisim.optimize.methods.breeding_settings import Breeding

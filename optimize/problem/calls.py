@@ -21,11 +21,10 @@ from tisim.errors import InputError, Words, abbreviated, must, printable
 from tisim.files.python_file import own_folders
 
 if TYPE_CHECKING:
+    from tisim import Scene
     from tisim.optimize.problem.constraint import InequalityConstraint
     from tisim.optimize.problem.objective import Objective
     from tisim.optimize.problem.problem import Problem
-
-    from tisim import Scene
 
 SOURCES = (".py", ".pyc", ".so", ".pyd")
 """Endings of files that are opened by imports."""

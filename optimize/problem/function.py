@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tisim.optimize.problem.calls import FaultyProblem, call_function
 
 from tisim.engine.result import Status
 from tisim.errors import InputError, abbreviated, must
+from tisim.optimize.problem.calls import FaultyProblem, call_function
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from tisim.optimize.problem.gene_values import WHOLE_WITHIN, Named, Value, check_name, plain_value
 
 from tisim.errors import InputError, abbreviated, is_number, must
+from tisim.optimize.problem.gene_values import WHOLE_WITHIN, Named, Value, check_name, plain_value
 
 Scale = Literal["linear", "log"]
 NEAR = 64

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from tisim.errors import InputError, abbreviated, must
 from tisim.optimize.problem.gene_values import Value
 from tisim.optimize.problem.genes import Gene, Searched
 from tisim.optimize.problem.given_genes import DependentGene, FixedGene
-
-from tisim.errors import InputError, abbreviated, must
 
 __all__ = ["Gene", "Genome", "SearchBox"]
 AnyGene = Searched | FixedGene | DependentGene

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+from tisim.errors import InputError, abbreviated, must
 from tisim.optimize.problem.calls import FaultyProblem, error_told
 from tisim.optimize.problem.gene_values import Named, Value, check_name, plain_value
-
-from tisim.errors import InputError, abbreviated, must
 
 
 @dataclass(frozen=True)

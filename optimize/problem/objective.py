@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tisim.optimize.problem.statistic import MEAN, Statistic
 
 from tisim.errors import must
+from tisim.optimize.problem.statistic import MEAN, Statistic
 
 
 @dataclass(frozen=True)

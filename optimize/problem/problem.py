@@ -8,6 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tisim.errors import InputError, must
+from tisim.files import python_file, regular_file
+from tisim.files.python_file import sha256
 from tisim.optimize.problem.calls import function_name
 from tisim.optimize.problem.constraint import DesignConstraint, InequalityConstraint, ResultConstraint
 from tisim.optimize.problem.fingerprint import fingerprint
@@ -17,10 +20,6 @@ from tisim.optimize.problem.genome import AnyGene, Genome
 from tisim.optimize.problem.given_genes import DependentGene
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.statistic import Misfit
-
-from tisim.errors import InputError, must
-from tisim.files import python_file, regular_file
-from tisim.files.python_file import sha256
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

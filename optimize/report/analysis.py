@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
+
+from tisim.files.atomic import replace_file
 from tisim.optimize.analysis import calibration as calibrating
 from tisim.optimize.analysis import sensitivity as sensing
 from tisim.optimize.analysis.calibration import Calibration
 from tisim.optimize.analysis.sensitivity import LEAST_Q2, Between, Sensitivity
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.report.report import columns_csv, picture, text
-
-from tisim.files.atomic import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

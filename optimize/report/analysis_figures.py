@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
+
 from tisim.optimize.analysis.calibration import Calibration, GeneEstimate, shown
 from tisim.optimize.analysis.sensitivity import LEAST_Q2, MOVES, Between, Sensitivity
-
 from tisim.plotting.style import empty, letters, plain, superscripts
 
 _KNOWN, _RANGE, _FIRST, _TOTAL = "#0b5394", "0.88", "#0b5394", "#9fc5e8"

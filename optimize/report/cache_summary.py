@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
+
+from tisim.console import plain_table
 from tisim.optimize.search_records import searches
 from tisim.optimize.storage.cache import existing
 from tisim.optimize.storage.runs_table import RunsTable
-
-from tisim.console import plain_table
 
 MAX_REASONS = 5
 """The largest number of failures whose reasons are printed."""

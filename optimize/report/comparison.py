@@ -12,6 +12,11 @@ from typing import Any
 
 import numpy as np
 from rich.table import Table
+
+from tisim import RunError
+from tisim.console import plain_table
+from tisim.errors import must
+from tisim.files import lock, ownership
 from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.evaluation.runs import Evaluator
@@ -21,11 +26,6 @@ from tisim.optimize.search import search
 from tisim.optimize.search_folder import check_problem, resume_or_clear
 from tisim.optimize.settings import Settings, fit, identity, proposed
 from tisim.optimize.storage.cache import Cache
-
-from tisim import RunError
-from tisim.console import plain_table
-from tisim.errors import must
-from tisim.files import lock, ownership
 
 COMPARISON_FILE, CSV = "compare.h5", "compare.csv"
 COMPARISON_FILES = (COMPARISON_FILE, f"{COMPARISON_FILE}.journal", f"{COMPARISON_FILE}.lock", CSV, lock.LOCK)

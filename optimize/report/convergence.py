@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+
 from tisim.optimize.generation_log import best_of
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.tables import interval_of_value, logbook_columns
-
 from tisim.plotting.style import empty, legend_above, letters, symbols
 
 _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from types import TracebackType
 
 from rich.console import Console
+
+from tisim.console import progress_bar
 from tisim.optimize.outcome import Progress
 from tisim.optimize.problem.gene_values import Value, brief
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.settings import Settings
-
-from tisim.console import progress_bar
 
 
 class Display:

@@ -13,10 +13,10 @@ from itertools import combinations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.tables import interval_of_value
-
 from tisim.plotting.style import empty, letters, plain, scale_of, superscripts
 
 _FRONT_COLOUR, _MANY_STARTS_COLOUR, _FEW_STARTS_COLOUR, _CHOSEN_COLOUR = (

@@ -13,12 +13,12 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
-from tisim.optimize.outcome import Outcome
-from tisim.optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_strings
 
 from tisim.console import TERMINAL_WIDTH
 from tisim.files import pictures
 from tisim.files.atomic import replace_file
+from tisim.optimize.outcome import Outcome
+from tisim.optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_strings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

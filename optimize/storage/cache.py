@@ -19,17 +19,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tisim.errors import Words, must
+from tisim.files.atomic import locked, replace_file
+from tisim.files.ownership import ensure_writable
+from tisim.files.regular_file import file_status, is_folder, open_descriptor
 from tisim.optimize.storage import hdf5_store
 from tisim.optimize.storage.hdf5_store import Content
 from tisim.optimize.storage.journal import Journal, Mark, TableRows
 from tisim.optimize.storage.record import Record
 from tisim.optimize.storage.runs_table import RunsTable, tabulated
 from tisim.optimize.storage.table import Hdf5Table
-
-from tisim.errors import Words, must
-from tisim.files.atomic import locked, replace_file
-from tisim.files.ownership import ensure_writable
-from tisim.files.regular_file import file_status, is_folder, open_descriptor
 
 FOLD_BYTES = 64 << 10
 """The journal is folded when it is longer than this, in bytes, ..."""

@@ -19,6 +19,12 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+from tisim import InputError
+from tisim.errors import must
+from tisim.files import regular_file
+from tisim.files.checksum import verified, with_checksum
+from tisim.files.superblock import SIGNATURE
 from tisim.optimize.storage import older
 from tisim.optimize.storage.runs_table import KINDS, RunsTable, tabulated
 from tisim.optimize.storage.table import (
@@ -28,12 +34,6 @@ from tisim.optimize.storage.table import (
     write_column,
     write_table,
 )
-
-from tisim import InputError
-from tisim.errors import must
-from tisim.files import regular_file
-from tisim.files.checksum import verified, with_checksum
-from tisim.files.superblock import SIGNATURE
 
 EVALUATIONS_FORMAT = "tisim evaluations 2"
 EVALUATIONS = "evaluations"

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
-from tisim.optimize.storage import older
-from tisim.optimize.storage.record import Record, plain
-from tisim.optimize.storage.table import Hdf5Table
 
 from tisim.files.atomic import append_at
 from tisim.files.framing import Scan, frame, scan
 from tisim.files.regular_file import content, file_status, open_descriptor
+from tisim.optimize.storage import older
+from tisim.optimize.storage.record import Record, plain
+from tisim.optimize.storage.table import Hdf5Table
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,12 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from tisim.files.atomic import locked
 from tisim.optimize.storage import hdf5_store, salvage
 from tisim.optimize.storage.cache import Cache, existing_files, file_content
 from tisim.optimize.storage.hdf5_store import Content
 from tisim.optimize.storage.journal import Journal, Mark
 from tisim.optimize.storage.record import Record
-
-from tisim.files.atomic import locked
 
 
 @dataclass(frozen=True)

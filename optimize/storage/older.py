@@ -14,6 +14,7 @@ from typing import Any
 
 import h5py
 from pydantic import BaseModel, ConfigDict
+
 from tisim.optimize.storage.record import Integer64, Record, canonical
 from tisim.optimize.storage.table import Hdf5Table
 

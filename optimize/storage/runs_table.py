@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from tisim.optimize.storage.record import Gene, Record, canonical, plain
 from tisim.optimize.storage.table import text_column
 

@@ -14,14 +14,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
-from tisim.optimize.storage import hdf5_store, older
-from tisim.optimize.storage.runs_table import RunsTable, tabulated
-from tisim.optimize.storage.table import Hdf5Table, read_tables
 
 from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.checksum import verified
 from tisim.files.regular_file import content, file_status
+from tisim.optimize.storage import hdf5_store, older
+from tisim.optimize.storage.runs_table import RunsTable, tabulated
+from tisim.optimize.storage.table import Hdf5Table, read_tables
 
 TIME_LIMIT = 300.0
 """Time limit of that process, s; reading a million rows takes a tenth of it."""

@@ -11,9 +11,9 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-from tisim.optimize.storage.record import canonical
 
 from tisim.errors import must
+from tisim.optimize.storage.record import canonical
 
 _OWN_ATTRIBUTES = ("columns", "crc32")
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import norm
+
 from tisim.optimize.surrogate.belief import Belief
 from tisim.optimize.surrogate.gaussian_process import Array
 from tisim.optimize.surrogate.selection import beaten_by
@@ -24,7 +25,7 @@ from tisim.optimize.surrogate.selection import beaten_by
 _CONFIDENCE = 1.0
 """Distance of the confidence bound for several costs from the mean, in standard deviations."""
 _LARGEST_IMPROVEMENT = 3.0
-"""Largest predicted improvement that counts, in standard deviations. A process through values without noise
+"""Largest predicted improvement that counts if values have no noise, in standard deviations. The process then
 underestimates its error; among designs that all improve by more than this, the most uncertain one is run."""
 _MONTE_CARLO = 4000
 """Number of sample points for a hypervolume of three costs or more."""
@@ -53,8 +54,10 @@ class Worth:
         """Return the worth of designs from mean and standard deviation of their costs, both (m,
         objectives)."""
         if means.shape[1] == 1:
-            least = self.best[0] - _LARGEST_IMPROVEMENT * deviations[:, 0]
-            return log_expected_improvement(np.maximum(means[:, 0], least), deviations[:, 0], self.best[0])
+            mean, deviation, best = means[:, 0], deviations[:, 0], float(self.best[0])
+            if self.belief.exact:
+                mean = np.maximum(mean, best - _LARGEST_IMPROVEMENT * deviation)
+            return log_expected_improvement(mean, deviation, best)
         return self.volume.improvement(means - _CONFIDENCE * deviations)
 
     def of(self, points: Array) -> Array:

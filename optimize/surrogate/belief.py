@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.stats import yeojohnson
+
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
 from tisim.optimize.surrogate.selection import representative, thinned

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess
 
 _COSINES = 512

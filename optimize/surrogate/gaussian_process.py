@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
+
 from tisim.optimize.surrogate.selection import representative
 
 Array = NDArray[np.float64]

@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+
+from tisim.numerics.skewed import Moments
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
 from tisim.optimize.surrogate.belief import MOST_LEARNED, costs_and_noise
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess
 from tisim.optimize.surrogate.selection import representative
-
-from tisim.numerics.skewed import Moments
 
 LEAST_DESIGNS = 10
 """Smallest number of designs with several starts for an estimate."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
 from tisim.optimize.surrogate.belief import Belief, all_exact

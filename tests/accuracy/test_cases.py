@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from tisim.cases.agglomeration import scene as agglomeration
-from tisim.cases.blast import scene as blast
-from tisim.cases.case import every
-from tisim.cases.vibration import scene as vibration
 
 from tests.scenes import simulate
 from tisim import Box, Particles
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.reference import closed_form
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.blast import scene as blast
+from tisim.cases.case import every
+from tisim.cases.vibration import scene as vibration
 from tisim.sources import ElectricField
 
 

@@ -25,13 +25,13 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import agglomeration_numba as peer
 import numba
 import numpy as np
-from tisim.cases.agglomeration.problem import cost
-from tisim.cases.agglomeration.published_strings import designs
-from tisim.cases.agglomeration.scene import DURATION, scene
 
 from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
+from tisim.cases.agglomeration.problem import cost
+from tisim.cases.agglomeration.published_strings import designs
+from tisim.cases.agglomeration.scene import DURATION, scene
 from tisim.scene.initial_state import Arrays
 
 DESIGNS = designs()

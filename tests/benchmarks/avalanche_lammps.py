@@ -25,6 +25,10 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
+from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 from tisim.cases.avalanche.measures import grains_volume, heap_volume, repose  # noqa: E402
 from tisim.cases.avalanche.scene import (  # noqa: E402
     DIAMETERS,
@@ -39,11 +43,6 @@ from tisim.cases.avalanche.scene import (  # noqa: E402
     young,
 )
 from tisim.cases.avalanche.sizes import Cell  # noqa: E402
-
-from tests.benchmarks import lammps_peer  # noqa: E402
-from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
-from tests.benchmarks.lammps_peer import State  # noqa: E402
-from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
 if TYPE_CHECKING:
     from tisim import Scene

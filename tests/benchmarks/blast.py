@@ -18,11 +18,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import blast_numba as peer
 import numba
 import numpy as np
-from tisim.cases.blast.scene import AIR, FLUX, VISCOSITY, scene
 
 from tests.benchmarks.turns import rest, spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime
+from tisim.cases.blast.scene import AIR, FLUX, VISCOSITY, scene
 
 WINDOW = 64
 """Steps of the numba program between two barriers, as many as ours at most."""

@@ -18,12 +18,12 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from tisim.cases.agglomeration.problem import problem
-from tisim.optimize.evaluation.runs import start_seed
 
 import tisim
 from tisim import optimize
 from tisim.analysis import Mean
+from tisim.cases.agglomeration.problem import problem
+from tisim.optimize.evaluation.runs import start_seed
 
 FRESH = 10**6
 """The seed of the starts that judge."""

@@ -28,15 +28,14 @@ from scipy.constants import G
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tisim.cases.coalescence import scene as cloud  # noqa: E402
-from tisim.cases.coalescence.measures import Asteroid, Conserved, Gathering  # noqa: E402
-from tisim.cases.runs import sound  # noqa: E402
-
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 from tisim import Scene, Simulation  # noqa: E402
+from tisim.cases.coalescence import scene as cloud  # noqa: E402
+from tisim.cases.coalescence.measures import Asteroid, Conserved, Gathering  # noqa: E402
+from tisim.cases.runs import sound  # noqa: E402
 from tisim.effects import SelfGravity  # noqa: E402
 
 LOOKS = (5000.0, 10_000.0)

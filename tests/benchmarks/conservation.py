@@ -14,10 +14,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from tisim.cases.vibration.scene import ATTRACTION, REPULSION, scene
 
 from tisim import Result, run
 from tisim.backend import runtime
+from tisim.cases.vibration.scene import ATTRACTION, REPULSION, scene
 from tisim.effects import NearField
 from tisim.steppers import (
     Collocation,

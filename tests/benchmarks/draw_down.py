@@ -18,6 +18,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
+
+import tisim
+from tisim.analysis import Mean
 from tisim.cases.granular_bench.problem import (
     EXAMPLES,
     KNOWN,
@@ -27,9 +30,6 @@ from tisim.cases.granular_bench.problem import (
     other_runs,
 )
 from tisim.optimize.evaluation.estimate import FitnessEstimate
-
-import tisim
-from tisim.analysis import Mean
 
 FRICTIONS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 ROLLING_FRICTIONS = (0.19, 0.23, 0.27, 0.31, 0.35)

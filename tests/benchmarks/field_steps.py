@@ -17,12 +17,12 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from tisim.cases.agglomeration import fields
-from tisim.cases.agglomeration.problem import cost, problem
-from tisim.cases.agglomeration.scene import scene
 
 import tisim
 from tisim.analysis import Mean
+from tisim.cases.agglomeration import fields
+from tisim.cases.agglomeration.problem import cost, problem
+from tisim.cases.agglomeration.scene import scene
 
 STRONGEST = {"surface_charge": 4e-3, "magnetic_field": 1.0, "hardness": 1e5, "friction": 0.01}
 

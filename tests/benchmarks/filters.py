@@ -13,12 +13,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from tisim import run
+from tisim.analysis import Mean
 from tisim.cases.capture.problem import captured, problem
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.report.comparison import FRESH
-
-from tisim import run
-from tisim.analysis import Mean
 
 SOFT = {"flux": 0.48, "field_angle": 75.0, "aspect": 2.45, "number": 8.0, "spacing": 3.6}
 HARD = {**SOFT, "flux": 0.07, "field_angle": 24.0, "magnetisation_angle": 63.0}

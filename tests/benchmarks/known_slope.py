@@ -13,11 +13,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from tisim.cases.avalanche.measures import repose
-from tisim.cases.avalanche.problem import EXAMPLE, KNOWN, other_runs
 
 import tisim
 from tisim.analysis import Mean
+from tisim.cases.avalanche.measures import repose
+from tisim.cases.avalanche.problem import EXAMPLE, KNOWN, other_runs
 
 
 def main() -> None:

@@ -31,17 +31,16 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
+from tests.benchmarks.lammps_peer import State  # noqa: E402
+from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 from tisim.cases.mrf_shear import published  # noqa: E402
 from tisim.cases.mrf_shear.grains import LARGE_RADIUS  # noqa: E402
 from tisim.cases.mrf_shear.measures import order, shear_stress  # noqa: E402
 from tisim.cases.mrf_shear.regime import magnetisation  # noqa: E402
 from tisim.cases.mrf_shear.scene import BEFORE, CUT, SEARCHED, STRAIN, SUSCEPTIBILITY, scene  # noqa: E402
 from tisim.cases.runs import sound  # noqa: E402
-
-from tests.benchmarks import lammps_peer  # noqa: E402
-from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
-from tests.benchmarks.lammps_peer import State  # noqa: E402
-from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
 if TYPE_CHECKING:
     from tisim import Scene

@@ -15,12 +15,12 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from tisim.cases.mrf_shear.flow_curve import AS_PUBLISHED, MIXED, VARIATIONS, Curve
-from tisim.cases.mrf_shear.runs import grouped
-from tisim.cases.mrf_shear.scene import RATES, SEARCHED, SWEPT, scene
 
 import tisim
 from tisim.analysis import Mean
+from tisim.cases.mrf_shear.flow_curve import AS_PUBLISHED, MIXED, VARIATIONS, Curve
+from tisim.cases.mrf_shear.runs import grouped
+from tisim.cases.mrf_shear.scene import RATES, SEARCHED, SWEPT, scene
 
 
 def main() -> None:

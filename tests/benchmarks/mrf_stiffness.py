@@ -14,14 +14,14 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
+
+import tisim
+from tisim.analysis import Mean
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.grains import LARGE_RADIUS
 from tisim.cases.mrf_shear.measures import shear_stress
 from tisim.cases.mrf_shear.scene import SEARCHED, impact_step, scene
 from tisim.cases.runs import overlap, sound
-
-import tisim
-from tisim.analysis import Mean
 
 
 def main() -> None:

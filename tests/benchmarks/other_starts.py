@@ -16,13 +16,13 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from tisim.cases.case import every
-from tisim.cases.runs import OTHER_STARTS
-from tisim.optimize import Problem
 
 import tisim
 from tisim import Result
 from tisim.analysis import Mean
+from tisim.cases.case import every
+from tisim.cases.runs import OTHER_STARTS
+from tisim.optimize import Problem
 
 
 def designs(problem: Problem, file: Path, most: int) -> list[dict[str, float]]:

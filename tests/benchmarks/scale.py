@@ -24,11 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import granular_bed
 import numpy as np
 from matplotlib.axes import Axes
-from tisim.cases.agglomeration.scene import BEST
-from tisim.cases.agglomeration.scene import scene as agglomeration
 
 import tisim
 from tisim.backend import memory, runtime
+from tisim.cases.agglomeration.scene import BEST
+from tisim.cases.agglomeration.scene import scene as agglomeration
 from tisim.effects import Gravity, Walls
 from tisim.geometry import Plane
 from tisim.plotting.style import empty, letters, plain

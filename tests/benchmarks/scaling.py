@@ -25,12 +25,12 @@ import dipole_dipole
 import granular_bed
 import near_field
 import numpy as np
-from tisim.cases.agglomeration import CASE as AGGLOMERATION
-from tisim.cases.blast.scene import scene as blast
-from tisim.cases.capture.scene import scene as capture
 
 import tisim
 from tisim.backend import runtime
+from tisim.cases.agglomeration import CASE as AGGLOMERATION
+from tisim.cases.blast.scene import scene as blast
+from tisim.cases.capture.scene import scene as capture
 
 SECONDS = 1.0
 """A measurement lasts about so long."""

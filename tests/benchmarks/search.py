@@ -31,6 +31,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 from search_peers import ONE, SEVERAL, Spent
 from search_problems import TASKS, Task
+
+import tisim
+from tisim import optimize
+from tisim.analysis import Mean
 from tisim.optimize import Problem
 from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
@@ -40,10 +44,6 @@ from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.surrogate.selection import beaten_by
-
-import tisim
-from tisim import optimize
-from tisim.analysis import Mean
 
 FRESH = 10**6
 """The seed of the starts by which all are judged."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.constants import elementary_charge, proton_mass
+
+import tisim
 from tisim.cases.agglomeration.problem import problem as agglomeration
 from tisim.cases.avalanche.problem import problem as avalanche
 from tisim.cases.blast.problem import problem as blast
@@ -18,10 +20,8 @@ from tisim.cases.valve.problem import problem as valve
 from tisim.cases.vibration.problem import GENES as VIBRATION_GENES
 from tisim.cases.vibration.problem import closed_form
 from tisim.cases.vibration.problem import problem as vibration
-from tisim.optimize import Gene, Genome, Objective, Problem
-
-import tisim
 from tisim.effects import Lorentz
+from tisim.optimize import Gene, Genome, Objective, Problem
 from tisim.sources import MagneticField
 from tisim.steppers import Boris, FixedStep
 

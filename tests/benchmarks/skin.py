@@ -15,13 +15,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from tisim.cases.avalanche import scene as avalanche
-from tisim.cases.avalanche.sizes import DEFAULT
-from tisim.cases.mrf_shear import scene as mrf_shear
-
 from tests.benchmarks.turns import spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime
+from tisim.cases.avalanche import scene as avalanche
+from tisim.cases.avalanche.sizes import DEFAULT
+from tisim.cases.mrf_shear import scene as mrf_shear
 
 SCENES = {
     "avalanche": lambda: avalanche.scene(DEFAULT, field=0.0),

@@ -26,19 +26,18 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tisim.cases.coalescence import scene as cloud  # noqa: E402
-from tisim.cases.coalescence.published import DIAMETERS  # noqa: E402
-from tisim.cases.runs import sound  # noqa: E402
-from tisim.cases.spin_up.checks import at_least  # noqa: E402
-from tisim.cases.spin_up.scene import DEFAULT, NUMBERS, SETTLED, scene  # noqa: E402
-from tisim.cases.spin_up.stages import RATES, SpinStep, SpinUp, stage_ends, turn  # noqa: E402
-
 from tests.benchmarks import coalescence_lammps, lammps_peer  # noqa: E402
 from tests.benchmarks.coalescence_lammps import FIELDS, run_each, state_of  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 from tisim import Scene, Simulation  # noqa: E402
+from tisim.cases.coalescence import scene as cloud  # noqa: E402
+from tisim.cases.coalescence.published import DIAMETERS  # noqa: E402
+from tisim.cases.runs import sound  # noqa: E402
+from tisim.cases.spin_up.checks import at_least  # noqa: E402
+from tisim.cases.spin_up.scene import DEFAULT, NUMBERS, SETTLED, scene  # noqa: E402
+from tisim.cases.spin_up.stages import RATES, SpinStep, SpinUp, stage_ends, turn  # noqa: E402
 from tisim.effects import SelfGravity  # noqa: E402
 
 SPINS = (0.0, *RATES)

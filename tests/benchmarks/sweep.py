@@ -19,14 +19,14 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from tisim.cases.agglomeration import scene as agglomeration
-from tisim.cases.agglomeration.published_strings import designs
-from tisim.cases.capture import scene as capture
-from tisim.cases.vibration import scene as vibration
 
 from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
+from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.agglomeration.published_strings import designs
+from tisim.cases.capture import scene as capture
+from tisim.cases.vibration import scene as vibration
 
 SWEEPS = {
     "vibration": lambda: [vibration.scene(ratio, "printed", 2e-4) for ratio in vibration.RATIOS],

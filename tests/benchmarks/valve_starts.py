@@ -13,10 +13,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+import tisim
 from tisim.cases.valve.runs import ARRESTED, flows, left, left_of
 from tisim.cases.valve.scene import FIELD, scene
-
-import tisim
 
 
 def main() -> None:

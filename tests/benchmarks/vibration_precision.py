@@ -28,10 +28,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numba
 import numpy as np
 from scipy.integrate import solve_ivp
-from tisim.cases.vibration import scene as vibration
 
 from tisim import Simulation
 from tisim.backend import runtime
+from tisim.cases.vibration import scene as vibration
 from tisim.plotting.style import empty, letters, plain
 from tisim.steppers import Collocation, ErrorControl, StageControl, Stepper, Trapezoid
 

@@ -3,9 +3,9 @@
 import inspect
 
 import pytest
-from tisim.cases.case import Late, every
 
 from tisim import InputError
+from tisim.cases.case import Late, every
 
 INVERSE = [name for name, case in every().items() if case.problem]
 

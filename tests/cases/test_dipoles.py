@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.constants import mu_0
+
 from tisim.cases.dipoles import attraction_in_line
 
 

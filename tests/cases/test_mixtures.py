@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from tisim.cases import mixtures
 
+from tisim.cases import mixtures
 from tisim.packing.grains import draw, masses
 
 

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tisim.cases.runs import overlap, sound
 
 from tisim import Box, RunError, ShearedBox
+from tisim.cases.runs import overlap, sound
 from tisim.domains.domain import Open
 from tisim.engine.result import Status
 

@@ -1,9 +1,8 @@
 """Means, claims and checks: what they hold, and what is shown of them."""
 
+from tisim.analysis import Mean
 from tisim.cases.case import Check
 from tisim.cases.statistics import Claim, Shown
-
-from tisim.analysis import Mean
 
 
 def test_claim_holds_when_all_of_the_interval_does():

@@ -249,12 +249,13 @@ PYTHONS = (
     ("a loop of asyncio", "import asyncio\n    async def main(): print(work())\n    asyncio.run(main())"),
     ("output without a file", "import types\n    text = []\n"
      "    sys.stdout = sys.stderr = types.SimpleNamespace(write=text.append)\n"
-     "    import optimize, my_drift\n"
+     "    from tisim import optimize; import my_drift\n"
      "    optimize.run(my_drift.PROBLEM, verbose=True, out='s', **my_drift.SEARCH)\n"
      "    sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__\n"
      "    assert any('written' in t for t in text); print(work())"),
     ("no output at all", "show = os.dup(1); sys.stdout = sys.stderr = None\n"
-     "    import optimize, my_drift; optimize.run(my_drift.PROBLEM, verbose=True, **my_drift.SEARCH)\n"
+     "    from tisim import optimize; import my_drift\n"
+     "    optimize.run(my_drift.PROBLEM, verbose=True, **my_drift.SEARCH)\n"
      "    os.write(show, f'{work()}\\n'.encode())"),
     ("four threads", "from concurrent.futures import ThreadPoolExecutor\n"
      "    print(*set(ThreadPoolExecutor(4).map(work, [20] * 8)))"),

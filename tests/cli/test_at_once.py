@@ -5,10 +5,10 @@ import subprocess
 import sys
 
 import pytest
-from tisim.cases import case as catalogue
-from tisim.cases.case import Case, Size
 
 from tests.accuracy.scenes import only, oscillator
+from tisim.cases import case as catalogue
+from tisim.cases.case import Case, Size
 from tisim.files import lock
 
 STOPPED = """

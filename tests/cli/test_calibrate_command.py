@@ -3,6 +3,7 @@
 import csv
 
 import pytest
+
 from tisim.cases.case import Size
 from tisim.cases.granular_bench import scene as draw_down
 

@@ -8,7 +8,6 @@ import signal
 from dataclasses import replace
 
 import pytest
-from tisim.cases.case import every
 from typer.main import get_command
 
 from tests.accuracy.scenes import only, oscillator
@@ -17,6 +16,7 @@ from tisim import InputError
 from tisim.accuracy import Row, Study, reference, storage
 from tisim.accuracy.formatting import options, shell_line
 from tisim.accuracy.sweep import methods
+from tisim.cases.case import every
 from tisim.cli import cost, scene_arguments
 from tisim.cli.main import app
 

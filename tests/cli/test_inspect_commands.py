@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from tisim.cases import case as catalogue
-from tisim.cases.case import Case, Size
 
 from tests.files.full_disk import files_of_at_most
 from tests.files.test_growing_hdf5 import STILL
 from tests.files.test_growing_hdf5 import frame as grown
 from tisim import Recording, Simulation
+from tisim.cases import case as catalogue
+from tisim.cases.case import Case, Size
 from tisim.files import atomic, checksum, ownership
 from tisim.io.reader import frames
 from tisim.io.trajectory import Trajectory

@@ -4,13 +4,13 @@ import csv
 
 import numpy as np
 import pytest
+
+from tisim import Box, Cloud, Scene
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.cache import Cache
-
-from tisim import Box, Cloud, Scene
 from tisim.plotting.cloud import cloud
 from tisim.steppers import FixedStep, Verlet
 

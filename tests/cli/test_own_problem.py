@@ -4,9 +4,9 @@ import csv
 from pathlib import Path
 
 import pytest
-from tisim.optimize.storage.cache import Cache
 
 from tests.own_files import LAW, PROBLEM
+from tisim.optimize.storage.cache import Cache
 
 SEARCH = ["optimize", "my_drift.py", "--out", "s"]
 

@@ -4,10 +4,10 @@ import json
 import re
 
 import pytest
-from tisim.optimize.storage.cache import Cache
 
 from tests.own_files import LAW, METHOD, PROBLEM
 from tisim import Scene
+from tisim.optimize.storage.cache import Cache
 
 PLUGIN = ["--plugin", "own_laws.py"]
 

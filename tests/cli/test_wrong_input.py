@@ -8,9 +8,9 @@ import sys
 from typing import get_args, get_type_hints
 
 import pytest
-from tisim.cases.case import every
 from typer.main import get_command
 
+from tisim.cases.case import every
 from tisim.cli.main import app
 
 CASES = ", ".join(sorted(every()))

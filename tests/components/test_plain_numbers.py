@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from tisim.optimize import Gene
 
 import tisim
 from tisim.effects import Gravity
+from tisim.optimize import Gene
 from tisim.steppers import Collocation, FixedStep
 
 MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0])

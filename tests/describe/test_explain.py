@@ -6,9 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rich.console import Console
-from tisim.cases.agglomeration.scene import BEST
-from tisim.cases.agglomeration.scene import scene as agglomeration
-from tisim.cases.vibration.scene import scene as vibration
 
 from tests.effects.contact.grains import heap
 from tests.scenes import scene
@@ -18,6 +15,9 @@ from tests.throwaway import SoftShell
 from tisim import Material, MaterialPair, Simulation
 from tisim.backend import memory
 from tisim.backend.thread import in_taichi_thread
+from tisim.cases.agglomeration.scene import BEST
+from tisim.cases.agglomeration.scene import scene as agglomeration
+from tisim.cases.vibration.scene import scene as vibration
 from tisim.describe.explain import brief, explain, known_effects, render
 from tisim.describe.explained_parts import explained, explained_materials
 from tisim.effects import Granular, MindlinForce, RollingEPSD, Rotation, Walls

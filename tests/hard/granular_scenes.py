@@ -6,12 +6,12 @@ nothing unless a liquid or a cement is given.
 
 import numpy as np
 from scipy.integrate import quad
-from tisim.cases.granular_bench import closed_forms
 
 from tests.effects.contact import compositions
 from tests.effects.contact.grains import AWAY, FAR, HERTZ_MINDLIN
 from tests.scenes import by_id, compiled, scene
 from tisim import Material
+from tisim.cases.granular_bench import closed_forms
 from tisim.effects import CapillaryBridge, Gravity, ParallelBond, Translation, Walls
 from tisim.geometry import Disc, Plane
 

@@ -108,7 +108,7 @@ MOTION = "tisim/effects/walls"
 MOVING = "tests/effects/contact/test_moving_walls.py::test_"
 WALLS = {
     "walls": (
-        f"{CONTACT}/wall_contacts.py", "self.past[w, i, begin + c] = known[c]",
+        f"{MOTION}/wall_contacts.py", "self.past[w, i, begin + c] = known[c]",
         "self.past[w, i, begin + c] = 0.0 * known[c]",
         "tests/effects/contact/test_walls.py::test_a_grain_between_two_walls_hangs_by_mindlins_springs",
     ),
@@ -197,7 +197,7 @@ SHARED = {
         "tests/effects/contact/test_compositions.py::test_one_step_and_some_hundred_are_those_of_the_twin[jkr]",
     ),
     "memory_at_surfaces": (
-        f"{CONTACT}/wall_contacts.py", "STILL_THE_SAME = 0.9", "STILL_THE_SAME = 1.1",
+        f"{MOTION}/wall_contacts.py", "STILL_THE_SAME = 0.9", "STILL_THE_SAME = 1.1",
         "tests/effects/contact/test_surfaces.py::test_a_sphere_that_rolls_downhill_over_seams_keeps_its_grip",
     ),
     "arm": (

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from tisim.cases.granular_bench.closed_forms import hertz_duration
 
 from tests.hard.granular_scenes import ELASTIC, LAWS, ends, grains, kinetic, loaded, lossy, stored
 from tests.scenes import roundoff
+from tisim.cases.granular_bench.closed_forms import hertz_duration
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,6 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-from tisim.optimize.storage import hdf5_store
-from tisim.optimize.storage.cache import Cache
 
 import tisim
 from tests.accuracy.scenes import oscillator
@@ -21,6 +19,8 @@ from tisim.io import checkpoint, run_folder
 from tisim.io import read as reading
 from tisim.io.reader import world_count
 from tisim.io.run_folder import RunFolder
+from tisim.optimize.storage import hdf5_store
+from tisim.optimize.storage.cache import Cache
 
 pytestmark = pytest.mark.long
 

@@ -7,10 +7,9 @@ import sys
 import time
 from pathlib import Path
 
-from tisim.optimize.storage.cache import Cache
-
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import RunError
+from tisim.optimize.storage.cache import Cache
 
 
 def write(path, first):
@@ -139,9 +138,8 @@ def asleep():
 
 def tisim(*arguments):
     """The command, naming each evaluation."""
-    from tisim.cases import case
-
     from tests.optimize.drift_case import CASE
+    from tisim.cases import case
     from tisim.cli.main import main
 
     every = case.every

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from tisim.optimize import Gene, Problem
 
 from tisim import optimize
+from tisim.optimize import Gene, Problem
 
 GENES = (Gene("x", "", 0.0, 1.0), Gene("y", "", 0.0, 1.0))
 

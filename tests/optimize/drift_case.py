@@ -1,11 +1,11 @@
 """A case that compiles in a moment: free grains, and how far they drift."""
 
 import numpy as np
+
+from tisim import Box, Cloud, Scene
 from tisim.cases.case import Case, Size
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.problem import Problem
-
-from tisim import Box, Cloud, Scene
 from tisim.steppers import FixedStep, Verlet
 
 

@@ -7,6 +7,7 @@ import time
 from types import SimpleNamespace
 
 import numpy as np
+
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Gene, Genome

@@ -1,10 +1,10 @@
 """A noisy function of two genes whose searches, of several methods, share a folder."""
 
 import numpy as np
-from tisim.optimize.problem.genes import Gene
-from tisim.optimize.problem.problem import Problem
 
 from tisim import optimize
+from tisim.optimize.problem.genes import Gene
+from tisim.optimize.problem.problem import Problem
 
 
 def noisy(design, seed):

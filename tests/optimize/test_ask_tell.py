@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
+
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+from tisim import InputError, optimize
 from tisim.optimize import AskTell, Choice, DesignConstraint, Gene, Genome, Objective, ResultConstraint
 from tisim.optimize.ask_tell import SAME
 from tisim.optimize.methods.base import every
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
-
-from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
-from tisim import InputError, optimize
 
 GENES = (Gene("x", "m", -1.0, 1.0), Gene("y", "m", 1e-3, 10.0, "log"))
 METHODS = sorted(every())

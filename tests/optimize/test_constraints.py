@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from tisim.optimize import Gene, Objective, Problem, ResultConstraint
 
 from tisim import optimize
+from tisim.optimize import Gene, Objective, Problem, ResultConstraint
 
 GENES = (Gene("x", "m", 0.0, 1.0), Gene("y", "m", 0.0, 1.0))
 

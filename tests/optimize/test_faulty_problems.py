@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+
+from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
+from tisim import InputError, RunError
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
-from tisim import InputError, RunError
 
 SETTINGS = Settings(
     method="zohdi", generations=3, options={"population": 6, "parents": 2},

@@ -11,10 +11,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tisim.optimize.problem.fingerprint import fingerprint
 
 from tests.optimize.drift_case import problem
 from tisim import InputError, optimize
+from tisim.optimize.problem.fingerprint import fingerprint
 
 LEVEL = 1.0
 TABLE = np.arange(4.0)

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tisim.optimize import FitnessRecord, Gene, Genome, Objective, Problem
 
 import tisim
 from tisim import InputError, RunError, optimize
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity
+from tisim.optimize import FitnessRecord, Gene, Genome, Objective, Problem
 from tisim.steppers import FixedStep, Verlet
 
 

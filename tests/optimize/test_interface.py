@@ -142,7 +142,7 @@ def test_another_objective_has_another_identity():
 
 def test_importing_it_loads_nothing_heavy():
     heavy = ("taichi", "quadrants", "numpy", "deap", "h5py", "pydantic", "pandas")
-    code = f"import optimize, sys; print([m for m in {heavy} if m in sys.modules])"
+    code = f"import tisim.optimize, sys; print([m for m in {heavy} if m in sys.modules])"
     completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert completed.stdout == "[]\n"
 

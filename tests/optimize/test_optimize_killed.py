@@ -5,12 +5,12 @@ import subprocess
 import time
 
 import pytest
-from tisim.optimize.storage.cache import Cache, existing
-from tisim.optimize.storage.maintenance import verify
 
 from tests.optimize.cache_files import PIPE, worker
 from tisim import InputError
 from tisim.files import lock
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import verify
 
 QUICK = ("drift",)
 REAL = ("agglomeration", "--size", "small")

@@ -1,13 +1,13 @@
 import random
 
 import pytest
+
+from tests.optimize.cache_files import PIPE, worker
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.maintenance import verify
-
-from tests.optimize.cache_files import PIPE, worker
-from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 
 SETTINGS = Settings(seed=2, generations=4, ensemble={"min_starts": 8})
 

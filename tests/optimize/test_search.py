@@ -5,6 +5,9 @@ import random
 
 import numpy as np
 import pytest
+
+from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
+from tisim import InputError, RunError
 from tisim.optimize.evaluation.ensemble import FRESH, EnsembleSettings
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.methods.operators import GeneticOperator
@@ -13,9 +16,6 @@ from tisim.optimize.search_records import searches
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.maintenance import verify
-
-from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
-from tisim import InputError, RunError
 
 ONE = EnsembleSettings(min_starts=1, select=0, confirm=0)  # a function without noise needs no averaging
 DEAP_OPTIONS = {

@@ -5,15 +5,15 @@ import sys
 import numpy as np
 import pytest
 from scipy import stats
+
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem
+from tisim import InputError, optimize
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.search import search
 from tisim.optimize.search_folder import SEARCH_FILE
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tests.optimize.fake_runs import FakeEvaluator, fake_problem
-from tisim import InputError, optimize
 
 pytest.importorskip("pandas")
 GENOME = Genome((Gene("speed", "m/s", 1.0, 9.0), Gene("ratio", "", 1e-3, 1.0, "log")))

@@ -5,6 +5,9 @@ import csv
 import numpy as np
 import pytest
 from matplotlib.image import imread
+
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
+from tisim import InputError
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.hall_of_fame import Hall, compromise
@@ -18,9 +21,6 @@ from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import compact, verify
 from tisim.optimize.storage.record import Record
-
-from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
-from tisim import InputError
 
 ONE = EnsembleSettings(min_starts=1, select=0, confirm=0)
 OBJECTIVES = (

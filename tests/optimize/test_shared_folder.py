@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from tests.optimize.cache_files import PIPE, worker
+from tests.optimize.shared_case import problem, searched
+from tisim import InputError, optimize
 from tisim.optimize.problem.constraint import DesignConstraint
 from tisim.optimize.report import report
 from tisim.optimize.report.analysis import Analysis
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import verify
-
-from tests.optimize.cache_files import PIPE, worker
-from tests.optimize.shared_case import problem, searched
-from tisim import InputError, optimize
 
 METHODS = ("zohdi", "cma-es", "random", "restart")
 

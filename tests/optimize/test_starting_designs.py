@@ -4,6 +4,10 @@ import math
 
 import numpy as np
 import pytest
+
+from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
+from tests.optimize.methods.test_methods import method_named, quiet, worth
+from tisim import InputError, optimize
 from tisim.optimize.beginning import Beginning
 from tisim.optimize.designs_csv import designs
 from tisim.optimize.experiments import combined, experiments, restored, table_of
@@ -18,10 +22,6 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
-from tests.optimize.methods.test_methods import method_named, quiet, worth
-from tisim import InputError, optimize
 
 GENES = [
     Gene("speed", "m/s", 1.0, 10.0),

@@ -14,11 +14,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from tisim.backend import runtime
 from tisim.cases.agglomeration.problem import cost
 from tisim.cases.agglomeration.scene import scene
 from tisim.optimize import FitnessRecord, Gene, Genome, Objective, Problem
-
-from tisim.backend import runtime
 
 FILE = Path(__file__).with_name("fitness.json")
 STARTS = 64

@@ -38,9 +38,8 @@ RUNS = (
 
 def fingerprint(name: str, size: str, part: float) -> str:
     """SHA-256, hexadecimal, of what one case gives from its start number 1."""
-    from tisim.cases.case import every
-
     import tisim
+    from tisim.cases.case import every
     from tisim.io.reader import frames
 
     scene = every()[name].scene(size, 1)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, FILTER_PARTICLES, FLOW_SPEED
-from tisim.cases.capture.problem import GENES, problem
 
 import tisim
 from tisim.backend import runtime
+from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, FILTER_PARTICLES, FLOW_SPEED
+from tisim.cases.capture.problem import GENES, problem
 
 CAUGHT = {
     "throughput": {

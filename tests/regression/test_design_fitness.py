@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tisim.cases.blast import problem as blast
-from tisim.cases.vibration import problem as vibration
 
 import tisim
 from tisim.backend import runtime
+from tisim.cases.blast import problem as blast
+from tisim.cases.vibration import problem as vibration
 
 VIBRATION = {
     (1.0, 1.0): -0.7005773424878275,

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tisim.optimize import FitnessRecord
 
 import tisim
 from tests.regression import fitness_record
+from tisim.optimize import FitnessRecord
 from tisim.scene.scene import PHYSICS_VERSION
 
 STANDARD_ERRORS = 4.0

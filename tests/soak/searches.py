@@ -15,13 +15,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from tisim.optimize.storage.cache import Cache, existing
-from tisim.optimize.storage.maintenance import verify
-
 from tests.soak.counts import Counts
 from tisim.backend.kernel_cache import LOCKS
 from tisim.backend.runtime import cores
 from tisim.backend.taichi import BACKEND
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import verify
 
 WORKER = Path(__file__).parents[1] / "optimize" / "cache_worker.py"
 SEARCH = ("optimize", "drift", "--generations", "3", "--seed", "3")

@@ -3,13 +3,12 @@ cluster."""
 
 from __future__ import annotations
 
+from tisim.backend import runtime
+from tisim.errors import must
 from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.evaluation.runs import Evaluator
 from tisim.optimize.problem.problem import Problem
-
-from tisim.backend import runtime
-from tisim.errors import must
 
 RULE = "batch, processes:N or dask://HOST:PORT"
 """The valid names of executors, for error messages."""

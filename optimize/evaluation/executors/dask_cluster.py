@@ -9,11 +9,10 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tisim.optimize.evaluation.executors import handshake, worker
-from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
-
 from tisim import InputError, RunError, Scene
 from tisim.errors import must
+from tisim.optimize.evaluation.executors import handshake, worker
+from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -10,12 +10,11 @@ import threading
 from collections.abc import Iterator, Sequence
 from multiprocessing import resource_tracker
 
+from tisim import RunError, Scene
+from tisim.backend import runtime
 from tisim.optimize.evaluation.executors import worker
 from tisim.optimize.evaluation.executors.remote import Lost
 from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
-
-from tisim import RunError, Scene
-from tisim.backend import runtime
 
 LEAVE_S = 10.0
 """Time limit for an idle worker to exit by itself, s."""

@@ -6,10 +6,9 @@ import concurrent.futures as cf
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
+from tisim import Result, RunError, Scene
 from tisim.optimize.evaluation.executors import handshake
 from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
-
-from tisim import Result, RunError, Scene
 
 UNITS = 2
 """Units of work of each worker in a call. More units balance runs of different length; fewer are larger, and

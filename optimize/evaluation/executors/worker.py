@@ -12,15 +12,14 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any
 
-from tisim.optimize.evaluation.evaluator import BatchEvaluator
-from tisim.optimize.evaluation.executors import handshake
-from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
-from tisim.optimize.problem.function import FunctionCall
-
 from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
 from tisim.files import python_file
 from tisim.files.python_file import PythonFile
+from tisim.optimize.evaluation.evaluator import BatchEvaluator
+from tisim.optimize.evaluation.executors import handshake
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
+from tisim.optimize.problem.function import FunctionCall
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ import pytest
 from scipy.constants import epsilon_0, mu_0
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+
+from tests.scenes import fixed, simulate
 from tisim.cases.agglomeration import CASE, field_checks, fields
 from tisim.cases.agglomeration.problem import problem
 from tisim.cases.agglomeration.scene import BEST, HALF_SIDE, scene
@@ -19,8 +21,6 @@ from tisim.cases.agglomeration.what_fields_add import (
     problem_of,
     table,
 )
-
-from tests.scenes import fixed, simulate
 from tisim.effects import CARBONYL_IRON
 
 DESIGN = {

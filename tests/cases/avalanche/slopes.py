@@ -1,6 +1,7 @@
 """Slopes of grains that are made, not run."""
 
 import numpy as np
+
 from tisim.cases.avalanche.scene import DIAMETERS
 
 WIDTH = 6

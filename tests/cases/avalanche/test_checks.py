@@ -4,6 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from tests.cases.avalanche.slopes import WIDTH, block, leaning
+from tisim import InputError
 from tisim.cases.avalanche import figures as drawing
 from tisim.cases.avalanche.calving import STRIP, strips_of
 from tisim.cases.avalanche.checks import of_avalanches
@@ -15,9 +18,6 @@ from tisim.cases.avalanche.scene import DIAMETERS, FLUX, GRAVITY, RELAXATION
 from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
 from tisim.cases.avalanche.stages import Avalanche, avalanches
 from tisim.cases.case import Size
-
-from tests.cases.avalanche.slopes import WIDTH, block, leaning
-from tisim import InputError
 
 CELL = Cell(number=0, column=8.0, width=WIDTH, length=40.0, height=20.0)
 

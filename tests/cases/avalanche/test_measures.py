@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from tests.cases.avalanche.slopes import WIDTH, block, leaning
 from tisim.cases.avalanche.measures import (
     filled_parts,
     grains_volume,
@@ -14,8 +16,6 @@ from tisim.cases.avalanche.measures import (
     two_slopes,
 )
 from tisim.cases.avalanche.scene import DIAMETERS, GRAVITY
-
-from tests.cases.avalanche.slopes import WIDTH, block, leaning
 
 D = DIAMETERS[0]
 

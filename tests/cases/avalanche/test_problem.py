@@ -4,6 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+import tisim
+from tests.cases.avalanche.slopes import leaning
+from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
+from tisim import InputError, optimize
 from tisim.cases.avalanche.measured import MeasuredProfile, area, read
 from tisim.cases.avalanche.measures import profile, repose
 from tisim.cases.avalanche.problem import EXAMPLE, KNOWN, calibration, measured, other_runs, simulated
@@ -11,11 +16,6 @@ from tisim.cases.case import every
 from tisim.cases.granular_bench.measured import Measurement
 from tisim.optimize import Misfit
 from tisim.optimize.tables import met_columns
-
-import tisim
-from tests.cases.avalanche.slopes import leaning
-from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
-from tisim import InputError, optimize
 
 HEADING = "distance,height,uncertainty\n"
 WRONG = WRONG_ANGLES | {

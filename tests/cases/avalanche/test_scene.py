@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from scipy.constants import mu_0
+
+from tests.cases.avalanche.slopes import block
+from tisim.analysis import contacts
 from tisim.cases.avalanche.calving import pictures
 from tisim.cases.avalanche.published import SLOPES, larger
 from tisim.cases.avalanche.scaling import attraction, moment, ratio, weight
@@ -18,9 +21,6 @@ from tisim.cases.avalanche.scene import (
     young,
 )
 from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
-
-from tests.cases.avalanche.slopes import block
-from tisim.analysis import contacts
 from tisim.effects import Walls
 
 TINY = Cell(number=40, column=6.0, width=5.25, length=12.0, height=8.0)

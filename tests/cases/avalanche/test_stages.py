@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tisim.cases.avalanche import stages
-from tisim.cases.avalanche.scene import DIAMETERS, FLUX, REST
-from tisim.cases.avalanche.stages import avalanches
 
 from tests.cases.avalanche.test_scene import TINY
 from tisim import RunError
+from tisim.cases.avalanche import stages
+from tisim.cases.avalanche.scene import DIAMETERS, FLUX, REST
+from tisim.cases.avalanche.stages import avalanches
 from tisim.effects import Walls
 from tisim.engine.result import Status
 from tisim.operators import AtRest

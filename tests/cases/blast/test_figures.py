@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from tisim.cases.blast.figures import SEQUENCE_FRAMES, BlastHistory, beside, pictures, table
-from tisim.cases.blast.scene import scene
 
 from tisim import Recording, run
+from tisim.cases.blast.figures import SEQUENCE_FRAMES, BlastHistory, beside, pictures, table
+from tisim.cases.blast.scene import scene
 from tisim.io.reader import frames
 from tisim.plotting.cloud import PROJECTION
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from tisim import InputError, Result, Status
 from tisim.cases.blast import CASE
 from tisim.cases.blast import scene as blast
 from tisim.cases.blast.problem import DURATION, TARGET_FLUX, details, field, misfit, problem, start
@@ -10,8 +12,6 @@ from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tisim import InputError, Result, Status
 
 
 def shell(rng, number=200_000):

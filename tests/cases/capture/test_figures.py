@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from tisim.cases.capture import curves, figures
 from tisim.cases.capture import scene as capture
 from tisim.cases.capture.curves import TIMES

@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+
+from tisim import InputError, Result, Status, run
+from tisim.analysis import Mean
 from tisim.cases.capture import problem as filters
 from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
 from tisim.cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
@@ -12,9 +15,6 @@ from tisim.optimize.report.comparison import FRESH
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tisim import InputError, Result, Status, run
-from tisim.analysis import Mean
 from tisim.sources import MagneticCylinders, MagneticField
 
 FIBRES = {"flux": 0.8, "field_angle": 90.0, "aspect": 2.5, "number": 8.2, "spacing": 3.0}

@@ -5,12 +5,12 @@ import sys
 
 import numpy as np
 import pytest
-from tisim.cases.capture import CASE, curves, figures, statistics
-from tisim.cases.capture import scene as capture
-from tisim.cases.statistics import Claim
 
 from tisim import Recording, run
 from tisim.analysis import Mean
+from tisim.cases.capture import CASE, curves, figures, statistics
+from tisim.cases.capture import scene as capture
+from tisim.cases.statistics import Claim
 from tisim.io.reader import frames
 
 

@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from tisim import RandomAroundCylinder, run
 from tisim.cases.capture.statistics import fraction
 from tisim.cases.cascade import CASE, capture_times
 from tisim.cases.cascade.capture_times import captured_at, time_to
 from tisim.cases.cascade.scene import Cascade
-
-from tisim import RandomAroundCylinder, run
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """What figures of cascades show, of times that are known."""
 
 import numpy as np
+
 from tisim.cases.cascade import figures
 
 

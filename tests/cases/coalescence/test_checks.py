@@ -1,6 +1,7 @@
 """What the case coalescence must show."""
 
 import pytest
+
 from tisim.cases.coalescence.checks import check
 
 

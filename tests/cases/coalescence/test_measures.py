@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from tisim.cases.coalescence.measures import (
     Asteroid,
     Conserved,

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from scipy.constants import G
+
+from tests.cases.coalescence.test_measures import row, state_of
+from tisim import InputError
 from tisim.cases.case import Check
 from tisim.cases.coalescence.checks import of_agglomeration, of_conservation, of_structure, of_the_cloud
 from tisim.cases.coalescence.figures import asteroids, figures, forces, growth, shells, table
@@ -11,9 +14,6 @@ from tisim.cases.coalescence.published import MAGNETISATIONS
 from tisim.cases.coalescence.regime import COMPARED, regime, rotation_over_gravity
 from tisim.cases.coalescence.runs import CloudRun, clouds, of_magnetisation
 from tisim.cases.coalescence.scene import scene
-
-from tests.cases.coalescence.test_measures import row, state_of
-from tisim import InputError
 
 
 def made(magnetisation, bound, seed=0, lost=0):

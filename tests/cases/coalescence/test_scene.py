@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from scipy.constants import Boltzmann, G, mu_0
+
+from tisim.analysis import contacts
 from tisim.cases.coalescence import published
 from tisim.cases.coalescence.scaling import (
     attraction,
@@ -26,8 +28,6 @@ from tisim.cases.coalescence.scene import (
     step,
     thermal_speed,
 )
-
-from tisim.analysis import contacts
 from tisim.effects import PermanentMoment, SelfGravity, TreeGravity, TruncatedDipoleDipole
 
 

@@ -4,6 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from tisim import Particles, RunError, Simulation, run
+from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 from tisim.cases.capture.scene import SATURATION_MOMENTS
 from tisim.cases.concentration import CASE
 from tisim.cases.concentration.scene import (
@@ -28,9 +31,6 @@ from tisim.cases.concentration.statistics import (
     results,
 )
 from tisim.cases.statistics import Claim
-
-from tisim import Particles, RunError, Simulation, run
-from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
 
 
 @pytest.mark.parametrize("angle", [0.0, 90.0])

@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+import tisim
 from tisim.cases.granular_bench.accuracy import quantities
 from tisim.cases.granular_bench.bed import bed, centre_height, impact_time, linear_stiffness, side_load
 from tisim.cases.granular_bench.sizes import scene_for
 from tisim.cases.runs import overlap
-
-import tisim
 
 
 def test_quantities_of_a_bed():

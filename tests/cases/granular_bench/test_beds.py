@@ -4,6 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+import tisim
+from tisim.analysis import beverloo_rate
 from tisim.cases.granular_bench.beds import (
     PACKED,
     VALUES,
@@ -17,9 +20,6 @@ from tisim.cases.granular_bench.measures import discharge, floor, heap, repose
 from tisim.cases.granular_bench.problem import problem
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, SEARCH_SETTINGS, STEADY_PART, scene
 from tisim.optimize.settings import Settings, proposed
-
-import tisim
-from tisim.analysis import beverloo_rate
 
 STARTS = 4
 

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from tisim.cases.granular_bench import checks, particle_tests
 from tisim.cases.granular_bench.checks import BOUND, check, rebounds
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
+
 from tisim.cases.granular_bench.closed_forms import (
     HERTZ_DURATION,
     HERTZ_MEAN_DEPTH,

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from tisim.cases.granular_bench.plate import DRAWN, DROPPED, rebound, scene_with_plate, sliding
-from tisim.cases.granular_bench.scene import scene
 
 import tisim
 from tests.scenes import by_id
+from tisim.cases.granular_bench.plate import DRAWN, DROPPED, rebound, scene_with_plate, sliding
+from tisim.cases.granular_bench.scene import scene
 from tisim.effects import Walls
 
 FEW = {"number": 250, "silo": 4.0, "outlet": 5.0, "duration": 0.2}

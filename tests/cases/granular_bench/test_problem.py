@@ -4,6 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+import tisim
+from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
+from tisim import InputError, optimize
 from tisim.cases.case import every
 from tisim.cases.granular_bench import problem as calibrating
 from tisim.cases.granular_bench.measured import Measurement, read
@@ -17,10 +21,6 @@ from tisim.cases.granular_bench.problem import (
     other_runs,
     problem,
 )
-
-import tisim
-from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
-from tisim import InputError, optimize
 
 INTERVALS = {"friction": 0.05, "rolling_friction": 0.05, "restitution": 0.02}
 """How far what is found may be from the known design."""

@@ -4,6 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from tisim import RunError
+from tisim.analysis import contacts
 from tisim.cases.granular_bench import shear_cell
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER
 from tisim.cases.granular_bench.shear_cell import (
@@ -22,9 +25,6 @@ from tisim.cases.granular_bench.shear_cell import (
     sheared_beds,
 )
 from tisim.cases.granular_bench.shear_figure import shear_figure, shear_table
-
-from tisim import RunError
-from tisim.analysis import contacts
 from tisim.engine.result import Status
 
 

@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.constants import mu_0
+
+from tisim.analysis import Mean
 from tisim.cases.mrf_shear import checks, published
 from tisim.cases.mrf_shear.flow_curve import Curve, table
 from tisim.cases.mrf_shear.grains import LARGE_RADIUS
@@ -21,8 +23,6 @@ from tisim.cases.mrf_shear.regime import approach_time, magnetisation, mason_num
 from tisim.cases.mrf_shear.runs import paired
 from tisim.cases.mrf_shear.scene import LOWER, UPPER, scene
 from tisim.cases.runs import overlap
-
-from tisim.analysis import Mean
 
 R, UM = LARGE_RADIUS, 1e-6
 CELL = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0)

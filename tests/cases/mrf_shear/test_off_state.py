@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from tisim.cases.mrf_shear.off_state import (
     RANDOM_PACKING,
     closest_packing,

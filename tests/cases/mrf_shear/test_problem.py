@@ -4,15 +4,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+import tisim
+from tisim import InputError
 from tisim.cases.case import every
 from tisim.cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS
 from tisim.cases.mrf_shear.measures import flux, shear_stress
 from tisim.cases.mrf_shear.off_state import off_state_viscosity
 from tisim.cases.mrf_shear.problem import BOUND, design_viscosity, problem, viscosity
 from tisim.cases.runs import OTHER_STARTS, sound
-
-import tisim
-from tisim import InputError
 
 DESIGN = {"small": 0.25, "fraction": 0.2, "flux": 0.5}
 

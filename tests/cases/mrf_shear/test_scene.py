@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from tisim import InputError
 from tisim.cases.case import every
 from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.flow_curve import COMPARED, VARIATIONS
@@ -15,8 +17,6 @@ from tisim.cases.mrf_shear.grains import (
 )
 from tisim.cases.mrf_shear.runs import magnetised
 from tisim.cases.mrf_shear.scene import MAGNETISING_TIME, RATES, SIDES, impact_step, scene
-
-from tisim import InputError
 from tisim.effects import PrescribedMotion
 from tisim.operators import JoinGroup
 from tisim.sources import CouetteFlow, MagneticField

@@ -1,6 +1,7 @@
 """What the case spin_up must show."""
 
 import pytest
+
 from tisim.cases.spin_up.checks import check
 
 

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from scipy.constants import mu_0
+
+from tests.cases.valve.states import at_rest, result_of
 from tisim.cases.runs import overlap
 from tisim.cases.valve.measures import (
     attraction,
@@ -18,8 +20,6 @@ from tisim.cases.valve.measures import (
 from tisim.cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
 from tisim.cases.valve.scene import scene
 from tisim.cases.valve.sizes import THROATS
-
-from tests.cases.valve.states import at_rest, result_of
 
 R, UM = 22e-6, 1e-6
 VALVE = scene(throat=176 * UM, bore=352 * UM, straight=44 * UM, length=440 * UM, flowing=1e-4, lasting=3e-4)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
+
 from tisim.cases.mrf_shear.off_state import RANDOM_PACKING, relative_viscosity
 from tisim.cases.valve.duct import Duct
 from tisim.cases.valve.open_flow import open_flow, resistance, suspension_viscosity

@@ -2,6 +2,10 @@
 
 import numpy as np
 import pytest
+
+import tisim
+from tests.cases.valve.states import result_of
+from tisim import InputError
 from tisim.cases.case import every
 from tisim.cases.runs import OTHER_STARTS, sound
 from tisim.cases.valve import published
@@ -21,10 +25,6 @@ from tisim.cases.valve.problem import (
 )  # fmt: skip
 from tisim.cases.valve.runs import ARRESTED
 from tisim.optimize.settings import Settings, proposed
-
-import tisim
-from tests.cases.valve.states import result_of
-from tisim import InputError
 from tisim.sources import MagneticField
 
 DESIGN = {"throat": 200e-6, "diameter": 40e-6, "flux": 0.15}

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 from scipy.spatial import cKDTree
+
+from tests.cases.valve.states import at_rest
+from tisim import GrainClass, InputError
 from tisim.cases.case import every
 from tisim.cases.mrf_shear.grains import equal
 from tisim.cases.valve import published
@@ -13,9 +16,6 @@ from tisim.cases.valve.duct import Duct
 from tisim.cases.valve.measures import drag_pressure, duct_of, oil_of, pressure_at_rest
 from tisim.cases.valve.scene import mean_radius, scene, speed_of
 from tisim.cases.valve.sizes import COARSE, FINE_GRAINS, SIZES, THROATS
-
-from tests.cases.valve.states import at_rest
-from tisim import GrainClass, InputError
 from tisim.effects import MutualInducedMoment, StokesDrag, TruncatedDipoleDipole
 from tisim.packing import EqualSizes, UniformSizes
 from tisim.sources import MagneticField, sample

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+
+from tests.cases.valve.states import at_rest
 from tisim.cases.valve import checks, figures, studies
 from tisim.cases.valve.measures import oil_of, unhindered_rate
 from tisim.cases.valve.runs import FLOW_LOOKS, Flow
 from tisim.cases.valve.scene import FIELD
 from tisim.cases.valve.sizes import FINE_DIAMETER, THROATS, D
-
-from tests.cases.valve.states import at_rest
 
 
 def made_up(scenes, progress):

@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+
+import tisim
+from tisim import InputError
 from tisim.cases.vibration.problem import (
     DRIVE,
     VARIANTS,
@@ -17,9 +20,6 @@ from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-import tisim
-from tisim import InputError
 
 DESIGNS = {
     "far": {"flux": 1.0, "stiffness": 1.0},

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.accuracy import constants
 from tisim.cases.vibration.closed_forms import response
@@ -16,7 +17,6 @@ from tisim.cases.vibration.response import (
     slow_scenes,
     vertex,
 )
-
 from tisim.effects import Gravity
 
 CONSTANTS = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,

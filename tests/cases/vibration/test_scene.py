@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from tisim.cases.vibration.checks import deviation
-from tisim.cases.vibration.scene import RATIOS, SPACING, near_fields, scene
 
 from tests.scenes import simulate
+from tisim.cases.vibration.checks import deviation
+from tisim.cases.vibration.scene import RATIOS, SPACING, near_fields, scene
 
 
 @pytest.mark.long

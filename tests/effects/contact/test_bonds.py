@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from tisim.cases.granular_bench.closed_forms import beam_deflection, bridge_force, bridge_rupture
 
 from tests.effects.contact.loads import close
 from tests.scenes import by_id, compiled, scene
+from tisim.cases.granular_bench.closed_forms import beam_deflection, bridge_force, bridge_rupture
 from tisim.effects import CapillaryBridge, Lorentz, ParallelBond
 from tisim.sources import ElectricField
 

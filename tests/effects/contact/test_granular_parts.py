@@ -6,11 +6,11 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import gamma
-from tisim.cases.granular_bench import closed_forms
 
 from tests.effects.contact.compositions import NEUTRAL, alone, along, grains, loaded
 from tests.effects.contact.grains import run
 from tests.scenes import by_id
+from tisim.cases.granular_bench import closed_forms
 from tisim.effects import SJKR, Granular, HertzMaterial
 
 pytestmark = pytest.mark.long

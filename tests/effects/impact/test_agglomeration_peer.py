@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tisim.cases.agglomeration.problem import cost
-from tisim.cases.agglomeration.scene import BEST, DURATION, scene
 
 from tisim import Simulation
 from tisim.backend import runtime
+from tisim.cases.agglomeration.problem import cost
+from tisim.cases.agglomeration.scene import BEST, DURATION, scene
 from tisim.steppers import ApproachTime, Verlet
 
 numba = pytest.importorskip("numba")

@@ -10,10 +10,10 @@ uncertainties.
 import sys
 
 import numpy as np
-from tisim.optimize import Gene, Misfit, Objective, Problem
-from tisim.optimize.analysis.misfit_shape import Evidence, fit
 
 from tisim import optimize
+from tisim.optimize import Gene, Misfit, Objective, Problem
+from tisim.optimize.analysis.misfit_shape import Evidence, fit
 
 GENES = (
     Gene("friction", "", 0.05, 1.0),

@@ -14,11 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from tisim.optimize import Gene, Genome, Misfit, Objective, Problem
-from tisim.optimize.evaluation.executors import evaluator_named
-from tisim.optimize.search import search
-from tisim.optimize.settings import Settings
-from tisim.optimize.storage.cache import Cache
 
 import tisim
 from tests.optimize.analysis.granular_experiment import GENES as GRANULAR_GENES
@@ -37,6 +32,11 @@ from tisim.effects import (
     Walls,
 )
 from tisim.geometry import Plane
+from tisim.optimize import Gene, Genome, Misfit, Objective, Problem
+from tisim.optimize.evaluation.executors import evaluator_named
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tisim.sources import MagneticField
 
 RUNS = 60

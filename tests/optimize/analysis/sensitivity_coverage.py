@@ -7,9 +7,9 @@ import math
 import sys
 
 import numpy as np
-from tisim.optimize import Gene, Problem
 
 from tisim import optimize
+from tisim.optimize import Gene, Problem
 
 
 def ishigami(x):

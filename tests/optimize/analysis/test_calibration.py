@@ -4,9 +4,6 @@ import csv
 
 import numpy as np
 import pytest
-from tisim.optimize import Choice, Gene, Problem
-from tisim.optimize.analysis.misfit_shape import Evidence, coefficients, fit
-from tisim.optimize.report.analysis import Analysis
 
 from tests.optimize.analysis.granular_experiment import (
     coverage,
@@ -17,6 +14,9 @@ from tests.optimize.analysis.granular_experiment import (
     searched_coverage,
 )
 from tisim import InputError, optimize
+from tisim.optimize import Choice, Gene, Problem
+from tisim.optimize.analysis.misfit_shape import Evidence, coefficients, fit
+from tisim.optimize.report.analysis import Analysis
 
 SETS = 200
 

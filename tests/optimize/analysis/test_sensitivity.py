@@ -5,13 +5,13 @@ import math
 
 import numpy as np
 import pytest
+
+from tisim import InputError, optimize
 from tisim.optimize import Choice, Gene, Objective, Problem
 from tisim.optimize.analysis import sensitivity
 from tisim.optimize.report.analysis import Analysis, sensitivity_table
 from tisim.optimize.surrogate.draws import Draws
 from tisim.optimize.surrogate.gaussian_process import GaussianProcess, Parameters
-
-from tisim import InputError, optimize
 
 ANGLES = [Gene(f"x{k}", "", -math.pi, math.pi) for k in (1, 2, 3)]
 

@@ -2,15 +2,15 @@ import math
 
 import numpy as np
 import pytest
+
+from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
+from tisim import InputError, RunError
+from tisim.numerics.skewed import interval
 from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from tisim.optimize.evaluation.estimate import converged_after
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
-from tisim import InputError, RunError
-from tisim.numerics.skewed import interval
 
 DESIGNS = [{"x0": 0.1, "x1": 0.2}, {"x0": 0.9, "x1": 0.2}, {"x0": 0.5, "x1": 0.5}]
 

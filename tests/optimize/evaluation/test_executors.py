@@ -17,6 +17,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from tests.optimize.cache_files import worker
+from tests.optimize.drift_case import problem, scene
+from tests.optimize.evaluation import light_worker
+from tests.own_files import LAW
+from tisim import Cloud, InputError, RunError, Scene, __version__
+from tisim.backend import runtime
+from tisim.effects import Impact
+from tisim.files import python_file
 from tisim.optimize.evaluation import executors
 from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.evaluation.executors import dask_cluster, handshake
@@ -28,15 +37,6 @@ from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.maintenance import verify
-
-from tests.optimize.cache_files import worker
-from tests.optimize.drift_case import problem, scene
-from tests.optimize.evaluation import light_worker
-from tests.own_files import LAW
-from tisim import Cloud, InputError, RunError, Scene, __version__
-from tisim.backend import runtime
-from tisim.effects import Impact
-from tisim.files import python_file
 
 ROOT = Path(__file__).parents[3]
 SCENES = [scene({"speed": 3.0 + k, "rise": 5.0}, seed=k) for k in range(9)]

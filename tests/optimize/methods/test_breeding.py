@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from tisim.optimize.methods.breeding import Breeder
-from tisim.optimize.methods.breeding_settings import Breeding
 
 from tests.optimize.fake_runs import bowl
 from tisim import InputError
+from tisim.optimize.methods.breeding import Breeder
+from tisim.optimize.methods.breeding_settings import Breeding
 
 GENES = 5
 

@@ -6,6 +6,9 @@ import random
 import numpy as np
 import pytest
 from deap import base, tools
+
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+from tisim import InputError
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.base import find
@@ -15,9 +18,6 @@ from tisim.optimize.problem.genes import Choice
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings, identity
-
-from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
-from tisim import InputError
 
 GENES = 5
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)

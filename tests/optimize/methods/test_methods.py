@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+from tisim import InputError
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.base import every, find
@@ -10,9 +13,6 @@ from tisim.optimize.methods.individual import Individual
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
-from tisim import InputError
 
 ONE = EnsembleSettings(min_starts=1, select=0, confirm=0)
 METHODS = sorted(every())

@@ -1,12 +1,12 @@
 """A search method of the user's, in a Python file."""
 
 import pytest
-from tisim.optimize.methods.base import every, find
-from tisim.optimize.settings import Settings, identity
 
 from tests.optimize.fake_runs import fake_problem
 from tests.own_files import METHOD
 from tisim import InputError
+from tisim.optimize.methods.base import every, find
+from tisim.optimize.settings import Settings, identity
 from tisim.scene import plugins
 
 

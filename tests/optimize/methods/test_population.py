@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+
+from tests.optimize.fake_runs import fake_problem
+from tisim import InputError
 from tisim.cases import case as catalogue
+from tisim.cli.scene_arguments import with_changes
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.base import every, find
 from tisim.optimize.methods.breeding_settings import Breeding
 from tisim.optimize.settings import Settings, proposed, without_dependent_options
-
-from tests.optimize.fake_runs import fake_problem
-from tisim import InputError
-from tisim.cli.scene_arguments import with_changes
 
 GENES = 3
 POPULATIONS = range(2, 101)

@@ -4,14 +4,14 @@ import functools
 import math
 
 import pytest
+
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, FakeScene, fake_problem
+from tisim import InputError, optimize
 from tisim.optimize import DesignConstraint, Gene, Problem, ResultConstraint
 from tisim.optimize.evaluation.runs import Runs, Sample
 from tisim.optimize.problem.calls import constraint_value, make_scene
 from tisim.optimize.problem.function import FunctionCall
 from tisim.optimize.tables import best_columns
-
-from tests.optimize.fake_runs import FakeCache, FakeEvaluator, FakeScene, fake_problem
-from tisim import InputError, optimize
 
 FIRST = DesignConstraint("first", lambda design: design["x0"], "m", at_most=0.5)
 
@@ -68,7 +68,7 @@ def test_a_rule_is_told_in_words():
         ),
         (
             lambda: fake_problem(constraints=[FIRST, FIRST]),
-            "names of constraints, and of quantities, must be other than",
+            "names of constraints, and of quantities, must be different from each other",
         ),
         (
             lambda: fake_problem(constraints=[ResultConstraint("x1", len, at_most=1)]),

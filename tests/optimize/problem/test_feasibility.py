@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from deap import base, tools
+
 from tisim.optimize.problem.feasibility import beats, penalised, ranks, total_violation
 
 RNG = np.random.default_rng(11)

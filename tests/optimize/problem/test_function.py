@@ -8,12 +8,12 @@ import subprocess
 import sys
 
 import pytest
-from tisim.optimize import Choice, FitnessRecord, Gene, Objective, Problem
-from tisim.optimize.problem.function import PlainFunction
-from tisim.optimize.storage.cache import existing
 
 from tests.optimize.function_case import noisy, rosenbrock
 from tisim import InputError, RunError, optimize
+from tisim.optimize import Choice, FitnessRecord, Gene, Objective, Problem
+from tisim.optimize.problem.function import PlainFunction
+from tisim.optimize.storage.cache import existing
 
 TWO = (Gene("x", "", -2.0, 2.0), Gene("y", "", -1.0, 3.0))
 ONE = (Gene("x", "", 0.0, 1.0),)
@@ -118,10 +118,10 @@ def test_a_folder_has_all_but_a_scene(tmp_path):
 
 def test_neither_taichi_nor_a_device_is_started():
     code = (
-        "import optimize; from tests.optimize.function_case import rosenbrock; "
+        "from tisim import optimize; from tests.optimize.function_case import rosenbrock; "
         "from tisim.backend import runtime; "
         "problem = optimize.Problem.of_function(rosenbrock, [optimize.Gene(n, '', -2, 2) for n in 'xy']); "
-        "tisim.optimize.run(problem, generations=2); print(runtime.generation())"
+        "optimize.run(problem, generations=2); print(runtime.generation())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "0\n"

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from tisim.optimize import Choice, DependentGene, FixedGene, Gene, Genome
 
 from tisim import InputError, optimize
+from tisim.optimize import Choice, DependentGene, FixedGene, Gene, Genome
 
 BLADES = Gene("blades", "", 2, 7, integer=True)
 CELLS = Gene("cells", "", 1, 1000, "log", integer=True)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from tisim.optimize.problem.genome import Gene, Genome, SearchBox
 
 from tisim import InputError
+from tisim.optimize.problem.genome import Gene, Genome, SearchBox
 
 GENOME = Genome((Gene("v", "m/s", 20.0, 200.0), Gene("H0", "Pa", 1e5, 1e6, "log"), Gene("mu", "", 0.01, 0.1)))
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm
 from scipy.stats.mstats import hdquantiles
+
+from tisim import InputError, optimize
 from tisim.optimize import Expectation, Gene, Misfit, Objective, Problem, Quantile, WorstOf
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.evaluation.executors import evaluator_for
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
-
-from tisim import InputError, optimize
 
 RNG = np.random.default_rng(5)
 VALUES = RNG.normal(size=12)

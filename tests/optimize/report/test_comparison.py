@@ -6,19 +6,19 @@ import io
 import numpy as np
 import pytest
 from rich.console import Console
-from tisim.cases import case as catalogue
-from tisim.optimize.evaluation.runs import start_seed
-from tisim.optimize.problem.objective import Objective
-from tisim.optimize.report import comparison
-from tisim.optimize.report.comparison import FRESH, compare, plan, settings_of
-from tisim.optimize.storage.cache import Cache
 
 from tests.optimize.drift_case import CASE
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tests.optimize.test_several import OBJECTIVES
 from tisim import InputError
+from tisim.cases import case as catalogue
 from tisim.cli.main import main
 from tisim.files import ownership
+from tisim.optimize.evaluation.runs import start_seed
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.report import comparison
+from tisim.optimize.report.comparison import FRESH, compare, plan, settings_of
+from tisim.optimize.storage.cache import Cache
 
 BASE = {
     "method": "zohdi", "options": {"population": 10, "parents": 4}, "target": 0.1, "patience": 1,

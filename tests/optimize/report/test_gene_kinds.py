@@ -5,6 +5,9 @@ from dataclasses import replace
 
 import pytest
 from rich.console import Console
+
+from tests.optimize.fake_runs import fake_record
+from tisim import optimize
 from tisim.optimize import Choice, DependentGene, DesignConstraint, FixedGene, Gene, Problem
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.outcome import Outcome
@@ -12,9 +15,6 @@ from tisim.optimize.report import report
 from tisim.optimize.report.display import Display
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.record import Record
-
-from tests.optimize.fake_runs import fake_record
-from tisim import optimize
 
 GENES = (
     Gene("speed", "m/s", 1.0, 9.0), Gene("blades", "", 2, 5, integer=True), Choice("wall", ("flat", "round")),

@@ -5,6 +5,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from rich.console import Console
+
+from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
+from tisim import RunError, optimize
 from tisim.cases.agglomeration.problem import problem as agglomeration
 from tisim.optimize import Gene, Problem
 from tisim.optimize.evaluation.estimate import FitnessEstimate
@@ -17,9 +20,6 @@ from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.tables import best_columns
-
-from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
-from tisim import RunError, optimize
 
 N = 1000
 DERIVED = {

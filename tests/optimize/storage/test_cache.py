@@ -1,13 +1,13 @@
 import multiprocessing
 
 import pytest
-from tisim.optimize.storage import cache as cache_module
-from tisim.optimize.storage.cache import Cache, existing
-from tisim.optimize.storage.maintenance import compact, verify
 
 from tests.optimize.cache_files import journal_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
+from tisim.optimize.storage import cache as cache_module
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.maintenance import compact, verify
 
 
 def test_round_trip_through_journal_and_hdf5(path):

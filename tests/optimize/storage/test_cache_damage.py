@@ -4,14 +4,14 @@ import shutil
 
 import h5py
 import pytest
-from tisim.optimize.storage.cache import Cache, existing
-from tisim.optimize.storage.journal import Journal
-from tisim.optimize.storage.maintenance import compact, verify
 
 from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
 from tisim.files.framing import MAGIC, frame, scan
+from tisim.optimize.storage.cache import Cache, existing
+from tisim.optimize.storage.journal import Journal
+from tisim.optimize.storage.maintenance import compact, verify
 
 
 def test_torn_tail_at_every_byte(path):

@@ -4,16 +4,16 @@ import threading
 
 import h5py
 import pytest
-from tisim.optimize.storage.cache import Cache
-from tisim.optimize.storage.hdf5_store import build_image
-from tisim.optimize.storage.maintenance import verify
-from tisim.optimize.storage.runs_table import tabulated
 
 from tests.optimize.cache_files import journal_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import RunError
 from tisim.files import atomic
 from tisim.files.atomic import replace_file
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.hdf5_store import build_image
+from tisim.optimize.storage.maintenance import verify
+from tisim.optimize.storage.runs_table import tabulated
 
 
 @pytest.mark.parametrize("room_left", [0, 1, 40])

@@ -2,11 +2,11 @@ import random
 import time
 
 import pytest
-from tisim.optimize.storage.cache import Cache
-from tisim.optimize.storage.maintenance import verify
 
 from tests.optimize.cache_files import worker
 from tests.optimize.fake_runs import fake_record
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.storage.maintenance import verify
 
 
 @pytest.mark.slow

@@ -4,16 +4,16 @@ import os
 
 import h5py
 import pytest
-from tisim.cases import case as catalogue
-from tisim.cases.case import Case, Size
-from tisim.optimize.storage.cache import Cache
 
 from tests.optimize.cache_files import journal_of
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
+from tisim.cases import case as catalogue
+from tisim.cases.case import Case, Size
 from tisim.cli.main import main
 from tisim.files.framing import MAGIC, frame
 from tisim.files.lock import LOCK
 from tisim.files.ownership import MARKER
+from tisim.optimize.storage.cache import Cache
 
 BOWL = Case(
     "bowl", "A bowl", "none",

@@ -6,17 +6,17 @@ import tomllib
 from dataclasses import replace
 
 import pytest
+
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem
+from tisim import InputError
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
+from tisim.cli.main import main
+from tisim.files.ownership import MARKER
 from tisim.optimize.problem.genome import Genome
 from tisim.optimize.search_folder import SEARCH_FILES, resume_or_clear
 from tisim.optimize.search_records import searches
 from tisim.optimize.storage.cache import Cache
-
-from tests.optimize.fake_runs import FakeEvaluator, fake_problem
-from tisim import InputError
-from tisim.cli.main import main
-from tisim.files.ownership import MARKER
 
 BOWL = Case(
     "bowl", "A bowl", "none",

@@ -8,6 +8,12 @@ import time
 import h5py
 import numpy as np
 import pytest
+
+from tests.optimize.cache_files import journal_of, lock_of, payloads
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
+from tisim import InputError
+from tisim.files import atomic
+from tisim.files.framing import frame
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
@@ -18,12 +24,6 @@ from tisim.optimize.storage.cache import FOLD_BYTES, FOLD_SHARE, Cache, existing
 from tisim.optimize.storage.maintenance import compact, verify
 from tisim.optimize.storage.record import Record
 from tisim.optimize.storage.runs_table import RunsTable, tabulated
-
-from tests.optimize.cache_files import journal_of, lock_of, payloads
-from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
-from tisim import InputError
-from tisim.files import atomic
-from tisim.files.framing import frame
 
 GENOME = Genome((Gene("z speed", "m/s", 1.0, 9.0), Gene("a/b", "", 1e-3, 1.0, "log")))
 TWO = (

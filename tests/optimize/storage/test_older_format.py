@@ -8,17 +8,17 @@ import zlib
 import h5py
 import numpy as np
 import pytest
+
+from tests.optimize.cache_files import hurt, journal_of
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem
+from tisim.files.checksum import with_checksum
+from tisim.files.framing import frame
 from tisim.optimize.search import search
 from tisim.optimize.search_records import searches
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.maintenance import compact, verify
 from tisim.optimize.storage.record import canonical
-
-from tests.optimize.cache_files import hurt, journal_of
-from tests.optimize.fake_runs import FakeEvaluator, fake_problem
-from tisim.files.checksum import with_checksum
-from tisim.files.framing import frame
 
 IDENTITY = {"problem": "old", "gene_order": ["z", "a"], "objective_order": ["gain", "price"]}
 ROWS = [

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
+
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, fake_problem
 from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
-
-from tests.optimize.fake_runs import FakeCache, FakeEvaluator, fake_problem
 
 DESIGNS = [{"x0": x} for x in (0.10, 0.12, 0.5, 0.9)]
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from tisim.optimize import Gene, Genome, Objective
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.individual import Individual
