@@ -80,7 +80,7 @@ def rst(text: str) -> list[str]:
 
 
 def _items(paragraph: str) -> Iterator[str]:
-    """Lines of a paragraph; a list with an item for each name if it describes names: ``name : description``."""
+    """Lines of a paragraph; a list with an item for each name if it describes names (``name : text``)."""
     if not re.search(r"^[\w, ]+ : ", paragraph, re.M):
         yield from map(plain, paragraph.splitlines())
         return

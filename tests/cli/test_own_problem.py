@@ -31,6 +31,7 @@ def test_a_problem_is_searched_and_gone_on_with(tisim, own_file):
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_another_objective_in_the_file_is_another_search(tisim, own_file):
     """Evaluations of the old one are not taken for those of the new one."""
     own_file("my_drift.py", PROBLEM)

@@ -16,6 +16,7 @@ from tisim.effects import Granular, NearField
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_steps_of_all_pairs_and_of_contacts_are_timed():
     """In a process of its own; no time is that of a step which computes nothing."""
     laws = [type(make().effects[0]) for make in diagnostics.TIMED_SCENES.values()]

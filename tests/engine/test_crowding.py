@@ -221,6 +221,7 @@ def test_lists_that_would_not_fit_are_refused_before_they_are_made(monkeypatch):
         simulation.load([scene(middle, 0 * middle, made[0].effects, R, dt=1e-4, steps=120)])
 
 
+@pytest.mark.slow
 def test_a_command_prints_the_warning_on_one_line(tmp_path):
     """On standard error, whatever the place in the code."""
     two = scene([[0, 0, 0], [R, 0, 0]], np.zeros((2, 3)), (Hertz(young=1e-9, poisson=0.3),), R)

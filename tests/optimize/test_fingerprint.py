@@ -225,6 +225,7 @@ def test_another_target_in_the_same_folder_is_another_problem(tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_another_range_of_a_gene_is_another_search(tmp_path):
     """It is not taken for the same, and a value of the same design is."""
     made = problem("default", "")

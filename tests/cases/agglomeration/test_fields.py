@@ -99,6 +99,7 @@ def test_grains_are_of_two_classes_that_differ_in_charge_alone():
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_genes_of_no_charge_and_no_field_change_nothing():
     """Beside the flow of Z04 in the same box and steps."""
     with_none = scene({**BEST, **fields.NO_FIELDS}, 2, 60, duration=1e-3)

@@ -106,6 +106,7 @@ def test_without_restitution_a_grain_stays_where_it_hits():
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_an_elastic_impact_is_as_deep_as_hertz_found_and_as_long():
     """At half its time it is at rest, with the overlap and the force of the formulas."""
     errors = []

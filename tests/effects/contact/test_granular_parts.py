@@ -234,6 +234,7 @@ def jkr_force(overlap):
     return closed_forms.jkr_force(overlap, GAMMA, 1.0, E_STAR)
 
 
+@pytest.mark.slow
 def test_jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_most():
     """-8/9 of that at the first touch and -5/9 where it ends; dry before."""
     ways = np.concatenate([[-0.1 * STRETCH, 0.0, 0.03], np.linspace(0.03, -0.999999 * STRETCH, 300)])

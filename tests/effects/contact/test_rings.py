@@ -87,6 +87,7 @@ def test_a_ring_of_more_facets_is_not_stiffer():
     assert max(forces) / min(forces) == pytest.approx(1, abs=0.2)
 
 
+@pytest.mark.slow
 def test_a_ball_in_a_ring_is_the_same_alone_and_among_others():
     scenes = [lodged(16, friction=0.3, aside=(k * 1e-6, 2e-7), steps=300) for k in range(4)]
     together = simulate(scenes, worlds=4, capacity=2)
