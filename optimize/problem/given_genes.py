@@ -39,8 +39,9 @@ class FixedGene(Named):
 class DependentGene(Named):
     """A value computed from the others of a design: it is in tables and reports, and not searched.
 
-    of : function of the design, which contains all other genes and the dependent genes before this one. It
-        must return a value for every design; use constraints to restrict the allowed values.
+    of : function of the design, which contains all genes that are not dependent, and the dependent genes
+        before this one. It must return a value for every design; use constraints to restrict the allowed
+        values.
     """
 
     name: str

@@ -118,7 +118,8 @@ def sensitivity_table(found: Sensitivity) -> RenderableType:
         "without their noise"
     )
     words = [
-        f"-10 %, +10 %: change of {found.objective} when only this gene moves by that part of its range",
+        f"-10 %, +10 %: change of {found.objective} when only this gene moves from the best design by that "
+        "part of its range",
         f"alone, in all: parts of the variance of {found.objective} over all ranges due to the gene alone "
         "and together with others (first-order and total Sobol' indices)",
         f"±: half of the 95 % interval. From a Gaussian process through {found.designs} designs, which "

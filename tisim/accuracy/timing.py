@@ -73,7 +73,8 @@ class SimulationCache:
     """Compiled simulations, one for each structure and number of worlds, because idle worlds would add to the
     time.
 
-    Simulations are kept while there is memory for another. The least recently used are closed first.
+    Simulations are kept while enough field trees are free for another (ROOM). The least recently used are
+    closed first.
     """
 
     def __init__(self) -> None:

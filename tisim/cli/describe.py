@@ -94,7 +94,7 @@ def check(
 
 
 def doctor() -> None:
-    """Report this machine's backend, processor, memory and versions, and time the other backend."""
+    """Report this machine's backend, processor, memory, devices and versions; time both backends."""
     from tisim.describe.diagnostics import findings
 
     table = plain_table()

@@ -21,7 +21,7 @@ Name = Annotated[
     str | None,
     typer.Argument(
         metavar="NAME",
-        help="Full name of one part, such as impact; or a category, to list its members: operators, pair. "
+        help="A part to show in full, such as impact; or a category to list: operators, pair. "
         "Without a name, list all.",
     ),
 ]

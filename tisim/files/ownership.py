@@ -154,6 +154,7 @@ def _marked_names(folder: Path) -> set[str]:
 
 
 def _written_by_tisim(path: Path) -> bool:
-    """Return whether tisim has written an HDF5 file or a journal; only the first bytes are read."""
+    """Return whether tisim has written an HDF5 file or a journal; only the first MiB is read,
+    and its HDF5 structure is not interpreted."""
     head = regular_file.content(path, _HEAD) or b""
     return head.startswith(framing.MAGIC) or (head.startswith(SIGNATURE) and b"tisim" in head)

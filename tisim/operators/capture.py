@@ -20,8 +20,8 @@ class Capture(Operator):
     particles too, which are not counted); ``captured_by`` is the number of the magnet, counted from 0 through
     the lists of the scene in order, or -1; ``captured_at`` is the end of the step in which the particle
     touched (s), or -1. ``work["captures"]`` is the number of captured particles. A particle whose step ends
-    inside a magnet is moved to the nearest point outside, so steps near a magnet must be short. Impacts are
-    refused, because they would move a captured particle.
+    inside a magnet is moved to the nearest point outside, so the path in a step must be short compared with
+    the size of the magnet. Impacts are refused, because they would move a captured particle.
 
     Source: B16 section 6.3.
     """

@@ -22,7 +22,8 @@ class Bound(Generic[Part]):
     values returned by ``connect`` of the part are attributes too. Any other attribute, such as an option or a
     constant of the class, is taken from the data.
 
-    data : the part of the scene that was compiled; its parameter values differ from the loaded scenes.
+    data : the part of the scene that was compiled; its parameter values may differ from those of
+        the loaded scenes.
     index : its index among the effects of the scene.
     """
 

@@ -112,7 +112,7 @@ def meeting_speed(
     extent = math.inf if low is None or high is None else float(np.linalg.norm(high - low))
     if not len(velocity):
         return sum(effect.reached_speed(duration, extent) for effect in effects)
-    # Relative to each other, and relative to particles and walls at rest.
+    # Relative to each other, and relative to whatever is at rest or held.
     own = float(np.linalg.norm(velocity - velocity.mean(axis=0), axis=1).max())
     speed = max(2 * own, float(np.linalg.norm(velocity, axis=1).max()))
     return speed + sum(effect.reached_speed(duration, extent) for effect in effects)

@@ -56,8 +56,8 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     ``sweep_change`` of a world is the change in the last sweep, over the largest value. With one sweep per
     step, the distance of the values from the solution is about L / (1 - L) times this change.
     ``sweep_factor`` is the factor by which a sweep multiplies the change, from the last three sweeps of a
-    step. For plain sweeps it tends to the largest |1 - a + a L|. If a world stops because L exceeds 1, it is
-    a lower bound of L.
+    step. For plain sweeps that go on it tends to the largest |1 - a + a L|. If a world stops because L
+    exceeds 1, it is a lower bound of L.
 
     linear : whether the response is linear in the influence of the others. The ``weight`` must then make the
     influence of i on j equal to that of j on i.

@@ -28,7 +28,11 @@ class ContactBond(SurfaceContact):
     exponent: Exponent = option("exponent p of the overlap strain", 2, gt=0)
     grip_stiffness: float = parameter("N/m^3", "stiffness K_rb of the grip along the surfaces", 0.0, ge=0)
     threshold: float = parameter(
-        "", "overlap strain E* above which the bond holds; Z16 gives no value", examples=[0.01], ge=0, lt=1
+        "",
+        "smallest overlap strain E* at which the bond holds; Z16 gives no value",
+        examples=[0.01],
+        ge=0,
+        lt=1,
     )
 
     @ti.func

@@ -81,7 +81,8 @@ class Compare(PerBlock):
 
 
 class Mix(PerParticle):
-    """This phase takes x = f - theta (f - f_last), or f itself in the first iteration."""
+    """This phase takes x = f - theta (f - f_last), or f itself if theta is not defined, as in the
+    first iteration."""
 
     def __init__(self, context: StepContext, sums: BlockSums) -> None:
         super().__init__(context.s)
