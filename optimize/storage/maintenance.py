@@ -81,8 +81,8 @@ def _same(one: Record, other: Record) -> bool:
 def compact(path: str | Path) -> int:
     """Fold the journal of an existing cache file, drop damaged and duplicate records; return the number kept.
 
-    A file that is damaged as a whole is kept as FILE.damaged; FILE then contains the records that could be read
-    from it.
+    A file that is damaged as a whole is kept as FILE.damaged; FILE then contains the records that could be
+    read from it.
     """
     file, _, lock = existing_files(path)
     salvage.repair(file, lock)
