@@ -31,8 +31,8 @@ from tisim.optimize.settings import Settings, identity
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.record import canonical
 from tisim.optimize.storage.runs_table import RunsTable
-from tisim.optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
-from tisim.optimize.surrogate.selection import representative
+from tisim.optimize.surrogate.noise import all_exact, costs_and_noise
+from tisim.optimize.surrogate.selection import MOST_LEARNED, representative
 
 
 def warmed(

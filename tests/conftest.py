@@ -45,7 +45,7 @@ RENDERED = (
     "cli/test_optimize_command.py",
     "cli/test_inspect_commands.py",
 )
-"""Of the command line and the search, these files look at pictures."""
+"""Tests of the command line and the search that read the images."""
 
 
 def pytest_collection_modifyitems(items):
@@ -102,8 +102,8 @@ def room_for_the_next_module():
 
 @pytest.fixture(scope="module", autouse=True)
 def unrendered(request):
-    """Commands and searches draw their pictures, but write a stand-in for the image: to render one takes a
-    quarter of a second, and a search has four. Where pictures are what is tested they are rendered."""
+    """Tests of commands and searches draw all figures but do not render them, which takes a quarter of a
+    second for each of the four images of a search. The files in RENDERED test the images, and render them."""
     file = request.path.relative_to(Path(__file__).parent).as_posix()
     if not file.startswith(("cli/", "optimize/")) or file.startswith(RENDERED):
         yield

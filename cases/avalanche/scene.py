@@ -50,8 +50,8 @@ DIAMETERS = (5e-3, 1e-2, 5e-2)
 DENSITY, POISSON, RESTITUTION = 7750.0, 0.278, 0.2
 """Density, kg/m^3, Poisson's ratio and restitution; L21 table 4.4."""
 ROLLING_DAMPING = 0.4
-"""gamma_r of L21 table 4.4, as a fraction of critical damping. L21 gives k_r = 10 without a unit; the rolling
-stiffness here is that of the ``rolling_epsd`` model."""
+"""gamma_r of L21 table 4.4, as a fraction of critical damping. L21 gives k_r = 10 without a unit; here
+``rolling_epsd`` sets the rolling stiffness."""
 IRON_DESIGN = {"friction": 0.6, "rolling_friction": 0.4, "cohesion": 10.0}
 """The design of the grains: friction, rolling friction, and cohesion in J/m^3; L21 table 4.4."""
 YOUNG = 1e9

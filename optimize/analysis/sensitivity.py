@@ -26,10 +26,10 @@ from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.gene_values import Value
 from tisim.optimize.problem.genome import Genome
-from tisim.optimize.surrogate.belief import MOST_LEARNED, all_exact, costs_and_noise
 from tisim.optimize.surrogate.draws import Draws
 from tisim.optimize.surrogate.gaussian_process import GaussianProcess
-from tisim.optimize.surrogate.selection import representative
+from tisim.optimize.surrogate.noise import all_exact, costs_and_noise
+from tisim.optimize.surrogate.selection import MOST_LEARNED, representative
 
 Array = NDArray[np.float64]
 

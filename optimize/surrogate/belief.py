@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -10,12 +9,9 @@ from scipy.stats import yeojohnson
 
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
-from tisim.optimize.surrogate.selection import representative, thinned
+from tisim.optimize.surrogate.noise import all_exact, costs_and_noise, pooled_variance
+from tisim.optimize.surrogate.selection import MOST_LEARNED, representative, thinned
 
-MOST_LEARNED = 500
-"""Largest number of designs that a process is fitted to."""
-_PRIOR_STARTS = 8
-"""Weight, in starts, of the pooled noise of all designs relative to the starts of a single design."""
 _SKEWED, _SKEWED_NOISE = 0.5, 2.0
 """Costs with a larger skewness than this, without and with noise, are transformed: otherwise a few large
 costs would hide all differences between small ones. With noise the limit is higher, because the mean of noisy
@@ -58,7 +54,7 @@ class Belief:
         chosen = alone[representative(costs[alone], MOST_LEARNED, self.exact)]
         self.chosen = chosen
         variances = self.noise * slopes**2
-        self.one_start = np.array([_pooled(strings, k) for k in range(costs.shape[1])]) * np.mean(
+        self.one_start = np.array([pooled_variance(strings, k) for k in range(costs.shape[1])]) * np.mean(
             slopes[chosen] ** 2, axis=0
         )
         at = self.features(self.points[chosen])
@@ -86,48 +82,6 @@ class Belief:
         at = self.features(np.atleast_2d(points))
         means, deviations = zip(*(model.predict(at) for model in self.models), strict=True)
         return np.column_stack(means), np.column_stack(deviations)
-
-
-def all_exact(strings: Sequence[Individual]) -> bool:
-    """Return whether all costs of the individuals that did not fail are known to have no noise."""
-    return all(one.exact for string in strings if not string.failed for one in string.estimates)
-
-
-def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
-    """Return the costs of individuals and the variances of these means, both (strings, objectives)."""
-    costs = np.array([string.fitness.values for string in strings], dtype=float)
-    good = np.all(np.isfinite(costs), axis=1)
-    for column in costs.T:
-        column[~good] = column[good].max()
-    noise = np.empty_like(costs)
-    for k in range(costs.shape[1]):
-        pooled = _pooled(strings, k)
-        for i, string in enumerate(strings):
-            estimate = string.estimates[k]
-            n, known = max(estimate.starts, 1), math.isfinite(estimate.std)
-            if n == 1 and known:
-                noise[i, k] = estimate.std**2
-                continue
-            own = estimate.std**2 if known else pooled
-            noise[i, k] = (_PRIOR_STARTS * pooled + (n - 1) * own) / (_PRIOR_STARTS + n - 1) / n
-    return costs, noise
-
-
-def _pooled(strings: Sequence[Individual], objective: int) -> float:
-    """Return the variance of a cost between starts, pooled over all designs.
-
-    If no design has two starts, it is the mean of the given squared standard errors; 0 if there are none.
-    """
-    known = [string.estimates[objective] for string in strings]
-    known = [estimate for estimate in known if estimate.ok and math.isfinite(estimate.std)]
-    squares, freedom = 0.0, 0
-    for estimate in known:
-        if estimate.starts > 1:
-            squares += (estimate.starts - 1) * estimate.std**2
-            freedom += estimate.starts - 1
-    if not freedom and known:
-        return float(np.mean([estimate.std**2 for estimate in known]))
-    return squares / freedom if freedom else 0.0
 
 
 def _transformed(costs: Array, skewed: float) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Skewness of the noise of runs, estimated from all designs, although each has only about two starts."""
+"""The noise of costs: the variance of a mean of few starts, and the skewness estimated from all designs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,55 @@ import numpy as np
 from tisim.numerics.skewed import Moments
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
-from tisim.optimize.surrogate.belief import MOST_LEARNED, costs_and_noise
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess
-from tisim.optimize.surrogate.selection import representative
+from tisim.optimize.surrogate.selection import MOST_LEARNED, representative
 
+_PRIOR_STARTS = 8
+"""Weight, in starts, of the pooled noise of all designs relative to the starts of a single design."""
 LEAST_DESIGNS = 10
 """Smallest number of designs with several starts for an estimate."""
+
+
+def all_exact(strings: Sequence[Individual]) -> bool:
+    """Return whether all costs of the individuals that did not fail are known to have no noise."""
+    return all(one.exact for string in strings if not string.failed for one in string.estimates)
+
+
+def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
+    """Return the costs of individuals and the variances of these means, both (strings, objectives)."""
+    costs = np.array([string.fitness.values for string in strings], dtype=float)
+    good = np.all(np.isfinite(costs), axis=1)
+    for column in costs.T:
+        column[~good] = column[good].max()
+    noise = np.empty_like(costs)
+    for k in range(costs.shape[1]):
+        pooled = pooled_variance(strings, k)
+        for i, string in enumerate(strings):
+            estimate = string.estimates[k]
+            n, known = max(estimate.starts, 1), math.isfinite(estimate.std)
+            if n == 1 and known:
+                noise[i, k] = estimate.std**2
+                continue
+            own = estimate.std**2 if known else pooled
+            noise[i, k] = (_PRIOR_STARTS * pooled + (n - 1) * own) / (_PRIOR_STARTS + n - 1) / n
+    return costs, noise
+
+
+def pooled_variance(strings: Sequence[Individual], objective: int) -> float:
+    """Return the variance of a cost between starts, pooled over all designs.
+
+    If no design has two starts, it is the mean of the given squared standard errors; 0 if there are none.
+    """
+    known = [string.estimates[objective] for string in strings]
+    known = [estimate for estimate in known if estimate.ok and math.isfinite(estimate.std)]
+    squares, freedom = 0.0, 0
+    for estimate in known:
+        if estimate.starts > 1:
+            squares += (estimate.starts - 1) * estimate.std**2
+            freedom += estimate.starts - 1
+    if not freedom and known:
+        return float(np.mean([estimate.std**2 for estimate in known]))
+    return squares / freedom if freedom else 0.0
 
 
 def moments(genome: Genome, strings: Sequence[Individual]) -> tuple[Moments, ...] | None:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.genome import Genome
-from tisim.optimize.surrogate.belief import Belief, all_exact
+from tisim.optimize.surrogate.belief import Belief
+from tisim.optimize.surrogate.noise import all_exact
 from tisim.optimize.surrogate.selection import beaten_by
 
 _UNSEEN = 1e-4

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+MOST_LEARNED = 500
+"""Largest number of designs that a process is fitted to."""
+
 
 def representative(costs: Array, most: int, exact: bool) -> NDArray[np.intp]:
     """Return the indices of at most ``most`` designs, in order, from their costs, (n, objectives).

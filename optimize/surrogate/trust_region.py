@@ -22,7 +22,8 @@ from tisim.optimize.surrogate.gaussian_process import Array
 _FIRST, _LARGEST, _SMALLEST = 0.2, 0.4, 1e-3
 """Half-widths of the region in the unit cube: initial, largest, and at convergence."""
 SAME_PLACE = 0.02
-"""Of designs within this distance in all genes, the process of the whole range learns only from one."""
+"""Smallest distance, in at least one gene, between the designs that the process of the whole range is fitted
+to."""
 _APART = 0.1
 """The process of the whole range proposes only designs farther from the centre than this in at least one
 gene."""

@@ -3,10 +3,10 @@
     python tests/benchmarks/field_steps.py [--designs 64] [--starts 16] [--phases 0.2 0.1 0.05] [--grains 60]
         [--strongest]
 
-Designs are drawn from the ranges of the search, every other one soft and fast;
-with --strongest all are soft, and have the largest charges and magnetic field. The phase is the longest step
-times the rate of an oscillation that the forces of fields can cause. A line for each phase has how many runs
-were stopped, the mean of Pi, by how much it is off that of the last phase with the 95 % interval over the
+Designs are drawn from the ranges of the search; every other one is soft and fast. With --strongest all are
+soft, and have the largest charges and magnetic field. The phase is the longest step times the angular
+frequency of the fastest oscillation that the fields can cause. For each phase, a line shows the number of
+stopped runs, the mean of Pi, its difference from the mean at the last phase with a 95 % interval over the
 designs, and the steps of a run.
 """
 

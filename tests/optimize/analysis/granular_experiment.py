@@ -45,7 +45,7 @@ def right_widths(truth, number):
 
 
 def measured_objective(wanted):
-    """The misfit of what a function returns to what was measured, name -> (value, uncertainty)."""
+    """The misfit between the returned values of a function and measurements, name -> (value, uncertainty)."""
     return Objective("misfit", lambda result: result.value, statistic=Misfit(wanted))
 
 

@@ -9,10 +9,10 @@ from scipy.stats import norm
 from tests.optimize.fake_runs import fake_problem, string_of
 from tisim.optimize.surrogate import gaussian_process
 from tisim.optimize.surrogate.acquisition import Worth, log_expected_improvement
-from tisim.optimize.surrogate.belief import MOST_LEARNED, Belief
+from tisim.optimize.surrogate.belief import Belief
 from tisim.optimize.surrogate.gaussian_process import GaussianProcess, Parameters
 from tisim.optimize.surrogate.ranking import best, spread
-from tisim.optimize.surrogate.selection import beaten_by, representative, thinned
+from tisim.optimize.surrogate.selection import MOST_LEARNED, beaten_by, representative, thinned
 
 RNG = np.random.default_rng(4)
 POINTS = RNG.random((25, 3))
