@@ -35,9 +35,9 @@ ON_DEVICES = (
     *("steppers/implicit/test_collocation.py", "steppers/brownian/test_brownian.py"),
     "packing/test_random_sequential.py",
 )
-"""These files are to hold on every device: the contracts, and the physics of each kind of law. Where they
-have been seen to, docs/devices.md says. Insertions and clumps, whose steps take longest to compile, are left
-out."""
+"""Tests that must pass on every device: the contracts, and the physics of each kind of law.
+docs/measurements/devices.md lists the devices on which they passed. Insertions and clumps, whose steps take
+longest to compile, are left out."""
 
 RENDERED = (
     "optimize/report/",

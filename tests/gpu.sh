@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What a device is tried with: the tests marked gpu, then a dated record of speed; within 8 minutes on a card.
+# Run the tests marked gpu on a device, then print a dated record of its speed; at most 8 minutes on a card.
 #
 #     tests/gpu.sh [cuda|vulkan]
 #
@@ -11,11 +11,13 @@ export TISIM_DEVICE=$device
 if [ "$device" = cuda ]; then
     limits=(--most 1000000 --worlds 4096 --limit 180)
     tests=(tests)
+    processes=auto
 else
     limits=(--most 1000 --worlds 16 --limit 90)
     tests=(tests/device tests/numerics)
+    processes=0
 fi
-timeout 270 python -m pytest -q -rs -n 0 -m "gpu and not slow" "${tests[@]}"
+timeout 270 python -m pytest -q -rs -n "$processes" --dist worksteal -m "gpu and not slow" "${tests[@]}"
 tested=$?
 TISIM_DEVICE= timeout 200 python tests/benchmarks/scaling.py --device "$device" "${limits[@]}" || exit
 exit $tested

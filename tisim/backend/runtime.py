@@ -3,7 +3,6 @@ nothing."""
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import ctypes
 import io
@@ -140,7 +139,9 @@ def init(
 def _start(requested: Runtime) -> None:
     global _current, _generation
     if not _generation:
-        atexit.register(_stop)
+        # At the time of atexit the thread has ended, and on CUDA no other thread can stop the compiler. The
+        # function used here is private to Python 3.11-3.13; concurrent.futures ends its threads by it.
+        threading._register_atexit(_stop)  # type: ignore[attr-defined]
     if surroundings.address_space() < LEAST_ADDRESS_SPACE:
         # If threads cannot get their stacks, Quadrants waits for them forever.
         raise _too_little_memory()
@@ -164,6 +165,9 @@ def _start(requested: Runtime) -> None:
                 # With this pass, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes
                 # three times as long to compile; LLVM optimises the same code afterwards.
                 cfg_optimization=False,
+                # On CUDA, Quadrants 1.3.3 takes the first component of a vector for constant in kernels that
+                # write it: the kick after a sum of forces in the same kernel had the force along x of before.
+                detect_read_only=False,
                 # A step of many phases is unrolled on purpose; this avoids the warning.
                 unrolling_limit=0,
                 **kernel_cache.options(),
@@ -197,8 +201,12 @@ def _compile_first():
 
 def _stop() -> None:
     """Stop Taichi at the end of the process, so that it writes the compiled kernels to disk."""
-    if forked():
-        return
+    if not forked():
+        _reset()
+
+
+@in_taichi_thread
+def _reset() -> None:
     with kernel_cache.exclusive_access():
         ti.reset()
 
