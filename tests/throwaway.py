@@ -7,7 +7,7 @@ from tisim.backend.taichi import ti
 from tisim.effects import Force, PairForce, parameter
 from tisim.numerics import elementary, philox
 from tisim.operators import Operator
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 
 K_E = 8.9875517873681764e9
 """Coulomb's constant, N m^2/C^2."""
@@ -42,7 +42,7 @@ class RandomKicks(Operator):
     """v += sigma sqrt(dt) normal, three draws for each particle and step; sums what each has received."""
 
     fields = (Field("kicked", "m/s", 3), "velocity")
-    counters = ("kicks",)
+    world_fields = (WorldField("kicks", "counter"),)
     sigma: float = parameter("m/s^1.5", "sigma", ge=0)
 
     @ti.func

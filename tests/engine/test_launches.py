@@ -16,7 +16,7 @@ from tisim.program.launches import tasks_of
 from tisim.program.phases import Phase, Repeat
 from tisim.program.team import FIRST_ALONE, TRIAL_COST, Teams, TeamTrials
 from tisim.program.world_program import in_pieces, in_shares, world_programs
-from tisim.state.fields import CORE
+from tisim.state.fields import CORE, CORE_OF_WORLDS, WorldField
 from tisim.state.state import State
 from tisim.state.status import NEVER, WorldStatus
 
@@ -80,7 +80,8 @@ class While(Repeat):
 @in_taichi_thread
 def make():
     """A state with two columns of items, and a step with a repeat in a repeat that is not in every step."""
-    s = State(WORLDS, 1, CORE, (), ("trace",), ("outer", "inner"))
+    own = (WorldField("trace", "real"), WorldField("outer", "integer"), WorldField("inner", "integer"))
+    s = State(WORLDS, 1, CORE, (*CORE_OF_WORLDS, *own))
     columns, builder = (ti.field(ti.i32), ti.field(ti.i32)), Builder()
     builder.dense(ti.ij, (WORLDS, ITEMS)).place(*columns)
     s.mixed, s.mixed_tree = columns, Tree(builder)

@@ -32,7 +32,7 @@ def test_a_law_without_a_source_is_told_so():
 
 LAWS = """
 from tisim.backend.taichi import ti
-from tisim.effects import Force, parameter
+from tisim.effects import Force, parameter, WorldField
 
 
 class UnknownName(Force):
@@ -58,15 +58,15 @@ class Undeclared(Force):
 
 
 class Reads(Force):
-    counters = ("read",)
+    world_fields = (WorldField("read", "counter"),)
 
 
 class Again(Force):
-    world_quantities = ("status",)
+    world_fields = (WorldField("status", "measure"),)
 
 
 class OfStepper(Force):
-    counters = ("rejections",)
+    world_fields = (WorldField("rejections", "counter"),)
 """
 SAID = {
     "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be code that Taichi can compile; .*'kk'",

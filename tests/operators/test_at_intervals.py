@@ -4,7 +4,7 @@ import pytest
 
 from tests.scenes import scene, simulate
 from tisim.backend.taichi import ti
-from tisim.effects import parameter
+from tisim.effects import WorldField, parameter
 from tisim.operators.at_intervals import AtIntervals
 
 DT, STEPS = 1e-6, 5003
@@ -14,7 +14,7 @@ DT, STEPS = 1e-6, 5003
 class Chime(AtIntervals):
     """Counts the times that it has acted."""
 
-    counters = ("chimes",)
+    world_fields = (WorldField("chimes", "counter"),)
 
     interval: float = parameter("s", "time from one to the next", gt=0, examples=[1.0])
 

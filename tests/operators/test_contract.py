@@ -11,14 +11,14 @@ from tisim import Box, Simulation, run
 from tisim.backend.taichi import ti
 from tisim.effects import Agglomeration, Impact
 from tisim.operators import Operator
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers import ApproachTime, Verlet
 
 
 class Census(Operator):
     """Counts its calls; a world has no pair events to wait for."""
 
-    counters = ("censuses",)
+    world_fields = (WorldField("censuses", "counter"),)
 
     @ti.func
     def world(self, s, w):
@@ -67,7 +67,7 @@ class Take(Operator):
 class Tally(Operator):
     """Counts the particles that it is asked about."""
 
-    counters = ("tallied",)
+    world_fields = (WorldField("tallied", "counter"),)
     terms = 1
 
     @ti.func

@@ -8,7 +8,7 @@ from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.operators import Operator
 from tisim.program import scans as prefix_sum
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 
 N, STEPS = 300, 6
 
@@ -20,8 +20,7 @@ class Cull(Operator):
         Field("step_of_end", "", 1, "keep", integer=True),
         Field("by_itself", "", 1, "keep", integer=True),
     )
-    counters = ("culled",)
-    world_quantities = ("culled_mass",)
+    world_fields = (WorldField("culled", "counter"), WorldField("culled_mass", "measure"))
     terms = 2
 
     @ti.func

@@ -11,7 +11,7 @@ from tisim import Scene
 from tisim.backend.taichi import ti
 from tisim.effects import parameter
 from tisim.program.phases import PerParticle, Phase, Repeat
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers import Controller, Step, Stepper
 
 
@@ -89,8 +89,11 @@ class Iteration(Repeat):
 class Implicit(Stepper):
     """Trapezoidal rule by fixed-point iteration."""
 
-    counters = ("corrections",)
-    world_quantities = ("unsolved", "largest_change")
+    world_fields = (
+        WorldField("corrections", "counter"),
+        WorldField("unsolved", "real"),
+        WorldField("largest_change", "real"),
+    )
     control: Controller
     tolerance: float = parameter("m", "tolerance", 1e-14, gt=0)
 

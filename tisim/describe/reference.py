@@ -33,7 +33,7 @@ from tisim.scene.initial_state import Start
 from tisim.scene.initial_velocity import Pulse
 from tisim.sources.base import Source
 from tisim.sources.magnetic.magnets import Body
-from tisim.state.fields import resolve_fields
+from tisim.state.fields import names_of, resolve_fields
 from tisim.steppers.base import Stepper
 from tisim.steppers.step_control import StepControl
 
@@ -168,7 +168,7 @@ def describe(kind: type[Component], family: str) -> Entry:
         settings=settings(kind),
         fields=tuple((field.name, field.unit) for field in declared if field.name in wanted),
         needs=tuple(_needs(kind)),
-        gives=(*effect.counters, *effect.world_quantities),
+        gives=(*names_of(effect.world_fields, "counter"), *names_of(effect.world_fields, "measure")),
         toml=template.toml(kind, place, named="NAME" not in FAMILIES[family].place) if place else "",
     )
 

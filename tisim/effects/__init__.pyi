@@ -32,6 +32,9 @@ from .base import (
     Vector as Vector,
 )
 from .base import (
+    WorldField as WorldField,
+)
+from .base import (
     option as option,
 )
 from .base import (

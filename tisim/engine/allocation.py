@@ -6,7 +6,7 @@ from typing import Any
 
 from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected, require_memory
-from tisim.engine.assembly import Assembly, declared, needed_fields, picks_pairs
+from tisim.engine.assembly import Assembly, needed_fields, needed_world_fields, picks_pairs
 from tisim.engine.loading import check_newcomers
 from tisim.pairs.half_list import ListSizes
 from tisim.scene.scene import Scene
@@ -33,10 +33,8 @@ class Allocation:
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
         asked = (scene.acting(), scene.stepper)
-        counters, quantities, clocks, flags, totals = (
-            declared(*asked, what) for what in ("counters", "world_quantities", "clocks", "flags", "totals")
-        )
         fields = resolve_fields(needed_fields(*asked))
+        world_fields = needed_world_fields(*asked, (*State.reserved(), *(field.name for field in fields)))
         # Checked before compilation: a vector in place of a number would end the process.
         for effect in scene.effects:
             check_newcomers(fields, effect)
@@ -44,8 +42,7 @@ class Allocation:
         # Checked before allocation: the compiler cannot refuse a request that is too large.
         require_memory(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
         self._trees: list[Tree] = []
-        kept = (*quantities, *clocks)
-        self.s = State(worlds, capacity, fields, counters, kept, flags, picks_pairs(*asked), totals)
+        self.s = State(worlds, capacity, fields, world_fields, picks_pairs(*asked))
         self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
         bound = (self.table.bind(part) for part in parts(scene))
         *effects, self.domain, self.stepper, self.control = bound

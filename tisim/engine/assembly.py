@@ -38,7 +38,7 @@ from tisim.program.occasion import Enter, EnterAfterEvents, Occasion
 from tisim.program.phases import Item
 from tisim.self_consistent.self_consistent import SelfConsistentSolver, solver
 from tisim.state.bound import Bound, Peers
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField, names_of, resolve_world_fields
 from tisim.state.state import State
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import EndStep, FinishStep, FirstStep
@@ -70,16 +70,13 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
     return {need: ", ".join(dict.fromkeys(names)) for need, names in users.items()}
 
 
-def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[str, ...]:
-    """Return the names of the ``counters``, ``world_quantities``, ``clocks``, ``flags`` or ``totals`` that
-    the parts of a scene declare, each once.
-
-    Effects may share a name. A name that both an effect and the stepper declare appears twice, and
-    ``check_names`` refuses it.
-    """
-    shared = [name for effect in effects for name in effect.keeps(what)]
-    own = [name for part in (stepper, stepper.control) for name in getattr(part, what, ())]
-    return (*dict.fromkeys(shared), *dict.fromkeys(own))
+def needed_world_fields(
+    effects: Sequence[Effect], stepper: Stepper, taken: Sequence[str]
+) -> tuple[WorldField, ...]:
+    """Return the world fields of a scene; InputError is raised for a name that is ``taken``."""
+    of_effects = [field for effect in effects for field in effect.required_world_fields()]
+    of_stepper = (*stepper.world_fields, *stepper.control.world_fields)
+    return resolve_world_fields(of_effects, of_stepper, taken)
 
 
 def measured(effects: Sequence[Effect]) -> dict[str, str]:
@@ -130,7 +127,7 @@ class Assembly:
         final = (law.sum for law in effects.of(LongRange) if not isinstance(law.data, SelfConsistentQuantity))
         self._long_range_items = tuple(item for one in final for item in one.phases())
         for effect in effects:
-            for name, value in effect.data.remembers(s).items():
+            for name, value in effect.data.bind_fields(s).items():
                 setattr(effect, name, value)
         force_sum = SumForces(*self._sees())
         listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
@@ -155,7 +152,8 @@ class Assembly:
         self.failure_attribution = FailureAttribution(context.force_sum)
         own: Step = stepper.data.step(context)
         known = (FirstStep(s, control),) if isinstance(control.data, FixedStep) and context.forced else ()
-        keepers = tuple(e for e in effects if e.data.offers("end_step") and e.data.keeps("world_quantities"))
+        measuring = (e for e in effects if names_of(e.data.required_world_fields(), "measure"))
+        keepers = tuple(e for e in measuring if e.data.offers("end_step"))
         ends = (EndStep(s, keepers),) if keepers else ()
         # Items that are the same objects as in the step are compiled once.
         items, again = fuse(own.items, forces)

@@ -21,6 +21,7 @@ from tisim.pairs import near_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.placed_together import placed_together
 from tisim.scene.scene import Scene
+from tisim.state.fields import names_of
 from tisim.state.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
@@ -260,7 +261,7 @@ class Simulation(CompiledWorlds):
 
     def measures(self, worlds: Sequence[int]) -> list[dict[str, float]]:
         """Return the current measures of these loaded worlds, by name."""
-        quantities = [name for effect in self.scenes[0].effects for name in effect.keeps("world_quantities")]
+        quantities = names_of(self.s.world_fields, "measure")
         now, measures = self.s.snapshot(quantities), []
         for w in worlds:
             of_world = {name: float(now[name][w]) for name in quantities}

@@ -13,8 +13,8 @@ import numpy as np
 
 from tisim.engine.loading import check_field
 from tisim.errors import Words, must
-from tisim.state.fields import Field
-from tisim.state.status import WORLD_COUNTERS, WorldStatus
+from tisim.state.fields import CORE_OF_WORLDS, Field, names_of
+from tisim.state.status import WorldStatus
 
 ROUNDED_PART = 1e-9
 """Bound of the relative rounding error of times."""
@@ -43,7 +43,7 @@ def check_columns(columns: Columns, own: Columns, fields: Sequence[Field], world
         known = np.isin(columns[name], [int(one) for one in WorldStatus])
         must(bool(known.all()), f"checkpoint's {name}", "a known status", columns[name][~known].tolist()[:1])
     _check_times(columns, own, worlds)
-    for name in WORLD_COUNTERS:
+    for name in names_of(CORE_OF_WORLDS, "counter"):
         _within(columns, name, 0, np.inf)
     for w in range(worlds):
         _check_particles(columns, fields, w, capacity)

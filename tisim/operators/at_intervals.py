@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.operators.base import Operator
+from tisim.state.fields import WorldField
 
 
 class AtIntervals(Operator):
@@ -17,13 +18,12 @@ class AtIntervals(Operator):
 
     contract: ClassVar[bool] = True
 
-    def keeps(self, what: str) -> tuple[str, ...]:
-        own = (f"{self.label}_intervals",) if what == "clocks" else ()
-        return *super().keeps(what), *own
+    def required_world_fields(self) -> tuple[WorldField, ...]:
+        return *super().required_world_fields(), WorldField(f"{self.label}_intervals", "real")
 
-    def remembers(self, s: Any) -> dict[str, Any]:
+    def bind_fields(self, s: Any) -> dict[str, Any]:
         """Return the field with the number of counted intervals."""
-        return {**super().remembers(s), "counted": getattr(s, f"{self.label}_intervals")}
+        return {**super().bind_fields(s), "counted": getattr(s, f"{self.label}_intervals")}
 
     @ti.func
     def elapsed(self, s, w):

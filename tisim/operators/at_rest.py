@@ -12,6 +12,7 @@ from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.base import parameter
 from tisim.operators.insertion import Insertion
 from tisim.state.bound import Peers
+from tisim.state.fields import WorldField
 
 LOOKS = 10
 """Number of checks of the grains within the time for which they must be at rest."""
@@ -39,8 +40,11 @@ class AtRest(AtIntervals):
     Source: C. O'Sullivan, Particulate Discrete Element Modelling (2011), section 2.6.
     """
 
-    world_quantities = ("kinetic_ratio", "unbalanced_ratio")
-    flags: ClassVar = ("looks_at_rest",)
+    world_fields = (
+        WorldField("kinetic_ratio", "measure"),
+        WorldField("unbalanced_ratio", "measure"),
+        WorldField("looks_at_rest", "integer"),
+    )
     any_order: ClassVar[bool] = True
     terms: ClassVar = 4
     requires: ClassVar = (Gravity,)

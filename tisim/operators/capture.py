@@ -9,7 +9,7 @@ from tisim.effects.base import Constraint, PairEvent
 from tisim.operators.base import Operator
 from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 
 
 class Capture(Operator):
@@ -32,7 +32,7 @@ class Capture(Operator):
         Field("captured_by", "", 1, "keep", integer=True, default=-1),
         Field("captured_at", "s", 1, "keep", default=-1.0),
     )
-    counters: ClassVar = ("captures",)
+    world_fields: ClassVar = (WorldField("captures", "counter"),)
     requires: ClassVar = (Magnets,)
     excludes: ClassVar = (PairEvent, Constraint)
 

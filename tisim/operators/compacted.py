@@ -8,6 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
 from tisim.operators.base import parameter
 from tisim.operators.filled_part import FilledPart
+from tisim.state.fields import WorldField
 
 
 class Compacted(FilledPart):
@@ -22,15 +23,12 @@ class Compacted(FilledPart):
     ``measures`` as ``filled_fraction``.
     """
 
-    world_quantities = ("filled_fraction",)
+    world_fields = (WorldField("filled_fraction", "measure"),)
     any_order: ClassVar[bool] = True
     fields = ("radius",)
     ends: ClassVar = "grains fill the region"
 
     interval: float = parameter("s", "time between two checks of the region", gt=0, examples=[1e-3])
-
-    def measured(self) -> dict[str, str]:
-        return {"filled_fraction": ""}
 
     @ti.func
     def world(self, s, w):

@@ -21,7 +21,7 @@ from tisim.operators.base import Operator, parameter
 from tisim.program.phases import Item, PerParticle, Phase, Repeat, WorldAction
 from tisim.program.scans import PrefixSum
 from tisim.state.bound import Bound, Peers
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.state.state import State
 from tisim.state.status import WorldStatus
 
@@ -48,8 +48,7 @@ class Fragmentation(ImpactLaw, Operator):
         Field("pieces", "", 1, "keep", integer=True),
         Field("fracture_energy", "J", 1, "sum"),
     )
-    counters = ("fractures",)
-    flags: ClassVar = ("fracture_due",)
+    world_fields = (WorldField("fractures", "counter"), WorldField("fracture_due", "integer"))
     requires: ClassVar = (Impact,)
 
     surface_energy: float = parameter("J/m^2", "surface energy gamma", examples=[10.0], gt=0)

@@ -22,6 +22,7 @@ from tisim.operators.tried_place import TriedPlace
 from tisim.packing.grains import check_quantities, class_materials, quantity
 from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound
+from tisim.state.fields import WorldField
 from tisim.state.state import State
 
 MOST_TRIES = 20_000
@@ -68,12 +69,9 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         shapes = (table.tobytes() for table in GrainShapes.lookups(self).values())
         return (*super().structure(), *classes, *shapes)
 
-    def keeps(self, what: str) -> tuple[str, ...]:
-        own = (f"{self.label}_number", f"{self.label}_mass") if what == "world_quantities" else ()
-        return *super().keeps(what), *own
-
-    def measured(self) -> dict[str, str]:
-        return {f"{self.label}_number": "", f"{self.label}_mass": "kg"}
+    def required_world_fields(self) -> tuple[WorldField, ...]:
+        number = WorldField(f"{self.label}_number", "measure")
+        return *super().required_world_fields(), number, WorldField(f"{self.label}_mass", "measure", "kg")
 
     def check_materials(self, materials: Materials) -> None:
         class_materials(self.grains, materials)
@@ -118,17 +116,17 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
     def world_action(self, own: Bound[Any], s: State) -> WorldAction:
         return TriedPlace(own, s)
 
-    def remembers(self, s: Any) -> dict[str, Any]:
+    def bind_fields(self, s: Any) -> dict[str, Any]:
         """Return the state variables of the insertion, and the fields of the quantities given by the classes,
         each with its first column in the table."""
-        number, mass = (getattr(s, name) for name in self.keeps("world_quantities"))
+        number, mass = getattr(s, f"{self.label}_number"), getattr(s, f"{self.label}_mass")
         given, first = [], 0
         for name, value in self.given_quantities()[0].items():
             if hasattr(s, name):
                 given.append((getattr(s, name), first, np.size(value)))
             first += np.size(value)
         own = {"inserted": number, "inserted_mass": mass, "given_fields": tuple(given)}
-        return {**super().remembers(s), **own}
+        return {**super().bind_fields(s), **own}
 
     @ti.func
     def pending(self, s, w):

@@ -12,6 +12,7 @@ from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.base import option, parameter
 from tisim.operators.behind_planes import BehindPlanes
 from tisim.state.bound import Peers
+from tisim.state.fields import WorldField
 
 NEARLY = 1e-6
 """A step has reached a time if it ends before it by at most this part of the step's length (rounding)."""
@@ -29,7 +30,7 @@ class JoinGroup(BehindPlanes, AtIntervals):
     """
 
     fields: ClassVar = ("group",)
-    counters: ClassVar = ("joined",)
+    world_fields: ClassVar = (WorldField("joined", "counter"),)
     terms: ClassVar = 1
     requires: ClassVar = (PrescribedMotion,)
     repeatable: ClassVar[bool] = True

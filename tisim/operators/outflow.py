@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.operators.behind_planes import BehindPlanes
+from tisim.state.fields import WorldField
 
 
 class Outflow(BehindPlanes):
@@ -18,13 +19,12 @@ class Outflow(BehindPlanes):
     """
 
     fields = ("radius",)
-    counters = ("outflow",)
-    world_quantities = ("outflow_mass",)
-    flags: ClassVar = ("outflow_due",)
+    world_fields = (
+        WorldField("outflow", "counter"),
+        WorldField("outflow_mass", "measure", "kg"),
+        WorldField("outflow_due", "integer"),
+    )
     terms: ClassVar = 2
-
-    def measured(self) -> dict[str, str]:
-        return {"outflow_mass": "kg"}
 
     @ti.func
     def particle(self, s, w, i, t, dt):

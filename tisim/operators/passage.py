@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.operators.base import parameter
 from tisim.operators.behind_planes import BehindPlanes
 from tisim.operators.outflow import Outflow
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 
 
 class Passage(BehindPlanes):
@@ -25,17 +25,19 @@ class Passage(BehindPlanes):
     """
 
     fields: ClassVar = (Field("passed", "", 1, "keep", integer=True, default=0),)
-    world_quantities: ClassVar = ("passed_mass", "passage_rate", "passage_begin_time", "passage_begin_mass")
-    flags: ClassVar = ("passage_due",)
+    world_fields: ClassVar = (
+        WorldField("passed_mass", "measure", "kg"),
+        WorldField("passage_rate", "measure", "kg/s"),
+        WorldField("passage_begin_time", "measure", "s"),
+        WorldField("passage_begin_mass", "measure", "kg"),
+        WorldField("passage_due", "integer"),
+    )
     terms: ClassVar = 1
     # Removed grains have no mass left to weigh.
     precedes: ClassVar = (Outflow,)
 
     begin: float = parameter("kg", "passed mass from which on the rate is measured", 0.0, ge=0)
     end: float = parameter("kg", "passed mass up to which the rate is measured", 1e30, gt=0)
-
-    def measured(self) -> dict[str, str]:
-        return dict(zip(self.world_quantities, ("kg", "kg/s", "s", "kg"), strict=True))
 
     @ti.func
     def particle(self, s, w, i, t, dt):

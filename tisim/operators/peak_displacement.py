@@ -7,7 +7,7 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
 from tisim.operators.base import Operator
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 
 START_POSITION = Field("origin", "m", 3, "mean", default="position")
 """The position of a particle at the start."""
@@ -24,11 +24,8 @@ class PeakDisplacement(Operator):
     """
 
     fields: ClassVar = (START_POSITION,)
-    world_quantities: ClassVar = ("peak_displacement",)
+    world_fields: ClassVar = (WorldField("peak_displacement", "measure", "m"),)
     terms: ClassVar = 4
-
-    def measured(self) -> dict[str, str]:
-        return {"peak_displacement": "m"}
 
     @ti.func
     def each(self, s, w, i):

@@ -23,6 +23,7 @@ from tisim.materials.materials import Material, MaterialPair, Materials
 from tisim.scene import plain_data, plugins
 from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source
+from tisim.state.fields import names_of
 from tisim.steppers.base import Stepper
 from tisim.steppers.choice import ACCURACY, StepperChoice, choose, critical_steps
 
@@ -105,7 +106,8 @@ class Scene(Component):
         labels = [effect.label for effect in self.effects]
         for effect, kind, label in zip(self.effects, present, labels, strict=True):
             must(labels.count(label) == 1, f"effects.{label}", "given once", labels.count(label))
-            allowed = (kind.repeatable and not kind.world_quantities) or present.count(kind) == 1
+            repeatable = kind.repeatable and not names_of(kind.world_fields, "measure")
+            allowed = repeatable or present.count(kind) == 1
             must(allowed, f"effects of kind {kind.kind()}", "one in a scene", present.count(kind))
             for required_kinds in effect.required_effects():
                 must(

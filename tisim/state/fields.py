@@ -1,9 +1,9 @@
-"""Particle fields: the definition of each, and the choice of the fields that a scene needs."""
+"""Particle fields and world fields: the definition of each, and the choice of those that a scene needs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -77,6 +77,91 @@ SHARED = {
     )
 }
 """Fields that several effects share by name."""
+
+
+@dataclass(frozen=True)
+class WorldField:
+    """A world field is a number that every world has, ``s.NAME[w]``; it is 0 at the start.
+
+    kind : "counter" (i64), a number of events, which is in the ``work`` of a Result; "measure" (f64), in its
+    ``measures``; or internal: "real" (f64), "integer" (i32), or "sum" (i64), to which particles add whole
+    numbers within a step, in any order, by ``ti.atomic_add``.
+    components : 3 for a vector, of which kernels read and write ``s.NAME[w, k]``.
+    saved : whether the continuation of a run depends on it, so that checkpoints contain it.
+    """
+
+    name: str
+    kind: Literal["counter", "measure", "real", "integer", "sum"]
+    unit: str = ""
+    components: Literal[1, 3] = 1
+    saved: bool = True
+
+
+CORE_OF_WORLDS = (
+    WorldField("time", "real", "s"),
+    WorldField("time_carry", "real", "s"),
+    WorldField("end", "real", "s"),
+    WorldField("dt", "real", "s"),
+    WorldField("approach_time", "real", "s"),
+    WorldField("fastest", "real", "m/s"),
+    WorldField("volume", "real", "m^3"),
+    WorldField("failure_time", "real", "s"),
+    WorldField("reached", "real", "s"),
+    WorldField("cut", "real", "s"),
+    WorldField("count", "integer"),
+    WorldField("status", "integer"),
+    WorldField("failed", "integer"),
+    WorldField("failing_particle", "integer"),
+    WorldField("failing_effect", "integer"),
+    WorldField("ending_effect", "integer"),
+    WorldField("changed", "integer"),
+    WorldField("events", "integer"),
+    WorldField("next_id", "integer"),
+    WorldField("underway", "integer"),
+    WorldField("steps", "counter"),
+    WorldField("particle_steps", "counter"),
+    # Velocity of the common frame, and the largest displacement in it since the last pair list.
+    WorldField("frame", "real", "m/s", components=3),
+    WorldField("displacement", "real", "m", components=3, saved=False),
+    WorldField("seed", "sum"),
+    # The skin of the scene, or 0 to choose it automatically; and the first step if it is known.
+    WorldField("skin", "real", "m", saved=False),
+    WorldField("step_ahead", "real", "s", saved=False),
+    # Largest number of particles of the scene; the capacity of the memory may be larger.
+    WorldField("most", "integer", saved=False),
+    # A world waits at the first end of a step at or after ``pause_time``, at ``goal`` steps, and until the
+    # next launches at ``step_limit`` steps. ``place`` is the next launch that it takes, and ``occasion`` the
+    # reason for it.
+    WorldField("pause_time", "real", "s", saved=False),
+    WorldField("goal", "sum"),
+    WorldField("step_limit", "sum", saved=False),
+    WorldField("place", "integer", saved=False),
+    WorldField("occasion", "integer", saved=False),
+    # With more particles than this a world searches pairs in cells.
+    WorldField("listed_above", "integer", saved=False),
+)
+"""World fields of every scene."""
+
+
+def names_of(fields: Iterable[WorldField], kind: str) -> tuple[str, ...]:
+    """Return the names of the world fields of a kind."""
+    return tuple(field.name for field in fields if field.kind == kind)
+
+
+def resolve_world_fields(
+    effects: Iterable[WorldField], stepper: Iterable[WorldField], taken: Sequence[str]
+) -> tuple[WorldField, ...]:
+    """Return the world fields of a scene: the core, those of its effects and those of its stepper, each once.
+
+    Effects may share a field. InputError is raised for a name that is declared in two ways, that the stepper
+    uses too, or that is ``taken``.
+    """
+    fields = (*CORE_OF_WORLDS, *dict.fromkeys(effects), *dict.fromkeys(stepper))
+    names = [field.name for field in fields]
+    for k, name in enumerate(names):
+        free = name.isidentifier() and name not in taken and name not in names[:k]
+        must(free, "name of a world field", "a name of no other use on a state", name)
+    return fields
 
 
 def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:

@@ -18,43 +18,56 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
 from tisim.errors import RunError
-from tisim.state.fields import Field
-from tisim.state.status import (
-    WORLD_COUNTERS,
-    WORLD_INTEGERS,
-    WORLD_QUANTITIES,
-    WORLD_SETTINGS,
-    WORLD_VECTORS,
-    check_names,
-)
+from tisim.state.fields import CORE_OF_WORLDS, Field, WorldField, names_of
+
+DTYPES = {"counter": ti.i64, "sum": ti.i64, "integer": ti.i32, "measure": ti.f64, "real": ti.f64}
+"""Type of each kind of world field."""
 
 
 class StateMemory:
     """A state memory is the device memory of ``worlds`` worlds of at most ``capacity`` particles.
 
+    fields : the particle fields. world_fields : the fields of a world.
     shared : whether several threads may work on a world at once, in the compiled kernels.
     records : whether the real quantities of a particle are adjacent in memory.
     domain : the domain of the worlds, as kernels see it.
     before_reading : functions called before particle fields are read, for values that are kept elsewhere.
+    columns : names of all world fields. counters : names of those that count events.
+    singles, slotted : particle fields that a copy of a particle has; with their numbers of values and
+    defaults if they have several.
+    defaults, copied : values of the other fields of an inserted particle: a number, or a copy of a field.
+    means, sums : particle fields by the rule of merging.
     """
+
+    worlds: int
+    capacity: int
+    fields: tuple[Field, ...]
+    world_fields: tuple[WorldField, ...]
+    reported: tuple[Field, ...]
+    real: Any
+    records: bool
+    shared: bool
+    domain: Any
+    before_reading: list[Callable[[], None]]
+    columns: tuple[str, ...]
+    counters: tuple[str, ...]
+    singles: tuple[Any, ...]
+    slotted: tuple[Any, ...]
+    defaults: tuple[Any, ...]
+    copied: tuple[Any, ...]
+    means: tuple[Any, ...]
+    sums: tuple[Any, ...]
 
     def __init__(
         self,
         worlds: int,
         capacity: int,
         fields: tuple[Field, ...],
-        counters: tuple[str, ...],
-        world_quantities: tuple[str, ...] = (),
-        flags: tuple[str, ...] = (),
+        world_fields: tuple[WorldField, ...] = CORE_OF_WORLDS,
         records: bool = False,
-        totals: tuple[str, ...] = (),
     ) -> None:
-        # Checked before allocation: fields that are left half made would break every later kernel.
-        names = (*(field.name for field in fields), *counters, *world_quantities, *flags, *totals)
-        check_names(type(self), names)
         self.worlds, self.capacity = worlds, capacity
-        self.fields, self.counters = fields, (*WORLD_COUNTERS, *counters)
-        self.world_quantities, self.flags, self.totals = world_quantities, flags, totals
+        self.fields, self.world_fields = fields, world_fields
         self.reported = tuple(field for field in fields if not field.scratch)
         self.real, self.records, self.shared = runtime.current().real, records, True
         builder = Builder()
@@ -63,47 +76,20 @@ class StateMemory:
             setattr(self, field.name, self._place(builder, field))
         if self._record:
             builder.dense(ti.i, worlds).dense(ti.j, capacity).place(*self._record)
-        quantities, integers = (*WORLD_QUANTITIES, *world_quantities), (*WORLD_INTEGERS, *flags)
-        whole = (*self.counters, *totals)
-        for names, dtype in ((quantities, ti.f64), (integers, ti.i32), (whole, ti.i64)):
-            for name in names:
-                column = ti.field(dtype)
-                builder.dense(ti.i, worlds).place(column)
-                setattr(self, name, column)
-        self.seed = ti.field(ti.i64)
-        builder.dense(ti.i, worlds).place(self.seed)
-        # The skin of the scene, m, or 0 to choose it automatically; and the first step, s, if it is known.
-        self.skin, self.step_ahead = ti.field(ti.f64), ti.field(ti.f64)
-        builder.dense(ti.i, worlds).place(self.skin, self.step_ahead)
-        # Largest number of particles of the scene; the capacity may be larger.
-        self.most = ti.field(ti.i32)
-        builder.dense(ti.i, worlds).place(self.most)
-        # Not part of the state of a run. A world waits at the first end of a step at or after ``pause_time``
-        # (s), at ``goal`` steps, and until the next launches at ``step_limit`` steps. ``place`` is the next
-        # launch that it takes, and ``occasion`` the reason for it. With more particles than ``listed_above``
-        # a world searches pairs in cells.
-        self.pause_time, self.place = ti.field(ti.f64), ti.field(ti.i32)
-        self.goal, self.step_limit = ti.field(ti.i64), ti.field(ti.i64)
-        self.listed_above, self.occasion = ti.field(ti.i32), ti.field(ti.i32)
-        waits = (self.pause_time, self.place, self.occasion, self.goal, self.step_limit, self.listed_above)
-        for column in waits:
-            builder.dense(ti.i, worlds).place(column)
-        for name in WORLD_VECTORS:
-            # Scalars with an axis index: atomic operations on a component of a vector field are lost.
-            column = ti.field(ti.f64)
-            builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
-            setattr(self, name, column)
+        for of_world in world_fields:
+            # A vector has an axis index: atomic operations on a component of a vector field are lost.
+            column, place = ti.field(DTYPES[of_world.kind]), builder.dense(ti.i, worlds)
+            (place.dense(ti.j, 3) if of_world.components == 3 else place).place(column)
+            setattr(self, of_world.name, column)
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
-        self.domain: Any = None
-        self.before_reading: list[Callable[[], None]] = []
-        self.columns = (*quantities, *integers, *WORLD_VECTORS, *whole, *WORLD_SETTINGS)
+        self.domain, self.before_reading = None, []
+        self.columns, self.counters = tuple(f.name for f in world_fields), names_of(world_fields, "counter")
         carried = [field for field in fields if not (field.slots or field.lookup)]
         self.singles = tuple(getattr(self, field.name) for field in carried)
         self.slotted = tuple(
             (getattr(self, field.name), field.slots, _number(field)) for field in fields if field.slots
         )
-        # Values of the other fields of an inserted particle: a number, or a copy of another field.
         self.defaults = tuple(
             (getattr(self, field.name), _number(field), field.components)
             for field in carried
@@ -118,7 +104,7 @@ class StateMemory:
         self.sums = self._by_merge_rule("sum")
 
     def __getattr__(self, name: str) -> Any:
-        what = "the fields, counters or world_quantities of an effect that reads it"
+        what = "the fields or world_fields of an effect that reads it"
         raise AttributeError(f"{name!r} must be declared in {what}")
 
     def _place(self, builder: Any, field: Field) -> Any:
@@ -172,8 +158,12 @@ class StateMemory:
         """Return the names of all fields that determine how a simulation continues, except pair lists, which
         can be rebuilt."""
         fields = (field.name for field in self.fields)
-        worlds = (*WORLD_QUANTITIES, *WORLD_INTEGERS, *self.counters, *self.world_quantities, *self.flags)
-        return (*fields, *worlds, *self.totals, "frame", "seed", "goal")
+        return (*fields, *(field.name for field in self.world_fields if field.saved))
+
+    @classmethod
+    def reserved(cls) -> tuple[str, ...]:
+        """Return the names that no field may have, as they have another use on a state."""
+        return (*StateMemory.__annotations__, *dir(cls))
 
     def image(self) -> dict[str, np.ndarray]:
         """Return a copy of the current state of all worlds, by the names of ``saved``."""

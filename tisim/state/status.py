@@ -1,8 +1,6 @@
-"""The status of the worlds of a batch, and the names of the world fields of a state."""
+"""The status of the worlds of a batch."""
 
 from enum import IntEnum
-
-from tisim.errors import must
 
 
 class WorldStatus(IntEnum):
@@ -42,54 +40,3 @@ ASKED = NO_ONE - 1
 
 NEVER = 2**62
 """A number of steps that no world reaches."""
-
-
-WORLD_QUANTITIES = (
-    *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "failure_time"),
-    *("reached", "cut"),
-)
-"""World quantities (f64) for the time of a world and its steps."""
-WORLD_INTEGERS = (
-    *("count", "status", "failed", "failing_particle", "failing_effect"),
-    "ending_effect",
-    *("changed", "events", "next_id", "underway"),
-)
-"""World integers (i32) for the number of particles of a world and its status."""
-WORLD_VECTORS = ("frame", "displacement")
-"""World vectors (f64) for the displacement of the particles."""
-WORLD_COUNTERS = ("steps", "particle_steps")
-"""Counters (i64) of every world."""
-WORLD_SETTINGS = (
-    "seed",
-    "skin",
-    "step_ahead",
-    "most",
-    "pause_time",
-    "place",
-    "occasion",
-    "goal",
-    "step_limit",
-    "listed_above",
-)
-"""Settings of a world, and the limits at which it waits."""
-ATTRIBUTES = (
-    *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "totals", "reported"),
-    *("real", "records", "shared", "domain", "before_reading", "columns", "singles", "slotted", "defaults"),
-    *("copied", "means", "sums"),
-)
-
-
-def check_names(state: type, names: tuple[str, ...]) -> None:
-    """Raise InputError if a declared name is used twice or has another meaning on a state."""
-    for k, name in enumerate(names):
-        taken = name in (
-            *WORLD_QUANTITIES,
-            *WORLD_INTEGERS,
-            *WORLD_VECTORS,
-            *WORLD_COUNTERS,
-            *WORLD_SETTINGS,
-            *ATTRIBUTES,
-            *names[:k],
-        )
-        free = name.isidentifier() and not taken and not hasattr(state, name)
-        must(free, "name of a field, counter, flag or quantity", "a name of no other use on a state", name)

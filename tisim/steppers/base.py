@@ -22,7 +22,7 @@ from tisim.effects.base import (
 )
 from tisim.errors import must
 from tisim.sources.base import Source
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import MOST_STEPS, StepControl
 
@@ -40,19 +40,16 @@ class Stepper(StepperHints, Component):
 
     Before the first step, ``force`` and ``torque`` have the values of the initial state.
 
-    counters, world_quantities, flags : names of its state variables of a world, ``s.NAME[w]``: counters of
-    events (i64), which a Result contains, quantities (f64) and integers (i32), all 0 at the start. random :
-    whether it draws random numbers, so that only statistics converge. all_pairs : whether it sums over all
-    pairs itself. follows_shear : whether it places moved particles with ``domain.put``, at the time of the
-    new place, and reports displacements relative to ``drift``, so that it can step a sheared box.
-    follows_constraints : whether it leaves particles held by constraints to the constraints.
+    world_fields : the numbers of a world that it counts or keeps, as ``WorldField``. random : whether it
+    draws random numbers, so that only statistics converge. all_pairs : whether it sums over all pairs itself.
+    follows_shear : whether it places moved particles with ``domain.put``, at the time of the new place, and
+    reports displacements relative to ``drift``, so that it can step a sheared box. follows_constraints :
+    whether it leaves particles held by constraints to the constraints.
     """
 
     contract: ClassVar[bool] = True
     all_pairs: ClassVar[bool] = False
-    counters: ClassVar[tuple[str, ...]] = ()
-    world_quantities: ClassVar[tuple[str, ...]] = ()
-    flags: ClassVar[tuple[str, ...]] = ()
+    world_fields: ClassVar[tuple[WorldField, ...]] = ()
     random: ClassVar[bool] = False
     follows_shear: ClassVar[bool] = False
     follows_constraints: ClassVar[bool] = False
@@ -123,7 +120,7 @@ class Stepper(StepperHints, Component):
 
         Forces are summed at ``time``. A stepper that sums them within a step sets ``time`` to that instant,
         as Boris does, and stores the beginning of the step in ``time_before``, which it names in
-        ``world_quantities``; ``apply_operators`` and ``AdvanceClock`` (steppers/common.py) continue from it.
+        ``world_fields``; ``apply_operators`` and ``AdvanceClock`` (steppers/common.py) continue from it.
         A stepper that moves particles twice reports both displacements with ``report_displacement``, which
         sets them to 0 after each. ``s.axes(s.frame, w)`` is the velocity of the frame (m/s). Forces and
         derived quantities after a step may belong to the middle of the step; the next step must not rely on

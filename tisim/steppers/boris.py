@@ -8,7 +8,7 @@ from tisim.components.component import option
 from tisim.effects.base import Effect, Force
 from tisim.forces.loads import FORCE
 from tisim.program.phases import PerParticle, Phase
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import (
     AdvanceClock,
@@ -43,7 +43,7 @@ class Boris(Stepper):
 
     control: Controller = option("step control", examples=[FixedStep(dt=1e-6)])
 
-    world_quantities: ClassVar = ("time_before", STEP_EXCESS)
+    world_fields: ClassVar = (WorldField("time_before", "real", "s"), STEP_EXCESS)
     follows_shear: ClassVar = True
 
     @classmethod

@@ -7,7 +7,7 @@ intervals and may end anywhere: the progress of each particle is in its own cloc
 
 from tisim.backend.taichi import ti
 from tisim.program.phases import Phase
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.state.status import WorldStatus
 from tisim.steppers.context import StepContext
 
@@ -26,10 +26,14 @@ OWN_CLOCK = tuple(
 )
 """The progress of a particle: the number of its interval, the time elapsed in it, and the rounding error of
 that time."""
-INTERVAL_QUANTITIES = ("intervals", "launch_intervals")
-"""Completed intervals of a world, and intervals of the present launch."""
-INTERVAL_FLAGS = ("halted", "attempt_limit")
-"""Whether a particle of a world cannot go on, and the number of attempts allowed to each in this launch."""
+INTERVALS = (
+    WorldField("intervals", "real"),
+    WorldField("launch_intervals", "real"),
+    WorldField("halted", "integer"),
+    WorldField("attempt_limit", "integer"),
+)
+"""Completed intervals of a world, intervals of the present launch, whether a particle of the world cannot go
+on, and the number of attempts allowed to each in this launch."""
 
 
 class BeginIntervals(Phase):

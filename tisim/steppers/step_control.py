@@ -11,6 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, parameter
 from tisim.errors import must
+from tisim.state.fields import WorldField
 
 HALF_DIGIT = 2.0**-24
 """Largest relative rounding error in single precision."""
@@ -45,12 +46,12 @@ class StepControl(Component):
     """Step control chooses the length of steps; ``pair`` is called for every near pair, ``note`` for every
     particle.
 
-    watches_pairs : whether it needs pairs at all. world_quantities : names of its state variables of a world.
+    watches_pairs : whether it needs pairs at all. world_fields : the numbers of a world that it keeps.
     """
 
     contract: ClassVar[bool] = True
     watches_pairs: ClassVar[bool] = False
-    world_quantities: ClassVar[tuple[str, ...]] = ()
+    world_fields: ClassVar[tuple[WorldField, ...]] = ()
 
     @ti.func
     def pair(self, s, w, i, j, separation):

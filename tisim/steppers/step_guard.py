@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.forces.force_sum import turning
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.state.status import WorldStatus
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
 
@@ -32,7 +32,7 @@ HARDLY = 1e-2
 turns it by less than this angle (rad): the force on a particle that hardly moves is changed by the others."""
 STRAINED = Field("strained", "", 1, "keep", scratch=True)
 """Whether the last step of a particle was beyond the limit, in a scene with laws that guard themselves."""
-STEP_EXCESS = "step_excess"
+STEP_EXCESS = WorldField("step_excess", "real")
 """This quantity of a world is the largest (omega dt)^2 above the limit."""
 
 

@@ -45,7 +45,7 @@ class Verlet(Stepper):
 
     control: Controller = option("step control", ApproachTime())
 
-    world_quantities: ClassVar = (STEP_EXCESS,)
+    world_fields: ClassVar = (STEP_EXCESS,)
     follows_shear: ClassVar = True
     follows_constraints: ClassVar = True
 

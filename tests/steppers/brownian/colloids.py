@@ -10,7 +10,7 @@ from tisim.components.component import parameter
 from tisim.effects import Gravity
 from tisim.operators import Operator
 from tisim.sources import Source
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers import Brownian, DriftLimit
 
 RADIUS, TEMPERATURE, VISCOSITY = 1e-7, 298.0, 1e-3
@@ -41,7 +41,7 @@ class Stop(Operator):
     """Fixes what has got beyond a place along x, and notes when."""
 
     fields = (Field("fixed", "", 1, "keep", integer=True), Field("stopped_at", "s", 1, "keep"))
-    counters = ("stops",)
+    world_fields = (WorldField("stops", "counter"),)
     place: float = parameter("m", "place")
 
     @ti.func

@@ -18,20 +18,20 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
    ``depends_on_velocity`` says whether the effect reads or changes velocities or spins, which steppers
    without inertia do not have. ``homogeneous`` says whether it can be used in a sheared box; for forces on
    single particles, sources and operators the default is no.
-4. ``counters`` lists integer event counters of a world: ``ti.atomic_add(s.NAME[w], 1)``. ``world_quantities``
-   lists f64 quantities of a world, ``s.NAME[w]``, which start at 0. A Result contains both. Several effects
-   of one kind write to the same entries, which therefore hold their sums. Sums over particles within a step
-   are whole numbers (``totals``), so that they do not depend on the order of summation. State variables for
-   the effect alone are ``flags`` (i32) and ``clocks`` (f64). If the names depend on the options, ``keeps``
-   returns them; the names of the stepper are not allowed. ``end_step`` sets quantities of a world from the
-   forces of the step. ``measures`` computes further quantities from the particles of a Result, and
-   ``measured`` gives the names and units of all of them.
+4. ``world_fields`` lists the numbers of a world, ``s.NAME[w]``, which are 0 at the start. A Result contains
+   those of the kinds "counter", as in ``ti.atomic_add(s.NAME[w], 1)``, and "measure". Several effects of one
+   kind write to the same fields, which therefore hold their sums. Sums over particles within a step are whole
+   numbers (kind "sum"), so that they do not depend on the order of summation. If the fields depend on the
+   options, ``required_world_fields`` returns them; the names of the stepper are not allowed. ``end_step``
+   sets measures from the forces of the step. ``measures`` computes further quantities from the particles of a
+   Result, and ``measured`` gives the names and units of all of them.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state and writes nothing. Forces and torques
    are summed in scene order. The velocity of j relative to i is ``s.relative_velocity(w, i, j, separation)``:
    it includes the velocity of a moving periodic image, which the difference of both velocities does not.
    ``interaction`` receives the contact history of a pair (``memory`` values) and returns the updated history
    with the force. The history that a particle keeps of a force, such as a wall force, is updated in ``load``
-   if ``commit`` is set; there ``load`` may also add to ``totals``. A short-ranged law acts between particles
+   if ``commit`` is set; there ``load`` may also add to world fields of the kind
+   "sum". A short-ranged law acts between particles
    of one rigid body only if it sets ``within_bodies``. A law with a cut-off far beyond contact sets
    ``truncated`` and is summed separately from contact laws. A law that stops a world on purpose, by a force
    that is not a number, describes the condition in ``may_stop``.
@@ -82,7 +82,7 @@ from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
 from tisim.effects.base.pair_force import PairForce, keeps_apart, kinks
 from tisim.effects.base.pairwise import Pairwise
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 
 __all__ = [
     "Constraint",
@@ -97,6 +97,7 @@ __all__ = [
     "Pairwise",
     "SelfConsistentQuantity",
     "Vector",
+    "WorldField",
     "keeps_apart",
     "kinks",
     "option",

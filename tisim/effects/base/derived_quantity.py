@@ -9,6 +9,7 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pairwise import Pairwise
+from tisim.state.fields import WorldField
 
 SWEEPS = 100
 """Default of the largest number of sweeps."""
@@ -67,8 +68,11 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
 
     contract: ClassVar[bool] = True
     within_bodies: ClassVar[bool] = True
-    counters = ("mutual_sweeps",)
-    world_quantities = ("sweep_factor", "sweep_change")
+    world_fields = (
+        WorldField("mutual_sweeps", "counter"),
+        WorldField("sweep_factor", "measure"),
+        WorldField("sweep_change", "measure"),
+    )
     linear: ClassVar[bool] = False
 
     tolerance: float = parameter(

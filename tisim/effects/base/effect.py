@@ -13,7 +13,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import LawHints
 from tisim.state.bound import Peers
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 
 if TYPE_CHECKING:
     from tisim.domains.domain import Domain
@@ -35,12 +35,10 @@ class Effect(LawHints, Component):
 
     fields : the particle fields that it reads or writes, by name or as a ``Field``. depends_on_velocity :
     whether it reads or changes velocities or spins. homogeneous : whether it is unchanged if all particles
-    are shifted, or if a common velocity is added to all, as in the layers of a sheared box. counters : names
-    of the integer counters of a world. world_quantities : names of the quantities of a world. totals : names
-    of whole numbers of a world to which particles add within a step, in any order (``ti.atomic_add``); a
-    Result does not contain them. requires_source : quantities; a scene must have at least one source of any
-    of them. repeatable : whether a scene can hold several of its kind. ends : the event at which it ends a
-    world.
+    are shifted, or if a common velocity is added to all, as in the layers of a sheared box. world_fields :
+    the numbers of a world that it counts, measures or keeps, as ``WorldField``. requires_source : quantities;
+    a scene must have at least one source of any of them. repeatable : whether a scene can hold several of its
+    kind. ends : the event at which it ends a world.
 
     kinked : whether its force, or the field that it produces, has kinks or jumps, at which steppers of high
     order lose their order. leapfrog : whether only explicit steppers integrate it to second order, because it
@@ -61,9 +59,7 @@ class Effect(LawHints, Component):
     fields: ClassVar[tuple[str | Field, ...]] = ()
     depends_on_velocity: ClassVar[bool] = False
     homogeneous: ClassVar[bool] = True
-    counters: ClassVar[tuple[str, ...]] = ()
-    world_quantities: ClassVar[tuple[str, ...]] = ()
-    totals: ClassVar[tuple[str, ...]] = ()
+    world_fields: ClassVar[tuple[WorldField, ...]] = ()
     ends: ClassVar[str] = "it ends"
     requires_source: ClassVar[tuple[str, ...]] = ()
     kinked: ClassVar[bool] = False
@@ -135,18 +131,16 @@ class Effect(LawHints, Component):
         itself."""
         return self
 
-    def keeps(self, what: str) -> tuple[str, ...]:
-        """Return the names of its ``counters``, ``world_quantities``, ``totals``, ``flags`` (i32) or
-        ``clocks`` (f64) of a world, given its options; by default those of its class. A Result does not
-        contain flags and clocks. If there are several effects of a kind, names that begin with the effect's
-        own name belong to it alone; it finds them with ``remembers``."""
-        return getattr(self, what, ())
+    def required_world_fields(self) -> tuple[WorldField, ...]:
+        """Return the world fields that it needs, given its options; by default ``world_fields``. Effects of
+        one kind share them, unless the names contain the name of the effect; ``bind_fields`` finds these."""
+        return self.world_fields
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         """Return attributes to set on its bound object, taken from the bound effects of the scene."""
         return {}
 
-    def remembers(self, s: Any) -> dict[str, Any]:
+    def bind_fields(self, s: Any) -> dict[str, Any]:
         """Return attributes to set on its bound object, taken from the fields of the state."""
         return {}
 
@@ -186,19 +180,19 @@ class Effect(LawHints, Component):
         return len(masses)
 
     def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
-        """Return quantities for a Result, by name, computed from the particles; ``world_quantities`` are
-        reported anyway."""
+        """Return quantities for a Result, by name, computed from the particles; world fields of the
+        kind "measure" are reported anyway."""
         return {}
 
     def measured(self) -> dict[str, str]:
-        """Return the unit of each quantity that it adds to a Result, by name: of its ``world_quantities`` and
-        of the values of ``measures``. A trajectory has a column for each."""
-        return dict.fromkeys(self.keeps("world_quantities"), "")
+        """Return the unit of each quantity that it adds to a Result, by name: of its world fields of the kind
+        "measure" and of the values of ``measures``. A trajectory has a column for each."""
+        return {field.name: field.unit for field in self.required_world_fields() if field.kind == "measure"}
 
     @ti.func
     def end_step(self, s, w):
-        """Set its quantities of a world at the end of a step, and once before the first step; serially,
-        before events and operators. It is called only for effects with quantities of a world."""
+        """Set its measures of a world at the end of a step, and once before the first step; serially, before
+        events and operators. It is called only for effects with world fields of the kind "measure"."""
 
     def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
         """Return the condition in which it stops a world on purpose by values that are not a number, given

@@ -47,7 +47,7 @@ class Force(Effect):
 
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
         """Return the fields that hold the history of its force on particles, given all effects of the scene;
-        by default none. A bound force finds them with ``remembers``."""
+        by default none. A bound force finds them with ``bind_fields``."""
         return ()
 
     @ti.func

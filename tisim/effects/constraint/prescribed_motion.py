@@ -66,7 +66,7 @@ class PrescribedMotion(Constraint):
     def reached_speed(self, duration: float, extent: float) -> float:
         return self.motion.top_speed(extent)
 
-    def remembers(self, s: Any) -> dict[str, Any]:
+    def bind_fields(self, s: Any) -> dict[str, Any]:
         return {"kept": MotionState({})}
 
     def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:

@@ -8,6 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.impact.impact import Impact
 from tisim.effects.impact.law import ImpactLaw
 from tisim.numerics import elementary
+from tisim.state.fields import WorldField
 
 
 class Agglomeration(ImpactLaw):
@@ -21,7 +22,7 @@ class Agglomeration(ImpactLaw):
     Source: Z04 remark 2.1.
     """
 
-    counters = ("merges",)
+    world_fields = (WorldField("merges", "counter"),)
     requires: ClassVar = (Impact,)
 
     @ti.func

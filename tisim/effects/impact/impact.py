@@ -44,6 +44,7 @@ from tisim.effects.impact.law import HOOKS, ImpactLaw
 from tisim.effects.impact.resting import rests, rounding, support
 from tisim.errors import must
 from tisim.state.bound import Peers
+from tisim.state.fields import WorldField
 
 
 class Impact(PairEvent):
@@ -64,7 +65,9 @@ class Impact(PairEvent):
     hard: ClassVar[bool] = True
     fields = ("radius", "mass", "velocity")
     depends_on_velocity: ClassVar[bool] = True
-    counters = ("impacts", "contacts", "bonds", "iterations", "unconverged")
+    world_fields = tuple(
+        WorldField(name, "counter") for name in ("impacts", "contacts", "bonds", "iterations", "unconverged")
+    )
     forced: ClassVar[bool] = False
 
     hardness: float = parameter(

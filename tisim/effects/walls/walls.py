@@ -31,6 +31,7 @@ from tisim.geometry.triangles import TriangulatedSurface
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Materials
 from tisim.state.bound import Peers
+from tisim.state.fields import WorldField
 
 if TYPE_CHECKING:
     from tisim.scene.scene import Scene
@@ -141,10 +142,10 @@ class Walls(WallContacts, UsesMaterials, Force):
         deepest: np.ndarray = radius - np.min([shape.distances(places) for shape in shapes], axis=0)
         return deepest
 
-    def keeps(self, what: str) -> tuple[str, ...]:
-        kept = tuple(self.motion.quantities)
-        names = {"world_quantities": kept, "totals": ("resistance",) if kept else ()}
-        return tuple(f"{self.label}_{name}" for name in names.get(what, ()))
+    def required_world_fields(self) -> tuple[WorldField, ...]:
+        kept = self.motion.quantities.items()
+        measures = (WorldField(f"{self.label}_{name}", "measure", unit) for name, unit in kept)
+        return (*measures, WorldField(f"{self.label}_resistance", "sum")) if kept else ()
 
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
         values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
@@ -177,7 +178,7 @@ class Walls(WallContacts, UsesMaterials, Force):
             "mesh": bound.surface,
         }
 
-    def remembers(self, s: Any) -> dict[str, Any]:
+    def bind_fields(self, s: Any) -> dict[str, Any]:
         def columns(names: Iterable[str]) -> dict[str, Any]:
             return {name: getattr(s, f"{self.label}_{name}") for name in names}
 
@@ -195,5 +196,4 @@ class Walls(WallContacts, UsesMaterials, Force):
         return resultant(self.label, state["position"], -loads[:, :3], -loads[:, 3:], centre)
 
     def measured(self) -> dict[str, str]:
-        kept = {f"{self.label}_{name}": unit for name, unit in self.motion.quantities.items()}
-        return {**resultant_units(self.label), **kept}
+        return {**resultant_units(self.label), **super().measured()}

@@ -14,7 +14,7 @@ from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.errors import must
 from tisim.forces.loads import FORCE
 from tisim.operators.base import Operator
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper, single
 from tisim.steppers.brownian.coupled import BrownianDrift, Proceed, Scatter, Separate
 from tisim.steppers.brownian.drift_limit import DriftLimit
@@ -30,7 +30,7 @@ from tisim.steppers.brownian.mobility import Mobility, Oseen, RotnePrager
 from tisim.steppers.brownian.vectorised import VectorisedBrownianSteps, vectorises
 from tisim.steppers.common import BeginStep
 from tisim.steppers.context import Buffer, Step, StepContext
-from tisim.steppers.intervals import INTERVAL_FLAGS, INTERVAL_QUANTITIES, BeginIntervals
+from tisim.steppers.intervals import INTERVALS, BeginIntervals
 
 LONGEST_RELAXATION = 0.2
 """Steps are at most this fraction of the relaxation time of a spring."""
@@ -76,8 +76,7 @@ class Brownian(Stepper):
 
     all_pairs = True
     random: ClassVar = True
-    world_quantities: ClassVar = (*INTERVAL_QUANTITIES, "beta")
-    flags: ClassVar = INTERVAL_FLAGS
+    world_fields: ClassVar = (*INTERVALS, WorldField("beta", "real"))
 
     @property
     def order(self) -> int:

@@ -11,6 +11,7 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.errors import must
 from tisim.numerics.ieee import finite
+from tisim.state.fields import WorldField
 from tisim.state.status import WorldStatus
 from tisim.steppers.step_control import SHORTEST_STEP, Controller
 
@@ -47,7 +48,7 @@ class DriftLimit(Controller):
     )
     drift: float = parameter("", "largest displacement by forces in a step, over the radius", 0.05, gt=0)
 
-    world_quantities: ClassVar = ("steepest",)
+    world_fields: ClassVar = (WorldField("steepest", "real"),)
     accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = (
         AccuracyParameter(longest=1, drift=1),
         AccuracyParameter(longest=1, converges=False),

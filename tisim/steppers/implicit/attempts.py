@@ -2,6 +2,7 @@
 
 from tisim.backend.taichi import ti
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
+from tisim.state.fields import WorldField
 from tisim.state.status import WorldStatus
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
@@ -10,6 +11,15 @@ from tisim.steppers.step_control import note_speed
 
 RETRY, ACCEPTED, HOPELESS = range(3)
 """The verdict on an attempt: try again with a shorter step, accepted, or given up."""
+
+ATTEMPTS = (
+    *(WorldField(name, "counter") for name in ("rejections", "solver_iterations", "force_evaluations")),
+    WorldField("time_before", "real", "s"),
+    WorldField("next_dt", "real", "s"),
+    WorldField("attempting", "integer"),
+    WorldField("verdict", "integer"),
+)
+"""World fields of all implicit steppers."""
 
 SHORTER = 0.8
 """Largest length of a second attempt, over the length of the first."""

@@ -15,11 +15,11 @@ from tisim.forces.loads import FORCE
 from tisim.numerics import elementary
 from tisim.program.phases import Item
 from tisim.program.scans import BlockSums
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
 from tisim.steppers.context import Buffer, Step, StepContext
-from tisim.steppers.implicit.attempts import Begin, Decide, RestoreState, SaveState, StepAttempt
+from tisim.steppers.implicit.attempts import ATTEMPTS, Begin, Decide, RestoreState, SaveState, StepAttempt
 from tisim.steppers.implicit.collocation_phases import (
     ChooseCollocationStep,
     Conclude,
@@ -180,12 +180,15 @@ class Collocation(Stepper):
     stages: int = option("number s of stages; the order is 2s - 2", 5, ge=3, le=8)
     control: StageControl = option("step control", StageControl())
 
-    counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
-    world_quantities: ClassVar = (
-        *("time_before", "next_dt", "last_dt", "measured_dt"),
-        *("stage_change", "last_change", "contraction"),
+    world_fields: ClassVar = (
+        *ATTEMPTS,
+        WorldField("last_dt", "real", "s"),
+        WorldField("measured_dt", "real", "s"),
+        WorldField("stage_change", "real"),
+        WorldField("last_change", "real"),
+        WorldField("contraction", "real"),
+        *(WorldField(name, "integer") for name in ("sweeping", "sweep", "stage", "out_of_range")),
     )
-    flags: ClassVar = ("attempting", "verdict", "sweeping", "sweep", "stage", "out_of_range")
 
     @property
     def order(self) -> int:

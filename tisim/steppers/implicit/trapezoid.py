@@ -12,13 +12,14 @@ from tisim.forces.loads import FORCE
 from tisim.numerics.ieee import finite, infinity
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.program.scans import BlockSums, PerBlock
-from tisim.state.fields import Field
+from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import AdvanceClock, apply_operators, note_displacement, report_displacement
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.anderson import accelerated, memory_of_iterates
 from tisim.steppers.implicit.attempts import (
     ACCEPTED,
+    ATTEMPTS,
     HOPELESS,
     RETRY,
     SHORTER,
@@ -36,8 +37,7 @@ from tisim.steppers.implicit.one_particle import Solve
 from tisim.steppers.implicit.saved_state import CHANGE, saved_fields
 from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
 from tisim.steppers.intervals import (
-    INTERVAL_FLAGS,
-    INTERVAL_QUANTITIES,
+    INTERVALS,
     OWN_CLOCK,
     BeginIntervals,
     EndIntervals,
@@ -74,9 +74,12 @@ class Trapezoid(Stepper):
     control: IterationControl = option("step control", IterationControl())
     acceleration: Literal["none", "anderson"] = option("acceleration of the fixed-point iteration", "none")
 
-    counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
-    world_quantities: ClassVar = ("time_before", "next_dt", *INTERVAL_QUANTITIES)
-    flags: ClassVar = ("attempting", "verdict", "iterating", "solver_iteration", *INTERVAL_FLAGS)
+    world_fields: ClassVar = (
+        *ATTEMPTS,
+        *INTERVALS,
+        WorldField("iterating", "integer"),
+        WorldField("solver_iteration", "integer"),
+    )
 
     @property
     def order(self) -> int:
