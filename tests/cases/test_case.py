@@ -56,6 +56,6 @@ def test_every_scene_of_a_moderate_size_may_begin(name):
             if scene.capacity() < 5000:
                 start = scene.start()
                 for effect in scene.acting():
-                    effect.suits_start(start, scene)
+                    effect.check_start(start, scene)
                 begun += 1
     assert begun > 0

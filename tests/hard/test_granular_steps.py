@@ -224,7 +224,7 @@ def test_grains_that_nothing_holds_apart_stop_their_world(monkeypatch):
     ]  # fmt: skip
     with pytest.raises(InputError, match="cohesion must be below"):
         loaded(made)
-    for name in ("suits_start", "suits_wall"):
+    for name in ("check_start", "check_wall"):
         monkeypatch.setattr(Granular, name, lambda *_: None)
     simulation = loaded(made)
     simulation.run()

@@ -147,7 +147,7 @@ def _steppers(scene: Scene, dt: float) -> list[Stepper]:
 
 def _suits(stepper: Stepper, scene: Scene) -> bool:
     try:
-        stepper.suits(scene.effects, scene.domain)
+        stepper.check(scene)
     except InputError:
         return False
     return True

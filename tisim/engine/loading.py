@@ -49,7 +49,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         names = ", ".join(sorted(missing))
         raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
     if n and any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects):
-        scene.stepper.control.suits_start(start["radius"], start["velocity"])
+        scene.stepper.control.check_start(start)
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
         must(rest, "particles.velocity", "0 for fixed particles", Words("one that moves"))
@@ -59,7 +59,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     check_held(scene, start)
     check_rounding(scene)
     for effect in scene.acting():
-        effect.suits_start(start, scene)
+        effect.check_start(start, scene)
     with np.errstate(over="ignore", invalid="ignore"):
         momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
     must(bool(np.isfinite(momentum)), "particles.velocity", "of a finite momentum", float(momentum))

@@ -86,8 +86,7 @@ class Scene(Component):
         self._check_effects()
         self._check_materials()
         for effect in self.effects:
-            effect.suits(self.domain)
-            effect.suits_others(self.effects)
+            effect.check(self)
         rule = "at least one, or inserted by an effect such as insertion_by_flux"
         must(self.capacity() > 0, "particles", rule, Words("none"))
         if "stepper" in self.model_fields_set:
@@ -138,7 +137,7 @@ class Scene(Component):
                 f"one that suits {effect.label}, such as fixed_step or the control of an implicit stepper",
                 self.stepper.control.kind(),
             )
-        self.stepper.suits(self.effects, self.domain)
+        self.stepper.check(self)
         self.stepper.resolves(self.effects, lambda: self._unplaced()[2])
         self.stepper.fewest(self.effects, self.duration)
 

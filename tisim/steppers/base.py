@@ -10,7 +10,6 @@ import numpy as np
 
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import StepperHints
-from tisim.domains.domain import Domain
 from tisim.effects.base import (
     Constraint,
     DerivedQuantity,
@@ -18,6 +17,7 @@ from tisim.effects.base import (
     Force,
     LongRange,
     PairEvent,
+    SceneParts,
     SelfConsistentQuantity,
 )
 from tisim.errors import must
@@ -60,8 +60,9 @@ class Stepper(StepperHints, Component):
         """Return the order of the stepper's error in dt, for smooth forces."""
         return 2
 
-    def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
-        """Raise InputError if the stepper cannot step a scene of these effects in this domain."""
+    def check(self, scene: SceneParts) -> None:
+        """Raise InputError if the stepper cannot step the effects of a scene in its domain."""
+        effects, domain = scene.effects, scene.domain
         for effect in effects:
             if isinstance(effect, Constraint):
                 rule = f"one that follows constraints, such as verlet, with effects.{effect.label}"

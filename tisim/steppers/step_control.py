@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Self
 
 import numpy as np
@@ -70,9 +71,9 @@ class StepControl(Component):
         """Return the relative errors requested of steps, by the names of the settings; by default none."""
         return {}
 
-    def suits_start(self, radius: np.ndarray, velocity: np.ndarray) -> None:
-        """Raise InputError if the steps do not suit an initial state of hard particles that collide: their
-        radii (m, shape (n,)) and velocities (m/s, shape (n, 3)). By default they do."""
+    def check_start(self, start: Mapping[str, np.ndarray]) -> None:
+        """Raise InputError if the steps are too long for an initial state, by field name, of hard particles
+        that collide; by default they are not."""
 
 
 class Controller(StepControl):
@@ -138,7 +139,8 @@ class ApproachTime(Controller):
     def fewest(self, duration: float) -> float:
         return duration / self.longest
 
-    def suits_start(self, radius: np.ndarray, velocity: np.ndarray) -> None:
+    def check_start(self, start: Mapping[str, np.ndarray]) -> None:
+        radius, velocity = start["radius"], start["velocity"]
         # Two particles that meet head on, and move by a radius each in one step, have passed each other: no
         # impact is detected.
         with np.errstate(over="ignore", invalid="ignore"):

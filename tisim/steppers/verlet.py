@@ -10,8 +10,7 @@ from typing import ClassVar, Self
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option
-from tisim.domains.domain import Domain
-from tisim.effects.base import Effect, Force, PairEvent
+from tisim.effects.base import Effect, Force, PairEvent, SceneParts
 from tisim.errors import must
 from tisim.program.phases import PerParticle, Phase
 from tisim.state.fields import Field
@@ -58,11 +57,11 @@ class Verlet(Stepper):
         events = any(isinstance(effect, PairEvent) for effect in effects)
         return (cls(control=FixedStep(dt=dt)), *((cls(),) if events else ()))
 
-    def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
-        super().suits(effects, domain)
-        for effect in effects:
+    def check(self, scene: SceneParts) -> None:
+        super().check(scene)
+        for effect in scene.effects:
             rule = f"one that turns velocities, such as boris or collocation, with effects.{effect.label}"
-            must(not effect.gyrates(effects), "stepper", rule, self.kind())
+            must(not effect.gyrates(scene.effects), "stepper", rule, self.kind())
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
         return (*guard_fields(effects), *rounding_fields())

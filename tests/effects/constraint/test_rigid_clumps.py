@@ -456,10 +456,10 @@ def test_a_rod_whose_ends_another_may_touch_at_once_in_an_image_is_refused(side,
         duration=1e-5,
     )
     if fits:
-        made.acting()[0].suits_start(made.start(), made)
+        made.acting()[0].check_start(made.start(), made)
     else:
         with pytest.raises(InputError, match=r"box must be at least 0.076 m wide where it is periodic"):
-            made.acting()[0].suits_start(made.start(), made)
+            made.acting()[0].check_start(made.start(), made)
 
 
 def test_the_longest_clump_is_found_whatever_the_order_of_its_members():
@@ -471,7 +471,7 @@ def test_the_longest_clump_is_found_whatever_the_order_of_its_members():
 
 def test_clumps_may_all_be_put_in_later_in_a_periodic_box():
     made = put_in(DUMBBELL, 0.1)
-    made.acting()[0].suits_start(made.start(), made)
+    made.acting()[0].check_start(made.start(), made)
 
 
 def test_clumps_that_are_put_in_later_must_fit_the_box_too():
@@ -479,7 +479,7 @@ def test_clumps_that_are_put_in_later_must_fit_the_box_too():
     for side, fits in ((6.1 * R, True), (5.9 * R, False)):
         made = put_in(DUMBBELL, side)
         if fits:
-            made.acting()[0].suits_start(made.start(), made)
+            made.acting()[0].check_start(made.start(), made)
         else:
             with pytest.raises(InputError, match=r"box must be at least 0.006 m wide where it is periodic"):
-                made.acting()[0].suits_start(made.start(), made)
+                made.acting()[0].check_start(made.start(), made)

@@ -97,7 +97,7 @@ def cohesive(normal, density, radius, pairs=None, material=None, acting=(), **gi
         material_pairs=pairs or {},
     )
     for effect in made.acting():
-        effect.suits_start(made.start(), made)
+        effect.check_start(made.start(), made)
 
 
 FLAT = Walls(planes=[Plane()], material="grain")

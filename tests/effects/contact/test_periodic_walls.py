@@ -108,7 +108,7 @@ def scene(duration=1e-6, **walls):
 def start(made):
     """Look at the start of a scene as a run does, without compiling it."""
     for effect in made.acting():
-        effect.suits_start(made.start(), made)
+        effect.check_start(made.start(), made)
 
 
 def test_a_mesh_that_does_not_tell_its_distances_is_refused_beside_a_duct(monkeypatch):

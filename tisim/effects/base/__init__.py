@@ -48,8 +48,9 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
 10. A ``Constraint`` moves the particles that it holds, in place of the stepper, regardless of the forces.
 11. ``connect`` returns references to other bound effects, such as ``peers.of(Heating)``. ``requires`` lists
     effects that must be present, ``excludes`` those that must be absent, and ``precedes`` those that must
-    come later in the scene. ``suits_others`` rejects incompatible settings of other effects; ``beside``
-    adopts these settings when an approximate effect is tried. No code depends on the name of an effect.
+    come later in the scene. ``check`` rejects a domain, or settings of other effects, that do not fit;
+    ``check_start`` rejects initial states. ``beside`` adopts the settings of another effect when an
+    approximate effect is tried. No code depends on the name of an effect.
 12. ``at_start`` fills in values that depend on the start; ``capacity`` returns the largest number of
     particles that may exist at once, given the start.
 13. Four hooks serve scenes that name no stepper (see tisim/steppers/choice.py): ``critical_step`` gives the
@@ -76,7 +77,7 @@ Rules of Taichi for a method with ``ti.func``:
 from tisim.components.component import Vector, option, parameter
 from tisim.effects.base.constraint import Constraint
 from tisim.effects.base.derived_quantity import DerivedQuantity, SelfConsistentQuantity
-from tisim.effects.base.effect import Effect
+from tisim.effects.base.effect import Effect, SceneParts
 from tisim.effects.base.force import Force
 from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
@@ -95,6 +96,7 @@ __all__ = [
     "PairEvent",
     "PairForce",
     "Pairwise",
+    "SceneParts",
     "SelfConsistentQuantity",
     "Vector",
     "WorldField",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -17,12 +17,30 @@ from tisim.state.fields import Field, WorldField
 
 if TYPE_CHECKING:
     from tisim.domains.domain import Domain
-    from tisim.scene.scene import Scene
 
 
 LONGEST_PART = 0.35
 """Largest automatic step over the critical step. In rows of grains energy grows at steps from 0.7 of the
 critical step on."""
+
+
+class SceneParts(Protocol):
+    """The parts of a scene that effects and steppers check.
+
+    effects : the effects as they are given. acting : the effects completed by the materials and the start.
+    duration : of the run (s).
+    """
+
+    @property
+    def effects(self) -> tuple[Effect, ...]: ...
+
+    @property
+    def domain(self) -> Domain: ...
+
+    @property
+    def duration(self) -> float: ...
+
+    def acting(self) -> tuple[Effect, ...]: ...
 
 
 class Effect(LawHints, Component):
@@ -119,12 +137,13 @@ class Effect(LawHints, Component):
         default."""
         return math.inf
 
-    def suits(self, domain: Domain) -> None:
-        """Raise InputError if it cannot act in a domain; by default it can act in any."""
+    def check(self, scene: SceneParts) -> None:
+        """Raise InputError if it cannot act in the domain of a scene or together with the other effects; by
+        default it can."""
 
-    def suits_others(self, effects: Sequence[Effect]) -> None:
-        """Raise InputError if it cannot act together with the effects of a scene, as they are set; by default
-        it can."""
+    def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
+        """Raise InputError if it cannot act on the particles of a start, by field name, in its scene; by
+        default it can."""
 
     def beside(self, other: Effect) -> Self:
         """Return a copy with the settings that it must share with an effect that replaces another; by default
@@ -159,10 +178,6 @@ class Effect(LawHints, Component):
         largest two of each class, or of one if it inserts only one, and ``length`` (m) of their clumps; empty
         by default. Laws are checked against all pairs of them."""
         return {"radius": np.zeros(0), "material": np.zeros(0, int), "length": np.zeros(0)}
-
-    def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
-        """Raise InputError if it cannot act on the particles of a start, by field name, in its scene; by
-        default it can."""
 
     def at_start(self, masses: np.ndarray) -> Self:
         """Return a copy with values that depend on the masses of the start (kg) filled in; by default

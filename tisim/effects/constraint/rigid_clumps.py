@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.domains.domain import Domain
-from tisim.effects.base import Constraint, Effect, Field, PairForce
+from tisim.effects.base import Constraint, Effect, Field, PairForce, SceneParts
 from tisim.effects.constraint.clump_fields import (
     BODY,
     BODY_BEFORE,
@@ -26,9 +26,6 @@ from tisim.numerics.quaternions import brought, rotated
 INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
 """Slot k holds the present index of clump member number k; it does not describe the particle that occupies
 the slot."""
-
-if TYPE_CHECKING:
-    from tisim.scene.scene import Scene
 
 
 class RigidClumps(Constraint):
@@ -59,7 +56,7 @@ class RigidClumps(Constraint):
         held: np.ndarray = start["clump"] != NO_CLUMP
         return held
 
-    def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
+    def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         domain, effects = scene.domain, scene.acting()
         (low, high), imaged = domain.bounds(), np.array(domain.imaged())
         touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)

@@ -12,7 +12,7 @@ from scipy.constants import G
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
-from tisim.effects.base import Effect, Force, LongRange
+from tisim.effects.base import Effect, Force, LongRange, SceneParts
 from tisim.effects.gravitation.tree_walk import TreeSum
 from tisim.errors import must
 
@@ -65,7 +65,8 @@ class TreeGravity(LongRange, Force):
     ) -> float | None:
         return fall_step(start)
 
-    def suits(self, domain: Domain) -> None:
+    def check(self, scene: SceneParts) -> None:
+        domain = scene.domain
         rule = f"one in which particles do not see images of each other, with effects.{self.label}"
         must(not any(domain.imaged()), domain.label, rule, domain.imaged())
 

@@ -14,6 +14,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import (
     Effect,
     PairForce,
+    SceneParts,
     SelfConsistentQuantity,
     keeps_apart,
     option,
@@ -61,10 +62,10 @@ class Dipoles(Pairwise):
             return math.inf
         return None
 
-    def suits_others(self, effects: Sequence[Effect]) -> None:
+    def check(self, scene: SceneParts) -> None:
         if not isinstance(self, SelfConsistentQuantity):
             return
-        forces = [one for one in effects if isinstance(one, Dipoles) and isinstance(one, PairForce)]
+        forces = [one for one in scene.effects if isinstance(one, Dipoles) and isinstance(one, PairForce)]
         for other in forces:
             where, theirs = f"effects.{self.label}", other.summed()
             must(self.alike == other.alike, where, "used with forces by the same sum", other.label)

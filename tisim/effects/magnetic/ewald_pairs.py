@@ -13,7 +13,7 @@ from scipy.constants import mu_0
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.domains.domain import Domain
-from tisim.effects.base import Effect, LongRange, Vector, option, parameter
+from tisim.effects.base import Effect, LongRange, SceneParts, Vector, option, parameter
 from tisim.effects.magnetic.dipole_pairs import Dipoles
 from tisim.effects.magnetic.ewald_accuracy import WIDEST_DECAY, most_waves, screening_for, waves_for
 from tisim.errors import must
@@ -98,7 +98,9 @@ class EwaldPairs(LongRange, Dipoles):
         limits = {"screening": screening, "wave_cutoff": self.wave_cutoff or 2 * s * screening}
         return self.model_copy(update=limits)
 
-    def suits(self, domain: Domain) -> None:
+    def check(self, scene: SceneParts) -> None:
+        super().check(scene)
+        domain = scene.domain
         joined, where = domain.imaged(), f"effects.{self.label}"
         rule = f"one in which particles see images of each other along two axes or three, with {where}"
         must(sum(joined) >= 2 and not domain.shears(), domain.label, rule, joined)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Component, Text
 from tisim.domains.domain import Domain
-from tisim.effects.base import Effect, Field, Force, option
+from tisim.effects.base import Effect, Field, Force, SceneParts, option
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.walls.motion import Fixed, Motion, MotionState, resultant, resultant_units
 from tisim.effects.walls.wall_contacts import WallContacts
@@ -32,9 +32,6 @@ from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Materials
 from tisim.state.bound import Peers
 from tisim.state.fields import WorldField
-
-if TYPE_CHECKING:
-    from tisim.scene.scene import Scene
 
 FIELDS = ("past", "surface_past", "loads", "touched", "clear")
 """Fields of a grain for a wall, if needed: the contact history at planes and at surfaces, the load, the
@@ -92,11 +89,11 @@ class Walls(WallContacts, UsesMaterials, Force):
     def check_materials(self, materials: Materials) -> None:
         self.material_index(materials)
 
-    def suits_start(self, start: Mapping[str, np.ndarray], scene: Scene) -> None:
+    def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         effects = scene.acting()
         for law in effects:
             if isinstance(law, GranularContact):
-                law.suits_wall(start, effects, self.material_index(self._materials), self.label)
+                law.check_wall(start, effects, self.material_index(self._materials), self.label)
         later = [effect.largest_newcomers()["radius"] for effect in effects]
         radii = np.concatenate([start["radius"], *later])
         reach = float(radii.max(initial=0.0))

@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from tisim.components.component import option, parameter
-from tisim.domains.domain import Domain
-from tisim.effects.base import Effect, Force, PairEvent, PairForce
+from tisim.effects.base import Effect, Force, PairEvent, PairForce, SceneParts
 from tisim.errors import must
 from tisim.forces.loads import FORCE
 from tisim.operators.base import Operator
@@ -82,8 +81,9 @@ class Brownian(Stepper):
     def order(self) -> int:
         return 1
 
-    def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
-        super().suits(effects, domain)
+    def check(self, scene: SceneParts) -> None:
+        super().check(scene)
+        effects, domain = scene.effects, scene.domain
         for effect in effects:
             name = f"effects.{effect.label}"
             turns = isinstance(effect, Force | PairForce) and effect.turns(effects)

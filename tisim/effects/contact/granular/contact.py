@@ -37,7 +37,7 @@ class GranularContact(MaterialLaw, PairForce):
     # This step control limits the approach of surfaces, but ignores the stiffness of contacts.
     incompatible_controls = ("approach_time",)
 
-    def suits_wall(
+    def check_wall(
         self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], material: int, label: str
     ) -> None:
         """Raise InputError unless it can act between walls of a material and the particles of a start, or

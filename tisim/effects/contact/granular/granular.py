@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -11,7 +11,7 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.component import Component
 from tisim.domains.domain import Domain
-from tisim.effects.base import Effect, option
+from tisim.effects.base import Effect, SceneParts, option
 from tisim.effects.base.critical_step import (
     SLIDING,
     adhesive_contact,
@@ -41,9 +41,6 @@ from tisim.errors import Words, must
 from tisim.materials.material_law import MaterialLaw
 from tisim.materials.materials import Touching
 from tisim.numerics.vectors import piece
-
-if TYPE_CHECKING:
-    from tisim.scene.scene import Scene
 
 
 @ti.func
@@ -137,7 +134,7 @@ class Granular(ContactGuards, GranularContact):
                 tried.append(law)
         return tuple(tried)
 
-    def suits_start(self, start: Mapping[str, np.ndarray], scene: "Scene") -> None:
+    def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         if self.by_overlap:
             check_grains(self, self._materials, with_newcomers(start, scene.acting()))
 
@@ -166,7 +163,7 @@ class Granular(ContactGuards, GranularContact):
         part = lagging_contact(accuracy) if lags else elastic_contact(accuracy)
         return min(part, adhesive_contact(accuracy)) if self.adhesive else part
 
-    def suits_wall(
+    def check_wall(
         self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], material: int, label: str
     ) -> None:
         if self.by_overlap:
