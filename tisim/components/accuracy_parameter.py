@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-if TYPE_CHECKING:
-    from tisim.components.component import Component
+from pydantic import BaseModel
 
 
 def three_digits(value: float) -> float:
@@ -13,7 +12,7 @@ def three_digits(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-Part = TypeVar("Part", bound="Component")
+Part = TypeVar("Part", bound=BaseModel)
 
 
 class AccuracyParameter:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from tisim.components.component import Component, option
-from tisim.components.cost_hints import StepperHints
 from tisim.effects.base import (
     Constraint,
     DerivedQuantity,
@@ -35,7 +34,7 @@ def single(effect: Effect) -> bool:
     return isinstance(effect, Source | DerivedQuantity) and not mutual
 
 
-class Stepper(StepperHints, Component):
+class Stepper(Component):
     """A stepper advances time, and its control chooses the length of each step: the contract of both.
 
     Before the first step, ``force`` and ``torque`` have the values of the initial state.
@@ -100,6 +99,22 @@ class Stepper(StepperHints, Component):
         """Return whether the stepper may advance each particle by itself: by default, if particles do not
         interact and only forces change them."""
         return all(single(effect) for effect in effects)
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        """Return the steppers of this class for ``tisim cost`` to try in a scene with these effects and steps
+        of about dt (s); by default none."""
+        return ()
+
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Any, ...] | None:
+        """Return the steppers to compare with this one; None, the default, for the alternatives of every
+        class."""
+        return None
+
+    def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
+        """Return the number of force evaluations per particle, averaged over particles, from the counts of a
+        run; by default one per step."""
+        return work["particle_steps"] / particles
 
     def structure(self) -> tuple[Any, ...]:
         own = tuple(option for option in super().structure() if option != ("control", self.control))

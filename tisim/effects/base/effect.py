@@ -11,7 +11,6 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, option
-from tisim.components.cost_hints import LawHints
 from tisim.state.bound import Peers
 from tisim.state.fields import Field, WorldField
 
@@ -43,7 +42,7 @@ class SceneParts(Protocol):
     def acting(self) -> tuple[Effect, ...]: ...
 
 
-class Effect(LawHints, Component):
+class Effect(Component):
     """An effect is any physical part of a scene: this is the contract of all effects.
 
     Laws derive from one of its kinds: ``Force``, ``PairForce``, ``PairEvent``, ``DerivedQuantity``,
@@ -62,7 +61,9 @@ class Effect(LawHints, Component):
     order lose their order. leapfrog : whether only explicit steppers integrate it to second order, because it
     has a history, rotates with its particle, or moves it. guards_steps : whether it stops its world itself if
     a step is too long for it, or whether no step is too long. step_dependent : whether its law contains the
-    length of the step, so that no accuracy can be requested.
+    length of the step, so that no accuracy can be requested. smooth : whether its forces have derivatives of
+    all orders along the trajectory; otherwise steppers of high order, and steps that follow the error, gain
+    nothing.
     """
 
     contract: ClassVar[bool] = True
@@ -84,6 +85,7 @@ class Effect(LawHints, Component):
     leapfrog: ClassVar[bool] = False
     guards_steps: ClassVar[bool] = False
     step_dependent: ClassVar[bool] = False
+    smooth: ClassVar[bool] = True
 
     @classmethod
     def called(cls, data: Mapping[str, Any]) -> str:
@@ -144,6 +146,11 @@ class Effect(LawHints, Component):
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         """Raise InputError if it cannot act on the particles of a start, by field name, in its scene; by
         default it can."""
+
+    def approximations(self, extent: float) -> tuple[Any, ...]:
+        """Return cheaper laws for ``tisim cost`` to try in place of this one, the coarsest first, for
+        particles up to ``extent`` (m) apart; by default none."""
+        return ()
 
     def beside(self, other: Effect) -> Self:
         """Return a copy with the settings that it must share with an effect that replaces another; by default
