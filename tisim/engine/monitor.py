@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import RUNNING, Status
+from tisim.engine.worlds import Worlds
 from tisim.errors import RunError
 from tisim.pairs.half_list import ListSizes
 from tisim.state.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from tisim.engine.simulation import Simulation
 
 REASONS: dict[int, str] = {
     WorldStatus.RUNNING: RUNNING,
@@ -46,7 +45,7 @@ class Monitor:
     faults : world -> (time of the fault in s, description).
     """
 
-    def __init__(self, simulation: Simulation, image: Image | None = None) -> None:
+    def __init__(self, simulation: Worlds, image: Image | None = None) -> None:
         """Begin to monitor a simulation.
 
         image : the state that the simulation was set to, or its state before the step under way; None at the
@@ -229,3 +228,9 @@ class Monitor:
         if speed[who] == 0.0:
             return passed
         return f"{passed}; it must be below {smallest / speed[who]:.3g} s, and far shorter if particles touch"
+
+
+class MonitoredWorlds(Worlds, Protocol):
+    """Worlds with the monitor that keeps their last good state."""
+
+    monitor: Monitor

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tisim.effects.base import DerivedQuantity
 from tisim.engine.crowding import check_places, warn_of_overlaps
 from tisim.engine.loading import check_field, check_start
-from tisim.engine.monitor import Monitor
+from tisim.engine.monitor import Monitor, MonitoredWorlds
 from tisim.errors import Words, must
 from tisim.forces.loads import FORCE, TORQUE
 from tisim.scene.initial_state import check_sizes
 from tisim.state.status import NEVER, WorldStatus
-
-if TYPE_CHECKING:
-    from tisim.engine.simulation import Simulation
 
 
 class ParticleState(Mapping[str, np.ndarray]):
@@ -35,7 +32,7 @@ class ParticleState(Mapping[str, np.ndarray]):
     time under ``settings["edited"]``; ``Result.start`` stays the loaded initial state.
     """
 
-    def __init__(self, simulation: Simulation, world: int) -> None:
+    def __init__(self, simulation: MonitoredWorlds, world: int) -> None:
         self._simulation, self._world = simulation, world
 
     @property
@@ -94,7 +91,7 @@ def _numbers(name: str, values: Any, whole: bool) -> np.ndarray:
     return floats
 
 
-def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None:
+def _edit(simulation: MonitoredWorlds, w: int, name: str, values: np.ndarray) -> None:
     """Write a quantity of a world between two steps, and recompute everything that depends on it."""
     s = simulation.s
     now, before = s.image(), simulation.monitor.replay.whole()
@@ -126,7 +123,7 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
     simulation.monitor.check_worlds()
 
 
-def _begin_again(simulation: Simulation, now: Mapping[str, np.ndarray]) -> None:
+def _begin_again(simulation: MonitoredWorlds, now: Mapping[str, np.ndarray]) -> None:
     """Set the worlds to an image, and prepare the next step of the running ones."""
     simulation.put(now)
     simulation.s.write("pause_time", np.inf)

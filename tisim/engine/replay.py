@@ -25,7 +25,7 @@ from tisim.state.status import WorldStatus
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tisim.engine.simulation import Simulation
+    from tisim.engine.worlds import Worlds
 
 Image = dict[str, np.ndarray]
 EVERY = 10.0
@@ -41,7 +41,7 @@ class Replay:
     state, as most runs are short and do not fail.
     """
 
-    def __init__(self, simulation: Simulation, base: Image | None) -> None:
+    def __init__(self, simulation: Worlds, base: Image | None) -> None:
         self.simulation, self.base, self.saved_at, self.pause = simulation, base, time.perf_counter(), EVERY
 
     def save_image(self) -> None:

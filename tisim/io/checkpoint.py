@@ -13,25 +13,27 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from tisim.backend import runtime
-from tisim.engine.monitor import Monitor
+from tisim.engine.monitor import Monitor, MonitoredWorlds
 from tisim.engine.observer import Observer
-from tisim.engine.simulation import Simulation
 from tisim.errors import Words, must
 from tisim.files import checksum
 from tisim.io.checkpoint_columns import check_columns
 from tisim.scene.initial_state import Arrays
 
+if TYPE_CHECKING:
+    from tisim.engine.simulation import Simulation
+
 CHECKPOINT_FORMAT = "tisim checkpoint 5"
 BEFORE_STEP = "before"
 
 
-def _identity(simulation: Simulation) -> dict[str, Any]:
+def _identity(simulation: MonitoredWorlds) -> dict[str, Any]:
     """Return the properties that must be equal in a checkpoint and in the simulation that it is restored
     to."""
     return {
@@ -43,7 +45,7 @@ def _identity(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-def save(simulation: Simulation, path: str | Path) -> None:
+def save(simulation: MonitoredWorlds, path: str | Path) -> None:
     """Write a checkpoint of a loaded simulation that is between two steps.
 
     At every instant, path is either the old or the complete new file. Raise RunError if the disk is full.
@@ -99,7 +101,7 @@ def snapshot(path: str | Path) -> Snapshot:
         return Snapshot(times, steps, states)
 
 
-def restore(simulation: Simulation, path: str | Path) -> None:
+def restore(simulation: MonitoredWorlds, path: str | Path) -> None:
     """Restore a simulation, loaded with the same scenes, to the state in a checkpoint.
 
     Raise InputError if the file is not a checkpoint, is truncated or damaged, or is of other scenes, another
