@@ -1,4 +1,4 @@
-"""Fits of flow curves to curves that are known, exact and with noise of a known size."""
+"""Fits of flow curves to known curves, exact and with noise of known size."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_rates_up_to_a_limit_are_left_out():
     ],
 )
 def test_intervals_hold_the_truth_as_often_as_they_say(rng, fit, law, true, known):
-    """Of 400 noisy curves; with errors that are known, and unlike."""
+    """Over 400 noisy curves, with fitted noise and with known errors that differ between points."""
     error, tries = np.where(RATE > 30, 0.3, 0.1) if known else np.full(len(RATE), 0.2), 400
     held = np.zeros(len(true))
     for _ in range(tries):

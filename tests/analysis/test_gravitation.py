@@ -1,4 +1,4 @@
-"""Energy, angular momentum and virial ratio against pairs one by one, closed forms and changes of frame."""
+"""Energy, angular momentum and virial ratio against pair-by-pair sums, closed forms and changes of frame."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def test_a_circular_pair_is_in_balance_and_turns_with_the_momentum_of_its_reduce
 
 
 def test_a_rigid_body_has_the_momentum_of_its_moments_of_inertia(cloud):
-    """L = I w with that of each sphere about its centre, 2/5 m R^2."""
+    """L = I w; I includes the moment of inertia of each sphere about its own centre, 2/5 m R^2."""
     position, _, mass = cloud
     radius, w = np.linspace(0.1, 0.5, 17), np.array([0.3, -0.2, 0.5])
     arm = position - mass @ position / mass.sum()

@@ -1,4 +1,5 @@
-"""Which package compiles the kernels, for every processor and whatever is installed; what a user is told."""
+"""The choice of the kernel compiler, for every processor and set of installed packages; messages to
+the user."""
 
 import os
 import subprocess
@@ -18,7 +19,7 @@ BOTH = ["taichi", "quadrants"]
 
 
 def x86(vendor, family, model):
-    """What /proc/cpuinfo says of a processor."""
+    """The entry of /proc/cpuinfo for a processor."""
     return {"vendor_id": vendor, "cpu family": str(family), "model": str(model)}
 
 
@@ -45,7 +46,8 @@ ZEN_4 = x86("AuthenticAMD", 25, 0x11)
     ],
 )
 def test_the_compiler_that_knows_the_processor_is_taken(cpu, taken):
-    """The newest where none is known to know it; the only one where there is one."""
+    """The newest compiler if none is known to support the processor; the installed one if there is
+    only one."""
     assert choice.automatic(BOTH, cpu) == taken
     for only in BOTH:
         assert choice.automatic([only], cpu) == only
@@ -53,7 +55,7 @@ def test_the_compiler_that_knows_the_processor_is_taken(cpu, taken):
 
 
 def test_the_table_has_the_llvm_that_is_in_each_package():
-    """The one in use by itself, the other in a process of its own."""
+    """One package is loaded in this process, the other in a separate process."""
     assert int(llvm_version().split(".")[0]) == choice.LLVM[BACKEND]
     (other,) = (name for name in BOTH if name != BACKEND)
     code = "from tisim.describe.diagnostics import llvm_version as v; print(v())"
@@ -61,7 +63,7 @@ def test_the_table_has_the_llvm_that_is_in_each_package():
 
 
 def python(code, **environment):
-    """A process that runs this code, with warnings as errors, and TISIM_BACKEND only where it is given."""
+    """A process that runs this code, with warnings as errors, and with TISIM_BACKEND only if it is given."""
     inherited = {name: value for name, value in os.environ.items() if name != choice.VARIABLE}
     command = [sys.executable, "-W", "error::RuntimeWarning", "-W", "error::UserWarning", "-c", code]
     environment = inherited | {name: str(value) for name, value in environment.items()}
@@ -100,7 +102,7 @@ def test_a_wrong_name_and_a_package_that_is_absent_are_refused(monkeypatch):
         r" TISIM_BACKEND left out; received 'quadrants'$",
     ):
         choice.check()
-    # What is imported meanwhile is one that is there.
+    # A package that is installed is imported in the meantime.
     assert choice.chosen() == "taichi"
 
 
@@ -142,7 +144,7 @@ def test_nothing_is_said_where_nothing_is_lost_or_somebody_has_chosen(tmp_path, 
     monkeypatch.setenv(choice.VARIABLE, "taichi")
     choice.advise(tmp_path)
     monkeypatch.delenv(choice.VARIABLE)
-    # Where it cannot be kept that it has been said, it would be said every time.
+    # The note is not printed if there is no folder to record it in; it would reappear in every run.
     choice.advise(tmp_path / "absent")
     assert capsys.readouterr() == ("", "")
     closed = (tmp_path / "closed").open("w")
@@ -152,7 +154,7 @@ def test_nothing_is_said_where_nothing_is_lost_or_somebody_has_chosen(tmp_path, 
 
 
 def test_the_first_processor_is_read(tmp_path, monkeypatch):
-    """Of a file that goes on: nothing of the second is read. Where there is none, there is a name."""
+    """Only the first processor of the file is read. Without the file, the result has a model name."""
     info = tmp_path / "cpuinfo"
     info.write_text(
         "vendor_id\t: AuthenticAMD\ncpu family\t: 26\nmodel\t\t: 2\nflags\t\t: a:b\n\nmodel : 3\n"

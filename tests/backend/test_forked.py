@@ -1,5 +1,5 @@
-"""A process that is forked after Taichi has been started says so at once, and reads; it harms nothing of the
-parent's."""
+"""A process forked after Taichi has started refuses to run anything at once, can still read results, and does
+not disturb its parent."""
 
 import multiprocessing
 import os
@@ -28,7 +28,7 @@ def forked(function, *arguments):
     """Return what a function returns in a forked process, or the error that it raises there."""
     reader, writer = os.pipe()
     with warnings.catch_warnings():
-        # Python warns of a fork where there are threads, as of 3.12: that is what is tried here.
+        # As of Python 3.12, a fork with threads running gives a warning; such a fork is intended here.
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if not child:
@@ -85,7 +85,7 @@ def test_a_turn_that_another_thread_has_is_not_waited_for():
 
 
 def test_a_child_does_not_hold_the_locks_of_its_parent(tmp_path):
-    """Nor takes them from it, as it leaves the context that it was forked in."""
+    """Nor does it release the parent's locks when it leaves the context in which it was forked."""
     path = tmp_path / "lock"
 
     def leave():

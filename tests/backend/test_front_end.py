@@ -1,4 +1,4 @@
-"""What the front end of the compiler remembers is what it would find."""
+"""The cached look-ups of the compiler's front end equal the uncached ones."""
 
 import ast
 import importlib
@@ -22,7 +22,7 @@ from tisim.backend.taichi import BACKEND, ti
 
 
 def decorated(function):
-    """As in the packages: a decorator that calls, at level 0, what asks for the frame at level 3."""
+    """A decorator that asks, at level 0, for the frame at level 3, as in the packages."""
     function.in_class = _in_class_body(3)
     return function
 
@@ -157,7 +157,7 @@ def test_while_a_package_is_imported_frames_have_the_line_that_they_have():
     def told():
         class Here:
             frame = sys._getframe()
-            # The line is the one that runs: asked for in the same line.
+            # Both calls are on one line, because the frame reports the line that is running.
             both = (thorough(frame), inspect.getframeinfo(frame))
 
         return Here.both
@@ -181,7 +181,7 @@ FROZEN = eval(compile("__import__('sys')._getframe()", "<nowhere>", "eval"))
 
 @dataclass
 class Pair:
-    """What a kernel of Quadrants takes apart."""
+    """An argument that a Quadrants kernel takes apart."""
 
     first: ti.i32
     second: ti.i32
@@ -217,7 +217,7 @@ def test_a_kernel_without_dataclasses_is_read_once(monkeypatch):
         return double, total
 
     runtime.current()
-    # Others' kernels are read as ever.
+    # Kernels of other modules are read as usual.
     for module, times in (("tisim.kernels", [1]), ("mine", [0, 1])):
         double, total = kernels(module)
         assert in_taichi_thread(double)(21) == 42
