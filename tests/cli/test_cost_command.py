@@ -1,4 +1,4 @@
-"""tisim cost: what it writes and answers, how it is stopped and goes on, and what it refuses."""
+"""tisim cost: its files and answers, its interruption and continuation, and its errors."""
 
 import csv
 import os
@@ -49,7 +49,8 @@ def test_wrong_input_is_reported_and_nothing_written(tisim, tmp_path, arguments,
 
 
 def test_a_case_has_a_size_of_its_own_for_costs(tisim, tmp_path, monkeypatch):
-    """granular_bench is measured in a bed, unless another size is given; others as they are run."""
+    """granular_bench is measured in a bed, unless another size is given; other cases at their
+    default size."""
     asked = []
 
     def note(target, size, *others):
@@ -101,7 +102,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, mon
         assert "dt=" not in err
         code, out, err = tisim(*command, "1e-3", "--anyway")
     assert code == 0
-    # Nothing is said at the end only: where the error is from, and what is wrong with it, comes first.
+    # The source of the error, and problems with it, are printed first, not only at the end.
     truth, advice, *measured = [
         line for line in err.splitlines() if not line.startswith(("running", "going"))
     ]
@@ -151,7 +152,7 @@ GIVEN = [
 
 @pytest.mark.parametrize("words", GIVEN, ids=lambda words: " ".join(words[1::2]) or "nothing")
 def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, monkeypatch, own_file, words):
-    """Whatever was given to tisim cost, and whatever the setting is: stepper, tolerance, law, precision or
+    """For all arguments of tisim cost, and for every kind of setting: stepper, tolerance, law, precision or
     arithmetic."""
     monkeypatch.chdir(tmp_path)
     own_file("own_laws.py", LAW)
@@ -174,8 +175,8 @@ def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, mon
 
 
 def parsed(command, *words):
-    """Of the words of a command the scene, precision and arithmetic, and what the parser makes of those of a
-    scene."""
+    """Parse a command; return its scene, its precision and arithmetic, and the parsed arguments that select
+    the scene."""
     parameters = get_command(app).commands[command].make_context(command, list(words)).params
     _, scene = scene_arguments.load_scene(
         parameters["target"],

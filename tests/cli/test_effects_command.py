@@ -1,4 +1,4 @@
-"""``tisim effects``: the index, one of them, and what is none of them."""
+"""``tisim effects``: the index, a single effect, and unknown names."""
 
 import re
 import sys

@@ -1,4 +1,4 @@
-"""tisim optimize on a plain function in the user's file, with a gene kept at a value."""
+"""tisim optimize on a plain function in the user's file, with one gene fixed at a value."""
 
 import csv
 

@@ -1,4 +1,4 @@
-"""Trajectories from the command line, and what shows them."""
+"""Trajectories from the command line, and the commands that show them."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(
     tisim, tmp_path, first, monkeypatch
 ):
-    """A folder as version 0.1.0 left it, with pictures that have other names by now."""
+    """A folder as version 0.1.0 left it, with pictures whose names have since changed."""
     monkeypatch.setattr("tisim.plotting.movie.movie", lambda *arguments: None)  # drawing is slow
     sizes = {"default": Size("", {})}
     parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
@@ -131,7 +131,7 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
 def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
     tisim, toml, tmp_path, monkeypatch
 ):
-    """The system refuses to let files grow while the run goes on; then there is room again."""
+    """The system refuses to let files grow during the run; later there is room again."""
     folder = tmp_path / "out" / "flow"
 
     def crowded(self, run=Simulation.run, **how):
@@ -231,7 +231,7 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
     assert names == {".tisim", "cloud.png", "time_series.png", "own.png"}
     assert counts == [4]
     code, out, _ = tisim("figures", "toy", "--size", "small")
-    # Numbers are written before a figure can fail.
+    # Tables are written before figures, because drawing a figure can fail.
     assert (code, out.split()) == (0, ["out/toy-figures/many.csv", "out/toy-figures/many.png"])
     assert (tmp_path / "out/toy-figures/many.csv").read_text() == "size\nsmall\n"
     (tmp_path / "out/toy-figures/notes.txt").write_text("the user's own")

@@ -1,4 +1,4 @@
-"""tisim optimize and compare on a Python file of the user's; a case of the user's in all commands."""
+"""tisim optimize and compare on a user's Python file; a user's case in all commands."""
 
 import csv
 from pathlib import Path
@@ -33,7 +33,7 @@ def test_a_problem_is_searched_and_gone_on_with(tisim, own_file):
 @pytest.mark.long
 @pytest.mark.slow
 def test_another_objective_in_the_file_is_another_search(tisim, own_file):
-    """Evaluations of the old one are not taken for those of the new one."""
+    """Evaluations of the old objective are not used for the new one."""
     own_file("my_drift.py", PROBLEM)
     begun = [*SEARCH, "--generations", "0"]
     assert tisim(*begun)[0] == 0

@@ -1,4 +1,4 @@
-"""--plugin: an effect of the user's own in all commands that read scenes."""
+"""--plugin: a user's effect in all commands that read scenes."""
 
 import json
 import re

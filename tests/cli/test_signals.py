@@ -1,4 +1,4 @@
-"""What asks a command to stop: Ctrl-C, SIGTERM, SIGHUP; and a terminal that is closed."""
+"""Requests to stop a command: Ctrl-C, SIGTERM, SIGHUP; and a closed terminal."""
 
 import contextlib
 import fcntl
@@ -20,7 +20,7 @@ ASKED = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 
 @pytest.fixture(autouse=True)
 def listener():
-    """Signals are heard here, also where the tests run in the background or under nohup."""
+    """Handle signals, even if the tests run in the background or under nohup."""
     before = {number: signal.signal(number, signal.default_int_handler) for number, _ in ASKED}
     yield
     for number, handler in before.items():
@@ -41,7 +41,7 @@ def test_signal_is_reported_at_once_and_raised_at_a_good_moment(number, code):
 
 
 def test_only_ctrl_c_forces():
-    """Whoever ends a session may send SIGTERM and SIGHUP, and each of them to a process and to its group."""
+    """At the end of a session SIGTERM and SIGHUP may both come, each to a process and to its group."""
     with Interrupt(lambda: None) as handler:
         for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGHUP):
             os.kill(os.getpid(), number)
@@ -91,7 +91,7 @@ def test_commands_that_keep_nothing_end_as_well(tisim, monkeypatch, number, code
 
 @pytest.mark.slow
 def test_run_whose_terminal_is_closed_saves_a_checkpoint(toml, tmp_path):
-    """All that it prints then fails."""
+    """From then on every print fails."""
     scene = Scene.from_toml(tmp_path / toml).model_copy(update={"duration": 1e3})
     (tmp_path / toml).write_text(scene.to_toml())
     ours, theirs = os.openpty()

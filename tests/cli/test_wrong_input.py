@@ -109,7 +109,7 @@ def test_checkpoint_seconds_that_are_none(tisim, impacts, monkeypatch, seconds):
 
 
 def number_options():
-    """(command, option) of all options that are numbers."""
+    """(command, option) for all numeric options."""
     for name, command in get_command(app).commands.items():
         types = get_type_hints(inspect.unwrap(command.callback))
         for option in command.params:
@@ -128,7 +128,7 @@ def test_a_word_for_a_number_is_refused_in_one_form(tisim, command, option):
     "words", [["-c", "from tisim.cli.main import main; main(['cases'])"], ["-m", "tisim", "cases"]]
 )
 def test_a_backend_that_is_none(words):
-    """Told in a line by the command, as importing the package has gone well."""
+    """The command reports it in a line, because importing the package succeeds."""
     environment = {**os.environ, "TISIM_BACKEND": "os"}
     command = [sys.executable, *words]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""Numbers as users give them, of NumPy too, are kept as they are or refused."""
+"""Numbers given by users, including NumPy's, are stored unchanged or refused."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0])
 
 
 def particles(**given):
-    """Return a particle, or what is given of it."""
+    """Return a single particle, with the given values replaced."""
     whole = {"position": [(0, 0, 0)], "velocity": [(0, 0, 0)], "radius": 1e-3, "density": 1.0}
     return tisim.Particles(**(whole | given))
 

@@ -1,4 +1,4 @@
-"""What tisim says of itself is complete: parts, parameters and options have texts; templates make parts."""
+"""The reference texts are complete: parts, parameters and options have texts; templates make parts."""
 
 import re
 import tomllib
@@ -19,7 +19,7 @@ from tisim.effects import Force
 ENTRIES = [entry for entry in reference.entries() if entry.kind.__module__.startswith("tisim.")]
 ALL = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
 TABLES = [entry for entry in ENTRIES if entry.toml]
-"""Without rows of lists, which stand in the tables of their sources."""
+"""Without rows of lists, which are described in the tables of their sources."""
 LISTS = (
     tuple[float, ...],
     tuple[float, ...] | None,
@@ -119,7 +119,7 @@ def test_families_share_nothing_and_leave_nothing_out():
     names = [entry.name for entry in ENTRIES]
     assert len(set(names)) == len(names)
     kinds = {kind.kind() for kind in Component.known().values() if kind.__module__.startswith("tisim.")}
-    # Templates of clumps are made in Python alone.
+    # Clump templates are made in Python only.
     assert kinds - set(names) == {"clump", "component", "scene"}
 
 
@@ -130,7 +130,7 @@ def test_what_a_part_needs():
     assert needs["lorentz"][0] == "a source of electric_field or magnetic_flux_density"
     assert needs["sphere"] == ("magnetic_spheres, a row of its spheres",)
     assert needs["collocation"] == ("a step control: stage_control",)
-    # "no impact or recorder", where a test of another file has an event of its own.
+    # If a test of another file defines an event of its own, the text is "no impact or recorder".
     assert any(one.startswith("no impact") for one in needs["capture"])
 
 

@@ -1,4 +1,4 @@
-"""What does not go with a box in simple shear."""
+"""Parts that cannot be combined with a box in simple shear."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Two effects of one kind in a scene, told apart by their names; without names nothing is another."""
+"""Two effects of one kind in a scene, distinguished by their names."""
 
 import json
 import re
@@ -22,19 +22,19 @@ ONE = ([[0, 0, 0]], [[0, 0, 0]])
 
 
 class Remembering(SoftShell):
-    """One whose pairs remember two values."""
+    """A shell whose pairs store two values."""
 
     memory = 2
 
 
 def one(*effects, **more):
-    """A scene of one grain under these."""
+    """A scene of one grain under these effects."""
     return scene(*ONE, effects, mass=1.0, **more)
 
 
 @pytest.mark.slow
 def test_each_acts_with_its_own_parameters(rng):
-    """The forces of two Mie pairs, one of them without a name, are the sum of their twins in NumPy."""
+    """The forces of two Mie pairs, one of them without a name, are the sum of their NumPy references."""
     for other in (CORE, Mie(epsilon=2.0)):
         setup = crowd(rng, SHELL).model_copy(update={"effects": (other, SHELL)})
         (result,) = simulate([setup])
@@ -83,7 +83,7 @@ def test_a_name_is_part_of_the_digest_and_the_kind_is_no_name():
 
 @pytest.mark.long
 def test_two_oscillating_fields_add_up():
-    """The force on a charge in both is that of the sum, with a frequency for each."""
+    """The force on a charge in both fields is the force in their sum; each field has its own frequency."""
     slow = ElectricField(name="slow", amplitude=(1.0, 0, 0), omega=(3.0, 0, 0))
     fast = ElectricField(name="fast", amplitude=(0, 2.0, 0), omega=(0, 50.0, 0), phase=(0, 0.3, 0))
     setup = one(slow, fast, Lorentz(), quantities={"charge": 1e-6}, dt=0.01, steps=7)
@@ -103,13 +103,13 @@ def test_what_touching_pairs_remember_is_kept_for_each_by_name():
 
 
 class Anchored(Gravity):
-    """One that declares a field of its own, in another unit than Tether does."""
+    """An effect that declares a field of its own, in another unit than Tether does."""
 
     fields = (Field("anchor", "mm", 3, "mean", default="position"),)
 
 
 def test_fields_that_two_declare_must_agree():
-    """Two tethers share the place where a particle began; what is declared differently is refused."""
+    """Two tethers share the field of initial positions; a conflicting declaration is refused."""
     tethers = (Tether(stiffness=(1.0,) * 3), Tether(name="other", stiffness=(2.0,) * 3))
     shared = resolve_fields(needed_fields(tethers, Verlet()))
     assert [field.name for field in shared].count("anchor") == 1
