@@ -1,4 +1,4 @@
-"""Magnetic moments along the field, and the pull of a field on them, against NumPy and closed forms."""
+"""Magnetic moments along the field, and the force of a field on them, against NumPy and closed forms."""
 
 from decimal import Decimal, getcontext
 
@@ -33,7 +33,7 @@ def made_of(rng, law, **quantities):
 
 
 def check(scenes, size):
-    """Moments of ``size`` along B, and the force of the gradient on them."""
+    """Moments of ``size`` along B, and the force of the field gradient on them."""
     for one, state in zip(scenes, loads(scenes), strict=True):
         b = flux_density(one.effects, state["position"])
         strength = np.linalg.norm(b, axis=1)
@@ -43,7 +43,7 @@ def check(scenes, size):
 
 
 def test_langevin_moments_of_many_domains(rng):
-    """x from 1e-2 to 1e2, for each particle its own domains."""
+    """x from 1e-2 to 1e2; each particle has its own domains."""
     scenes = []
     for _ in range(WORLDS):
         law = LangevinMoment(temperature=float(rng.uniform(100, 500)))
@@ -86,8 +86,9 @@ STEPPERS = [
 
 @pytest.mark.parametrize("stepper", STEPPERS)
 def test_every_stepper_solves_moments_before_forces(stepper):
-    """In B = (y, x, 0), T, a moment of k B is pulled by k r in the plane: r = r_0 cosh wt + v_0/w sinh wt,
-    w^2 = k/m. At the end the moment is that of the place; with Boris' stepper, of half a step before."""
+    """In B = (y, x, 0), T, the force on a moment k B is k r in the plane: r = r_0 cosh wt + v_0/w sinh wt,
+    w^2 = k/m. The final moment belongs to the final position; with Boris' stepper, to the position half a
+    step before."""
     k = 4 * np.pi / MU_0 * 0.4 * 1e-7
     effects = (
         Quadrupole(constant=(0, 0, 0), scale=(1, 1, 0)),

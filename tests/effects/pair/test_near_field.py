@@ -1,4 +1,5 @@
-"""The near field against its NumPy twin: every strength, whole and other exponents, near pairs only."""
+"""The near field against its NumPy reference: every strength, integer and other exponents, near
+pairs only."""
 
 from itertools import product
 
@@ -93,7 +94,7 @@ def test_exponents(exponents, rng):
 
 @pytest.mark.slow
 def test_near_pairs_only(rng):
-    """Also over the pair list, which a world of more particles than it looks through one by one has."""
+    """Also over the pair list, which worlds with many particles use."""
     scenes = [
         cloud(rng, TruncatedNearField(**coefficients(rng), cutoff=rng.uniform(0.4, 0.8)))
         for _ in range(WORLDS)
@@ -108,7 +109,7 @@ def test_near_pairs_only(rng):
 
 @pytest.mark.long
 def test_alpha1_attracts_and_alpha2_repels():
-    """Two particles side by side; between unlike signs each does the opposite."""
+    """Two particles side by side; between unlike signs each force is reversed."""
 
     def on_the_left(**options):
         setup = scene([[0, 0, 0], [0.5, 0, 0]], np.zeros((2, 3)), (NearField(**options),), quantities=signs)
