@@ -1,4 +1,4 @@
-"""Flows that drag laws feel, against NumPy and a closed form."""
+"""Flows that act on particles through drag laws, against NumPy and a closed form."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
-"""Walls at periodic faces of a box: felt where they go on from face to face, refused where they would have to
-be felt through one."""
+"""Walls at periodic faces of a box: accepted if they continue from face to face, refused if they would have
+to act through a face."""
 
 import numpy as np
 import pytest
@@ -91,7 +91,7 @@ FELT = {
 
 
 def scene(duration=1e-6, **walls):
-    """Return a grain that lies in a floor at 0.02 m by OVERLAP, in the middle."""
+    """Return a grain that overlaps a floor at 0.02 m by OVERLAP, in the middle."""
     return tisim.Scene(
         particles=tisim.Particles(
             position=[(0.05, 0.05, 0.02 + RADIUS - OVERLAP)], velocity=[(0, 0, 0)], radius=RADIUS,
@@ -106,13 +106,13 @@ def scene(duration=1e-6, **walls):
 
 
 def start(made):
-    """Look at the start of a scene as a run does, without compiling it."""
+    """Check the start of a scene as a run does, without compiling it."""
     for effect in made.acting():
         effect.suits_start(made.start(), made)
 
 
 def test_a_mesh_that_does_not_tell_its_distances_is_refused_beside_a_duct(monkeypatch):
-    """One of very many triangles is not taken for one that is the same at both faces."""
+    """A mesh of very many triangles is not accepted as equal at both faces."""
     monkeypatch.setattr("tisim.geometry.triangles.MOST_DISTANCES", 1)
     both = FELT["a duct of two pieces that reach beyond"] | {"surface": STAIR}
     with pytest.raises(tisim.InputError, match="it does not act through them"):
@@ -217,7 +217,8 @@ SHAPES = [
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.kind())
 def test_a_shape_reaches_as_far_as_it_says(shape):
-    """No farther, and so far: its distance from places on its extent is nowhere negative, and 0 somewhere."""
+    """No farther, and not less: its distance from points outside its extent is positive, and close to 0
+    somewhere on its boundary."""
     low, high = shape.extent()
     draw = np.random.default_rng(1)
     for axis in range(3):

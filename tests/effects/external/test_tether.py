@@ -1,4 +1,4 @@
-"""The tether to where a particle began, and gravity, against their NumPy twins."""
+"""The tether to the initial position, and gravity, against their NumPy references."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def stiffnesses(rng):
 
 
 def test_a_tether_draws_back_to_where_each_began(rng):
-    """The anchor is a copy of the start, to the bit, and stays where it is."""
+    """The anchor is a copy of the initial position, bit for bit, and is constant."""
     scenes = [cloud(rng, (Tether(stiffness=k),), dt=0.1, steps=3) for k in stiffnesses(rng)]
     for one, result in zip(scenes, simulate(scenes, worlds=WORLDS, capacity=16), strict=True):
         np.testing.assert_array_equal(result.state["anchor"], result.start["position"])
