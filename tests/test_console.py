@@ -1,4 +1,4 @@
-"""Progress that people see: what is compiled is said to be."""
+"""Progress bars: compilation is reported."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from tisim.program.launched_program import LaunchedProgram
 
 
 def test_a_bar_says_while_kernels_are_compiled():
-    """Compiling may be begun within compiling, as of lists that have grown."""
+    """Compilation may begin within compilation, for example for lists that have grown."""
     with progress_bar("run") as bar:
         bar.add_task("")
         (column,) = [one for one in bar.columns if isinstance(one, Compiling)]

@@ -1,4 +1,4 @@
-"""What the documents say can be done, can."""
+"""The scripts, links and citation in the documents are valid."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SCRIPTS = {
 }
 """The Python code of each page; files and guides are for test_contributing.py and test_guides.py."""
 PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": ["control="]}
-"""What they print, among other things."""
+"""Parts of their output."""
 
 
 @pytest.mark.long

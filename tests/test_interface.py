@@ -1,4 +1,4 @@
-"""What users import: everything is where it is looked for, and nothing is loaded before it is used."""
+"""Public imports: every name is available, and nothing is loaded before it is used."""
 
 import ast
 import importlib
@@ -19,7 +19,7 @@ HEAVY = ("taichi", "quadrants", "numpy", "scipy", "pydantic", "h5py", "matplotli
 
 
 def parts(family):
-    """Names of all parts of scenes that the modules of a family define, contracts too."""
+    """Names of all components of scenes that the modules of a family define, including contracts."""
     package = importlib.import_module(f"tisim.{family}")
     load(package)
     inside = (module for name, module in sys.modules.items() if name.startswith(f"tisim.{family}."))
@@ -35,7 +35,7 @@ def parts(family):
 def test_a_family_has_all_of_its_parts(family):
     package = importlib.import_module(f"tisim.{family}")
     missing = {name for name in parts(family) if not name.startswith("_")} - set(dir(package))
-    # What laws of one family share, and users do not name.
+    # Base classes shared by laws of one family, which users do not name.
     shared = {
         "AtIntervals",
         "BehindPlanes",

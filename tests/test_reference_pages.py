@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 @pytest.fixture(scope="module")
 def maker():
-    """docs/reference_pages.py, which is no part of a package."""
+    """docs/reference_pages.py, which does not belong to a package."""
     spec = importlib.util.spec_from_file_location("reference_pages", DOCS / "reference_pages.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -97,5 +97,5 @@ def test_docstrings_are_plain_text(maker):
 
 
 def test_the_list_of_parts_in_the_documents_is_that_of_the_code(maker):
-    """If not: python docs/reference_pages.py."""
+    """If it fails, run: python docs/reference_pages.py."""
     assert (DOCS / "parts.md").read_text(encoding="utf-8") == maker.parts()

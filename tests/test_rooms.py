@@ -1,4 +1,4 @@
-"""The order of the rooms holds: nothing is known to what it stands on."""
+"""The order of the rooms holds: no room imports from a later one."""
 
 import ast
 from collections import Counter
@@ -12,7 +12,7 @@ EARLY, LATE = rooms.imports(Path(__file__).parents[1])
 
 
 def above(imports):
-    """(module, what it imports) where that stands above it."""
+    """(module, imported module) for imports from a later room."""
     pairs = {(module, other) for module, others in imports.items() for other in others}
     return {(module, other) for module, other in pairs if rooms.room(other) > rooms.room(module)}
 
@@ -37,7 +37,7 @@ CASES = {name for name in EARLY if name.startswith("tisim.cases.") and f"{name}.
 
 
 def test_modules_of_a_case_do_not_import_its_package():
-    """Its CASE names what is below it; they import from each other."""
+    """A package's CASE names the modules below it; these import from each other."""
     assert CASES
     homes = {module: module.rpartition(".")[0] for module in EARLY}
     assert not [m for m, home in homes.items() if home in CASES and home in EARLY[m] | LATE[m]]
@@ -54,7 +54,7 @@ def test_listing_cases_loads_no_figures_checks_or_inverse_problems():
 
 
 def test_the_folders_beside_tisim_are_imported_as_parts_of_it():
-    """Under two names a module would be loaded twice, and a class of one not be that of the other."""
+    """Under two names a module would be loaded twice, and its classes would differ."""
     root = Path(__file__).parents[1]
     files = [
         file

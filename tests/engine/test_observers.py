@@ -1,4 +1,4 @@
-"""Runs of a part of the way, and what looks at them meanwhile."""
+"""Partial runs, and observers called during them."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def simulation():
 
 @pytest.fixture(scope="module")
 def whole():
-    """Results in one go, and the times of all ends of steps of each world, s."""
+    """Results of a run in one go, and the end times of all steps of each world, s."""
     sim = compiled(FLOWS[0], 2, CAPACITY)
     sim.load(FLOWS)
     times = [sim.s.read("time")]
@@ -39,12 +39,12 @@ def same(results, expected):
 
 
 def first_end(times, pause):
-    """The first of these times at or after one; the last where none is."""
+    """The first of these times at or after ``pause``; the last if there is none."""
     return times[min(np.searchsorted(times, pause), len(times) - 1)]
 
 
 class Waits(Observer):
-    """Has each world wait at times of its own, and keeps when it has seen it."""
+    """Makes each world wait at given times, and records the times at which it observes."""
 
     def __init__(self, *pauses):
         self.pauses, self.observed = [list(times) for times in pauses], []
@@ -63,7 +63,7 @@ def test_until_is_the_first_end_of_a_step_there_and_a_later_run_goes_on(simulati
     simulation.run(until=2e-4)
     assert [r.time for r in simulation.results()] == [first_end(times[w], 2e-4) for w in range(2)]
     assert [r.status.reason for r in simulation.results()] == ["running", "running"]
-    simulation.run(until=2e-4)  # where they are already
+    simulation.run(until=2e-4)  # they are already there
     simulation.run(until=3e-4, steps=2)
     assert simulation.results()[0].time < 3e-4
     simulation.run(until=5e-4)

@@ -1,4 +1,5 @@
-"""Particles read and written between runs: what follows is as from a start, and other worlds know nothing."""
+"""Particles read and written between steps: the run continues as from a start, and other worlds are
+unchanged."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ CAPACITY = max(scene.capacity() for scene in FLOWS)
 
 
 def crystal(seed=0, lattice=None, speed=None):
-    """Particles under a short-ranged pair force, which pair lists and forces at the start are of."""
+    """Particles under a short-ranged pair force, with pair lists and initial forces."""
     draw = np.random.Generator(np.random.Philox(seed))
     axis = np.arange(4) * 1.1 if lattice is None else lattice
     sites = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
@@ -55,7 +56,7 @@ def test_it_is_what_a_result_would_have(simulation):
 
 @pytest.mark.slow
 def test_a_world_written_to_goes_on_as_one_that_starts_so():
-    """Same forces, lists and steps, to the bit, wherever the particles have been put; time has gone on."""
+    """Forces, lists and steps are equal bit for bit, for any new positions; time has advanced."""
     simulation = compiled(crystal(), 2)
     start = crystal(7, lattice=np.arange(4) * 1.3 - 20.0)
     simulation.load([start, crystal(1)])
@@ -94,7 +95,8 @@ def test_forces_are_those_of_what_was_written():
 
 @pytest.mark.slow
 def test_lists_that_are_too_short_for_what_was_written_grow():
-    """The next step begins with the forces of what was written, as from a start, not with those of before."""
+    """The next step begins with forces at the written positions, as from a start, not with the previous
+    forces."""
     close = crystal(lattice=np.arange(4) * 0.55)
     simulation = compiled(crystal(), 2)
     simulation.load(crystal())
@@ -107,7 +109,7 @@ def test_lists_that_are_too_short_for_what_was_written_grow():
 
 
 def test_to_write_what_is_there_changes_nothing(simulation):
-    """Nor in what comes: events, steps and bits, in both worlds."""
+    """Later events, steps and bits are unchanged too, in both worlds."""
     simulation.run()
     expected = simulation.results()
     simulation.load(FLOWS)
@@ -136,7 +138,7 @@ def test_a_checkpoint_knows_of_it(simulation, tmp_path):
 
 
 def test_an_observer_may_write_too(simulation):
-    """A thermostat by hand: the run stops where it was asked to."""
+    """A thermostat by hand: the run stops at the requested step."""
 
     def cool(sim):
         if sim.fraction() > 0:

@@ -1,4 +1,4 @@
-"""The schedule that worlds run on unless one is given goes by the work of a step."""
+"""The default schedule of worlds depends on the work of a step."""
 
 from types import SimpleNamespace
 
@@ -20,7 +20,7 @@ TWO_THREADS = SimpleNamespace(device="cpu", threads=2)
 
 
 def two(*effects, **quantities):
-    """Two particles that feel each other however far apart."""
+    """Two particles that interact at any distance."""
     place = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
     return scene(place, np.zeros((2, 3)), effects, stepper=fixed(1e-3), quantities=quantities)
 
@@ -34,7 +34,7 @@ def dipoles():
 
 
 def merging():
-    """Sums of forces stand twice in a step: after events they are made anew."""
+    """Sums of forces occur twice in a step: they are computed again after events."""
     return scene([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], np.zeros((2, 3)), (NearField(alpha2=1.0), *laws()))
 
 
@@ -52,12 +52,12 @@ CASES = {
     "many grains": (grains, 1, 3000, "team"),
     "each by itself": (lambda: colloids([[0.0, 0.0, 0.0]]), 1, 10, "particle"),
 }
-"""What is made, how many worlds with how much room, and what runs them on two threads."""
+"""A scene, the number of worlds, their capacity, and the expected schedule on two threads."""
 
 
 @in_taichi_thread
 def chosen(made, worlds, capacity):
-    """The schedule of worlds with room for so many particles."""
+    """The schedule for worlds of this capacity."""
     with memory.collected() as trees:
         allocation = Allocation(made, worlds, capacity)
     found = choose(allocation.assembly.step, allocation.s, TWO_THREADS)

@@ -1,4 +1,4 @@
-"""Which law is named as the one that has stopped a world."""
+"""The law that is named when a world stops."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tisim.effects import PairForce, RigidClumps
 
 
 class Apart(PairForce):
-    """No number where surfaces overlap."""
+    """NaN if surfaces overlap."""
 
     short_ranged = True
 
@@ -21,7 +21,7 @@ class Apart(PairForce):
 
 
 class Near(PairForce):
-    """No number where centres are far apart."""
+    """NaN if centres are far apart."""
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

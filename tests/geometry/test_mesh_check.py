@@ -1,4 +1,4 @@
-"""What is said of a mesh: whether it is closed and of one orientation, and the faces that are suspect."""
+"""The report on a mesh: whether it is closed and consistently oriented, and its suspect faces."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def counts(faces, vertices=CORNERS):
 
 def test_a_tetrahedron_is_closed_and_of_one_orientation():
     assert counts(TETRAHEDRON) == (4, 0, 0, 0, 0, 0)
-    # Each triangle with vertices of its own, as in an STL file.
+    # Each triangle has its own vertices, as in an STL file.
     assert counts(np.arange(12).reshape(4, 3), CORNERS[TETRAHEDRON].reshape(-1, 3)) == (4, 0, 0, 0, 0, 0)
 
 

@@ -1,4 +1,4 @@
-"""Unions of spheres, beside closed forms of one and two, and the same from elsewhere."""
+"""Unions of spheres, against closed forms for one and two, and under rotation."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ def between(area, low, high):
 
 
 def two(a, b, d):
-    """Volume, centre along the axis, and moments along and across it, of spheres of radii a and b, d apart:
-    slices are discs."""
+    """Volume, centre along the axis, and moments along and across it, for spheres of radii a and b at a
+    distance d: slices are discs."""
     x = Polynomial([0, 1])
     plane = (d * d + a * a - b * b) / (2 * d)
     parts = ((a * a - x**2, -a, plane), (b * b - (x - d) ** 2, plane, d + b))
@@ -54,7 +54,7 @@ def test_two_that_overlap_are_two_caps(d, rng):
 
 
 def test_many_are_the_same_turned_and_what_points_at_random_find(rng):
-    """The quadrature goes by an axis: turned, it is another."""
+    """The quadrature uses an axis: after a rotation it is a different one."""
     centre, radius = 0.6 * rng.normal(size=(8, 3)), rng.uniform(0.5, 1.0, 8)
     solid = sphere_union(centre, radius)
     turn = Turn.from_rotvec([0.3, -1.0, 0.5]).as_matrix()
