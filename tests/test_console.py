@@ -10,7 +10,7 @@ from tisim.effects import Tether
 from tisim.program.launched_program import LaunchedProgram
 
 
-def test_a_bar_says_while_kernels_are_compiled():
+def test_a_bar_reports_compilation():
     """Compilation may begin within compilation, for example for lists that have grown."""
     with progress_bar("run") as bar:
         bar.add_task("")
@@ -22,7 +22,7 @@ def test_a_bar_says_while_kernels_are_compiled():
     assert said == ["", "compiling", ""]
 
 
-def test_making_a_simulation_is_compiling(monkeypatch):
+def test_making_a_simulation_reports_compilation(monkeypatch):
     said, compile_program = [], LaunchedProgram.compile
 
     def noted(program):

@@ -51,7 +51,7 @@ def ambiguous(files):
     }
 
 
-def test_a_name_stands_for_one_value():
+def test_a_name_has_one_value():
     texts = {module: file.read_text(encoding="utf-8") for module, file in FILES.items()}
     assert ambiguous(texts) == set()
 

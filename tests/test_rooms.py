@@ -17,15 +17,15 @@ def above(imports):
     return {(module, other) for module, other in pairs if rooms.room(other) > rooms.room(module)}
 
 
-def test_nothing_is_imported_from_above():
+def test_nothing_is_imported_from_a_later_room():
     assert above(EARLY) == set()
 
 
-def test_late_imports_from_above_are_those_listed():
+def test_late_imports_are_listed():
     assert above(LATE) == rooms.LATE
 
 
-def test_every_room_is_there():
+def test_every_room_exists():
     assert {rooms.room(module) for module in EARLY} == set(range(len(rooms.ROOMS)))
 
 
@@ -76,7 +76,7 @@ def test_a_circle_is_found():
         rooms.floors({"a": {"b"}, "b": {"a"}})
 
 
-def test_no_class_name_stands_for_two():
+def test_class_names_are_unique():
     names: Counter[str] = Counter()
     for file in rooms.modules(Path(__file__).parents[1]).values():
         nodes = ast.parse(file.read_text(encoding="utf-8")).body

@@ -32,7 +32,7 @@ class Failing(io.StringIO):
         (ValueError("I/O operation on closed file"), "I/O operation on closed file"),
     ],
 )
-def test_a_stream_that_fails_is_complained_of_where_somebody_reads_it(error, complaint):
+def test_a_failing_stream_is_reported(error, complaint):
     stream = SafeStream(Failing(error))
     assert stream.write("some text") == 9
     stream.flush()
@@ -40,7 +40,7 @@ def test_a_stream_that_fails_is_complained_of_where_somebody_reads_it(error, com
     assert stream.complaint == complaint
 
 
-def test_text_goes_through_and_what_cannot_be_encoded_becomes_an_escape():
+def test_text_that_cannot_be_encoded_is_escaped():
     raw = io.BytesIO()
     stream = SafeStream(io.TextIOWrapper(raw, encoding="ascii"))
     print("1 µm", "5", sep=", ", file=stream)
@@ -62,7 +62,7 @@ class Notebook:
 
 
 @pytest.mark.parametrize("stream", [None, Notebook()])
-def test_consoles_and_bars_bear_any_stream(monkeypatch, stream):
+def test_consoles_and_bars_accept_any_stream(monkeypatch, stream):
     monkeypatch.setattr(sys, "stdout", stream)
     monkeypatch.setattr(sys, "stderr", stream)
     console.out().print("a table")

@@ -107,7 +107,7 @@ STEPPERS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STEPPERS)
-def test_a_stepper_says_how_far_particles_have_moved(name):
+def test_steppers_report_displacements(name):
     """For motion by the stepper itself, and by operators."""
     stepper, more = STEPPERS[name]
     scenes = [crossing(stepper, **way, **more) for way in WAYS]
@@ -123,14 +123,14 @@ def test_every_stepper_is_tried():
 
 
 @pytest.mark.slow
-def test_lists_follow_what_is_captured():
+def test_lists_follow_captured_particles():
     sphere = {"centre": (2.5, 1.5, 1.5), "magnetisation": (0.0, 0.0, 1e3), "radius": 0.8}
     effects = (*LAWS, MagneticSpheres(spheres=(sphere,)), Capture())
     assert_lists(crossing(fixed(0.02), effects, **WAYS[0]))
 
 
 @pytest.mark.slow
-def test_lists_follow_what_bonds_breaks_and_cools():
+def test_lists_follow_merging_and_breaking_grains():
     assert_lists(flow(grains=60, stepper=fixed(4e-6), duration=4e-4))
 
 
@@ -164,12 +164,12 @@ class Drift(PerParticle):
 
 
 @pytest.mark.slow
-def test_a_stepper_that_does_not_say_so_is_reported():
+def test_a_stepper_that_reports_no_motion_is_detected():
     with pytest.raises(AssertionError, match=r"^position at the end must be the same with lists as"):
         assert_lists(crossing(Silent(), (SHELL,), velocity=3.0))
 
 
-def test_steps_must_not_depend_on_the_pairs_that_are_looked_at():
+def test_steps_must_not_depend_on_listed_pairs():
     with pytest.raises(
         InputError, match="step control must be one that does not look at pairs; received 'app"
     ):
@@ -317,7 +317,7 @@ class Damped(PairForce):
         (NeverZero(), "must be 0 if the inverse is 0; received 1 N on particle 0 by 1 along axis 0"),
     ],
 )
-def test_a_force_that_writes_or_is_another_by_the_inverse_or_of_images_is_reported(law, said):
+def test_invalid_pair_forces_are_reported(law, said):
     """The assertion of all contracts reports it too, before it runs anything."""
     with pytest.raises(AssertionError, match=said):
         assert_contracts(two(law))

@@ -31,7 +31,7 @@ def test_solid_fraction_of_a_cubic_packing_and_of_cut_spheres():
     np.testing.assert_allclose(cut * 2.0 * np.array([1.25, 1.75]), np.pi / 6 * np.array([5 / 32, 27 / 32]))
 
 
-def test_the_largest_overlap_is_found_across_a_face():
+def test_the_largest_overlap_across_a_face_is_found():
     position, radius = np.array([[0.2, 0.0, 0.0], [1.1, 0.0, 0.0], [3.9, 0.0, 0.0]]), [0.5, 0.5, 0.4]
     assert largest_overlap(position, radius) == pytest.approx(0.1)
     # 0.3 apart through the face at 4.
@@ -56,7 +56,7 @@ def test_contacts_of_a_cubic_packing():
     assert coordination_numbers(65, contacts(more, sizes, 1e-9))[-1] == 8
 
 
-def test_rattlers_hold_nobody():
+def test_rattlers_are_removed_repeatedly():
     """In a cube of 3 x 3 x 3 grains the 8 corners (3 contacts) go first; edges then have 2 of 4 contacts
     left."""
     position, radius = cubic(3)

@@ -82,7 +82,7 @@ def test_points_on_all_spheres_are_in_the_ellipsoid(rng):
     assert inner.volume < found.volume
 
 
-def test_what_has_no_ellipsoid_is_refused():
+def test_points_without_an_ellipsoid_are_refused():
     flat = np.column_stack([np.random.default_rng(1).normal(size=(10, 2)), np.zeros(10)])
     for measure in (bounding_ellipsoid, hull_volume):
         with pytest.raises(InputError, match="particles must be spheres, or points not all in a plane"):

@@ -48,7 +48,7 @@ def test_rates_up_to_a_limit_are_left_out():
         (fit_herschel_bulkley, lambda x: 5.0 + 0.5 * x**0.6, (5.0, 0.5, 0.6)),
     ],
 )
-def test_intervals_hold_the_truth_as_often_as_they_say(rng, fit, law, true, known):
+def test_intervals_have_their_nominal_coverage(rng, fit, law, true, known):
     """Over 400 noisy curves, with fitted noise and with known errors that differ between points."""
     error, tries = np.where(RATE > 30, 0.3, 0.1) if known else np.full(len(RATE), 0.2), 400
     held = np.zeros(len(true))

@@ -39,7 +39,7 @@ def test_a_mean_has_no_more_digits_than_its_interval(value, half, shown):
 @pytest.mark.parametrize(
     "runs", [[], [1.0, np.nan], [[1.0, 2.0], [3.0, 4.0]], [np.inf, 1.0], ["a"], [[1.0], [2.0, 3.0]]]
 )
-def test_what_is_no_list_of_numbers_is_refused(runs):
+def test_anything_but_numbers_is_refused(runs):
     with pytest.raises(InputError, match="runs must be a list of finite numbers, one for each run; received"):
         Mean.of(runs)
 

@@ -68,7 +68,7 @@ def test_the_radial_distribution_of_a_lattice_counts_its_neighbours():
         ([0.0, 3.9], None, "particles must be farther than the last edge"),
     ],
 )
-def test_what_has_no_radial_distribution_is_refused(edges, sides, text):
+def test_invalid_radial_distributions_are_refused(edges, sides, text):
     with pytest.raises(InputError, match=text):
         radial_distribution(np.ones((5, 3)), edges, (0, 0, 0), (8, 8, 8), sides)
 

@@ -20,7 +20,7 @@ LEANING = ShearedBox(low=(0, 0, 0), high=(3, 4, 5), rate=0.3, flow="z", gradient
         LEANING.model_copy(update={"flow": "y", "gradient": "z"}),
     ],
 )
-def test_near_pairs_are_those_whose_nearest_images_are(rng, domain):
+def test_near_pairs_use_nearest_images(rng, domain):
     """Also for spheres of unlike sizes, and for positions outside the box."""
     sides, position = periodic_sides(domain, time=7.3), rng.uniform(-1, 6, (70, 3))
     shifts = np.array(list(product(*(range(-4, 5) if side.any() else [0] for side in sides)))) @ sides

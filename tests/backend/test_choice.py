@@ -45,7 +45,7 @@ ZEN_4 = x86("AuthenticAMD", 25, 0x11)
         ({}, "quadrants"),
     ],
 )
-def test_the_compiler_that_knows_the_processor_is_taken(cpu, taken):
+def test_the_compiler_that_supports_the_cpu_is_chosen(cpu, taken):
     """The newest compiler if none is known to support the processor; the installed one if there is
     only one."""
     assert choice.automatic(BOTH, cpu) == taken
@@ -54,7 +54,7 @@ def test_the_compiler_that_knows_the_processor_is_taken(cpu, taken):
     assert choice.automatic([], cpu) == "taichi"
 
 
-def test_the_table_has_the_llvm_that_is_in_each_package():
+def test_the_table_has_the_llvm_of_each_package():
     """One package is loaded in this process, the other in a separate process."""
     assert int(llvm_version().split(".")[0]) == choice.LLVM[BACKEND]
     (other,) = (name for name in BOTH if name != BACKEND)
@@ -106,7 +106,7 @@ def test_a_wrong_name_and_a_package_that_is_absent_are_refused(monkeypatch):
     assert choice.chosen() == "taichi"
 
 
-def test_the_commands_install_what_the_package_asks_for():
+def test_install_commands_equal_the_requirements():
     with (ROOT / "pyproject.toml").open("rb") as file:
         asked = tomllib.load(file)["project"]["dependencies"]
     for name, command in choice.INSTALL.items():
@@ -124,7 +124,7 @@ print(runtime.backend())
 """
 
 
-def test_the_first_run_says_what_is_lost_once_and_where_no_script_reads(tmp_path):
+def test_the_first_run_prints_a_note_once_on_stderr(tmp_path):
     """Without Quadrants, on a processor that Taichi's LLVM does not know."""
     first, second = (python(FIRST_RUN, TI_OFFLINE_CACHE_FILE_PATH=tmp_path) for _ in range(2))
     (line,) = first.stderr.splitlines()
@@ -135,7 +135,7 @@ def test_the_first_run_says_what_is_lost_once_and_where_no_script_reads(tmp_path
     assert first.stdout.startswith("taichi")
 
 
-def test_nothing_is_said_where_nothing_is_lost_or_somebody_has_chosen(tmp_path, monkeypatch, capsys):
+def test_no_note_without_a_loss_or_after_a_choice(tmp_path, monkeypatch, capsys):
     assert choice.lost(BOTH, ZEN_4) == choice.lost(["quadrants"], ZEN_4) == ""
     assert choice.lost(["taichi"], x86("AuthenticAMD", 25, 0x01)) == ""
     assert "may not know" in choice.lost(["taichi"], {})

@@ -57,7 +57,7 @@ def forked(function, *arguments):
     ],
     ids=["run", "Simulation", "init anew", "init as it is", "current", "restart"],
 )
-def test_whatever_runs_is_refused_at_once(use):
+def test_running_is_refused_at_once(use):
     tisim.run(FLIGHT)
     began = time.monotonic()
     error = forked(use)
@@ -79,7 +79,7 @@ def test_results_are_read_and_the_parent_goes_on(tmp_path):
     assert (tisim.run(FLIGHT).state["position"] == before.state["position"]).all()
 
 
-def test_a_turn_that_another_thread_has_is_not_waited_for():
+def test_a_turn_of_another_thread_is_not_waited_for():
     with runtime.turn:
         assert forked(runtime.turn.acquire, False)
 

@@ -89,7 +89,7 @@ def test_one_definition_is_looked_up_once():
     assert asked == [first]
 
 
-def test_equal_codes_of_two_files_are_two():
+def test_equal_codes_of_two_files_differ():
     code = (
         compile("def f():\n    pass\n", "one.py", "exec"),
         compile("def f():\n    pass\n", "two.py", "exec"),
@@ -127,12 +127,12 @@ def test_text_of_one_line_is_wrapped_as_by_python():
 
 
 @pytest.mark.skipif(BACKEND != "taichi", reason="Quadrants remembers the texts of places itself")
-def test_the_text_of_a_place_is_taichis():
+def test_positions_in_source_text_equal_taichis():
     from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext
 
     tell = ASTTransformerContext.get_pos_info
     assert tell.__wrapped__ is not tell
-    lines, first = inspect.getsourcelines(test_equal_codes_of_two_files_are_two)
+    lines, first = inspect.getsourcelines(test_equal_codes_of_two_files_differ)
     tree = ast.parse(textwrap.dedent("".join(lines)))
 
     def context(src):
@@ -151,7 +151,7 @@ def test_the_text_of_a_place_is_taichis():
             assert remembered(context(edited), node) == tell.__wrapped__(context(edited), node)
 
 
-def test_while_a_package_is_imported_frames_have_the_line_that_they_have():
+def test_quick_imports_report_the_same_frames():
     thorough = inspect.getframeinfo
 
     def told():

@@ -105,7 +105,7 @@ print(runtime.generation() - before)
 
 
 @pytest.mark.long
-def test_simulation_of_an_earlier_start_says_so():
+def test_simulations_of_an_earlier_start_raise_an_error():
     """An error instead of a segmentation fault. The old simulation can be closed and a new one works, also
     after a failed start and if Taichi was restarted because it had grown."""
     completed = subprocess.run(
@@ -179,7 +179,7 @@ def test_the_callers_arithmetic_keeps_subnormal_numbers():
         assert thread.submit(lambda: np.float64(5e-324) * 1.0).result() > 0.0
 
 
-def test_a_closed_simulation_says_so():
+def test_a_closed_simulation_raises_an_error():
     simulation = Simulation(moving(1.0))
     simulation.load([moving(1.0)])
     simulation.close()
@@ -197,7 +197,7 @@ def tree():
     return column, Tree(builder)
 
 
-def test_trees_that_are_forgotten_are_destroyed():
+def test_unreferenced_trees_are_destroyed():
     """More than Taichi allows at once; none of them is destroyed explicitly."""
     before = len(memory.in_use())
     for _ in range(600):
@@ -244,7 +244,7 @@ def grains(number):
 
 
 @pytest.mark.slow
-def test_small_scenes_do_not_go_through_the_memory_of_large_ones():
+def test_small_scenes_do_not_reuse_large_simulations():
     """An idle simulation is reused for scenes of similar size; sizes are rounded, so that similar ones share
     it."""
     batches = Batches()
@@ -266,7 +266,7 @@ def test_a_few_worlds_of_a_small_scene_compile_nothing_after_one():
 
 
 @pytest.mark.slow
-def test_what_is_kept_for_later_is_given_up_where_there_is_no_room():
+def test_idle_simulations_are_closed_if_memory_is_short():
     """Idle simulations are closed, and unreferenced ones that the garbage collector has not yet freed."""
     kept = Batches()
     assert all(result.status.ok for _, result in kept.run([grains(3000)]))
@@ -289,7 +289,7 @@ def test_rounded_sizes():
 
 
 @pytest.mark.long
-def test_taichi_is_not_started_anew_under_what_is_in_use(monkeypatch):
+def test_taichi_is_not_restarted_while_in_use(monkeypatch):
     """A simulation in use survives, however many kernels have been compiled."""
     mine, before = Simulation(moving(1.0)), runtime.generation()
     monkeypatch.setattr(memory, "MAX_TREES_PER_START", 0)

@@ -47,7 +47,7 @@ def test_options_of_the_compilers_are_removed(environment, compiler):
     assert "QD_ADVANCED_OPTIMIZATION" not in environment(QD_ADVANCED_OPTIMIZATION="0")
 
 
-def test_the_folder_for_caches_is_named_where_home_is_not(environment):
+def test_the_cache_folder_is_set_without_home(environment):
     home = Path("~").expanduser() if "HOME" in os.environ else surroundings._home()
     assert "XDG_CACHE_HOME" not in environment(HOME=str(home))
     assert environment(HOME="/home/me", XDG_CACHE_HOME="/caches")["XDG_CACHE_HOME"] == "/caches"
@@ -81,7 +81,7 @@ def test_a_machine_without_a_folder_for_temporary_files(monkeypatch):
         tempfile.mkdtemp()
 
 
-def test_kernels_go_to_a_temporary_folder_or_nowhere_where_theirs_cannot_be_written(monkeypatch, capsys):
+def test_an_unwritable_cache_is_replaced_or_turned_off(monkeypatch, capsys):
     variable = kernel_cache.LOCKS[kernel_cache.BACKEND][0]
     monkeypatch.setenv(variable, "/dev/null/kernels")
     for cached in (kernel_cache._without, kernel_cache._temporary):
@@ -129,7 +129,7 @@ def test_limits_of_memory(monkeypatch, tmp_path):
         assert surroundings.memory_limit() == 500_000
 
 
-def test_work_goes_on_where_the_working_folder_has_been_removed(tmp_path):
+def test_a_removed_working_folder_is_tolerated(tmp_path):
     before = Path.cwd()
     with surroundings.existing_folder():
         assert Path.cwd() == before

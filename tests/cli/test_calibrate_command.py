@@ -20,7 +20,7 @@ def table(path):
 
 
 @pytest.mark.slow
-def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim, tmp_path, monkeypatch):
+def test_calibration_to_a_file_of_measurements(tisim, tmp_path, monkeypatch):
     """The misfit of the best design follows from its run, and the values and uncertainties in the file. A
     file with other values does not continue this search."""
     one_start = {"min_starts": 1, "block": 1, "max_starts": 1, "select": 0, "confirm": 0}

@@ -21,7 +21,7 @@ def test_cases_explain_and_version(tisim):
     assert tisim("--version")[1].startswith("tisim 0.")
 
 
-def test_check_tells_right_from_wrong(tisim, monkeypatch):
+def test_check_detects_failures(tisim, monkeypatch):
     checks = [
         Check("one", 1.0, 1.0, 0.0),
         Check("two", 2.1, 2.0, 0.01),

@@ -92,7 +92,7 @@ def rows(folder):
 
 
 @pytest.mark.long
-def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, monkeypatch):
+def test_cost_answers_and_stores_its_measurements(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--no-fast", "--quick", "--error")
     with monkeypatch.context() as patch:
         patch.setattr(reference, "LARGEST_REFERENCE_ERROR", 1e-12)
@@ -151,7 +151,7 @@ GIVEN = [
 
 
 @pytest.mark.parametrize("words", GIVEN, ids=lambda words: " ".join(words[1::2]) or "nothing")
-def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, monkeypatch, own_file, words):
+def test_printed_commands_run_the_measured_scene(tmp_path, monkeypatch, own_file, words):
     """For all arguments of tisim cost, and for every kind of setting: stepper, tolerance, law, precision or
     arithmetic."""
     monkeypatch.chdir(tmp_path)
@@ -191,7 +191,7 @@ def parsed(command, *words):
 
 
 @pytest.mark.long
-def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch):
+def test_ctrl_c_keeps_measurements(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--no-fast", "--repeats", "1", "--out", "cut")
     with monkeypatch.context() as patch:
         write, pressed = storage.write, []

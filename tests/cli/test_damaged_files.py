@@ -152,7 +152,7 @@ def test_cost(tisim, tmp_path, monkeypatch):
     ],
     ids=" ".join,
 )
-def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
+def test_drawing_and_copying_commands(tisim, tmp_path, monkeypatch, command, name):
     # Drawing is slow and is replaced; the files are still read.
     monkeypatch.setattr("tisim.plotting.movie.PillowWriter.grab_frame", lambda self, **more: None)
     monkeypatch.setattr("tisim.plotting.movie.PillowWriter.finish", lambda self: None)
@@ -170,7 +170,7 @@ def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
 
 
 @pytest.mark.parametrize("name", [MARKER, lock.LOCK])
-def test_what_is_in_the_place_of_our_own(tisim, impacts, tmp_path, name):
+def test_obstacles_in_place_of_tisims_files(tisim, impacts, tmp_path, name):
     folder = tmp_path / "out"
     folder.mkdir()
     for make in (os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/zero")):

@@ -67,9 +67,7 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
     [("export", "out", "--format", "xyz"), ("movie", "out", "--rate", 5), ("figures", "toy", "--out", "out")],
     ids=lambda words: words[0],
 )
-def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(
-    tisim, tmp_path, first, monkeypatch
-):
+def test_pictures_of_a_version_without_markers_are_replaced(tisim, tmp_path, first, monkeypatch):
     """A folder as version 0.1.0 left it, with pictures whose names have since changed."""
     monkeypatch.setattr("tisim.plotting.movie.movie", lambda *arguments: None)  # drawing is slow
     sizes = {"default": Size("", {})}
@@ -88,7 +86,7 @@ def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first
     ownership.check(folder, pictures)  # as tisim plot does
 
 
-def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
+def test_a_folder_without_data_to_draw_is_refused(tisim, tmp_path):
     (tmp_path / "out").mkdir()
     rule = "folder must be one with a trajectory.h5 or result.h5; received 'out', with"
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
@@ -128,9 +126,7 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
 
 
 @pytest.mark.slow
-def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
-    tisim, toml, tmp_path, monkeypatch
-):
+def test_a_full_disk_keeps_earlier_frames_and_a_checkpoint(tisim, toml, tmp_path, monkeypatch):
     """The system refuses to let files grow during the run; later there is room again."""
     folder = tmp_path / "out" / "flow"
 

@@ -22,7 +22,7 @@ def pulled(toml, own_file):
 
 
 @pytest.mark.slow
-def test_a_run_is_stopped_gone_on_with_and_drawn(tisim, pulled, press_ctrl_c, monkeypatch, own_file):
+def test_a_run_is_stopped_continued_and_drawn(tisim, pulled, press_ctrl_c, monkeypatch, own_file):
     command = ["run", pulled, "--out", "o", "--frames", "4", *PLUGIN]
     with monkeypatch.context() as patch:
         press_ctrl_c(patch, after=1)
@@ -43,7 +43,7 @@ def test_a_run_is_stopped_gone_on_with_and_drawn(tisim, pulled, press_ctrl_c, mo
     assert "pull" in out
 
 
-def test_without_it_the_effect_is_not_known(tisim, pulled):
+def test_without_the_plugin_the_effect_is_unknown(tisim, pulled):
     code, _, err = tisim("run", pulled)
     assert code == 2
     assert "effects.pull.kind must be one of" in err

@@ -87,7 +87,7 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
 
 
 @pytest.mark.parametrize("stopped", [True, False], ids=["interrupted", "finished"])
-def test_nothing_of_a_run_is_left_beside_another_that_was_killed(
+def test_a_killed_run_leaves_nothing_of_an_earlier_run(
     tisim, toml, tmp_path, monkeypatch, press_ctrl_c, stopped
 ):
     """The second run, with --overwrite, is killed before its first checkpoint. Then the first run is not
@@ -131,7 +131,7 @@ def test_failed_run_says_where_and_keeps_the_last_good_state(tisim, toml, tmp_pa
 
 
 @pytest.mark.slow
-def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim, impacts, tmp_path):
+def test_without_removes_an_effect_from_scene_and_kernels(tisim, impacts, tmp_path):
     assert tisim("run", impacts, "--without", "impact")[0] == 0
     assert Scene.from_toml(tmp_path / "out" / "flow" / "scene.toml").effects == ()
     with h5py.File(tmp_path / "out/flow/result.h5") as file:

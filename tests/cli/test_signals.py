@@ -74,7 +74,7 @@ def test_run_saves_a_checkpoint(tisim, toml, tmp_path, monkeypatch, press_ctrl_c
 
 
 @pytest.mark.long
-def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c):
+def test_comparison_says_how_to_continue(tisim, tmp_path, monkeypatch, press_ctrl_c):
     monkeypatch.setattr("tisim.cases.case.every", lambda: {CASE.name: CASE})
     press_ctrl_c(monkeypatch, after=9, number=signal.SIGTERM)
     code, _, err = tisim("compare", "drift", "--methods", "random", "--out", "c")
@@ -84,7 +84,7 @@ def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c
 
 
 @pytest.mark.parametrize(("number", "code"), ASKED)
-def test_commands_that_keep_nothing_end_as_well(tisim, monkeypatch, number, code):
+def test_commands_without_files_end_properly_too(tisim, monkeypatch, number, code):
     monkeypatch.setattr(runtime, "init", lambda *settings: os.kill(os.getpid(), number))
     assert tisim("check", "vibration") == (code, "", "")
 

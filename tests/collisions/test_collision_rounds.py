@@ -107,7 +107,7 @@ def agree(result, expected, twin):
 
 
 @pytest.mark.parametrize("hardness", [1e8, 1e6, 1e5], ids=["rebound", "some bond", "most bond"])
-def test_many_impacts_are_those_of_resolving_the_list_one_by_one(rng, hardness):
+def test_many_impacts_equal_serial_resolution(rng, hardness):
     """Eight jammed worlds, with about a hundred simultaneous impacts in each, against the serial
     reference."""
     scenes = [jam(rng, hardness) for _ in range(8)]
@@ -152,7 +152,7 @@ def test_grain_hit_by_twelve_at_once(rng):
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=0, atol=1e-15 * scale)
 
 
-def test_twelve_that_bond_become_one():
+def test_twelve_bonding_grains_merge_into_one():
     """All twelve hit the grain in the middle and bond: one sphere of 13 grains, at rest in the middle."""
     around = np.array([[a, b, 0] for a in (-1, 1) for b in (-1, 1)])
     around = np.vstack([np.roll(around, k, axis=1) for k in range(3)]) / np.sqrt(2)
@@ -195,7 +195,7 @@ def closing_in(number, delay):
 
 
 @pytest.mark.parametrize("number", [2, 3, 4])
-def test_a_tie_ends_as_the_limit_of_impacts_one_after_another(number):
+def test_a_tie_equals_the_limit_of_successive_impacts(number):
     """Of impacts in one instant the one with the highest indices comes first, as if it were
     slightly earlier."""
     tie, near = run([closing_in(number, delay) for delay in (0.0, 1e-13)])
@@ -236,7 +236,7 @@ def test_three_grains_in_a_row():
     np.testing.assert_allclose(by_id(result)["velocity"][:, 0], v, rtol=0, atol=1e-12)
 
 
-def test_more_contacts_than_there_is_room_for_is_a_clear_failure(rng, monkeypatch):
+def test_too_many_contacts_give_a_clear_failure(rng, monkeypatch):
     """Sixty grains in one place: impossible for hard spheres. If such a start passes validation, the run
     stops at once with a message."""
     n = 60

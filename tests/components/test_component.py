@@ -50,18 +50,18 @@ class SampleSpring(Component):
         ({"stiffness": 1, "axis": (0, 1)}, "sample_spring.axis.2 must be given; received nothing"),
     ],
 )
-def test_messages_say_what_it_must_be_and_what_was_received(settings, message):
+def test_messages_state_rule_and_received_value(settings, message):
     with pytest.raises(InputError) as fault:
         SampleSpring(**settings)
     assert str(fault.value) == message
 
 
-def test_a_list_of_four_is_no_vector():
+def test_a_list_of_four_is_refused_as_vector():
     with pytest.raises(InputError, match=r"sample_spring\.axis must be .*; received"):
         SampleSpring(stiffness=1, axis=(0, 0, 1, 0))
 
 
-def test_every_fault_has_its_line():
+def test_every_error_has_its_line():
     with pytest.raises(InputError) as fault:
         SampleSpring(stiffness=-1, share=2, colour="red")
     lines = str(fault.value).splitlines()

@@ -37,7 +37,7 @@ def text(explanation):
     return stream.getvalue()
 
 
-def test_whole_flow_leaves_nothing_out():
+def test_every_effect_of_the_flow_is_listed():
     flow = agglomeration(BEST, 1, grains=60)
     explanation = explain(flow)
     assert [part.name for part in explanation.effects] == [effect.kind() for effect in flow.effects]
@@ -103,7 +103,7 @@ BESIDE = {
 
 @pytest.mark.parametrize("kind", BESIDE)
 @in_taichi_thread
-def test_memory_beside_the_state_is_what_is_allocated_for_a_step(kind):
+def test_step_memory_is_what_is_allocated(kind):
     made, capacity = BESIDE[kind]
     with memory.collected() as trees:
         allocation = Allocation(made(), 3, capacity)
@@ -136,7 +136,7 @@ def test_parameters_have_units_and_sources():
     assert "Resolve*" in output
 
 
-def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
+def test_parts_of_a_law_and_pairs_of_materials():
     """Under the names of a scene file, with the numbers that kernels get."""
     law = Granular(tangential=MindlinForce(), rolling=RollingEPSD(damping_ratio=0.2))
     materials = {
@@ -172,7 +172,7 @@ def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
     assert "granular.rolling: rolling_epsd" in output
 
 
-def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
+def test_a_vibrating_cloud_has_no_contact_spin_or_temperature():
     """Z13: only forces on charges; no fields, lists or phases of anything else."""
     explanation = explain(vibration(sites=2))
     effects = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}

@@ -70,18 +70,18 @@ def test_a_device_and_the_cpu_agree(name, on_cpu):
         np.testing.assert_allclose(result.state[field], expected, rtol=0, atol=tolerance, err_msg=field)
 
 
-def test_a_sum_carries_its_rounding_error_along():
+def test_sums_are_compensated():
     """As for the clocks of steps: a driver that regroups sums would lose the compensation, which is 2e-8 of
     this sum of tenths."""
     _, total = numbers()
     assert total == pytest.approx(1e4, rel=1e-15)
 
 
-def test_a_step_is_two_launches_and_few_ask_how_far_worlds_have_come():
+def test_a_step_takes_two_launches_and_few_queries():
     assert_launches(simulation("grains"), STEPS, each=2)
 
 
 @pytest.mark.parametrize("look", [AtRest(time=9.0), Outflow(planes=[Plane(point=(0.0, 0.0, -9.0))])])
-def test_a_step_that_something_looks_at_the_grains_after_is_five_launches(look):
+def test_a_step_with_a_later_operator_takes_five_launches(look):
     """The operator acts between two fillings of slots, after which forces may be summed again."""
     assert_launches(simulation("grains", look), STEPS, each=5)

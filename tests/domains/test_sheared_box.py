@@ -94,7 +94,7 @@ def test_an_image_is_the_nearest_of_all(rng):
 
 
 @pytest.mark.slow
-def test_grains_in_shear_are_those_of_a_twin_that_wraps_nothing(rng):
+def test_grains_in_shear_equal_an_unwrapped_twin(rng):
     """Two rates side by side, and a box of many cells; many grains cross the faces, and stick and slide
     across them. Momentum is conserved."""
     made = [crowd(rng, rate=rate, low=low) for rate, low in ((RATE, 0.0), (-20.0, -0.7))]
@@ -137,7 +137,7 @@ def pair(shift, stepper=None):
 @pytest.mark.parametrize(
     "stepper", [None, pytest.param(Boris(control=FixedStep(dt=DT)), marks=pytest.mark.slow)]
 )
-def test_a_pair_across_the_face_is_one_in_the_middle(stepper):
+def test_a_pair_across_a_face_moves_as_in_the_middle(stepper):
     """It touches, sticks and separates as in the middle; the face lies between the two, or both cross it."""
     (there,) = run(pair(np.zeros(3), stepper))
     touched = by_id(there)
@@ -152,7 +152,7 @@ def test_a_pair_across_the_face_is_one_in_the_middle(stepper):
 
 
 @pytest.mark.long
-def test_what_a_study_compares_does_not_jump_at_a_face():
+def test_compared_quantities_are_continuous_at_faces():
     """The velocity of a pair relative to the flow is the same at every position in the box, also after it has
     crossed a face."""
     (there,), (here,) = run(pair(np.zeros(3))), run(pair(np.array([0.0, -0.75, 0.0])))
@@ -179,7 +179,7 @@ def layers(rate=RATE, steps=3000):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("made", ["crowd", "sparse", "layers", "reverse"])
-def test_lists_give_what_all_pairs_give(rng, made):
+def test_lists_give_the_result_of_all_pairs(rng, made):
     """Also if grains move only with the flow, so that shear alone brings them together."""
     one = {
         "crowd": lambda: crowd(rng),
@@ -198,7 +198,7 @@ def test_lists_give_what_all_pairs_give(rng, made):
     assert len(times) < 10
 
 
-def test_a_restart_has_its_images_where_they_were(rng, tmp_path):
+def test_a_restart_keeps_the_positions_of_images(rng, tmp_path):
     """The same bits as without a restart, alone or beside another world."""
     one, other = crowd(rng), crowd(rng, rate=-1.0, n=40)
     whole, _ = run(one, other)
@@ -224,7 +224,7 @@ def test_the_bits_are_those_of_the_other_schedule(rng):
 
 
 @pytest.mark.slow
-def test_any_two_axes_may_be_those_of_the_shear(rng):
+def test_any_two_axes_can_be_sheared(rng):
     """The same grains with x, y and z permuted to z, x and y; the third axis need not be periodic."""
     turned, other = [1, 2, 0], crowd(rng)
     start = other.particles.arrays(other.domain, 0)
@@ -244,7 +244,7 @@ def test_any_two_axes_may_be_those_of_the_shear(rng):
         np.testing.assert_allclose(by_id(here)[name], values, rtol=0, atol=atol)
 
 
-def test_files_say_where_images_are(rng, tmp_path):
+def test_files_have_the_positions_of_images(rng, tmp_path):
     """Both H5MD, as box edges, and extended XYZ, for each frame. They give the position of an image."""
     made, path = crowd(rng), tmp_path / "t.h5"
     simulation = compiled(made, WORLDS, CAPACITY)

@@ -88,7 +88,7 @@ def test_every_parameter_may_differ_per_world():
 
 
 @pytest.mark.slow
-def test_what_no_effect_needs_is_not_allocated():
+def test_unused_fields_are_not_allocated():
     """Only the fields, bytes, counters and phases of a scene's own effects are allocated."""
     core = {"position", "velocity", "mass", "radius", "id"}
     bare = Simulation(scene([[0, 0, 0]], [[0, 0, 0]]), worlds=3, capacity=7)
@@ -137,7 +137,7 @@ def test_a_scene_of_another_structure_is_refused():
     simulation.close()
 
 
-def test_a_scene_finds_them_by_name():
+def test_a_scene_finds_effects_by_name():
     """Without a registry: any existing class can be named in a file."""
     setup = charges([[0, 0, 0]], [[0, 0, 0]], [1.0], {"stiffness": 2.0})
     again = Scene.from_dict(setup.to_dict())

@@ -93,7 +93,7 @@ def test_fields_oscillate_in_time(rng):
         assert result.time > 0.3
 
 
-def test_no_oscillation_no_sine_is_the_same_field(rng):
+def test_zero_amplitude_is_a_constant_field(rng):
     """A field of zero amplitude in one world of a batch beside one that oscillates."""
     still = ElectricField(constant=vector(rng), omega=vector(rng), phase=vector(rng))
     scenes = [
@@ -145,7 +145,7 @@ def test_the_velocity_jacobian_of_the_lorentz_force(rng):
         close(claimed, difference, 1e-9)
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     field = MagneticField(constant=(0, 0, 1))
     extra = {
         (field,): set(),
@@ -175,7 +175,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

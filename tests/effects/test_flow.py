@@ -70,7 +70,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     right = {"pressure_gradient": (0, 0, 1), "viscosity": 1e-3, "porosity": 0.5, "diameter": 1e-3}
     with pytest.raises(InputError) as fault:
         DarcyFlow(**{**right, **WRONG[message]})

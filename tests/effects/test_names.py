@@ -58,7 +58,7 @@ def test_files_name_them_by_their_tables():
     assert '[effects.core]\nkind = "mie"\n' in setup.to_toml()
 
 
-def test_settings_and_leaving_out_go_by_name():
+def test_settings_and_removal_use_names():
     setup = one(CORE, SHELL)
     changed = setup.replace({"effects.core.epsilon": 5.0})
     assert [effect.epsilon for effect in changed.effects] == [5.0, 0.3]
@@ -73,7 +73,7 @@ def test_settings_and_leaving_out_go_by_name():
         setup.replace({"effects.core.depth.x": 1})
 
 
-def test_a_name_is_part_of_the_digest_and_the_kind_is_no_name():
+def test_names_are_in_the_digest_and_kinds_are_no_names():
     plain = one(Mie(epsilon=1.0))
     assert list(plain.to_dict()["effects"]) == ["mie"]
     assert "kind" not in plain.to_dict()["effects"]["mie"]
@@ -93,7 +93,7 @@ def test_two_oscillating_fields_add_up():
     np.testing.assert_allclose(result.state["force"][0], expected, rtol=1e-12)
 
 
-def test_what_touching_pairs_remember_is_kept_for_each_by_name():
+def test_each_effect_has_its_own_contact_history():
     two = (Remembering(stiffness=1.0, width=1e-3), Remembering(name="other", stiffness=1.0, width=1e-3))
     users = needed_fields(two, Verlet())
     memories = {
@@ -108,7 +108,7 @@ class Anchored(Gravity):
     fields = (Field("anchor", "mm", 3, "mean", default="position"),)
 
 
-def test_fields_that_two_declare_must_agree():
+def test_shared_fields_must_be_declared_equally():
     """Two tethers share the field of initial positions; a conflicting declaration is refused."""
     tethers = (Tether(stiffness=(1.0,) * 3), Tether(name="other", stiffness=(2.0,) * 3))
     shared = resolve_fields(needed_fields(tethers, Verlet()))
@@ -142,14 +142,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("message", REFUSED)
-def test_what_makes_no_sense_twice_and_wrong_names_are_refused(message):
+def test_invalid_duplicates_and_names_are_refused(message):
     with pytest.raises(InputError) as fault:
         REFUSED[message]()
     assert str(fault.value).startswith(message)
 
 
 @pytest.mark.long
-def test_a_failure_says_which_of_them():
+def test_a_failure_names_the_effect():
     control = IterationControl(first=1e-2, longest=1e-2, shortest=1e-2)
     traps = (Trap(stiffness=1.0), Trap(name="stiff", stiffness=1e7))
     setup = scene([[1, 0, 0]], [[0, 0, 0]], traps, mass=1.0, stepper=Trapezoid(control=control), duration=1.0)

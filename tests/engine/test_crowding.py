@@ -66,7 +66,7 @@ def test_grains_at_one_place_are_refused_by_name():
     assert time.perf_counter() - began < 20
 
 
-def test_what_holds_nothing_apart_may_be_at_one_place():
+def test_without_repulsion_particles_may_coincide():
     """Members of one body are not kept apart either."""
     assert check_places(*alone(scene([[0, 0, 0]] * 3, [[0, 0, 0]] * 3, (Gravity(),)))) == []
     plate = PrescribedMotion(group=1)
@@ -75,7 +75,7 @@ def test_what_holds_nothing_apart_may_be_at_one_place():
     assert "particles 0 and 1" in refused(start([[0, 0, 0]] * 2, plate, quantities={"group": [1.0, 0.0]}))
 
 
-def test_a_skin_that_takes_in_thousands_is_refused(rng):
+def test_a_skin_with_thousands_of_neighbours_is_refused(rng):
     """Lists of 2e8 pairs prevented a run from starting. A few particles may all be listed."""
     places = rng.uniform(0, 0.1, (20_000, 3))
     with pytest.raises(
@@ -114,7 +114,7 @@ def test_hard_spheres_in_a_crowd_are_refused():
     assert "at most 8 pairs overlap for each of them; received about" in refused(crowd)
 
 
-def test_deep_overlaps_are_warned_of():
+def test_deep_overlaps_give_a_warning():
     """Overlaps of half of the smaller radius, in open space and across a periodic face, between equal and
     unlike grains; one warning for all scenes states their number."""
     assert found(start([[0, 0, 0], [1.51 * R, 0, 0]])) == ""
@@ -153,7 +153,7 @@ TRIANGLES = TriangulatedSurface(
 
 @pytest.mark.parametrize("kind", [*SHEETS, "triangles"])
 @pytest.mark.parametrize("side", [1, -1])
-def test_grains_in_a_sheet_are_warned_of(kind, side):
+def test_grains_in_a_sheet_give_a_warning(kind, side):
     """From either side of the sheet."""
     wall = Walls(surface=TRIANGLES) if kind == "triangles" else Walls(**{kind: (SHEETS[kind],)})
     assert found(start([[0, 1e-2, side * 0.9 * R + bend(kind)]], wall)) == ""
@@ -166,7 +166,7 @@ def bend(kind):
     return 1 - np.sqrt(1 - 1e-4) if kind in ("spheres", "cylinders") else 0.0
 
 
-def test_grains_behind_a_plane_are_warned_of():
+def test_grains_behind_a_plane_give_a_warning():
     """Also behind a moving wall, at its initial position."""
     floor = Walls(planes=(Plane(),))
     assert found(start([[0, 0, R], [1, 0, 0.51 * R]], floor)) == ""
@@ -182,7 +182,7 @@ def test_grains_behind_a_plane_are_warned_of():
     "placement",
     [RandomInBall(centre=(0, 0, 0), radius=0.02), RandomInBox(low=(-0.02,) * 3, high=(0.02,) * 3)],
 )
-def test_the_packings_of_the_package_are_apart(placement):
+def test_packings_of_the_package_do_not_overlap(placement):
     """Also with unlike sizes."""
     classes = tuple(GrainClass(sizes=EqualSizes(radius=r), density=2e3) for r in (R, 0.1 * R))
     for grains in (classes, classes[:1]):
@@ -193,7 +193,7 @@ def test_the_packings_of_the_package_are_apart(placement):
         assert check_places(one, one.start()) == []
 
 
-def test_lists_that_would_not_fit_are_refused_before_they_are_made(monkeypatch):
+def test_lists_beyond_memory_are_refused_in_advance(monkeypatch):
     """At the start, an error states the position and the number of grains there; in a run, the world fails
     and others continue."""
 

@@ -190,11 +190,11 @@ def fast(in_fast_arithmetic):
     return in_fast_arithmetic("engine.test_fast", "everything")
 
 
-def test_results_say_so(fast):
+def test_results_state_the_arithmetic(fast):
     assert fast[0] == "fast"
 
 
-def test_what_is_not_finite_is_found_and_sums_carry_their_rounding_error_along(fast):
+def test_non_finite_values_are_found_and_sums_are_compensated(fast):
     kinds, total = fast[1]
     assert [kind[0] for kind in kinds] == [1, 1, 1, 1, 0, 0, 0, 0]
     assert [kind[1] for kind in kinds] == [0] * 8
@@ -206,7 +206,7 @@ def test_forces_are_those_of_their_twins(fast):
     assert max(fast[2]) < CLOSE
 
 
-def test_a_law_derived_from_one_by_the_inverse_is_its_own(fast):
+def test_derived_laws_do_not_inherit_the_inverse_sum(fast):
     np.testing.assert_allclose(fast[5], [np.exp(-10.0), -1.0], rtol=1e-9)
     assert not Screened.offers_inverse()
     assert NearField.offers_inverse()

@@ -126,7 +126,7 @@ def same(found, expected, what):
         np.testing.assert_array_equal(found[name], values, err_msg=f"{name}, {what}")
 
 
-def test_what_recurs_in_steps_is_a_piece_of_its_own():
+def test_phases_common_to_steps_form_their_own_pieces():
     a, b, c, d = (Phase() for _ in range(4))
     pieces, spans = in_pieces(((a, b, c, a), (d, d, b), ()))
     assert pieces == (((a,), (0, 3)), ((b,), (1, 6)), ((c,), (2,)), ((d,), (4, 5)))
@@ -134,7 +134,7 @@ def test_what_recurs_in_steps_is_a_piece_of_its_own():
     assert in_pieces(((a, b, c), (d,))) == ((((a, b, c), (0,)), ((d,), (1,))), (range(1), range(1, 2)))
 
 
-def test_all_schedules_and_ways_to_ask_take_the_same_steps_and_devices_are_asked_seldom(made):
+def test_all_schedules_take_the_same_steps(made):
     expected, _ = ends(made, "world")
     np.testing.assert_array_equal(expected["steps"], [60, 60, 60, 40, 50])
     assert len(set(expected["trace"])) == WORLDS
@@ -173,7 +173,7 @@ def test_teams_take_the_same_steps_late_or_not():
     assert elsewhere_with("threads=8")("engine.test_launches", "of_eight_threads") == []
 
 
-def test_a_team_that_parts_is_tried_again(made, monkeypatch):
+def test_a_parted_team_is_tried_again(made, monkeypatch):
     """Here it parts after each step; single threads then run some steps before the next trial."""
     expected, _ = ends(made, "world", threads=2, number=2)
     monkeypatch.setattr(team, "TIMES_LATE", 0)
@@ -186,7 +186,7 @@ def test_a_team_that_parts_is_tried_again(made, monkeypatch):
     same(found, expected, "without each other")
 
 
-def test_what_has_one_item_is_not_shared():
+def test_phases_with_one_item_are_not_shared():
     one, two, three = (Phase() for _ in range(3))
     many = Phase()
     many.extent = 2
@@ -225,7 +225,7 @@ def test_teams_are_tried_again_at_little_cost():
         (2000, "light", 1, 16, 3),
     ],
 )
-def test_tasks_of_a_phase_are_as_many_for_each_thread(extent, kind, worlds, threads, tasks):
+def test_tasks_of_a_phase_are_balanced(extent, kind, worlds, threads, tasks):
     """2000 particles are not divided into three tasks for two threads, one of which would idle; a single
     world with a large capacity is shared, too."""
     phase = Phase()

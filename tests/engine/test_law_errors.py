@@ -20,7 +20,7 @@ class TypedIn(Force):
 """
 
 
-def test_a_law_without_a_source_is_told_so():
+def test_a_law_without_source_text_is_refused():
     """Such laws are typed in, or read from standard input or the command line."""
     names = {"__name__": "typed_in"}
     exec(TYPED_IN, names)
@@ -86,7 +86,7 @@ def test_in_python(own_file, name):
 
 
 @pytest.mark.parametrize("stepper", [Trapezoid(), Collocation()])
-def test_what_a_stepper_keeps_is_not_that_of_an_effect(own_file, stepper):
+def test_names_of_stepper_and_effect_must_differ(own_file, stepper):
     """Both would write the same counter."""
     own = python_file.load(own_file("laws.py", LAWS)).OfStepper()
     rule = r"^name of .* must be a name of no other use on a state; received 'rejections'$"
@@ -114,7 +114,7 @@ def test_a_method_of_the_contract_must_be_for_kernels(own_file):
         python_file.load(own_file("plain.py", plain))
 
 
-def test_what_is_run_must_be_scenes():
+def test_only_scenes_can_be_run():
     for wrong in ("scene.toml", ["scene.toml"], [None]):
         with pytest.raises(InputError, match="scenes must be a Scene or a list of them"):
             tisim.run(wrong)

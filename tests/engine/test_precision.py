@@ -85,7 +85,7 @@ def refusals():
 
 
 @pytest.mark.slow
-def test_what_single_precision_cannot_hold_is_refused(single):
+def test_values_beyond_single_precision_are_refused(single):
     """Such scenes are refused: an infinite hardness, and a mass of zero, which would make the particle
     vanish."""
     hardness, mass, temperature = single("engine.test_precision", "refusals")

@@ -8,7 +8,7 @@ import numpy as np
 from tisim.engine import replay
 
 
-def test_images_that_take_long_are_made_seldom(monkeypatch):
+def test_slow_snapshots_are_made_rarely(monkeypatch):
     """A snapshot of a million grains takes seconds, and would otherwise take most of the time."""
     made = []
 

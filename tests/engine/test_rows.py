@@ -81,7 +81,7 @@ def test_files_and_dotted_keys(rng):
     [("effects.springs.springs.2.stiffness", "'2'"), ("effects.springs.springs.first.stiffness", "'first'"),
      ("effects.springs.springs.-1", "'-1'")],
 )  # fmt: skip
-def test_a_row_that_is_not_there(rng, key, received):
+def test_an_absent_row_is_refused(rng, key, received):
     with pytest.raises(InputError) as fault:
         hung(rng, 2).replace({key: 1.0})
     rule = "a setting of this scene (effects.springs.springs has rows 0 to 1)"

@@ -67,7 +67,7 @@ def chosen(made, worlds, capacity):
 
 
 @pytest.mark.parametrize("what", CASES)
-def test_what_is_worth_sharing_is_shared(what):
+def test_the_schedule_follows_the_work_of_a_step(what):
     made, worlds, capacity, expected = CASES[what]
     assert chosen(made(), worlds, capacity) == expected
 
@@ -77,10 +77,10 @@ def test_more_threads_share_more_work():
     assert [members(step, worlds, threads) for threads in (1, 2, 64)] == [1, 2, 5]
 
 
-def test_a_team_waits_for_as_long_as_looks_can_be_counted():
+def test_the_patience_of_a_team_is_bounded():
     assert Teams(1, 10**12, 2, 1).late == MOST_LOOKS
 
 
-def test_devices_take_phases_of_all_worlds():
+def test_devices_use_the_particle_schedule():
     card = SimpleNamespace(device="cuda", threads=2)
     assert choose((), SimpleNamespace(worlds=1, capacity=10), card) == "particle"

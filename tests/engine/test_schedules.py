@@ -60,7 +60,7 @@ def same(a, b):
         np.testing.assert_array_equal(values, b.state[name], err_msg=name)
 
 
-def test_two_runs_the_second_in_portions(usual):
+def test_a_run_in_portions_is_the_same(usual):
     """Three steps at a time: an interruption of a run does not change it."""
     simulation = compiled(WORLDS[0], BATCH, 200, "world")
     simulation.load(crowd())

@@ -217,7 +217,7 @@ def test_a_file_cut_anywhere_is_refused_or_the_whole_mesh(suffix, tmp_path):
         assert suffix == "obj" or len(surface.corners()) == 2
 
 
-def test_a_reader_that_waits_for_more_is_ended(tmp_path, monkeypatch):
+def test_a_reader_that_hangs_is_stopped(tmp_path, monkeypatch):
     """meshio reads endlessly from a PLY file whose header has no end."""
     monkeypatch.setattr(mesh_files, "READING_TIME", 3.0)
     with pytest.raises(InputError, match=r"^surface must be a file that meshio reads to its end; "):
@@ -238,7 +238,7 @@ def test_noise_is_refused(suffix, tmp_path, capfd):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no fifos")
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
 @pytest.mark.parametrize("kind", ["fifo", "device", "folder"])
-def test_what_is_no_regular_file_is_refused(tmp_path, kind, suffix):
+def test_only_regular_files_are_read(tmp_path, kind, suffix):
     """A fifo waits for ever, and a device has no end."""
     path = tmp_path / f"drum.{suffix}"
     if kind == "fifo":

@@ -181,7 +181,7 @@ def measured():
     return worlds, points, distances(worlds, points)
 
 
-def test_no_sample_of_a_face_is_nearer_and_one_is_as_near(measured):
+def test_distances_agree_with_samples_of_faces(measured):
     worlds, points, out = measured
     for w, shapes in enumerate(worlds):
         for m, name in enumerate(LISTS):
@@ -207,7 +207,7 @@ def check(points, distance, samples, apart):
     assert sampled.max() > 1
 
 
-def test_triangles_are_as_far_as_their_cells_tell(measured):
+def test_cells_give_lower_bounds_of_distances(measured):
     """The bound is never above the distance, and often better than the bound from the box around all
     triangles."""
     *_, out = measured
@@ -239,7 +239,7 @@ def test_a_file_is_read(tmp_path):
 
 
 @pytest.mark.parametrize("scale", [-1.0, 0.0, float("nan"), "1", True])
-def test_a_scale_that_is_no_length_is_refused(scale, tmp_path):
+def test_an_invalid_scale_is_refused(scale, tmp_path):
     """A negative scale would mirror the surface."""
     (tmp_path / "t.stl").write_text(tetrahedron())
     with pytest.raises(InputError, match=r"^surface.scale must be a number of m above 0; received "):
@@ -283,7 +283,7 @@ FILES = {
 
 
 @pytest.mark.parametrize(("surface", "message"), FILES.items())
-def test_a_surface_that_is_not_in_a_file_is_named(surface, message, tmp_path):
+def test_invalid_files_of_surfaces_are_refused(surface, message, tmp_path):
     with pytest.raises(InputError, match=message):
         Scene.from_toml(in_a_scene(tmp_path, surface))
 
@@ -308,7 +308,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

@@ -80,7 +80,7 @@ def filled():
 
 
 @pytest.mark.parametrize(("m", "shape"), SHAPES)
-def test_a_place_is_in_a_shape_in_kernels_and_in_python(filled, m, shape):
+def test_containment_agrees_in_kernels_and_python(filled, m, shape):
     away, inside = filled[0][m], filled[1][m]
     np.testing.assert_array_equal(inside, within(shape, away))
     np.testing.assert_array_equal(inside[:3], [True, False, False])
@@ -89,7 +89,7 @@ def test_a_place_is_in_a_shape_in_kernels_and_in_python(filled, m, shape):
 
 
 @pytest.mark.parametrize(("m", "shape"), SHAPES)
-def test_the_volume_is_the_part_of_places_inside(filled, m, shape):
+def test_the_volume_is_the_fraction_of_points_inside(filled, m, shape):
     """The points lie in a box that is a fifth wider; 4096 of them give the volume to half a percent."""
     _, inside, _, volumes = filled
     sides = 2 * np.array(HALVES[shape])
@@ -127,7 +127,7 @@ def surfaces(n=400):
     return on_ball.reshape(-1, 3), np.concatenate(on_cylinder).reshape(-1, 3), 2 * np.pi * RADIUS / n
 
 
-def test_solids_are_as_far_as_samples_of_their_surfaces():
+def test_distances_of_solids_agree_with_surface_samples():
     """The distance is negative inside; the nearest point lies along the normal."""
     points = np.random.default_rng(4).uniform(-1.2, 1.2, (500, 3))
     # The centre, and points on the axis within and beyond.

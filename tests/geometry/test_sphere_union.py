@@ -41,7 +41,7 @@ def test_spheres_apart_are_summed_exactly():
 
 
 @pytest.mark.parametrize("d", [0.45, 0.7, 1.2, 1.55])
-def test_two_that_overlap_are_two_caps(d, rng):
+def test_two_overlapping_spheres_are_two_caps(d, rng):
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)
     place = rng.normal(size=3)
@@ -53,7 +53,7 @@ def test_two_that_overlap_are_two_caps(d, rng):
     np.testing.assert_allclose(solid.inertia, expected, rtol=0, atol=2e-8 * across)
 
 
-def test_many_are_the_same_turned_and_what_points_at_random_find(rng):
+def test_many_spheres_under_rotation_and_by_random_points(rng):
     """The quadrature uses an axis: after a rotation it is a different one."""
     centre, radius = 0.6 * rng.normal(size=(8, 3)), rng.uniform(0.5, 1.0, 8)
     solid = sphere_union(centre, radius)
@@ -70,7 +70,7 @@ def test_many_are_the_same_turned_and_what_points_at_random_find(rng):
     np.testing.assert_allclose(points[within].mean(axis=0), solid.centre, rtol=0, atol=0.01)
 
 
-def test_a_sphere_that_is_there_twice_counts_once(rng):
+def test_duplicate_spheres_count_once(rng):
     centre, radius = 0.6 * rng.normal(size=(4, 3)), rng.uniform(0.5, 1.0, 4)
     once = sphere_union(centre, radius)
     twice = sphere_union(np.vstack([centre, centre[[2, 0, 2]]]), np.append(radius, radius[[2, 0, 2]]))

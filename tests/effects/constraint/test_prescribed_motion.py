@@ -38,7 +38,7 @@ def driven(motion, place, velocity=None, group=(1,), effects=(), **more):
 @pytest.mark.parametrize(
     "motion", ["oscillation", "rotation", "translation", "translation later", "translation after"]
 )
-def test_a_driven_group_is_where_its_motion_says(motion):
+def test_a_driven_group_follows_its_motion(motion):
     """For any gravity and any initial velocity; also through the faces of a box."""
     rate, centre, amplitude = np.array([0.3, -2.0, 1.0]), np.array([1e-2, 0, 0]), np.array([1e-3, 2e-3, 0])
     going = (0.5, -0.1, 0.2)
@@ -111,7 +111,7 @@ def test_a_frozen_group_stays_and_bears_the_weight_of_what_rests_on_it():
     np.testing.assert_allclose(state["force"][[2, 5, 6, 7, 8]], np.tile([0, 0, -weight], (5, 1)), rtol=1e-12)
 
 
-def test_a_group_goes_on_from_where_another_run_left_it():
+def test_a_group_continues_from_an_earlier_run():
     place, fall = (
         np.array([[0.0, 0.0, 0.0], [3e-3, 1e-3, 0.0], [0.0, 9e-3, 0.0]]),
         Gravity(acceleration=(0, 0, -G)),
@@ -178,7 +178,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("why", REFUSED)
-def test_what_cannot_be_is_refused(why):
+def test_invalid_scenes_are_refused(why):
     wrong, message = REFUSED[why]
     with pytest.raises(InputError, match=message):
         simulate([driven(**{"motion": Fixed(), "place": GRAIN, "group": (1, 0), **wrong})])
@@ -191,7 +191,7 @@ def test_a_scene_file_names_group_and_motion():
 
 
 @pytest.mark.slow
-def test_two_held_groups_push_each_other_as_grains_do():
+def test_held_groups_repel_each_other_as_grains_do():
     """They meet head on, with an overlap of a hundredth of a radius: damping uses the mass of a grain, not of
     a wall."""
     place, speed, dt = [[0, 0, 0], [0, 0, 1.99 * RADIUS]], -1e-3, 1e-7

@@ -235,7 +235,7 @@ def test_a_clump_of_one_is_a_sphere():
 
 
 @pytest.mark.slow
-def test_a_dumbbell_hits_the_floor_as_the_impulse_says():
+def test_a_dumbbell_hits_the_floor_with_the_right_impulse():
     """Without friction and loss, J = 2 v / (1/M + (r x n)^2 / I) at the contact point. Upright and with loss,
     v changes to -e v, because the mass of the contact is the mass of the body."""
     body, speed, lean = DUMBBELL.body, 0.05, 0.6
@@ -262,7 +262,7 @@ def test_a_dumbbell_hits_the_floor_as_the_impulse_says():
 
 
 @pytest.mark.slow
-def test_an_end_that_sticks_to_the_floor_swings_on_within_the_limit_of_its_lever():
+def test_a_sticking_end_is_stable_within_its_lever_limit():
     """The contact guard treats the body as a sphere of its mass and requires steps below 2 sqrt(M/k). With a
     lever arm l, steps must be below that over sqrt(1 + M l^2/I); otherwise a sticking end shakes itself off,
     without a message."""
@@ -363,7 +363,7 @@ def test_runs_have_the_same_bits_by_any_schedule_in_a_batch_and_restarted(tmp_pa
 
 
 @pytest.mark.long
-def test_clumps_go_through_the_faces_of_a_box():
+def test_clumps_cross_the_faces_of_a_box():
     """A clump may lie across a face at the start."""
     box, velocity = Box(low=(0, 0, 0), high=(0.01, 0.01, 0.01)), np.array([1.0, -0.73, 0.31])
     made = clumps(
@@ -381,7 +381,7 @@ def test_clumps_go_through_the_faces_of_a_box():
 
 
 @pytest.mark.long
-def test_spheres_may_be_put_in_beside_clumps():
+def test_spheres_may_be_inserted_beside_clumps():
     rain = InsertionByFlux(
         grains=[GrainClass(sizes=EqualSizes(radius=5e-4), density=2500.0)], number=5, low=(0, 0, 0.05),
         high=(0.02, 0.02, 0.07), flux=1e6,
@@ -404,7 +404,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("why", REFUSED)
-def test_what_cannot_be_is_refused(why):
+def test_invalid_scenes_are_refused(why):
     wrong, message = REFUSED[why]
     with pytest.raises(InputError, match=message):
         clumps(PEAR, [(0, 0, 0)], **wrong)
@@ -446,7 +446,7 @@ def put_in(shape, side):
 
 
 @pytest.mark.parametrize(("side", "fits"), [(0.0759, False), (0.0761, True)])
-def test_a_rod_whose_ends_another_may_touch_at_once_in_an_image_is_refused(side, fits):
+def test_rods_longer_than_the_box_allows_are_refused(side, fits):
     """The rod is 66 mm long, with spheres of 10 mm."""
     rod = Clump(centres=[(8e-3 * k, 0, 0) for k in range(8)], radii=[5e-3] * 8, density=2500.0)
     box = Box(low=(0, 0, 0), high=(side,) * 3)
@@ -471,12 +471,12 @@ def test_the_longest_clump_is_found_whatever_the_order_of_its_members():
     assert longest_clump({name: values[order] for name, values in start.items()}) == pytest.approx(4 * R)
 
 
-def test_clumps_may_all_be_put_in_later_in_a_periodic_box():
+def test_all_clumps_may_be_inserted_in_a_periodic_box():
     made = put_in(DUMBBELL, 0.1)
     made.acting()[0].suits_start(made.start(), made)
 
 
-def test_clumps_that_are_put_in_later_must_fit_the_box_too():
+def test_inserted_clumps_must_fit_the_box():
     """The largest inserted clump decides: a dumbbell is 4 R long, and another one needs 2 R."""
     for side, fits in ((6.1 * R, True), (5.9 * R, False)):
         made = put_in(DUMBBELL, side)

@@ -101,7 +101,7 @@ def left_over_in_numpy(steps, spreads):
     return (v / speed) ** 2
 
 
-def test_a_force_that_jumps_is_off_by_what_the_docs_say():
+def test_errors_of_jumping_forces_are_as_documented():
     """docs/granular.md has both figures: 3.6e-2 for a force that jumps, 7e-4 for one that is spread."""
     jumps, spread_out = (np.abs(left_over_in_numpy(100, spreads) - 1).max() for spreads in (False, True))
     print(f"off by {jumps:.1e} where the force jumps, {spread_out:.1e} where it is spread")

@@ -32,7 +32,7 @@ def rough(friction):
 
 
 @pytest.mark.parametrize("name", bench.LAWS)
-def test_each_law_that_both_have_is_the_same(name):
+def test_common_laws_are_equal(name):
     """After 1 step and after 100, the NumPy reference with LAMMPS's options equals LAMMPS, and without them
     it equals the package."""
     at, law = bench.start(), bench.LAWS[name]
@@ -52,18 +52,18 @@ def compared(law, walls, steps, ours, **start):
 
 @pytest.mark.parametrize("walls", [False, True])
 @pytest.mark.parametrize("steps", [1, 100])
-def test_numpy_with_the_two_points_of_lammps_is_lammps(walls, steps):
+def test_numpy_with_lammps_options_equals_lammps(walls, steps):
     """History, rotation, unloading, sliding and damping are the same, over hundreds of contacts."""
     assert compared(LIKE_LAMMPS, walls, steps, bench.by_numpy) < ROUNDING
 
 
-def test_the_package_is_numpy_without_them():
+def test_without_lammps_options_numpy_equals_the_package():
     at = bench.start()
     ours, twin = (by(at, bench.LAW, True, 100) for by in (bench.by_package, bench.by_numpy))
     assert max(bench.apart(ours, twin).values()) < ROUNDING
 
 
-def test_the_package_is_lammps_where_levers_do_not_matter():
+def test_the_package_equals_lammps_if_levers_do_not_matter():
     """Without friction, also with damping, for 100 steps; and the first forces of grains without spin, with
     friction that makes them stick."""
     assert compared(rough(0.0), True, 100, bench.by_package) < ROUNDING
@@ -80,7 +80,7 @@ def test_in_a_sheared_box_the_package_is_numpy_and_numpy_is_lammps():
     assert max(sheared_lammps.apart(theirs, sheared_lammps.by_lammps(made, steps)).values()) < ROUNDING
 
 
-def test_the_levers_are_what_makes_the_difference():
+def test_the_levers_cause_the_difference():
     """With the package's lever arm, NumPy differs from LAMMPS exactly as the package does."""
     at = bench.start()
     there = bench.by_lammps(at, bench.LAW, False, 1)

@@ -174,7 +174,7 @@ def critical(stiffness, damping, mass):
     return (np.sqrt(damping**2 + 4 * stiffness * mass) - damping) / stiffness
 
 
-def test_what_no_step_can_follow_stops_the_world():
+def test_too_long_steps_stop_the_world():
     """A bond that is stretched, sheared, bent or twisted, with each of these as the stiffest mode: with steps
     of 0.98 of its limit it is stable, with 1.02 the world stops and names it; also with damping, and in a
     row."""
@@ -221,7 +221,7 @@ def test_what_no_step_can_follow_stops_the_world():
     assert np.abs(result.state["velocity"]).max() < 1e-5
 
 
-def test_what_no_step_can_follow_of_unlike_grains_stops_the_world():
+def test_too_long_steps_for_unlike_grains_stop_the_world():
     """For unlike grains shear and bending are coupled: springs K with inverse masses B are stable if B K dt^2
     has no eigenvalue above 4."""
     radius, mass, wide, kappa = np.array([R, R / 3]), np.array([1e-2, 4e-4]), 1.0, 2.0

@@ -20,7 +20,7 @@ EACH = [name if name == "jkr" else pytest.param(name, marks=pytest.mark.slow) fo
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_one_step_and_some_hundred_are_those_of_the_twin(name, rng):
+def test_steps_equal_the_twin(name, rng):
     """Every part of a law acts, stores history, sticks and slides; pairs of materials follow their rules, or
     a table."""
     made = [heap(name, rng), heap(name, rng, pairs=True)]

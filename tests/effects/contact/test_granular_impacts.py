@@ -129,7 +129,7 @@ def test_an_elastic_impact_is_as_deep_as_hertz_found_and_as_long():
 
 
 @pytest.mark.slow
-def test_other_steppers_find_the_same():
+def test_other_steppers_agree():
     """Boris with the same steps; and the implicit trapezoid, which starts with steps as long as the impact
     and shortens them during it. The impact is oblique, of a spinning grain, with friction and damping."""
     ends = []
@@ -181,7 +181,7 @@ def test_a_grain_that_slides_through_its_impact_loses_mu_times_the_push():
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.5, 5.0])
-def test_friction_slows_the_surface_and_no_more(friction):
+def test_friction_only_slows_the_surface(friction):
     """At any angle: the friction impulse is within Coulomb's limit, the surface speed does not reverse to a
     larger value, and energy does not grow. The gained spin is 5/2 of the lost velocity over the lever arm."""
     angles = np.tan(np.linspace(0.02, 1.5, 32))

@@ -117,7 +117,7 @@ COHESIVE = {
 
 
 @pytest.mark.parametrize("case", COHESIVE)
-def test_cohesion_that_nothing_holds_is_refused(case):
+def test_cohesion_without_an_equilibrium_is_refused(case):
     """Above k / (2 pi R*) with a linear spring, and 2 E* / (3 pi) with Hertz; just below, the scene is
     accepted."""
     words, (normal, density, *more) = COHESIVE[case]
@@ -137,7 +137,7 @@ def test_cohesion_that_nothing_holds_is_refused(case):
     assert words in message
 
 
-def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
+def test_cohesion_is_checked_for_inserted_grains():
     """Two grains of one class, grains of two classes, an inserted grain with one of the start, and a grain at
     a wall."""
     dense = {"dust-grain": MaterialPair(cohesion_energy_density=3.1 * MOST)}
@@ -163,7 +163,7 @@ def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
         assert words in str(fault.value)
 
 
-def test_walls_say_what_the_laws_of_the_scene_say():
+def test_failure_hints_of_walls_follow_the_laws():
     """The failure hint mentions cohesion for a law whose cohesion grows with the overlap; a liquid bridge
     adds none."""
     long, held = (
@@ -179,7 +179,7 @@ def test_walls_say_what_the_laws_of_the_scene_say():
         assert FLAT.may_stop((FLAT, *laws), Open()) == words
 
 
-def test_a_scene_is_asked_before_it_runs():
+def test_a_scene_is_checked_before_it_runs():
     """The check runs whenever a scene is loaded."""
     made = one(Granular(normal=Hooke(), cohesion=SJKR()), Walls(planes=[Plane()]), radius=1.0,
                materials={"grain": Material(stiffness=1.0, cohesion_energy_density=1.0)})  # fmt: skip
@@ -190,7 +190,7 @@ def test_a_scene_is_asked_before_it_runs():
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message
@@ -201,7 +201,7 @@ def ends(scenes):
 
 
 @pytest.mark.long
-def test_what_no_step_can_follow_stops_the_world_and_is_named():
+def test_too_long_steps_stop_the_world_and_are_named():
     """A modulus that overflows, and steps too long for a pair, its damping and a wall; the previous state is
     kept."""
     far = {"dt": 1e-3, "steps": 1000}
@@ -239,7 +239,7 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
 
 
 @pytest.mark.long
-def test_what_is_pressed_far_into_each_other_gives_back_what_it_holds():
+def test_deep_overlaps_return_their_stored_energy():
     """A grain far beyond a wall, one within a larger one, and centres 1e-6 radii apart: the energy is Hertz's
     8/15 E* sqrt(R*) delta^2.5, in steps that resolve the motion."""
     e_star = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))

@@ -82,7 +82,7 @@ def test_viscoelastic_restitution_falls_as_the_fifth_root_of_the_speed():
     np.testing.assert_allclose(1 - found, small - 0.6 * small**2, rtol=0.02)
 
 
-def test_a_linear_spring_is_remembered_and_slides():
+def test_a_linear_spring_has_history_and_slides():
     """0.4 k xi, up to mu N; it decreases at once when the motion reverses."""
     moved = np.concatenate([np.tile(1e-3 * Y, (10, 1)), np.tile(-1e-4 * Y, (5, 1))])
     force, _, _ = along("hooke", held(15), moved, friction=0.2)
@@ -93,7 +93,7 @@ def test_a_linear_spring_is_remembered_and_slides():
 
 
 @pytest.mark.slow
-def test_the_displacement_of_mindlins_spring_is_remembered_whatever_the_pressure():
+def test_mindlins_spring_stores_its_displacement():
     """8 G* a xi; if pressed further at a constant displacement, the force grows."""
     overlap = np.array([0.01, 0.01, 0.04, 0.0025])
     force, _, _ = along("jkr", overlap, at(4, 0 * Y, 1e-6 * Y), friction=1e6)
@@ -101,7 +101,7 @@ def test_the_displacement_of_mindlins_spring_is_remembered_whatever_the_pressure
 
 
 @pytest.mark.slow
-def test_viscous_friction_forgets():
+def test_viscous_friction_has_no_history():
     """x gamma u up to mu N, and zero at rest."""
     moved = np.array([[0, 1e-7, 0], [0, 1, 0], [0, 0, 0]])
     force, _, _ = along("dmt", held(3), moved, friction=0.3, damping=30.0)
@@ -121,7 +121,7 @@ ROLLS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROLLS)
-def test_a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once(name):
+def test_a_rolling_spring_slips_at_its_limit(name):
     """k_r R* theta, up to mu_r R* N, perpendicular to the normal; it has no component along the normal."""
     first, spring, push = ROLLS[name]
     limit = 0.1 * push
@@ -159,7 +159,7 @@ TWISTS = {
 
 
 @pytest.mark.parametrize("name", ["hooke", pytest.param("jkr", marks=pytest.mark.slow)])
-def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(name):
+def test_a_twisting_spring_slips_at_its_limit(name):
     first, spring, limit = TWISTS[name]
     turned = np.concatenate(
         [np.tile(-0.1 * limit / spring * X, (20, 1)), np.tile(0.01 * limit / spring * X, (9, 1))]
@@ -170,7 +170,7 @@ def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(nam
 
 
 @pytest.mark.slow
-def test_a_contact_that_is_pressed_twisted_unloaded_and_twisted_back_yields_no_work():
+def test_a_closed_path_with_twisting_gains_no_work():
     """In twisting, half of the loss of stiffness times the square of the angle is dissipated."""
     n, angle = 500, 1e-4
     still, down = np.zeros(n), np.linspace(PRESSED, 0.005, n)

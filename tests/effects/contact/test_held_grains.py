@@ -37,7 +37,7 @@ def against_one_that_is_fixed(gap, velocity, spin, dt, steps):
 
 
 @pytest.mark.slow
-def test_what_is_fixed_is_like_a_wall():
+def test_fixed_grains_act_like_walls():
     """An impact has the given restitution, and a stretched and twisted bond the given damping ratio."""
     step = np.pi * np.sqrt(MASS / STIFFNESS) / 400
     area, second = np.pi * R**2, np.pi * R**4 / 4

@@ -57,7 +57,7 @@ def along(normal, overlap, moved, **law):
 
 
 @pytest.mark.long
-def test_one_step_and_some_hundred_are_those_of_the_twin(rng):
+def test_steps_equal_the_twin(rng):
     """Unlike grains that overlap, spin and slide, in a cell; many stick, many slide."""
     made = [heap(rng, friction=0.1 + 0.2 * k, restitution=0.3 + 0.2 * k) for k in range(4)]
     for steps in (1, 300):
@@ -78,7 +78,7 @@ def test_force_and_stiffness_are_those_of_hertz_and_mindlin():
     np.testing.assert_array_equal(elastic[1], [force[1, 0], 0, 0])
 
 
-def test_what_is_remembered_turns_with_the_pair():
+def test_the_contact_history_rotates_with_the_pair():
     """Displaced sideways, then rotated by 2 rad about a transverse axis: the force keeps its magnitude and
     rotates too."""
     turns = 400
@@ -94,7 +94,7 @@ def test_what_is_remembered_turns_with_the_pair():
     np.testing.assert_allclose(elastic[-1], ahead, atol=0.01 * np.linalg.norm(ahead))
 
 
-def test_coulombs_limit_holds_with_the_damping_and_is_left_at_once():
+def test_coulombs_limit_includes_damping_and_ends_at_once():
     """After long sliding, the force is mu F_n; when the motion reverses, it decreases at once as the spring
     does."""
     moved = np.zeros((30, 3))
@@ -106,7 +106,7 @@ def test_coulombs_limit_holds_with_the_damping_and_is_left_at_once():
     np.testing.assert_allclose(force[20:, 0], back, rtol=1e-12)
 
 
-def test_a_closed_path_yields_no_work():
+def test_a_closed_path_gains_no_work():
     """Pressed, sheared, unloaded, sheared back and pressed again: half (S_1 - S_0) u^2 is dissipated, and
     nothing is gained."""
     n = 500
@@ -122,7 +122,7 @@ def test_a_closed_path_yields_no_work():
     np.testing.assert_allclose(elastic[-1], 0, atol=1e-9 * np.abs(elastic).max())
 
 
-def test_a_large_grain_that_many_small_ones_touch_remembers_nothing_and_each_of_them_one(rng):
+def test_the_history_is_stored_on_the_smaller_grain(rng):
     """With more contacts than the capacity of a grain: the smaller grain stores the history, as it has few
     larger neighbours."""
     small, size = 40, 0.05
@@ -144,7 +144,7 @@ def test_a_large_grain_that_many_small_ones_touch_remembers_nothing_and_each_of_
 
 
 @pytest.mark.long
-def test_momentum_and_angular_momentum_stay(rng):
+def test_momentum_and_angular_momentum_are_conserved(rng):
     """Grains of unlike sizes and masses, far from any wall, that stick and slide."""
     n = 40
     radius, place = rng.uniform(0.1, 0.3, n), rng.uniform(0, 1.2, (n, 3))

@@ -69,7 +69,7 @@ def grow(known, i):
 
 
 @pytest.mark.parametrize("which", [(0, 30, 59), (59, 0, 30), (30, 59, 0)])
-def test_the_others_go_on_as_they_are(which):
+def test_other_grains_are_not_affected(which):
     """Indices change, the new grain reuses the slot of the merged one, and lists are rebuilt."""
     taken, taker, broken = which
     made = bed(5, taken=taken, taker=taker, broken=broken)

@@ -70,7 +70,7 @@ def run(scenes, **more):
 
 
 @pytest.mark.slow
-def test_a_moving_wall_is_one_at_rest_for_those_who_go_along():
+def test_moving_walls_are_galilean_invariant():
     """A spinning grain hits a wall that translates: the motion is the same as in the frame of the wall."""
     goes, velocity, spin = np.array([0.7, -0.4, 1.1]), np.array([0.3, 0.2, -1.0]), [[3.0, -5.0, 20.0]]
     place, more = [[0, 0, RADIUS + 0.05]], {"spin": spin, "steps": 20_000}
@@ -161,7 +161,7 @@ def test_a_servo_presses_with_the_wanted_force(pressed, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_servo_goes_on_from_a_checkpoint_to_the_same_bits(pressed, tmp_path):
+def test_a_servo_continues_from_a_checkpoint_bit_for_bit(pressed, tmp_path):
     """Also beside other worlds."""
     made, *_ = pressed
     others = among([[0, 0, 1]], [[0, 0, 0]], floor=Plane(), duration=0.3)
@@ -197,7 +197,7 @@ def test_the_same_bits_on_both_schedules(pressed):
 
 
 @pytest.mark.slow
-def test_a_grain_goes_along_with_a_plate_that_shakes_gently():
+def test_a_grain_follows_a_gently_shaking_plate():
     """With an acceleration amplitude of g/2: the plate carries m (g + a), and the grain has the plate's
     velocity, corrected for the overlap, which changes with the force."""
     frequency = 5.0
@@ -242,12 +242,12 @@ def test_a_wall_as_fast_as_sound_throws_grains_ahead():
     np.testing.assert_array_equal(result.state["velocity"][:, 1:], 0)
 
 
-def test_what_a_servo_adds_up_is_a_number_however_many_grains_resist():
+def test_the_sum_of_a_servo_does_not_overflow():
     """Four million grains, each at the largest value that is counted, as for a tiny target force."""
     assert 2**22 * QUANTA * MOST_RESISTANCE < 2**63
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     for message, wrong in {
         "servo.direction must be a direction; received (0.0, 0.0, 0.0)": {"direction": (0, 0, 0)},
         "servo.force must be greater than 0.0; received 0": {"force": 0},

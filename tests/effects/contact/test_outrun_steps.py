@@ -32,7 +32,7 @@ def fates(scenes):
     return simulate(scenes, worlds=granular.WORLDS, capacity=granular.CAPACITY)
 
 
-def test_a_grain_that_meets_a_wall_hundreds_of_radii_a_step_is_stopped():
+def test_a_grain_that_outruns_a_wall_contact_is_stopped():
     """Without the check the energy grew by a factor of 19, because the force acted with a lever arm of
     hundreds of radii. A grain of equal speed in sufficiently short steps keeps its energy, and fast sliding
     on the floor is allowed."""
@@ -53,7 +53,7 @@ def test_a_grain_that_meets_a_wall_hundreds_of_radii_a_step_is_stopped():
 
 
 @pytest.mark.parametrize(("part", "goes"), [(1.9, True), (2.1, False)])
-def test_how_far_a_grain_may_come_nearer_a_wall_in_a_step(part, goes):
+def test_largest_approach_to_a_wall_in_a_step(part, goes):
     """A grain may approach by its diameter, for any springs."""
     soft = {**LAW, "young": 1e-3}
     one = grains(
@@ -64,7 +64,7 @@ def test_how_far_a_grain_may_come_nearer_a_wall_in_a_step(part, goes):
     assert result.status.ok == goes, result.status.reason
 
 
-def test_two_that_pass_each_other_in_a_step_are_not_unseen():
+def test_grains_that_pass_each_other_in_a_step_are_detected():
     """Earlier, they passed without an error. Two grains that move side by side at the same speed
     are allowed."""
     place = [[0, 0, 0], [21 * RADIUS, 0, 0]]
@@ -81,7 +81,7 @@ def test_two_that_pass_each_other_in_a_step_are_not_unseen():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sheet", ["disc", "triangles"])
-def test_a_grain_does_not_go_through_a_sheet_unseen(sheet):
+def test_a_grain_that_passes_a_sheet_is_detected(sheet):
     """Behind a disc or a triangle nothing acts on a grain later. The check finds a grain that passes it in
     one step, and one that is pressed through it, which the sheet would push out on the other side."""
     above = (0.0, 0.0, 0.35) if sheet == "disc" else (0.1, 0.2, surfaces.SHEET + 0.35)
@@ -100,7 +100,7 @@ def test_a_grain_does_not_go_through_a_sheet_unseen(sheet):
     assert bounced.state["velocity"][0, 2] == pytest.approx(0.02 * surfaces.RADIUS / dt, rel=1e-2)
 
 
-def test_the_longest_step_that_is_named_is_that_of_the_stiffest_spring():
+def test_the_stated_longest_step_is_of_the_stiffest_spring():
     """The sliding mode is the stiffest, with the lever arm to the middle of the overlap."""
     depth = 0.2
     stiffness = 2 * LAW["young"] / (1 - LAW["poisson"] ** 2) * np.sqrt(RADIUS * depth * RADIUS)
@@ -119,7 +119,7 @@ def test_the_longest_step_that_is_named_is_that_of_the_stiffest_spring():
 
 
 @pytest.mark.long
-def test_two_bodies_that_are_both_held_have_no_longest_step():
+def test_held_bodies_have_no_longest_step():
     """Their contact moves nothing, and its force depends on the overlap alone, for any step."""
     speed, gap, duration = 1e-4, 2e-6, 0.05
     scenes = [

@@ -111,7 +111,7 @@ def start(made):
         effect.suits_start(made.start(), made)
 
 
-def test_a_mesh_that_does_not_tell_its_distances_is_refused_beside_a_duct(monkeypatch):
+def test_a_mesh_without_distances_is_refused_beside_a_duct(monkeypatch):
     """A mesh of very many triangles is not accepted as equal at both faces."""
     monkeypatch.setattr("tisim.geometry.triangles.MOST_DISTANCES", 1)
     both = FELT["a duct of two pieces that reach beyond"] | {"surface": STAIR}
@@ -126,13 +126,13 @@ def test_a_duct_of_pieces_is_taken_for_small_grains_too(radius):
 
 
 @pytest.mark.long
-def test_a_run_looks():
+def test_a_run_checks_its_walls():
     with pytest.raises(tisim.InputError, match="it does not act through them"):
         tisim.run(scene(**REFUSED["a plane across"]))
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_would_have_to_be_felt_through_a_face_is_refused(name):
+def test_walls_that_act_through_a_face_are_refused(name):
     with pytest.raises(
         tisim.InputError, match=r"^walls\.\w+ must be farther than the largest radius, 0.005 m"
     ):
@@ -140,7 +140,7 @@ def test_what_would_have_to_be_felt_through_a_face_is_refused(name):
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_without_periodic_faces_it_is_taken(name):
+def test_without_periodic_faces_walls_are_accepted(name):
     open_box = tisim.Box(low=(0, 0, 0), high=(SIDE,) * 3, periodic=(False, False, False))
     changed = scene(**REFUSED[name]).model_copy(update={"domain": open_box})
     start(changed)
@@ -150,7 +150,7 @@ def test_without_periodic_faces_it_is_taken(name):
 @pytest.mark.parametrize(
     "name", ["a plane", *(pytest.param(name, marks=pytest.mark.slow) for name in FELT if name != "a plane")]
 )
-def test_what_goes_on_from_face_to_face_is_felt(name):
+def test_walls_that_continue_across_faces_act(name):
     (result,) = tisim.run([scene(**FELT[name])])
     force = 4 / 3 * 1e7 / (2 * (1 - 0.25**2)) * np.sqrt(RADIUS) * OVERLAP**1.5
     assert result.measures["walls_force_z"] == pytest.approx(-force, rel=1e-3)
@@ -196,7 +196,7 @@ MOVED = {
 
 
 @pytest.mark.parametrize("name", MOVED)
-def test_a_wall_that_comes_to_a_face_as_it_moves_is_refused(name):
+def test_walls_that_move_to_a_face_are_refused(name):
     walls, motion, duration, taken = MOVED[name]
     made = scene(**walls, motion=motion, duration=duration)
     if taken:
@@ -216,7 +216,7 @@ SHAPES = [
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.kind())
-def test_a_shape_reaches_as_far_as_it_says(shape):
+def test_extents_of_shapes_are_tight(shape):
     """No farther, and not less: its distance from points outside its extent is positive, and close to 0
     somewhere on its boundary."""
     low, high = shape.extent()

@@ -61,7 +61,7 @@ def test_a_ball_rests_in_a_ring_of_any_number_of_facets(number, friction):
 @pytest.mark.parametrize(
     "number", [7, 12, *(pytest.param(number, marks=pytest.mark.slow) for number in (6, 8))]
 )
-def test_contacts_apart_push_each_by_its_own(number):
+def test_separate_contacts_act_independently(number):
     """The force is the sum of Hertz's forces, even if the contacts exceed the capacity for contact
     history."""
     sunk, aside = 1e-4, np.array([2e-7, -1e-7])
@@ -101,7 +101,7 @@ def test_a_ball_in_a_ring_is_the_same_alone_and_among_others():
 @pytest.mark.parametrize(
     "radius", [0.45, *(pytest.param(radius, marks=pytest.mark.slow) for radius in (0.3, 0.8))]
 )
-def test_nothing_pushes_a_ball_in_the_middle_aside(radius):
+def test_a_ball_in_the_middle_has_no_lateral_force(radius):
     """Nor strongly off its position near the middle: with 64 facets, the choice of contacts would be
     arbitrary."""
     given = {"radius": radius, "slope": 0.05, "sunk": 1e-4, "steps": 1, "dt": 1e-12}

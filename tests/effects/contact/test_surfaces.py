@@ -78,7 +78,7 @@ def test_a_scene_with_all_shapes_goes_to_a_file_and_back():
 
 
 @pytest.mark.slow
-def test_a_ball_within_bounces_for_ever():
+def test_a_ball_inside_a_shape_bounces_for_ever():
     """Along planes, curved faces, and in their corners, in which it may touch three at once."""
     rng = np.random.default_rng(1)
     scenes = [
@@ -162,7 +162,7 @@ def test_a_sphere_that_rolls_downhill_over_seams_keeps_its_grip():
 
 
 @pytest.mark.slow
-def test_a_grain_on_a_seam_is_held_once():
+def test_a_grain_on_a_seam_has_one_contact():
     """Exactly over a vertex, in which up to six triangles meet, and over an edge."""
     sunk = (3 * 10 / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
     corners = [(2.0, 2.0), (0.0, 2.0), (-2.0, 0.5)]

@@ -237,7 +237,7 @@ def tripod(steps, rate, out, turns):
     return np.array(places)
 
 
-def test_a_body_that_sticks_to_a_turntable_stays_where_it_is():
+def test_a_body_that_sticks_to_a_turntable_does_not_creep():
     """At 0.31 of Coulomb's limit, a tripod that cannot roll moves by less than 1e-4 of 2 pi T / S_t = 61 um a
     turn, in steps of any size. It would creep by that distance if the springs did not rotate with it."""
     for dt in (2e-5, 1e-5):
@@ -245,7 +245,7 @@ def test_a_body_that_sticks_to_a_turntable_stays_where_it_is():
         assert np.abs(moved[:, :2]).max() < 6e-9
 
 
-def test_what_carries_a_spring_keeps_its_length_and_goes_back():
+def test_rotating_a_spring_keeps_its_length():
     """Against a SciPy integral of dT/dt = W x T along a path of the normal with a spin about it; length is
     preserved."""
 

@@ -135,7 +135,7 @@ def test_a_turning_table_and_its_liquid_are_those_of_the_twin(thrown):
     assert np.abs(wet - dry).max() > 1e-4
 
 
-def test_a_disc_is_that_table_too(thrown):
+def test_a_disc_acts_as_the_table(thrown):
     """Its contacts are found and stored in another way."""
     discs = [
         made.model_copy(

@@ -114,7 +114,7 @@ def test_a_grain_between_two_walls_stays_below_coulombs_limit_and_slides_above_i
             assert v == pytest.approx((1 - part) * limit * result.time, abs=limit / stiffness**0.5)
 
 
-def test_a_wall_is_a_plane_wherever_its_point_is_and_however_long_its_normal():
+def test_walls_do_not_depend_on_point_and_normal_length():
     """A plane that is tilted, and one given by another point and a longer normal: the same motion to
     rounding."""
     normal = np.array([1.0, 2.0, 2.0]) / 3
@@ -131,7 +131,7 @@ def test_a_wall_is_a_plane_wherever_its_point_is_and_however_long_its_normal():
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
 
 
-def test_a_grain_in_a_corner_feels_each_wall_as_if_alone():
+def test_in_a_corner_forces_of_walls_add_up():
     """The force is the sum over the walls; each contact has its own history."""
     planes = [((0.0, 0.0, 0.0), tuple(axis)) for axis in np.eye(3)]
     place, velocity, spin = [[0.97, 0.98, 0.99]], [[0.3, -0.2, 0.1]], [[1.0, 2.0, 3.0]]

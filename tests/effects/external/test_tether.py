@@ -46,6 +46,6 @@ def test_only_a_tether_needs_an_anchor():
         assert not effect.offers("velocity_jacobian")
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError, match=r"^tether.stiffness.2 must be given; received nothing$"):
         Tether(stiffness=(1, 2))

@@ -25,7 +25,7 @@ def twin(law, state):
 
 
 @pytest.mark.parametrize("kind", [SelfGravity, pytest.param(SoftenedSelfGravity, marks=pytest.mark.slow)])
-def test_forces_are_those_of_the_twin_and_add_up_to_nothing(kind, rng):
+def test_forces_equal_the_twin_and_sum_to_zero(kind, rng):
     """Forces and torques sum to zero; and sum r.F is the energy (Clausius's virial)."""
     options = [{"softening_length": float(rng.uniform(0.1, 1))} for _ in range(WORLDS)]
     scenes = [random_cloud(rng, (kind(**one if kind is SoftenedSelfGravity else {}),)) for one in options]
@@ -54,7 +54,7 @@ def test_the_softened_force_is_the_gradient_of_the_softened_energy(rng):
 
 
 @pytest.mark.slow
-def test_two_in_one_place_pull_each_other_only_without_softening():
+def test_coincident_particles_attract_only_without_softening():
     """Without softening the force is not finite, and the world stops with a message."""
     law = SoftenedSelfGravity(softening_length=0.5)
     setup = scene(np.zeros((2, 3)), np.zeros((2, 3)), (law,), mass=1e9)
@@ -152,7 +152,7 @@ def test_kepler():
 
 
 @pytest.mark.slow
-def test_momenta_of_a_cloud_stay_to_rounding_and_its_energy_to_that_of_the_step(rng):
+def test_momenta_are_conserved_to_rounding_and_energy_to_the_step(rng):
     """Twenty bodies with softening through half a collapse, by Verlet: forces are central, equal and
     opposite."""
     n = 20
@@ -183,7 +183,7 @@ def test_momenta_of_a_cloud_stay_to_rounding_and_its_energy_to_that_of_the_step(
     assert energy[1] == pytest.approx(energy[0], rel=2e-3)
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         SoftenedSelfGravity(softening_length=0)
     assert str(fault.value) == "softened_self_gravity.softening_length must be greater than 0.0; received 0"

@@ -9,7 +9,7 @@ from tisim.effects import TreeGravity
 
 
 @pytest.mark.slow
-def test_the_same_bits_on_all_schedules_and_in_any_company(rng):
+def test_the_same_bits_on_all_schedules_and_in_batches(rng):
     """A world by one thread, by a team, by launches; alone, in a batch, and with a larger capacity."""
     places = [ball(rng, n) for n in (1500, 40, 3, 777)]
     scenes = [

@@ -76,7 +76,7 @@ def test_a_far_cell_is_within_the_bound_of_salmon_and_warren(rng):
         assert (error > 1e-3 * bound).all()
 
 
-def test_one_that_is_far_away_takes_no_accuracy_from_the_others(rng):
+def test_a_distant_particle_does_not_reduce_accuracy(rng):
     """The others then share a few of the 2^48 cells of the curve's cube, and are still sorted correctly."""
     near = ball(rng, 400)
     place = np.concatenate([near, [[1e3, 2e3, -1e3]]])
@@ -98,7 +98,7 @@ def test_momentum_is_conserved_to_the_error_of_the_forces(rng):
 
 
 @pytest.mark.slow
-def test_iterations_of_a_step_see_it_as_they_see_all_pairs():
+def test_iterated_steps_agree_with_all_pairs():
     """Two bodies share a leaf: orbits by collocation, whose trial states need new sums, are the same."""
     mass = np.array([3e9, 1e9])
     end = []
@@ -118,7 +118,7 @@ def test_iterations_of_a_step_see_it_as_they_see_all_pairs():
 
 
 @pytest.mark.slow
-def test_two_in_one_place_stop_the_world():
+def test_coincident_particles_stop_the_world():
     setup = scene([[1, 2, 3], [1, 2, 3], [0, 0, 0]], np.zeros((3, 3)), (TreeGravity(),), mass=1.0)
     (result,) = simulate([setup], capacity=16)
     assert not result.status.ok
@@ -143,7 +143,7 @@ def test_a_study_of_cost_tries_it_in_place_of_all_pairs():
     assert turned.turned(TreeGravity(), -3.0).opening_angle == pytest.approx(0.05)
 
 
-def test_its_memory_is_told():
+def test_the_memory_of_the_tree_is_reported():
     setup = scene(np.zeros((1, 3)), np.zeros((1, 3)), (TreeGravity(),), mass=1.0)
     simulation = compiled(setup, worlds=len(THETAS), capacity=CAPACITY)
     (buffer,) = [one for one in simulation.assembly.buffers if one.what == "long-range sum"]
@@ -152,6 +152,6 @@ def test_its_memory_is_told():
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])
-def test_what_is_wrong_is_named(angle):
+def test_invalid_values_are_refused(angle):
     with pytest.raises(InputError, match=r"tree_gravity\.opening_angle must be (greater|less) than"):
         TreeGravity(opening_angle=angle)

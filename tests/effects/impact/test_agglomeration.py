@@ -45,7 +45,7 @@ def test_two_bonded_grains_become_one_sphere(rng):
 
 
 @pytest.mark.long
-def test_bonded_grains_stay_two_where_nothing_merges_them():
+def test_bonded_grains_stay_separate_without_merging():
     """Without the effect a bond is counted, both grains move on together, and both remain."""
     (result,) = simulate([head_on(5.0, (Impact(hardness=SOFT),), mass=[1.0, 3.0])], worlds=300, capacity=2)
     assert result.work["bonds"] == 1

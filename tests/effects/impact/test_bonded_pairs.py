@@ -105,7 +105,7 @@ def summaries():
 
 
 @pytest.mark.slow
-def test_nor_does_it_in_single_precision(single):
+def test_a_bonded_pair_collides_once_in_single_precision(single):
     counts = np.array(single("effects.impact.test_bonded_pairs", "summaries"))
     assert (counts[..., 0] == 1).all()
     np.testing.assert_allclose(counts[..., 1], 1, rtol=1e-5)

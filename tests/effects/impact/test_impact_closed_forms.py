@@ -94,7 +94,7 @@ def test_harder_or_lighter_or_slower_never_bonds_more(rng):
     assert e[-1] == pytest.approx(0, abs=1e-14)
 
 
-def test_pairs_that_separate_or_do_not_touch_are_left_alone():
+def test_pairs_that_separate_or_do_not_touch_are_unchanged():
     """An impact needs both an overlap and an approach."""
     apart, parting = simulate(
         [

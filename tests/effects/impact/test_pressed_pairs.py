@@ -69,7 +69,7 @@ def test_a_pressed_pair_collides_once_whatever_the_step():
         assert np.ptp(result.state["velocity"], axis=0).max() <= 1e-15
 
 
-def test_its_energy_is_kept_and_its_heat_that_of_the_impact():
+def test_a_pressed_pair_keeps_the_energy_of_its_impact():
     for result in run_rows([row(steps=steps) for steps in (100, 1000)]):
         kinetic = MASS
         assert total(result.state) == pytest.approx(total(result.start), abs=1e-7 * kinetic)
@@ -118,7 +118,7 @@ STEPPERS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stepper", STEPPERS)
-def test_so_it_is_with_other_steppers(stepper):
+def test_a_pressed_pair_collides_once_with_other_steppers(stepper):
     for result in run_rows([row(stepper=STEPPERS[stepper](DURATION / steps)) for steps in (100, 1000)]):
         assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
         assert result.work["contacts"] >= 90
@@ -144,7 +144,7 @@ def cluster(steps, domain=None, low=-np.inf, side=np.inf):
 
 
 @pytest.mark.long
-def test_a_cluster_does_not_sink_into_itself_and_the_less_so_the_shorter_the_steps():
+def test_overlaps_of_a_cluster_shrink_with_the_step():
     deepest = []
     for steps in (500, 2000):
         (result,) = simulate([cluster(steps)], capacity=32)

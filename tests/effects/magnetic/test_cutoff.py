@@ -200,7 +200,7 @@ def test_mutual_moments_of_many_are_found_with_the_pair_list(rng):
     close(state["moment"], solved(setup, state["position"], state["radius"])[0], 1e-10)
 
 
-def test_where_there_is_no_cutoff_all_pairs_count():
+def test_without_a_cutoff_all_pairs_count():
     assert not MutualInducedMoment(susceptibility=1.0).short_ranged
     assert MutualInducedMoment(susceptibility=1.0, cutoff=2.5).short_ranged
     law = MutualInducedMoment(susceptibility=1.0, cutoff=6.0)
@@ -241,7 +241,7 @@ DISAGREE = {
 
 
 @pytest.mark.parametrize("message", DISAGREE)
-def test_moments_follow_the_fields_of_the_same_sum_as_forces(message):
+def test_moments_and_forces_must_use_the_same_sum(message):
     """In either order. Other forces, and moments that are not mutual, may have different settings."""
     box = Box(low=(0, 0, 0), high=(8.0,) * 3)
     for laws in (DISAGREE[message], DISAGREE[message][::-1]):
@@ -263,7 +263,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         MutualInducedMoment(susceptibility=1.0, **WRONG[message])
     assert str(fault.value) == message

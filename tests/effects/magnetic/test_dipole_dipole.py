@@ -57,7 +57,7 @@ def energy(r, m):
     return -0.5 * (m * field).sum()
 
 
-def test_forces_are_those_of_the_twin_and_add_up_to_nothing(rng):
+def test_forces_equal_the_twin_and_sum_to_zero(rng):
     """Nearest images in a periodic box."""
     scenes = [magnets(rng, DipoleDipole()) for _ in range(WORLDS)]
     states = loads(scenes)
@@ -225,7 +225,7 @@ def test_langevin_moments_in_each_others_field(rng):
     assert ratios[0] > 0.3 > 0.05 > ratios[2] > 0
 
 
-def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
+def test_mutual_laws_offer_approximations_to_a_cost_study():
     """The coarsest approximation first: each moment in the field of the sources alone; then one sweep a step;
     and cut-offs."""
     law = MutualLangevinMoment(temperature=300.0, sweeps=50)
@@ -252,12 +252,12 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
     assert several.sweeps == 100
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     setup = scene([[0, 0, 0]], [[0, 0, 0]], (DipoleDipole(),))
     assert fields_beside_the_core(setup) == {"moment", "force"}
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         TruncatedDipoleDipole(cutoff=2)
     rule = "greater than 2, or 2 beside a gap"

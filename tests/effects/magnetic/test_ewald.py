@@ -75,7 +75,7 @@ def test_sums_do_not_depend_on_how_they_are_split_and_forces_are_gradients_of_th
         assert (down - up) / (2e3 * h) == pytest.approx(exact.field()[i, a], rel=1e-6)
 
 
-def test_with_a_third_of_demagnetisation_they_are_sums_over_a_ball_of_images(rng):
+def test_factors_of_one_third_give_a_ball_of_images(rng):
     """The error of that sum falls as the third power of the ball's radius."""
     r, m = dipoles(rng, 8)
     domain = box((4.0, 4.0, 4.0))
@@ -162,7 +162,7 @@ def cubes(n, side):
     return side / n * (np.argwhere(np.ones((n, n, n))) + 0.25), np.tile([0, 0, 1.0], (n**3, 1))
 
 
-def test_lattices_have_the_energies_that_are_known():
+def test_lattices_have_their_known_energies():
     """Parallel dipoles on a simple cubic lattice have the field mu_0 M/3. In its ground state rows along z
     alternate up and down, with -2.676 mu_0 m^2 / (4 pi a^3) per dipole (J. M. Luttinger, L. Tisza, Phys. Rev.
     70 (1946) 954)."""
@@ -177,7 +177,7 @@ def test_lattices_have_the_energies_that_are_known():
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6])
-def test_the_error_of_forces_is_that_which_is_asked_for(accuracy, rng):
+def test_the_error_of_forces_is_as_requested(accuracy, rng):
     """Random moments of one magnitude; the estimate of the error is accurate to about 15 %."""
     domain, n = box((6.0, 6.0, 6.0)), 200
     low, high = domain.bounds()
@@ -261,7 +261,7 @@ def test_mutual_moments_are_those_of_a_linear_solve_and_of_clausius_and_mossotti
         close(state["moment"], np.tile([0, 0, gain * 0.3 / (1 - part)], (8, 1)), 3e-4)
 
 
-def test_settings_are_those_that_cost_least_and_suit_the_box():
+def test_settings_minimise_cost_and_suit_the_box():
     """The cut-off scales as N^(-1/6) in one box, and the number of wave vectors along an axis as
     its inverse."""
     domain = box((60.0, 60.0, 60.0))
@@ -302,7 +302,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message, rng):
+def test_invalid_values_are_refused(message, rng):
     options, shape = WRONG[message]
     with pytest.raises(InputError) as fault:
         magnets(rng, EwaldDipoleDipole(**options), box(**shape))

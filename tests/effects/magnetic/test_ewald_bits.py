@@ -28,7 +28,7 @@ def moments_and_forces():
 
 
 @pytest.mark.slow
-def test_the_same_bits_on_all_schedules_and_in_any_company():
+def test_the_same_bits_on_all_schedules_and_in_batches():
     """A world by one thread, by a team, by launches; alone, in a batch, and with a larger capacity."""
     scenes = [grains(n) for n in (150, 40, 3, 77)]
     together = simulate(scenes, worlds=4, capacity=150, schedule="world")

@@ -17,7 +17,7 @@ from tisim.sources import MagneticField
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["langevin", "froehlich"])
-def test_moments_that_saturate_are_those_of_the_field_of_all_images(kind, rng):
+def test_saturating_moments_follow_the_field_of_all_images(kind, rng):
     """Each moment follows from the law and the local field, which is the field of the sources plus the Ewald
     sum of the other moments. This sum is not negligible, and the samples have poles."""
     place = 1.1 * np.argwhere(np.ones((3, 4, 4)))[:40] + rng.uniform(-0.05, 0.05, (40, 3)) + (-0.8, 0.3, 0.7)

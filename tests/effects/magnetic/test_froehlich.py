@@ -87,7 +87,7 @@ def mutual(rng, b, law):
 
 
 @pytest.mark.long
-def test_saturation_gives_moments_an_end_where_linear_ones_have_none():
+def test_saturating_moments_are_finite_if_linear_ones_diverge():
     """Two spheres in a weak field overlap until 2 a = 2 exceeds 1, so linear moments diverge: here each
     saturates the other."""
     law = MutualFroehlichMoment(**NUMBERS, tolerance=1e-14, sweeps=1000)

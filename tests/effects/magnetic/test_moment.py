@@ -106,7 +106,7 @@ def test_every_stepper_solves_moments_before_forces(stepper):
     np.testing.assert_allclose(result.state["moment"], k * last[:, [1, 0, 2]], rtol=0, atol=1e-5 * k)
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     field = MagneticField(constant=(0, 0, 1))
     fixed = {"moment", "saturation_moment"}
     for law, more in (
@@ -132,7 +132,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

@@ -81,7 +81,7 @@ def energy(state):
     return moving - (m @ FIELD).sum() - (m * others).sum() / 2
 
 
-def test_a_moment_is_fixed_in_a_body_that_nothing_turns():
+def test_a_moment_is_fixed_in_a_torque_free_body():
     """The clump tumbles, and the forces of its magnets on each other sum to zero: for 100 turns, in steps of
     up to an eighth of a radian, the moment is constant in the body frame to rounding. The moment of a driven
     magnet rotates with its group."""

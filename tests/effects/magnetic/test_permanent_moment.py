@@ -246,7 +246,7 @@ def test_directions_are_drawn_evenly_by_the_seed():
         assert stats.kstest(direction[:, axis], "uniform", args=(-1, 2)).pvalue > 1e-3
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     """Only permanent moments have torques; with soft moments no spin is allocated."""
     field = MagneticField(constant=(0, 0, 1))
     hard = needle(0.1)
@@ -255,7 +255,7 @@ def test_only_what_is_needed_is_allocated():
     assert fields_beside_the_core(scene([[0, 0, 0]], [[0, 0, 0]], soft)) == {"moment", "force"}
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         magnets([[0, 0, 0]], [[0, 0, 1.0]], (MagneticField(), InducedMoment(susceptibility=1.0)))
     assert "induced_moment" in str(fault.value)

@@ -36,7 +36,7 @@ def force(m, place=L):
     return total
 
 
-def test_each_sweep_takes_moments_as_far_as_in_numpy():
+def test_each_sweep_equals_numpy():
     """One sweep a step, from zero moments: after k + 1 sweeps the error is that after k sweeps from isolated
     moments along the field. L21 prints -23.6, -22.9 and 17.0 %, then -0.66, -0.49 and 1.0 %, which differ
     from these: each sweep leaves 0.27 to 0.31 of the error, not 0.03."""
@@ -79,7 +79,7 @@ def run(setup):
     return result
 
 
-def test_one_sweep_a_step_does_while_moments_have_an_end_and_the_world_stops_where_they_have_none():
+def test_one_sweep_a_step_suffices_unless_moments_diverge():
     """Moments are 1 / (1 - L) times those of isolated spheres, with L = 2 R^3 / d^3, which is 1 at d = 1.26
     R. From zero moments sweeps continue to the tolerance; afterwards one a step is enough."""
     alone = 4 * np.pi / MU_0
@@ -95,7 +95,7 @@ def test_one_sweep_a_step_does_while_moments_have_an_end_and_the_world_stops_whe
     assert result.measures["sweep_factor"] == pytest.approx(2 / 1.25**3, rel=1e-6)
 
 
-def test_two_that_are_pressed_into_each_other_stop_where_their_moments_lose_their_end():
+def test_approaching_spheres_stop_when_their_moments_diverge():
     """They approach by 2e-4 R a step, from 1.35 R on."""
     result = run(pair(1.35, steps=1000, closing=0.1))
     assert "does not converge" in result.status.reason

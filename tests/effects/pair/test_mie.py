@@ -90,7 +90,7 @@ def test_repulsion_ends_smoothly_at_the_bottom_of_the_well():
     assert force(well, sigma * bottom * 1.01) < -0.1 * steep
 
 
-def test_it_needs_nothing_and_goes_to_files_and_back():
+def test_mie_needs_no_fields_and_survives_files():
     setup = scene([[0, 0, 0]], [[0, 0, 0]], (Mie(epsilon=1e-19),))
     assert fields_beside_the_core(setup) == {"force"}
     again = Scene.from_dict(setup.to_dict())
@@ -107,7 +107,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         Mie(**{"epsilon": 1.0, **WRONG[message]})
     assert str(fault.value) == message

@@ -123,7 +123,7 @@ def test_alpha1_attracts_and_alpha2_repels():
     np.testing.assert_allclose(on_the_left(alpha2=3.0, signed=True), [12, 0, 0])
 
 
-def test_of_charges_it_is_coulombs_law():
+def test_between_charges_it_is_coulombs_law():
     law = NearField(alpha2=COULOMB, strength="charge")
     scenes = [
         scene([[0, 0, 0], [0, 0.3, 0.4]], np.zeros((2, 3)), (law,), quantities={"charge": charge})
@@ -150,7 +150,7 @@ def test_the_nearest_image_acts_in_a_periodic_box():
     np.testing.assert_allclose(loads([setup])[0]["force"], [[-5, 0, 0], [5, 0, 0]], rtol=1e-12)
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     for strength, signed in product(["plain", "mass", "charge"], [False, True]):
         law = NearField(strength=strength, signed=signed)
         setup = scene([[0, 0, 0]], [[0, 0, 0]], (law,))
@@ -168,7 +168,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         NearField(**WRONG[message])
     assert str(fault.value) == message

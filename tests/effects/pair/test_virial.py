@@ -103,6 +103,6 @@ def test_contacts_in_shear_have_the_virial_of_their_twin(rng):
         ((TreeGravity(softening_length=0.1), MIE), "without tree_gravity"),
     ],
 )
-def test_it_goes_with_forces_between_particles_alone(effects, text):
+def test_the_virial_requires_pair_forces_alone(effects, text):
     with pytest.raises(InputError, match=text):
         scene([[0, 0, 0]], [[0, 0, 0]], (*effects, Virial()))
