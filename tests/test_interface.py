@@ -32,7 +32,7 @@ def parts(family):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_family_has_all_of_its_parts(family):
+def test_families_export_all_their_parts(family):
     package = importlib.import_module(f"tisim.{family}")
     missing = {name for name in parts(family) if not name.startswith("_")} - set(dir(package))
     # Base classes shared by laws of one family, which users do not name.
@@ -72,7 +72,7 @@ def test_importing_tisim_loads_nothing_heavy():
     assert json.loads(completed.stdout) == []
 
 
-def test_names_of_families_are_those_of_the_top_level():
+def test_names_of_families_equal_top_level_names():
     assert tisim.RandomInBox is tisim.packing.RandomInBox
     assert issubclass(tisim.Lattice, Placement)
     assert callable(tisim.accuracy.study)

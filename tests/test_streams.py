@@ -115,7 +115,7 @@ def test_a_file_never_gets_the_number_of_a_closed_stream(tmp_path):
     assert path.read_bytes() == b"data"
 
 
-def test_standard_streams_are_put_back(monkeypatch, capsys):
+def test_standard_streams_are_restored(monkeypatch, capsys):
     before = sys.stdout, sys.stderr
     with streams.safe_standard_streams() as (out, _):
         assert sys.stdout is out

@@ -212,7 +212,7 @@ def two(*effects, **quantities):
         (TooFarIfUnequal(), "on particle 0 by 1, of radii 1 and 0.5 m, at 1 of that distance"),
     ],
 )
-def test_a_force_beyond_its_reach_is_reported(law, said):
+def test_a_force_beyond_its_range_is_reported(law, said):
     with pytest.raises(AssertionError, match=f"^{law.kind()} must be 0 between particles farther .*{said}"):
         assert_reach(two(law))
 
@@ -246,7 +246,7 @@ SHORT = [kind for kind in known_effects() if is_short_ranged(kind)]
 
 
 @pytest.mark.slow
-def test_every_law_is_zero_beyond_its_reach():
+def test_every_law_is_zero_beyond_its_range():
     """All short-ranged laws in one scene, except those summed in another way. Only friction and bonds have
     zero force there before particles have moved."""
     most = assert_reach(joined([kind for kind in SHORT if kind not in (*IMAGED, *DIPOLES)]))

@@ -66,7 +66,7 @@ def test_orientations(rng):
     np.testing.assert_allclose(orientation_tensor(n), np.eye(3) / 3, atol=0.01)
     assert alignment(n, (1, 1, 0)) == pytest.approx(0.0, abs=0.02)
     assert alignment(np.eye(3)[:2], (0, 0, 5)) == pytest.approx(-0.5)
-    # An empty set has no order parameter, nor has a set without pairs across the axis.
+    # Without directions or pairs, or with zero weights, the results are undefined.
     none = np.zeros((0, 3))
     assert np.isnan(alignment(none, (0, 0, 5)))
     assert np.isnan(orientation_tensor(np.eye(3), np.zeros(3))).all()
@@ -85,7 +85,7 @@ def test_fabric_of_a_lattice_stretched_along_x():
     np.testing.assert_allclose(fabric_tensor(sites, pairs, sides), np.diag([0.5, 0, 0.5]), atol=1e-12)
 
 
-def test_chains_across_joined_faces_are_bound(rng):
+def test_chains_across_periodic_faces_are_connected(rng):
     place = np.array([[0.0, 0, 0.2], [0, 0, 9.2], [0, 0, 5.0]])
     moment = np.tile([0.0, 0, 1.0], (3, 1))
     assert len(head_to_tail(place, moment, 1.0)) == 0

@@ -25,7 +25,7 @@ def test_exact_curves_are_found(size):
 
 
 def test_rates_up_to_a_limit_are_left_out():
-    """Below it the curve is bent."""
+    """Below the limit the curve has another slope."""
     stress = np.where(RATE > 200, 40.0 + 0.1 * RATE, 10.0)
     found = fit_bingham(RATE, stress, above=200.0)
     assert found.yield_stress.value == pytest.approx(40.0)
@@ -49,7 +49,7 @@ def test_rates_up_to_a_limit_are_left_out():
     ],
 )
 def test_intervals_have_their_nominal_coverage(rng, fit, law, true, known):
-    """Over 400 noisy curves, with fitted noise and with known errors that differ between points."""
+    """Over 400 noisy curves, with an estimated noise level or with known errors that vary."""
     error, tries = np.where(RATE > 30, 0.3, 0.1) if known else np.full(len(RATE), 0.2), 400
     held = np.zeros(len(true))
     for _ in range(tries):

@@ -25,8 +25,8 @@ def test_layer_means_and_empty_layers():
 
 
 def test_granular_temperature_beside_a_mean_flow_and_its_shear(rng):
-    """Means over many layers of few grains each are unbiased, and the temperature of grains in line
-    is zero."""
+    """Means over many layers with few grains each are unbiased. Shear flow alone gives zero; two grains are
+    too few."""
     position = rng.uniform(0, 400, (8000, 3))
     flow = np.column_stack([7 + 3 * position[:, 2], -position[:, 2], 0 * position[:, 2]])
     edges = np.linspace(0, 400, 1001)

@@ -20,7 +20,7 @@ def result_of(position, velocity, virial, domain, mass=2.0):
     return Result(made, state, state, 0.7, {}, Status(True, ""), 0.0)
 
 
-def test_an_ideal_gas_has_the_pressure_of_its_motion_beside_the_flow(rng):
+def test_the_pressure_of_an_ideal_gas_excludes_flow(rng):
     """p = n m <c^2> / 3; neither the shear flow of a sheared box nor a uniform velocity contributes."""
     n = 4000
     position, thermal = rng.uniform(size=(n, 3)) * BOX["high"], rng.normal(size=(n, 3)) * (1, 2, 3)
@@ -64,7 +64,7 @@ def test_stress_on_a_wall():
         stress_on_wall(measures, "lid", 0.0)
 
 
-def test_the_stress_in_layers_is_that_of_the_weight_above():
+def test_the_stress_in_layers_carries_the_weight_above():
     """A column of touching grains on a floor: the contact of layers k and k + 1 bears all grains above it."""
     n, d, weight = 20, 0.02, 3.0
     height = d * (np.arange(n) + 0.5)

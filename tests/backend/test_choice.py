@@ -102,7 +102,7 @@ def test_a_wrong_name_and_a_package_that_is_absent_are_refused(monkeypatch):
         r" TISIM_BACKEND left out; received 'quadrants'$",
     ):
         choice.check()
-    # A package that is installed is imported in the meantime.
+    # The installed package is imported nevertheless.
     assert choice.chosen() == "taichi"
 
 

@@ -25,7 +25,7 @@ FLIGHT = scene([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], (), dt=0.5, steps=4)
 
 
 def forked(function, *arguments):
-    """Return what a function returns in a forked process, or the error that it raises there."""
+    """Run a function in a forked process; return its result, or the error that it raises there."""
     reader, writer = os.pipe()
     with warnings.catch_warnings():
         # As of Python 3.12, a fork with threads running gives a warning; such a fork is intended here.
@@ -72,7 +72,7 @@ def test_nothing_is_written_before_the_refusal(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_results_are_read_and_the_parent_goes_on(tmp_path):
+def test_results_are_readable_and_the_parent_continues(tmp_path):
     before = tisim.run(FLIGHT, record=Recording(tmp_path / "t.h5", frames=2))
     assert list(forked(lambda: tisim.read(tmp_path / "t.h5").times)) == [0.0, 1.0, 2.0]
     assert forked(lambda: multiprocessing.current_process().name) == "MainProcess"

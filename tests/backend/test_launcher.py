@@ -36,7 +36,7 @@ def counter():
     return Counter()
 
 
-def test_each_call_runs_the_kernel_of_its_own_object_and_returns_what_it_does():
+def test_each_call_runs_the_kernel_of_its_own_object():
     @in_taichi_thread
     def run(one, other):
         up, read, other_read = Launcher(one.up), Launcher(one.up_and_read), Launcher(other.up_and_read)
@@ -46,7 +46,7 @@ def test_each_call_runs_the_kernel_of_its_own_object_and_returns_what_it_does():
     assert run(counter(), counter()) == [(None, 2, 1), (None, 4, 2), (None, 6, 3)]
 
 
-def test_arguments_are_those_of_each_call():
+def test_each_call_uses_its_own_arguments():
     @in_taichi_thread
     def run(one):
         add = Launcher(one.add)

@@ -46,7 +46,7 @@ def test_starting_again_with_the_same_settings_changes_nothing():
     assert runtime.generation() == before
 
 
-def test_a_system_that_does_not_say_how_much_memory_it_has_refuses_nothing(monkeypatch):
+def test_unknown_memory_size_refuses_nothing(monkeypatch):
     monkeypatch.setattr(surroundings, "memory_limit", lambda: sys.maxsize)
     there = runtime.memory()
     assert diagnostics._memory() == f"{there / 2**30:.1f} GiB"

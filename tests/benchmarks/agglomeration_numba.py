@@ -22,7 +22,7 @@ from agglomeration_numba_impact import OPTIONS, Grains, Law, collide, meet, rear
 from numba import njit, parallel_chunksize, prange
 
 STEFAN_BOLTZMANN = 5.670374419e-8  # W/(m^2 K^4)
-CONTACTS = 8  # room for simultaneous contacts, per grain
+CONTACTS = 8  # capacity for simultaneous contacts, per grain
 COUNTS = ("steps", "particle_steps", "impacts", "merges", "fractures")
 HALF = tuple((x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1))[13:]  # and itself
 

@@ -25,8 +25,8 @@ class Law(NamedTuple):
 class Grains(NamedTuple):
     """One world's arrays."""
 
-    r: np.ndarray  # (3, room), m
-    v: np.ndarray  # (3, room), m/s
+    r: np.ndarray  # (3, capacity), m
+    v: np.ndarray  # (3, capacity), m/s
     b: np.ndarray  # radius, m
     m: np.ndarray  # kg; 0 for a grain that has merged into another
     T: np.ndarray  # K

@@ -81,7 +81,7 @@ def theirs(
 
 
 def compare(title: str, programs: dict, particle_steps: int, repeats: int, variance: float) -> None:
-    """Print the steps per second of each program, and the ratio of tisim to the others."""
+    """Print the time per particle-step of each program, and tisim's rate over its rate."""
     times: dict[str, list[float]] = {name: [] for name in programs}
     for run, _ in programs.values():
         run()

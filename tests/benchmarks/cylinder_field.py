@@ -2,10 +2,11 @@
 
     python tests/benchmarks/cylinder_field.py [--points 100000] [--repeats 7] [--arithmetic strict]
 
-Field, or field and gradient, exact or from tables. magpylib has no gradient: six more fields, by central
-differences. Runs are interleaved, the fastest of each counts. Points lie around a cylinder of L/D 5/3 (B16
-6.3), outside it and within three diameters, as particles about to be captured do. Errors are relative to
-magpylib's values: of a gradient no less than those of its field over the step of the differences, 1e-5 radii.
+Field, or field and gradient, exact or from tables. magpylib has no gradient, so it computes six more fields
+for central differences. Runs are interleaved, and the fastest of each counts. Points lie around a cylinder
+of L/D 5/3 (B16 6.3), outside it and within three diameters, like particles about to be captured. Errors are
+relative to magpylib's values. The error of a gradient is at least that of its field over the step of the
+differences, 1e-5 radii.
 """
 
 import argparse

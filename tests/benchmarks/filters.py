@@ -2,7 +2,7 @@
 
     python tests/benchmarks/filters.py [--starts 60]
 
-The designs are those of docs/capture.md. The random starts (seeds) are held out: no search has used them.
+The designs come from docs/capture.md. The random starts (seeds) are held out: no search has used them.
 """
 
 import argparse

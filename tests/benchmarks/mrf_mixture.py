@@ -1,4 +1,4 @@
-"""The yield stress of a mixture of grains of two sizes over that of equal grains, by Bingham's law.
+"""The ratio of the yield stresses of grains of two sizes and of equal grains, by Bingham's law.
 
     python tests/benchmarks/mrf_mixture.py [--starts 3] [--rates 2000 5000 10000]
 

@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.benchmarks import lammps_peer
 
 RADIUS, HEAVIEST, STEP = 50.0, 2e3, 1e-3
-"""Radius of the ball, m; mass of the heaviest particle, ten times that of the lightest, kg; time step, in
-which nothing moves far, s."""
+"""Radius of the ball, m; mass of the heaviest particle, kg, while the lightest has a tenth of it; time step,
+in which nothing moves far, s."""
 SIZE = 0.2
 """The diameter of all particles, m; they do not touch."""
 WARM = 5

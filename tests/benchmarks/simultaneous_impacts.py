@@ -22,7 +22,7 @@ SPEED, RADIUS, DENSITY, DT = 2.0, 1e-3, 2000.0, 1e-9
 
 
 def ring(number, restitution, delay=0.0):
-    """Grains around one that they just touch; each arrives ``delay`` (s) later than the one before."""
+    """Grains around one that they just touch; they arrive at intervals of ``delay`` (s), last one first."""
     from tests.scenes import scene
     from tisim.effects import Impact
 

@@ -53,7 +53,7 @@ def content(folder):
 
 
 @pytest.mark.long
-def test_a_run_is_alone_in_its_folder_until_it_is_gone(tisim, toml, tmp_path, under_way):
+def test_a_run_locks_its_folder_until_it_ends(tisim, toml, tmp_path, under_way):
     before = content(tmp_path / "out")
     assert set(before) == {".tisim", ".tisim.lock", "checkpoint.h5", "trajectory.h5"}
     for more in ((), ("--overwrite",), ("--fresh",), ("--resume", "--frames", "3")):

@@ -48,7 +48,7 @@ def test_wrong_input_is_reported_and_nothing_written(tisim, tmp_path, arguments,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_case_has_a_size_of_its_own_for_costs(tisim, tmp_path, monkeypatch):
+def test_cases_have_default_sizes_for_cost_studies(tisim, tmp_path, monkeypatch):
     """granular_bench is measured in a bed, unless another size is given; other cases at their
     default size."""
     asked = []

@@ -162,7 +162,7 @@ def test_damaged_trajectories_are_refused_in_a_line(tisim, tmp_path, command):
     Trajectory(Recording(tmp_path / "trajectory.h5", frames=3), [STILL]).close()
     code, out, err = tisim(command, "trajectory.h5")
     assert (code, out) == (2, "")
-    assert "file must be one with" in err  # so many frames
+    assert "file must be one with" in err  # followed by the number of frames
     content = (tmp_path / "trajectory.h5").read_bytes()
     for hurt in (content[: len(content) // 2], content[:9] + bytes(512) + content[521:], bytes(len(content))):
         (tmp_path / "trajectory.h5").write_bytes(hurt)

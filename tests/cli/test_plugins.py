@@ -52,7 +52,7 @@ def test_without_the_plugin_the_effect_is_unknown(tisim, pulled):
 
 
 @pytest.mark.slow
-def test_a_search_runs_it_in_worker_processes(tisim, own_file):
+def test_a_search_runs_plugins_in_worker_processes(tisim, own_file):
     own_file("own_laws.py", LAW)
     text = PROBLEM.replace("duration=2e-3", "duration=2e-3,\n        effects=(Pull(strength=1e-9),)")
     own_file("my_drift.py", "from own_laws import Pull\n" + text)

@@ -52,7 +52,7 @@ def test_only_ctrl_c_forces():
 
 
 @pytest.mark.parametrize(("number", "code"), ASKED)
-def test_signal_that_is_ignored_stays_so(number, code):
+def test_an_ignored_signal_stays_ignored(number, code):
     """As SIGHUP under nohup."""
     signal.signal(number, signal.SIG_IGN)
     with interrupt.handle_signals(interrupt.raise_interrupt), Interrupt(lambda: None) as handler:

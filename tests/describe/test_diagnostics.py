@@ -46,7 +46,7 @@ def benchmark_time(backend):
 
 @pytest.mark.slow
 @pytest.mark.skipif(len(choice.installed()) < 2, reason="one backend is installed")
-def test_the_ratio_of_both_backends_is_that_of_the_benchmark():
+def test_the_ratio_of_both_backends_equals_the_benchmark():
     """On an otherwise idle machine: the shortest of three turns of each."""
     ratios = []
     for time in (lambda backend: diagnostics.step_times_of(backend)["charges"], benchmark_time):

@@ -143,7 +143,7 @@ def test_an_unknown_name_lists_the_known_ones():
         reference.find("mei")
 
 
-def test_units_are_those_of_the_declaration():
+def test_units_equal_the_declaration():
     impact = reference.find("impact")
     units = {name: unit_of(info) for name, info in template.fields(impact.kind).items()}
     assert {one.name: one.unit for one in impact.settings} == units

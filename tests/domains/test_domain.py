@@ -26,7 +26,7 @@ def drift(position, velocity, steps=1, domain=None):
     return scene(position, velocity, (), dt=1.0, steps=steps, domain=domain or BOX)
 
 
-def test_comes_back_through_the_opposite_face_with_the_same_velocity(rng):
+def test_particles_return_through_the_opposite_face(rng):
     """The position is on the straight line, modulo the sides; the velocity is equal bit for bit."""
     low, high = (np.asarray(x) for x in (BOX.low, BOX.high))
     r = rng.uniform(low, high, (60, 3))

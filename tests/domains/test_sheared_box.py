@@ -216,7 +216,7 @@ def test_a_restart_keeps_the_positions_of_images(rng, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_bits_are_those_of_the_other_schedule(rng):
+def test_both_schedules_have_the_same_bits(rng):
     made = crowd(rng), layers()
     for one, other in zip(run(*made, schedule="world"), run(*made, schedule="particle"), strict=True):
         for name, values in one.state.items():

@@ -15,7 +15,7 @@ from tisim.describe.explain import known_effects
 from tisim.effects import Agglomeration, ContactFriction, Force, Impact, PairForce, Tether
 
 
-def test_forces_are_their_numpy_twin(rng):
+def test_forces_equal_their_numpy_twin(rng):
     """Random charges in a trap: the force on each, at the start and after a step."""
     scenes = []
     for _ in range(10):
@@ -158,7 +158,7 @@ def test_a_force_that_gives_its_derivatives_by_velocity_depends_on_it(kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", FORCES, ids=[kind.kind() for kind in FORCES])
-def test_a_force_says_whether_it_depends_on_velocity(kind):
+def test_forces_declare_dependence_on_velocity(kind):
     """Forces after a step in which nothing moves, at the same positions with and without velocity
     and spin."""
     data = copy.deepcopy(extremes.scenes()[f"effects.{kind.kind()}"])

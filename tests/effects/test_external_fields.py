@@ -62,7 +62,7 @@ def test_lorentz_force(kinds, rng):
         close(state["force"], lorentz_twin(one, state))
 
 
-def test_charges_that_a_magnetic_field_does_not_turn_feel_the_electric_field_alone(rng):
+def test_the_electric_field_alone_acts_without_a_magnetic_one(rng):
     electric, magnetic = (oscillating(kind, rng) for kind in (ElectricField, MagneticField))
     law = Lorentz(magnetic=False)
     setup = cloud(rng, (electric, magnetic, law), quantities={"charge": rng.normal(size=12)})

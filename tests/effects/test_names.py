@@ -33,7 +33,7 @@ def one(*effects, **more):
 
 
 @pytest.mark.slow
-def test_each_acts_with_its_own_parameters(rng):
+def test_named_effects_have_their_own_parameters(rng):
     """The forces of two Mie pairs, one of them without a name, are the sum of their NumPy references."""
     for other in (CORE, Mie(epsilon=2.0)):
         setup = crowd(rng, SHELL).model_copy(update={"effects": (other, SHELL)})
@@ -46,7 +46,7 @@ def test_each_acts_with_its_own_parameters(rng):
         )
 
 
-def test_files_name_them_by_their_tables():
+def test_files_use_names_as_table_names():
     setup = one(CORE, Mie(epsilon=2.0), SHELL)
     tables = setup.to_dict()["effects"]
     assert list(tables) == ["core", "mie", "shell"]
@@ -158,7 +158,7 @@ def test_a_failure_names_the_effect():
 
 
 @pytest.mark.long
-def test_explain_lists_them_by_name():
+def test_explain_lists_effects_by_name():
     from tisim.describe.explain import explain
 
     shells = SoftShell(stiffness=1.0, width=1e-3), SoftShell(name="outer", stiffness=0.1, width=2e-3)

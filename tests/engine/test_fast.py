@@ -202,7 +202,7 @@ def test_non_finite_values_are_found_and_sums_are_compensated(fast):
     assert total == 10_000.0
 
 
-def test_forces_are_those_of_their_twins(fast):
+def test_forces_equal_their_twins(fast):
     assert max(fast[2]) < CLOSE
 
 
@@ -228,7 +228,7 @@ def test_the_field_beside_a_long_cylinder_keeps_its_digits(fast):
 
 
 @pytest.mark.slow
-def test_a_heap_is_that_of_its_twin_and_grains_too_deep_in_each_other_are_reported(in_fast_arithmetic):
+def test_a_heap_equals_its_twin_and_deep_overlaps_are_reported(in_fast_arithmetic):
     off, sliding, reason, time = in_fast_arithmetic("engine.test_fast", "piled")
     assert off < CLOSE
     assert sliding > 1000
@@ -238,7 +238,7 @@ def test_a_heap_is_that_of_its_twin_and_grains_too_deep_in_each_other_are_report
 
 
 @pytest.mark.slow
-def test_a_crowd_in_shear_is_that_of_its_twin(in_fast_arithmetic):
+def test_a_crowd_in_shear_equals_its_twin(in_fast_arithmetic):
     off, sliding = in_fast_arithmetic("engine.test_fast", "flowing")
     assert off < CLOSE
     assert sliding > 1000

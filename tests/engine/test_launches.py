@@ -1,5 +1,5 @@
-"""Steps launched without asking for progress, as on a GPU, and steps by teams of threads equal those of
-worlds that are asked after each launch."""
+"""Steps launched without asking for progress, as on a GPU, and steps by teams of threads are equal to steps
+of worlds that are asked after each launch."""
 
 import numpy as np
 import pytest

@@ -199,7 +199,7 @@ def test_an_impossible_write_gives_a_clear_failure():
 
 
 @pytest.mark.slow
-def test_a_world_begins_anew_with_its_forces_also_after_a_run_of_no_steps():
+def test_forces_are_kept_over_a_run_of_no_steps():
     made = crystal()
     simulation = compiled(made, 1, 64)
     simulation.load([made])

@@ -17,8 +17,7 @@ WORLDS = [
     flow(seed=3, grains=60, surface_energy=30.0, grain_mass=GRAIN / 8, sizes=4.0),
     flow(seed=4, grains=20),
 ]
-"""In two worlds most grains merge or few do; in one agglomerates break; one is small enough to need
-no lists."""
+"""In these worlds most grains merge; few merge; agglomerates break; there are too few grains for lists."""
 
 
 BATCH = 240

@@ -101,7 +101,7 @@ def test_relative_indices_count_from_the_face(tmp_path):
     assert heights.tolist() == [[0] * 3, [0] * 3, [5] * 3, [5] * 3]
 
 
-def test_a_polygon_that_is_not_convex_is_cut_within_it(tmp_path):
+def test_non_convex_polygons_are_triangulated_inside(tmp_path):
     """An L of 3 m^2 in a tilted plane; a fan from its first vertex would extend beyond it."""
     flat = np.array([[2, 1], [1, 1], [1, 2], [0, 2], [0, 0], [2, 0]], float)
     places = flat @ np.array([[1, 0, 1], [0, 1, 1]]) / np.sqrt([1, 1, 1])

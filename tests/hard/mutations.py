@@ -5,18 +5,18 @@ PARTS = "tests/effects/contact/test_granular_parts.py::test_"
 PARTS_OF_LAWS = {
     "hooke": (
         f"{LAW}/hooke.py", "(w, pair) * overlap", "(w, pair) * overlap * 1.01",
-        f"{PARTS}hooke_pushes_like_a_spring_and_damping_goes_by_speed",
+        f"{PARTS}hooke_spring_and_constant_damping",
     ),
     "hertz_material": (
         f"{LAW}/hertz.py", "2.0 / 3.0", "0.66", f"{PARTS}cohesion_pulls_while_surfaces_touch",
     ),
     "jkr": (
         f"{LAW}/jkr.py", "1.5 * (ratio", "1.4 * (ratio",
-        f"{PARTS}jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_most",
+        f"{PARTS}jkr_force_from_contact_to_pull_off",
     ),
     "restitution_damping": (
         f"{LAW}/restitution.py", "hypot(logarithm, math.pi)", "hypot(logarithm, 3.0)",
-        f"{PARTS}beside_hookes_spring_an_impact_has_the_restitution_too",
+        f"{PARTS}restitution_with_hookes_spring",
     ),
     "viscoelastic_damping": (
         f"{LAW}/viscoelastic.py", "* stiffness", "* stiffness * 1.1",
@@ -24,7 +24,7 @@ PARTS_OF_LAWS = {
     ),
     "constant_damping": (
         f"{LAW}/constant.py", "+ 0.0 * stiffness", "+ 1e-3 * stiffness",
-        f"{PARTS}hooke_pushes_like_a_spring_and_damping_goes_by_speed",
+        f"{PARTS}hooke_spring_and_constant_damping",
     ),
     "mindlin_displacement": (
         f"{LAW}/mindlin.py", "known / spring, 0.0)", "0.9 * known / spring, 0.0)",
@@ -73,7 +73,7 @@ PARTS_OF_LAWS = {
 }  # fmt: skip
 """By part of a composed law: a file, what is in it once, what it becomes, and a test that must fail then."""
 CONTACT = "tisim/effects/contact"
-TWIN = "tests/effects/contact/test_contact.py::test_contact_is_its_numpy_twin"
+TWIN = "tests/effects/contact/test_contact.py::test_contact_equals_its_numpy_twin"
 SOFT_GRAINS = {
     "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{TWIN}[contact]"),
     "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{TWIN}[hertz]"),
@@ -96,7 +96,7 @@ BONDS = "tests/effects/contact/test_bonds.py::test_"
 BONDED = {
     "capillary_bridge": (
         f"{CONTACT}/capillary_bridge.py", "2.5 * gap", "2.4 * gap",
-        f"{BONDS}a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures",
+        f"{BONDS}a_liquid_bridge_follows_willett",
     ),
     "parallel_bond": (
         f"{CONTACT}/parallel_bond.py", "ti.abs(twist) * r / (2.0 * second)", "ti.abs(twist) * r / second",
@@ -249,7 +249,7 @@ SUMS = {
     ),
     "ewald_layers": (
         f"{MAGNETIC}/wave_sum.py", "if not a.is_inside(w, i):", "if False:",
-        f"{DIPOLES}ewald.py::test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name",
+        f"{DIPOLES}ewald.py::test_a_magnet_that_leaves_its_layer_stops_the_world",
     ),
     "virial": (
         "tisim/forces/loads.py", "= -0.5 * separation[a]", "= 0.5 * separation[a]",
@@ -258,7 +258,7 @@ SUMS = {
     "gravity_by_a_tree": (
         "tisim/effects/gravitation/tree_gravity.py", "return s.mass[w, i] * self.sum",
         "return 1.01 * s.mass[w, i] * self.sum",
-        "tests/effects/gravitation/test_tree_gravity.py::test_with_all_cells_opened_it_is_the_sum_over_pairs[0.2]",
+        "tests/effects/gravitation/test_tree_gravity.py::test_with_all_cells_opened_it_sums_all_pairs[0.2]",
     ),
 }  # fmt: skip
 """The same of sums over many: of dipoles up to a cut-off and with all images, of their virial, by a tree."""

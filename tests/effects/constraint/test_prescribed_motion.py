@@ -94,7 +94,7 @@ def on_plate(height, velocity=(0.0, 0.0, 0.0), motion=None, over=SEAT, **more):
 
 
 @pytest.mark.slow
-def test_a_frozen_group_stays_and_bears_the_weight_of_what_rests_on_it():
+def test_a_frozen_group_carries_the_weight_on_it():
     height = np.sqrt(4 - 2 * 0.95**2) * RADIUS
     (result,) = simulate([on_plate(height * (1 - 1e-3), steps=1_000_000)], capacity=10)
     assert result.status.reason == "grains are at rest, by effects.at_rest"

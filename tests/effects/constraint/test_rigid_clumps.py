@@ -133,7 +133,7 @@ def test_a_top_spun_about_its_intermediate_axis_flips():
 
 
 def random_clump(rng):
-    """Some spheres, each touching the one before, with an inertia that such spheres can have."""
+    """Some spheres, each near the one before; repeated until the clump is accepted."""
     while True:
         number = rng.integers(2, 5)
         steps = rng.normal(size=(number, 3))
@@ -171,7 +171,7 @@ def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
 
 
 @pytest.mark.long
-def test_a_clump_on_springs_is_its_numpy_twin():
+def test_a_clump_on_springs_equals_its_numpy_twin():
     """Forces on the members give the force and torque on the body: convergence is second order."""
     stiffness, time, errors = 0.2, 0.02, []
     springs = (Tether(stiffness=(stiffness,) * 3), Gravity(acceleration=(0, 3, -9.81)))
@@ -410,7 +410,7 @@ def test_invalid_scenes_are_refused(why):
         clumps(PEAR, [(0, 0, 0)], **wrong)
 
 
-def test_particles_that_are_no_clumps_are_refused():
+def test_particles_without_clumps_are_refused():
     made = clumps(PEAR, [(0, 0, 0)])
     bare = made.model_copy(update={"particles": LOOSE})
     with pytest.raises(InputError, match=r"particles must be made by Particles\.of_clumps with effects"):
@@ -429,7 +429,7 @@ def test_a_scene_file_holds_clumps():
 
 def put_in(shape, side):
     """A scene that inserts clumps into a periodic box, which is wide enough for the (empty) start."""
-    # Of the volume of the two spheres of a dumbbell.
+    # The radius of a sphere with the volume of the two spheres of a dumbbell.
     grains = GrainClass(sizes=EqualSizes(radius=2 ** (1 / 3) * R), density=2500.0, clump=shape)
     return Scene(
         particles=Particles(position=np.zeros((0, 3)), velocity=np.zeros((0, 3)), radius=R, density=2500.0),
@@ -464,7 +464,7 @@ def test_rods_longer_than_the_box_allows_are_refused(side, fits):
             made.acting()[0].suits_start(made.start(), made)
 
 
-def test_the_longest_clump_is_found_whatever_the_order_of_its_members():
+def test_the_longest_clump_is_found_for_any_order_of_members():
     box = Box(low=(-1, -1, -1), high=(1, 1, 1))
     start = Particles.of_clumps(DUMBBELL, position=[(0, 0, 0), (9 * R, 0, 0)]).arrays(box, 0)
     order = [0, 2, 1, 3]

@@ -55,7 +55,7 @@ def bridge(gap, radius=(R, R), **liquid):
     return float(bridge_force(gap, mean, law["surface_tension"], law["contact_angle"], law["volume"]))
 
 
-def test_a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures():
+def test_a_liquid_bridge_follows_willett():
     """Heavy grains separate slowly: the force at each gap; no force before they have touched."""
     sizes, gaps, dt = ((R, R), (R, 0.3 * R)), np.array([0.1, 0.5, 0.98, 1.02]) * RUPTURE, 1e-3
     made = []
@@ -74,7 +74,7 @@ def test_a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures()
             np.testing.assert_array_equal(dry["force"], 0)
 
 
-def test_a_bridge_takes_its_work_from_grains_that_part():
+def test_a_bridge_dissipates_its_rupture_work():
     """The integral of the force up to rupture, to first order in the step."""
     work, mass = quad(bridge, 0, RUPTURE)[0], 1e-3
     v = 1.5 * (4 * work / mass) ** 0.5

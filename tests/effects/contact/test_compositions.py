@@ -65,7 +65,7 @@ def couples(name, rng, each=16, **more):
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_energy_never_grows_in_impacts_and_momentum_stays(name, rng):
+def test_impacts_never_gain_energy_and_conserve_momentum(name, rng):
     """For grains of two materials that have collided and separated; adhesive ones have dissipated more."""
     met = 0
     for result in run([couples(name, rng) for _ in range(8)]):

@@ -132,7 +132,7 @@ COMBINATIONS = {
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name == "all" else pytest.mark.slow) for name in COMBINATIONS]
 )
-def test_contact_is_its_numpy_twin(name, rng):
+def test_contact_equals_its_numpy_twin(name, rng):
     """Random heaps, all worlds of one batch; forces and torques; momentum and angular momentum."""
     kinds = COMBINATIONS[name]
     scenes = [heap(rng, kinds) for _ in range(WORLDS)]

@@ -1,4 +1,4 @@
-"""Contact: what is wrong in a scene is named."""
+"""Contact: invalid scenes are refused by name."""
 
 import pytest
 

@@ -76,7 +76,7 @@ def critically_damped(tau, speed):
 
 
 @pytest.mark.slow
-def test_without_restitution_a_grain_stays_where_it_hits():
+def test_without_restitution_a_grain_does_not_rebound():
     """At e = 0 damping is critical: the overlap decays to 0 as in Antypov and Elliott, at a wall and at
     another grain; the grains never separate."""
     speed, unit = 1.0, (5 / 3 * E_STAR) ** -0.5
@@ -107,7 +107,7 @@ def test_without_restitution_a_grain_stays_where_it_hits():
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_an_elastic_impact_is_as_deep_as_hertz_found_and_as_long():
+def test_elastic_impacts_have_hertz_depth_and_duration():
     """After half its duration the grain is at rest, with the overlap and the force of the formulas."""
     errors = []
     for steps in (200, 400):
@@ -168,7 +168,7 @@ def oblique(angles, **law):
     return [result.state for result in run(made)]
 
 
-def test_a_grain_that_slides_through_its_impact_loses_mu_times_the_push():
+def test_a_sliding_impact_loses_mu_times_the_normal_impulse():
     """Delta v = mu (1 + e) v_n, and a spin of 5/2 of that over R, for any sliding speed."""
     angles, friction = (4.0, 8.0, 30.0), 0.2
     for tangent, state in zip(angles, oblique(angles, restitution=1.0, friction=friction), strict=True):

@@ -35,7 +35,7 @@ def at(n, *steps):
 
 
 @pytest.mark.slow
-def test_hooke_pushes_like_a_spring_and_damping_goes_by_speed():
+def test_hooke_spring_and_constant_damping():
     """k delta; with constant damping gamma v, in addition to Hertz's force."""
     force, _, _ = along("hooke", np.linspace(0, 0.1, 5))
     np.testing.assert_allclose(force[:, 0], -K * np.linspace(0, 0.1, 5), rtol=1e-14)
@@ -62,7 +62,7 @@ def impacts(name, speeds, duration, steps, **first):
 
 
 @pytest.mark.slow
-def test_beside_hookes_spring_an_impact_has_the_restitution_too():
+def test_restitution_with_hookes_spring():
     """From e = 0.01 to 1, to first order in the step."""
     e = np.array([0.01, 0.1, 0.5, 0.9, 1.0])
     for steps in (100, 400):
@@ -204,7 +204,7 @@ def test_cohesion_pulls_while_surfaces_touch():
 
 
 @pytest.mark.slow
-def test_beside_hertz_cohesion_by_the_overlap_has_two_rest_at_a_root():
+def test_sjkr_beside_hertz_has_an_equilibrium():
     """(3 pi k_c / (2 E*))^2 R* for R* = 1 m, also found in NumPy; up to k_c = 2 E* / (3 pi), at which it is
     R*."""
     law = Granular(normal=HertzMaterial(), cohesion=SJKR())
@@ -236,7 +236,7 @@ def jkr_force(overlap):
 
 
 @pytest.mark.slow
-def test_jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_most():
+def test_jkr_force_from_contact_to_pull_off():
     """-8/9 of that at the first touch and -5/9 at the end of the contact; no force before the first touch."""
     ways = np.concatenate([[-0.1 * STRETCH, 0.0, 0.03], np.linspace(0.03, -0.999999 * STRETCH, 300)])
     force, _, lasts = along("jkr", [*ways, -1.000001 * STRETCH, -0.5 * STRETCH], surface_energy=GAMMA)
@@ -250,7 +250,7 @@ def test_jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_mos
     )
 
 
-def test_friction_of_adhesive_grains_goes_by_the_force_that_parts_them():
+def test_friction_of_adhesive_grains_includes_pull_off():
     """mu |F_n + 2 F_c|: 10/9 mu F_c at the first touch."""
     force, _, _ = along("jkr", held(1, 0.0), at(1, 0.1 * Y), surface_energy=GAMMA, friction=0.3)
     assert force[0, 1] == pytest.approx(0.3 * 10 / 9 * PARTS, rel=1e-12)

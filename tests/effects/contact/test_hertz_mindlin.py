@@ -70,7 +70,7 @@ def test_steps_equal_the_twin(rng):
             assert np.abs(known.v - result.start["velocity"]).max() > (0.03 if steps == 1 else 3)
 
 
-def test_force_and_stiffness_are_those_of_hertz_and_mindlin():
+def test_force_and_stiffness_of_hertz_and_mindlin():
     """At rest, 4/3 E* sqrt(R*) delta^1.5; displaced sideways a little, 8 G* a more per metre."""
     force, elastic = along([0, 0, 1], [PRESSED, PRESSED], np.array([[0, 0, 0], [1e-6, 0, 0]]), restitution=1)
     np.testing.assert_allclose(force[0], [0, 0, -4 / 3 * E_STAR * PRESSED**1.5], rtol=1e-14)

@@ -120,7 +120,7 @@ def test_a_mesh_without_distances_is_refused_beside_a_duct(monkeypatch):
 
 
 @pytest.mark.parametrize("radius", [1e-5, 1e-4])
-def test_a_duct_of_pieces_is_taken_for_small_grains_too(radius):
+def test_a_duct_of_pieces_is_accepted_for_small_grains(radius):
     made = scene(**FELT["a duct of two pieces that reach beyond"])
     start(made.replace({"particles.radius": radius}))
 

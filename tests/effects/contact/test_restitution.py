@@ -14,7 +14,7 @@ from tisim.materials.materials import Materials
 
 
 @pytest.mark.slow
-def test_beside_hookes_spring_grains_without_restitution_stay_together():
+def test_zero_restitution_with_hookes_spring():
     """With e = 0, even in only one of two materials: the overlap is v t exp(-t sqrt(k / m*)), without
     rebound."""
     rate, v = (NEUTRAL["hooke"]["stiffness"] / 0.5) ** 0.5, 1.0

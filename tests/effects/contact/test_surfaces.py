@@ -64,7 +64,7 @@ BLOCKS = {
 }
 
 
-def test_a_scene_with_all_shapes_goes_to_a_file_and_back():
+def test_a_scene_with_all_shapes_survives_a_file():
     """Including triangles, which are arrays; other triangles make another scene."""
     made = beside((0, 0, 0), (0, 0, 0), {})
     again = Scene.from_dict(made.to_dict())

@@ -93,7 +93,7 @@ AXES = {"normal": (0.0, 0.0, 1.0), "across": (0.6, 0.8, 0.0), "askew": (2 / 3, -
 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("name", SPRINGS)
-def test_a_pair_that_turns_as_one_has_the_force_of_its_displacement(name, axis):
+def test_a_pair_rotating_as_one_has_the_exact_force(name, axis):
     """About axes that are displaced by c: the force is S_t (c - R c) perpendicular to the normal, where R is
     the rotation of the bodies. It is zero after whole turns, for any motion of the normal."""
     law, ratio = SPRINGS[name]
@@ -124,7 +124,7 @@ def test_projected_springs_do_not_turn_about_the_normal():
 
 @pytest.mark.parametrize("wall", ["plane", "disc"])
 @pytest.mark.parametrize("name", SPRINGS)
-def test_a_grain_that_turns_with_a_wall_has_the_force_of_its_displacement(name, wall):
+def test_a_grain_rotating_with_a_wall_keeps_its_force(name, wall):
     """About its normal, on a table that rotates about an axis beside the grain's."""
     law, ratio = SPRINGS[name]
     c = APART * np.array([1.0, 0.5, 0.0])
@@ -143,7 +143,7 @@ def test_a_grain_that_turns_with_a_wall_has_the_force_of_its_displacement(name, 
         )
 
 
-def test_a_grain_that_turns_with_a_drum_has_no_force():
+def test_a_grain_rotating_with_a_drum_has_no_force():
     """Around the axis of a drum, together with it: the normal rotates, and this causes no force."""
     drum = Walls(cylinders=[CylindricalSurface(start=(0, 0, -0.1), end=(0, 0, 0.1), radius=5 * R)],
                  motion=Rotation(rate=(0, 0, RATE)))  # fmt: skip
@@ -273,7 +273,7 @@ def test_rotating_a_spring_keeps_its_length():
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
 
 
-def test_projected_springs_are_those_of_the_twin(rng):
+def test_projected_springs_equal_the_twin(rng):
     """Grains that stick, slide and spin in a cell."""
     made = heap(rng)
     law, *others = made.effects

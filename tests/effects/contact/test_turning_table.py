@@ -122,7 +122,7 @@ def thrown():
     return [on_table(place, velocity, spin, liquid=tension, **more) for tension in (0.0, 5.0)]
 
 
-def test_a_turning_table_and_its_liquid_are_those_of_the_twin(thrown):
+def test_a_turning_table_with_liquid_equals_the_twin(thrown):
     """Slip, rolling and twisting depend on the spin relative to the table."""
     states = ended(thrown)
     for made, state, tension in zip(thrown, states, (0.0, 5.0), strict=True):
@@ -154,7 +154,7 @@ def test_a_disc_acts_as_the_table(thrown):
             close(at_disc[name], at_table[name], 1e-9)
 
 
-def test_a_grain_on_the_axis_comes_to_turn_with_the_table():
+def test_a_grain_on_the_axis_is_spun_up_by_the_table():
     """By twisting resistance alone. A grain whose centre moves with the table has no rolling resistance."""
     sunk = (3 * G / (4 * SURFACE["young"] / (2 * (1 - 0.09)) * RADIUS**0.5)) ** (2 / 3)
     place = np.array([[*CENTRE[:2], RADIUS - sunk]])

@@ -27,7 +27,7 @@ def speeds(result):
 
 
 @pytest.mark.long
-def test_a_sliding_sphere_comes_to_roll():
+def test_a_sliding_sphere_starts_to_roll():
     """It slows down by mu g, and rolls from the time v / (mu g (1 + 5 L^2 / (2 R^2))) on. Its speed is then
     5/7 v for a lever arm L = R; the overlap of its weight makes L slightly smaller."""
     speed, friction, g = 1.0, 0.3, 10.0
@@ -53,7 +53,7 @@ def test_a_sliding_sphere_comes_to_roll():
     assert rolls.state["position"][0, 2] == pytest.approx(1 - sunk(g), abs=1e-9)
 
 
-def test_a_sphere_on_a_slope_rolls_where_it_is_flat_and_slides_where_it_is_steep():
+def test_a_sphere_rolls_on_gentle_and_slides_on_steep_slopes():
     """While tan is below 7/2 mu (for a lever arm R), the acceleration is 5/7 g sin; beyond, it is g (sin - mu
     cos)."""
     g, friction, t = 10.0, 0.2, 0.4

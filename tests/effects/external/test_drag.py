@@ -153,7 +153,7 @@ def test_velocity_jacobian_in_each_piece_of_a_law(kind, rng):
                 close(a, b, 2e-6)
 
 
-def test_schiller_and_naumann_jump_by_as_much_as_they_say():
+def test_schiller_and_naumann_have_their_known_jump():
     """From 0.4383 to 0.44 at a Reynolds number of 1000; at small Reynolds numbers they agree with Stokes."""
     assert schiller_naumann_coefficient(1000.0) == pytest.approx(0.4383, abs=5e-5)
     law, radius = SchillerNaumannDrag(density=2.0, viscosity=0.01), 0.1

@@ -13,7 +13,7 @@ def stiffnesses(rng):
     return [tuple(float(k) for k in rng.uniform(0, 5, 3)) for _ in range(WORLDS)]
 
 
-def test_a_tether_draws_back_to_where_each_began(rng):
+def test_a_tether_pulls_to_the_initial_position(rng):
     """The anchor is a copy of the initial position, bit for bit, and is constant."""
     scenes = [cloud(rng, (Tether(stiffness=k),), dt=0.1, steps=3) for k in stiffnesses(rng)]
     for one, result in zip(scenes, simulate(scenes, worlds=WORLDS, capacity=16), strict=True):

@@ -87,7 +87,7 @@ def shell(radius):
     return radius * every / np.linalg.norm(every[0])
 
 
-def test_a_uniform_sphere_pulls_as_newton_found():
+def test_newtons_shell_theorem():
     """Shells of equal mass with radii 1, 10, 100, ...: between two of them only the inner shells attract, as
     if from the centre. The corners of the outer ones leave a rest below 7 (r/R)^6 of the field of one shell.
     """

@@ -13,7 +13,7 @@ from tisim.steppers import Collocation, StageControl
 
 
 @pytest.mark.parametrize("softening", [0.0, 0.2])
-def test_with_all_cells_opened_it_is_the_sum_over_pairs(softening, rng):
+def test_with_all_cells_opened_it_sums_all_pairs(softening, rng):
     """Unlike masses in a ball, on a line, in a plane, and in distant clumps; for various numbers of
     particles."""
     places = [
@@ -133,7 +133,7 @@ def test_a_periodic_box_with_images_is_refused():
     assert "particles do not see images of each other, with effects.tree_gravity" in str(fault.value)
 
 
-def test_a_study_of_cost_tries_it_in_place_of_all_pairs():
+def test_a_cost_study_tries_tree_gravity():
     tried = SelfGravity().approximations(1.0)
     assert [law.opening_angle for law in tried] == list(OPENING_ANGLES)
     soft = SoftenedSelfGravity(softening_length=0.3).approximations(1.0)

@@ -41,7 +41,7 @@ def test_speed_that_halves_the_radius_closed_form():
 
 @pytest.mark.long
 @pytest.mark.parametrize("pieces", [2, 3, 5, 8])
-def test_default_threshold_lets_two_pieces_happen(pieces):
+def test_the_default_threshold_allows_two_pieces(pieces):
     """With b/b0 = 2^(-1/3) a grain breaks as soon as dK suffices for two pieces, into the largest number that
     dK allows."""
     gamma = 30.0
@@ -144,7 +144,7 @@ def test_no_piece_is_lighter_than_an_original_grain():
     assert len(single.state["mass"]) == 1
 
 
-def test_smallest_piece_is_the_lightest_grain_of_the_start_whatever_its_density():
+def test_the_smallest_piece_is_the_lightest_initial_grain():
     """Two agglomerates of eight grains beside a single grain: each breaks into eight, for any density."""
     light = scene(
         [[-2 * RADIUS, 0, 0], [2 * RADIUS, 0, 0], [0, 1, 0]], [[1e3, 0, 0], [-1e3, 0, 0], [0, 0, 0]],
@@ -158,7 +158,7 @@ def test_smallest_piece_is_the_lightest_grain_of_the_start_whatever_its_density(
     assert heavy.capacity() == 9
 
 
-def test_agglomerate_of_grains_breaks_into_all_of_them():
+def test_an_agglomerate_breaks_into_all_its_grains():
     """Rounding of the summed masses costs no piece: 7 merged grains give 7 pieces."""
     radius = RADIUS * 7 ** (1 / 3)
     mass = sum([GRAIN] * 7) * (1 - 1e-15)

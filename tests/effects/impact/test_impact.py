@@ -26,7 +26,7 @@ def impacts(request):
 
 
 @pytest.mark.long
-def test_impact_is_its_twin(impacts):
+def test_impact_equals_its_twin(impacts):
     kinds, pairs, results = impacts
     bond_outcomes = set()
     for pair, result in zip(pairs, results, strict=True):

@@ -159,7 +159,7 @@ def test_overlaps_of_a_cluster_shrink_with_the_step():
 
 
 @pytest.mark.slow
-def test_grains_put_apart_across_a_face_stay_in_the_box():
+def test_grains_separated_across_a_face_stay_in_the_box():
     side, low = 16 * RADIUS, np.array([0.0, -8 * RADIUS, -8 * RADIUS])
     box = Box(low=low, high=low + side)
     (result,) = simulate([cluster(500, box, low, side)], capacity=32)

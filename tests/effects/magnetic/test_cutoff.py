@@ -163,7 +163,7 @@ def solved(one, r, radius):
 
 @pytest.mark.long
 @pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_mutual_moments_up_to_a_cutoff_are_those_of_a_linear_solve(rng, shifted):
+def test_mutual_moments_with_a_cutoff_equal_a_linear_solve(rng, shifted):
     """If the forces have the same cut-off, they are the gradient of the energy -1/2 sum m.B_0."""
     scenes = []
     for k in range(WORLDS):

@@ -80,7 +80,7 @@ def test_the_force_is_the_gradient_of_the_energy(rng):
     close(state["force"], expected, 1e-8)
 
 
-def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
+def test_torques_on_moments_balance_torques_of_forces(rng):
     """sum r x F + sum m x B = 0, with all particles in less than half of the box, so that no image acts."""
     (state,) = loads([magnets(rng, DipoleDipole(), spread=0.49 * SIDE)])
     r, m = state["position"], state["moment"]
@@ -177,7 +177,7 @@ def test_two_touching_spheres():
         np.testing.assert_allclose(state["moment"], [expected, expected], rtol=1e-11, atol=1e-14)
 
 
-def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_their_energy(rng):
+def test_induced_moments_and_forces_follow_from_their_energy(rng):
     """A bent chain of three, and clouds of five; in a non-uniform field, with all its forces.
 
     The energy of linear spheres is -1/2 sum m.B_0. Its gradient is the whole force: the force of the field on

@@ -53,7 +53,7 @@ def dipoles(rng, n=16):
 
 
 @pytest.mark.parametrize("periodic", [(True, True, True), (True, True, False)])
-def test_sums_do_not_depend_on_how_they_are_split_and_forces_are_gradients_of_the_energy(periodic, rng):
+def test_sums_are_independent_of_splitting_and_conservative(periodic, rng):
     """In NumPy, by central differences of positions and moments; also for a box that is open along z."""
     (r, m), domain, h = dipoles(rng), box(periodic=periodic), 1e-5
 
@@ -139,7 +139,7 @@ def test_forces_and_torques_are_those_in_numpy(periodic, rng):
 
 
 @pytest.mark.slow
-def test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name(rng):
+def test_a_magnet_that_leaves_its_layer_stops_the_world(rng):
     """There the gap to the next layer would become smaller than guaranteed. Along the layer a magnet may move
     on."""
     law = EwaldDipoleDipole(cutoff=1.6, accuracy=1e-2, waves=(*WAVES[:2], 24), slab_factor=2.0)
@@ -222,7 +222,7 @@ def solved(one, r, radius):
 
 
 @pytest.mark.slow
-def test_mutual_moments_are_those_of_a_linear_solve_and_of_clausius_and_mossotti(rng):
+def test_mutual_moments_follow_clausius_and_mossotti(rng):
     """At random positions, with forces that are gradients of the energy -1/2 sum m.B_0 to the accuracy of the
     sum; and on lattices, within the sample and with its poles."""
     low, high = box().bounds()

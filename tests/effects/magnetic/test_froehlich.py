@@ -37,7 +37,7 @@ def magnetisation(chi, saturation, flux):
 CHI = (1e-3, 0.5, 3.0, 50.0, 1e3, 1e6, 1e12, 1e-9)
 
 
-def test_moments_are_those_of_the_root_and_the_field_pulls_them(rng):
+def test_saturating_moments_and_their_forces(rng):
     scenes = [made_of(rng, FroehlichMoment(susceptibility=chi, saturation=1e6)) for chi in CHI]
     for one, state in zip(scenes, loads(scenes), strict=True):
         b, law = flux_density(one.effects, state["position"]), one.effects[2]
@@ -64,7 +64,7 @@ def at(fields, law):
     ]
 
 
-def test_weak_fields_are_those_of_a_linear_sphere_and_strong_ones_saturate():
+def test_weak_fields_are_linear_and_strong_ones_saturate():
     """chi H / M_s from 1e-12 to 1e6 and beyond; chi of 1e3, and almost infinite."""
     for chi in (999.0, 1e9):
         law = FroehlichMoment(susceptibility=chi, saturation=NUMBERS["saturation"])
@@ -103,7 +103,7 @@ def test_saturating_moments_are_finite_if_linear_ones_diverge():
     assert m.min() > 0.9 * 4 / 3 * np.pi * NUMBERS["saturation"]
 
 
-def test_mutual_moments_are_those_of_the_field_where_each_is(rng):
+def test_mutual_moments_follow_the_local_field(rng):
     """Against a root found by SciPy; from weak fields, in which moments are linear, to saturation."""
     fields = np.geomspace(1e-3, 50.0, WORLDS)
     law = MutualFroehlichMoment(**NUMBERS, tolerance=1e-14, sweeps=1000)

@@ -57,7 +57,7 @@ def test_langevin_moments_of_many_domains(rng):
     check(scenes, size)
 
 
-def test_induced_moments_are_those_of_magnetised_spheres(rng):
+def test_induced_moments_of_magnetised_spheres(rng):
     """V M with M = chi H and H = H_0 - M/3 inside; from a superconductor to iron."""
     scenes = [
         made_of(rng, InducedMoment(susceptibility=chi)) for chi in (-1, -1e-5, 0, 1e-3, 0.5, 3, 1e3, 1e6)

@@ -36,7 +36,7 @@ def felt(*field):
     return (*field, Magnetophoresis(), DipoleDipole())
 
 
-def test_torques_are_those_of_the_fields_and_balance(rng):
+def test_torques_follow_the_fields_and_balance(rng):
     """T = m x B, where B is the field of the sources and of all other moments (L21 4.9). For dipoles without
     a source, sum r x F + T = 0."""
     scenes = []

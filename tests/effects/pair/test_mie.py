@@ -64,7 +64,7 @@ def test_other_powers(n, m, rng):
 
 @pytest.mark.slow
 def test_over_the_pair_list(rng):
-    """With so many particles that the pair list is used."""
+    """With enough particles for the pair list to be used."""
     many = crowd(rng, Mie(epsilon=1.0, cutoff=1.8), n=400)
     (state,) = loads([many], capacity=400)
     close(state["force"], twin(many.effects[0], state), 1e-8)

@@ -134,7 +134,7 @@ def test_between_charges_it_is_coulombs_law():
     assert like["force"][0, 1] < 0 < unlike["force"][0, 1]
 
 
-def test_it_is_in_balance_at_alpha2_over_alpha1():
+def test_equilibrium_at_alpha2_over_alpha1():
     """beta = (1, 2): no force at d = alpha2 / alpha1, and the stiffness of Z13 (33) there."""
     law, h = NearField(alpha1=2.0, alpha2=1.0), 1e-6
     scenes = [scene([[0, 0, 0], [0.5 + x, 0, 0]], np.zeros((2, 3)), (law,)) for x in (0.0, h, -h)]

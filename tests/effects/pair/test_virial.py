@@ -59,7 +59,7 @@ def magnets(rng, n=40):
 
 
 @pytest.mark.long
-def test_each_particle_has_half_of_its_pairs_over_all_and_listed_ones(rng):
+def test_each_particle_has_half_of_the_virial_of_its_pairs(rng):
     scenes = [magnets(rng) for _ in range(2)]
     for state in loads(scenes, capacity=64):
         gap = state["position"][:, None] - state["position"][None]
@@ -70,7 +70,7 @@ def test_each_particle_has_half_of_its_pairs_over_all_and_listed_ones(rng):
 
 
 @pytest.mark.long
-def test_measures_are_sums_of_those_of_particles(rng):
+def test_measures_are_sums_over_particles(rng):
     (result,) = run(magnets(rng))
     expected = result.state["virial"].sum(axis=0)
     close([result.measures[f"virial_{a}{b}"] for a in "xyz" for b in "xyz"], expected)
