@@ -1,5 +1,5 @@
-"""One runtime for the whole suite: cpu, f64 and strict arithmetic unless TISIM_DEVICE,
-TISIM_TEST_PRECISION and TISIM_TEST_ARITHMETIC say otherwise."""
+"""One runtime for the whole suite: cpu, f64 and strict arithmetic, unless TISIM_DEVICE, TISIM_TEST_PRECISION
+or TISIM_TEST_ARITHMETIC is set."""
 
 import json
 import os
@@ -49,7 +49,7 @@ RENDERED = (
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what is for devices too; TISIM_DEVICE names the one to run on."""
+    """Mark tests that must also pass on devices; TISIM_DEVICE names the device."""
     folder = Path(__file__).parent
     for item in items:
         if item.path.relative_to(folder).as_posix() in ON_DEVICES:
@@ -57,20 +57,23 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_configure(config):
-    """A shell starts jobs in the background with Ctrl-C ignored, and nohup with SIGHUP; what is ignored stays
-    so in tisim.
+    """Set signals and environment variables for the suite.
 
-    With Taichi, tests take two thirds of the time, nearly all of which is compiling, without the compiler's
-    passes ahead of LLVM. No bit depends on these: the process of ``elsewhere`` has them. Quadrants 1.3.3 and
-    1.4.0 compile as long without theirs, and wrongly: the oscillator of CONTRIBUTING.md does not move.
+    A shell starts background jobs with Ctrl-C ignored, and nohup starts them with SIGHUP ignored; tisim keeps
+    ignored signals ignored.
 
-    The processes of xdist, one on each core, inherit the environment of this one. NumPy's and SciPy's linear
-    algebra would have as many threads as cores in each of them, which wait for each other.
+    With Taichi, tests take two thirds of the time, nearly all of which is compilation, without the compiler's
+    passes ahead of LLVM. No bit depends on these passes: the process of ``elsewhere`` uses them. Quadrants
+    1.3.3 and 1.4.0 are not faster without these passes, and compile wrongly: the oscillator of
+    CONTRIBUTING.md does not move.
+
+    The processes of xdist, one for each core, inherit the environment of this one. Otherwise the linear
+    algebra of NumPy and SciPy would start one thread per core in each of them, which wait for each other.
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
-        # A program that is begun has the default again; the tests themselves go on.
+        # Programs started by tests have the default handler again; the tests themselves continue.
         signal.signal(signal.SIGHUP, lambda *_: None)
     os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -78,7 +81,7 @@ def pytest_configure(config):
 
 @pytest.fixture(scope="session", autouse=True)
 def the_runtime():
-    """The settings that every test in this process runs under."""
+    """The settings under which every test in this process runs."""
     try:
         return runtime.init(
             device=os.environ.get("TISIM_DEVICE", "cpu"),
@@ -91,8 +94,8 @@ def the_runtime():
 
 @pytest.fixture(scope="module", autouse=True)
 def room_for_the_next_module():
-    """Taichi is started anew after a module where it has grown: with what all slow tests have compiled in one
-    process, there is no room for more, and compiling takes longer and longer."""
+    """Restart Taichi after a module in which it has grown: the kernels of all slow tests do not fit in one
+    process, and compilation becomes slower and slower."""
     yield
     if memory.needs_restart():
         scenes.close_compiled()
@@ -102,8 +105,9 @@ def room_for_the_next_module():
 
 @pytest.fixture(scope="module", autouse=True)
 def unrendered(request):
-    """Tests of commands and searches draw all figures but do not render them, which takes a quarter of a
-    second for each of the four images of a search. The files in RENDERED test the images, and render them."""
+    """Draw figures without rendering them in tests of commands and searches, because rendering takes a
+    quarter of a second for each of the four images of a search. The files in RENDERED test the images, and
+    render them."""
     file = request.path.relative_to(Path(__file__).parent).as_posix()
     if not file.startswith(("cli/", "optimize/")) or file.startswith(RENDERED):
         yield
@@ -121,7 +125,7 @@ def rng():
 
 @pytest.fixture
 def own_file(tmp_path, monkeypatch):
-    """Writes a file into a fresh folder, which one works in; what was loaded is forgotten at the end."""
+    """Write a file into a fresh folder, which is the working folder; loaded files are unloaded at the end."""
     monkeypatch.chdir(tmp_path)
 
     def write(name, text):
@@ -197,8 +201,8 @@ def in_single_precision(tmp_path_factory):
 
 
 def elsewhere_with(setting):
-    """Return what calls a function of a test module, MODULE.NAME, in a process with a setting of the runtime:
-    it returns what the function does."""
+    """Return a function that calls MODULE.NAME of the tests in a process with a runtime setting, and returns
+    its result."""
 
     def call(module, name):
         code = (
@@ -215,17 +219,19 @@ def elsewhere_with(setting):
 
 @pytest.fixture(scope="module")
 def single():
-    """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
+    """A function that calls MODULE.NAME of the tests in a process of single precision, and returns its
+    result."""
     return elsewhere_with("precision='f32'")
 
 
 @pytest.fixture(scope="module")
 def in_one_thread():
-    """Calls a function of a test module, MODULE.NAME, in a process of one thread: what it returns."""
+    """A function that calls MODULE.NAME of the tests in a process of one thread, and returns its result."""
     return elsewhere_with("threads=1")
 
 
 @pytest.fixture(scope="module")
 def in_fast_arithmetic():
-    """Calls a function of a test module, MODULE.NAME, in a process of fast arithmetic: what it returns."""
+    """A function that calls MODULE.NAME of the tests in a process of fast arithmetic, and returns
+    its result."""
     return elsewhere_with("arithmetic='fast'")

@@ -1,10 +1,10 @@
-"""How often the prose has turns of phrase that readers stumble over, in 1,000 words.
+"""Count the turns of phrase over which readers stumble, in 1,000 words of prose.
 
-    python tests/english.py [FILE OR FOLDER ...]    each file that has any, the worst first; without: rooms
+    python tests/english.py [FILE OR FOLDER ...]    each file with any of them, worst first; without: rooms
 
-Prose is the docstrings and comments of Python files, and the text of Markdown pages outside code. Counted are
-"what" in place of a noun (questions do not count), "where" in place of "if" or "when", "so many" and "so
-much" in place of a number, and "that of" and "those of" in place of the noun.
+Prose is the docstrings and comments of Python files, and the text of Markdown pages outside code. Four turns
+are counted: "what" in place of a noun (except in questions), "where" in place of "if" or "when", "so many"
+and "so much" in place of a number, and "that of" and "those of" in place of the noun.
 """
 
 import ast
@@ -26,7 +26,7 @@ CODE = re.compile(r"(?s:```.*?```)|``[^`]*``|`[^`\n]*`|^(?: {4}|\t)[^\n]*$", re.
 
 
 def prose(file: Path) -> str:
-    """The text of a file that people read as English."""
+    """The prose of a file."""
     text = file.read_text(encoding="utf-8")
     if file.suffix == ".md":
         return QUESTION.sub("", CODE.sub("", text))

@@ -1,8 +1,10 @@
-"""Scenes of every kind of effect, operator, source and stepper, with numbers at the ends of what is accepted.
+"""Scenes of every kind of effect, operator, source and stepper, with numbers at the ends of the accepted
+ranges.
 
-Three particles, two of which press into each other while the third comes near, with all that makes the kind
-act: a field has somebody who feels it, a moment a field. Numbers are of common size, until one of them, or
-some, are made extreme; then the scene may be refused, but what is accepted must run, or fail in words.
+Each scene has three particles: two overlap, and the third approaches. It also has everything that the kind
+needs to act: particles that respond to a field, a field for a moment. Numbers are of ordinary size until one
+or more of them are made extreme. Such a scene may be refused; if it is accepted, it must run, or fail with a
+message.
 """
 
 from __future__ import annotations
@@ -47,13 +49,13 @@ MAGNITUDES = (
     5e-324, 2.3e-308, 1e-300, 1e-155, 1e-100, 1e-60, 1e-30, 1e-15, 1e-9, 1e-3, 0.5, math.nextafter(1.0, 0.0),
     1.0, 1e3, 1e9, 1e15, 1e30, 1e60, 1e100, 1e155, 1e300, 1.7e308,
 )  # fmt: skip
-"""From the least to the most that a number can be, through those whose squares and cubes still are one."""
+"""From the smallest to the largest number, including some whose squares and cubes do not overflow."""
 VALUES = (0.0, *MAGNITUDES, *(-size for size in MAGNITUDES))
 DT, STEPS = 1e-5, 30
-"""s, a step of common length; how many of them make a run."""
+"""s, an ordinary step; number of steps in a run."""
 
 PERIODIC = {"kind": "box", "low": [-0.04] * 3, "high": [0.04] * 3}
-"""A box for what needs images."""
+"""A box for effects that need images."""
 EWALD = {"cutoff": 0.035, "waves": [6, 6, 6], "accuracy": 1e-2}
 COMMON: dict[str, dict[str, Any]] = {
     "impact": {"hardness": 1e5},
@@ -121,9 +123,9 @@ COMMON: dict[str, dict[str, Any]] = {
     "mean_force": {"begin": 1e-4},
     "compacted": {"low": [0.0, 0.0, 0.0], "high": [0.02, 0.02, 0.02], "interval": 2e-5},
 }
-"""Numbers of common size, of effects for which 1/2 is none. All together make something happen."""
+"""Ordinary parameters of effects that cannot take 1/2. With all of them, something happens in each scene."""
 FIELDS = {"flow_velocity": (StokesDrag,), "electric_field": (Lorentz,)}
-"""Who feels a field; a magnetic one is felt by charges and moments."""
+"""Effects that respond to a field; charges and moments respond to a magnetic one."""
 CONTROLLED = {
     "verlet": (
         ({"kind": "fixed_step", "dt": DT}, {}, (NearField, Tether)),
@@ -147,12 +149,12 @@ CONTROLLED = {
         ({"kind": "drift_limit", "longest": DT}, {"hydrodynamics": "oseen", "noise": "fast"}, (NearField,)),
     ),
 }  # fmt: skip
-"""Of each stepper, the controls that it is tried with: control, options, effects."""
+"""For each stepper, the controls with which it is tested: control, options, effects."""
 QUANTITIES: dict[str, Any] = {
     "temperature": 300.0, "charge": 1e-9, "spin": [0.0, 0.0, 10.0], "saturation_moment": 1e-6,
     "domain_moment": 1e-18, "polarity": 1,
 }  # fmt: skip
-"""What each particle carries, where something needs it."""
+"""Values for all particles, used if an effect needs them."""
 PAIR, _SIZES = clump_columns(
     Clump(centres=[(0, 0, 0), (1.99e-3, 0, 1e-4)], radii=[1e-3], density=2e3),
     [(0.995e-3, 0, 0.5e-4)],
@@ -163,13 +165,13 @@ LONE = sphere_columns(np.array([2e-6]))
 EACH = {"group": [1, 0, 0]} | {
     name: [*PAIR[name].tolist(), *LONE[name].tolist()] for name in LONE if name != "spin"
 }
-"""What each of the three has of its own, where something needs it: two are a clump."""
+"""Values that differ between the three particles, used if an effect needs them: two form a clump."""
 FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 
 
 @cache
 def scenes() -> dict[str, dict[str, Any]]:
-    """Plain data by name: a scene of each effect, source and operator, and those of each stepper."""
+    """Scenes as plain data, by name: one for each effect, source and operator, and those for each stepper."""
     serialization.load(steppers)
     scenes_by_name = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
     for name in sorted(CONTROLLED):
@@ -181,7 +183,7 @@ def scenes() -> dict[str, dict[str, Any]]:
 
 
 def _company(kind: type[Effect]) -> dict[str, Any]:
-    """An effect, what it needs, and what makes it do something."""
+    """An effect with the effects that it needs, and with those that make it act."""
     felt: tuple[type[Effect], ...] = ()
     if issubclass(kind, Source):
         felt = FIELDS.get(kind.quantity, (Lorentz, LangevinMoment, Magnetophoresis))
@@ -246,7 +248,7 @@ Place = tuple[str | int, ...]
 
 
 def places(data: Any, path: Place = ()) -> Iterator[Place]:
-    """Every number in plain data that is not a whole one."""
+    """All floating-point numbers in plain data."""
     for key, inner in data.items() if isinstance(data, dict) else enumerate(data):
         if isinstance(inner, dict | list):
             yield from places(inner, (*path, key))
@@ -255,7 +257,8 @@ def places(data: Any, path: Place = ()) -> Iterator[Place]:
 
 
 def own(name: str) -> list[Place]:
-    """The places of a scene that are of its kind, of its first particle, or its duration."""
+    """The numbers in a scene that belong to its kind, to its first particle or to materials, and its
+    duration."""
     family, kind, *_ = name.split(".")
     return [
         place
@@ -279,14 +282,14 @@ def changed(data: dict[str, Any], values: dict[Place, Any]) -> dict[str, Any]:
 
 
 def one_by_one(name: str) -> Iterator[dict[Place, float]]:
-    """Every number of a kind and of its particles, to every extreme, and the others as they are."""
+    """Set each number of a kind and of its particles to each extreme, and leave the others unchanged."""
     for place in own(name):
         for value in VALUES:
             yield {place: value}
 
 
 def draw_values(name: str, random: Random) -> dict[Place, float]:
-    """One to four numbers of a scene at random, each at an extreme."""
+    """One to four random numbers of a scene, each at an extreme."""
     all_places = list(places(scenes()[name]))
     return {
         place: random.choice(VALUES) for place in random.sample(all_places, random.choice((1, 1, 2, 3, 4)))

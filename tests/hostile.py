@@ -1,4 +1,4 @@
-"""Hostile input: values that nobody means, and valid scenes with such a value in the wrong place."""
+"""Hostile input: nonsensical values, and valid scenes with such a value in the wrong place."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tisim.steppers import DriftLimit, FixedStep, Stepper
 
 
 def nested(levels: int) -> list[Any]:
-    """A list in a list, so many times."""
+    """A list nested ``levels`` deep."""
     inner: list[Any] = []
     for _ in range(levels):
         inner = [inner]
@@ -28,7 +28,7 @@ def nested(levels: int) -> list[Any]:
 
 
 def tables(levels: int) -> dict[str, Any]:
-    """A table in a table, so many times."""
+    """A table nested ``levels`` deep."""
     inner: dict[str, Any] = {}
     for _ in range(levels):
         inner = {"a": inner}
@@ -53,7 +53,7 @@ DEEP = (100, 500, 2000, 20_000)
 
 
 def value(random: Random) -> Any:
-    """Something hostile."""
+    """A random hostile value."""
     choice = random.randrange(10)
     if choice < 4:
         return random.choice(NUMBERS)
@@ -65,7 +65,7 @@ def value(random: Random) -> Any:
 
 
 def _places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Every place in plain data but the whole of it; the first few of long lists, and none very deep."""
+    """Every place in plain data except the root; only the first few of long lists, and none very deep."""
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     paths = []
     for key, inner in list(items)[: 8 if len(path) < 8 else 0]:
@@ -74,7 +74,7 @@ def _places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def _mutate(data: dict[str, Any], random: Random) -> None:
-    """Change one thing: a value, a key, or that it is there."""
+    """Change one thing: replace a value or a key, or remove it."""
     *path, last = random.choice(_places(data))
     place: Any = data
     for step in path:
@@ -95,7 +95,7 @@ def _mutate(data: dict[str, Any], random: Random) -> None:
 
 
 def mutated(random: Random) -> dict[str, Any]:
-    """The plain data of a scene that was valid, with one to three things in it changed."""
+    """Plain data of a valid scene with one to three changes."""
     data = copy.deepcopy(random.choice(valid()))
     for _ in range(random.choice((1, 1, 1, 2, 3))):
         if data:
@@ -105,15 +105,15 @@ def mutated(random: Random) -> dict[str, Any]:
 
 @cache
 def valid() -> tuple[dict[str, Any], ...]:
-    """Plain data of scenes: those of all cases, every stepper and control, every start, every effect by
-    itself where it needs no other."""
+    """Plain data of scenes: all cases, every stepper and control, every start, and every effect with those it
+    needs."""
     from tisim.cases.case import every
 
     base = scene([[0, 0, 0], [1, 0, 0]], [[0, 0, 0]] * 2, quantities={"temperature": 300.0})
     tables_ = [flow(grains=3).to_dict(), base.to_dict()]
     tables_ += [case.scene(size, 1).to_dict() for case in every().values() for size in list(case.sizes)[:2]]
     box = {"kind": "box", "low": [-1.0] * 3, "high": [1.0] * 3}
-    # For Ewald sums, which take images.
+    # For Ewald sums, which use images.
     wide = {"kind": "box", "low": [-4.2] * 3, "high": [4.2] * 3}
     cylinder = RandomAroundCylinder(radius=0.5, length=3.0, thickness=0.4)
     starts = (
@@ -145,7 +145,7 @@ def valid() -> tuple[dict[str, Any], ...]:
 
 
 def with_needed(kind: type[Effect]) -> dict[str, Any]:
-    """Plain data of an effect, after those that it needs."""
+    """Plain data of an effect, after the effects that it needs."""
     partners: dict[str, Any] = {}
     for contract in kind.requires:
         partners |= with_needed(next(other for other in known_effects() if issubclass(other, contract)))
@@ -156,7 +156,7 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
 
 
 def _required(kind: type[Component]) -> dict[str, Any]:
-    """A value that will do for each parameter that must be given."""
+    """A valid value for each required parameter."""
     fit = {"cutoff": 4.0, "low": (0.0, 0.0, 0.0), "high": (4.0, 4.0, 4.0), "second": 4.0}
     fit |= {"duct_radius": 4.0}
     values = {
@@ -166,13 +166,13 @@ def _required(kind: type[Component]) -> dict[str, Any]:
     }
     others = kind.model_fields.keys() - values.keys() - dict(kind.lists()).keys()
     options = {name: kind.model_fields[name] for name in others if kind.model_fields[name].is_required()}
-    # As many waves as the cut-off asks for.
+    # The number of waves that the cut-off requires.
     more = {"waves": (12, 12, 12)} if "waves" in kind.model_fields else {}
     return {**values, **{name: info.examples[0] for name, info in options.items() if info.examples}, **more}
 
 
 def materials() -> dict[str, Any]:
-    """Plain data of a material that has all properties that there are, for laws that go by them."""
+    """Plain data of a material with all properties, for laws that use them."""
     return {"grain": {name: 0.3 for name, _, _ in Material.parameters()}}
 
 
@@ -196,7 +196,7 @@ LINES = (
 
 
 def mutated_toml(random: Random) -> bytes:
-    """The text of a scene file that was valid, with one to three of its lines changed, and perhaps cut."""
+    """The text of a valid scene file with one to three changed lines, and perhaps truncated."""
     lines = serialization.toml(random.choice(valid())).splitlines()
     for _ in range(random.choice((1, 1, 1, 2, 3))):
         at = random.randrange(len(lines))
@@ -216,7 +216,7 @@ def mutated_toml(random: Random) -> bytes:
 
 
 def assignment(data: dict[str, Any], random: Random) -> str:
-    """What stands after --set: a setting of a scene, or nearly one, and a hostile value."""
+    """An argument of --set: a setting of a scene, or nearly one, and a hostile value."""
     path = [str(step) for step in random.choice(_places(data))]
     kind = random.randrange(8)
     if kind == 4:

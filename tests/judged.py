@@ -1,4 +1,4 @@
-"""What tisim makes of hostile input: a scene that comes back from its file, or a message for people."""
+"""Checks of the response to hostile input: a scene that survives a round trip, or a readable message."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from tisim.engine.monitor import REASONS
 from tisim.state.status import WorldStatus
 
 ACCEPTED = "accepted"
-"""What a command says in place of running."""
+"""The message of a command in place of a run."""
 OF_THE_WORLD = WorldStatus.OUT_OF_ROOM, WorldStatus.CONTACT_OVERFLOW
-"""Failures that are of no particle and no force: there is no more room."""
+"""Failures for lack of capacity, which name no particle or force."""
 
 
 def check_message(text: str) -> None:
-    """What is said of bad input: a line for each fault, of bounded length, that can be printed."""
+    """Check an error message: a line for each fault, of bounded length and printable."""
     lines = text.splitlines()
     assert 0 < len(lines) <= 10, text[:2000]
     for line in lines:
@@ -37,7 +37,7 @@ def check_message(text: str) -> None:
 
 
 def check_file(accepted: Scene, file: Path) -> None:
-    """A scene comes back from its file to the last bit."""
+    """Check that a scene survives a round trip through its file, bit for bit."""
     file.write_text(accepted.to_toml(), encoding="utf-8")
     again = Scene.from_toml(file)
     assert again.to_dict() == accepted.to_dict()
@@ -46,8 +46,8 @@ def check_file(accepted: Scene, file: Path) -> None:
 
 @contextmanager
 def nothing_runs() -> Iterator[list[Scene]]:
-    """Commands go as far as they can without starting or compiling anything, and end there with ACCEPTED; the
-    scenes that would have been run."""
+    """Let commands proceed until they would start or compile anything, and end there with ACCEPTED; yields
+    the scenes that would have been run."""
     scenes: list[Scene] = []
 
     def accept(*scene: Any, **options: Any) -> None:
@@ -66,7 +66,7 @@ def nothing_runs() -> Iterator[list[Scene]]:
 
 
 def command(words: Sequence[str]) -> tuple[int, str]:
-    """Exit code and standard error of a command that is given in this process."""
+    """Exit code and standard error of a command given in this process."""
     out, err = io.StringIO(), io.StringIO()
     code: Any = None
     with redirect_stdout(out), redirect_stderr(err):
@@ -78,10 +78,10 @@ def command(words: Sequence[str]) -> tuple[int, str]:
 
 
 def check_result(result: Result) -> None:
-    """What a run gives back is finite; a failure says when, and which particle or force or what of the world.
+    """Check that a result is finite, and that a failure states the time, and a particle, a force or a
+    capacity.
 
-    A start that fails is given back as it was: what should have followed from it, such as forces, may be what
-    is not finite.
+    A start that fails is returned unchanged; quantities derived from it, such as forces, need not be finite.
     """
     if result.measures:
         assert result.measures.keys() == measured(result.scene.effects).keys()

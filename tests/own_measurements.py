@@ -1,5 +1,4 @@
-"""Files of measurements to which a case is calibrated: those that are refused, and those that make another
-problem."""
+"""Files of measurements for the calibration of a case: refused ones, and those that make another problem."""
 
 import os
 
@@ -20,11 +19,11 @@ WRONG_ANGLES = {
     "no uncertainty": (ANGLES + "angle_of_repose,1,0\n", "uncertainty must be finite and"),
     "not finite": (ANGLES + "angle_of_repose,nan,1\n", "value must be finite and above 0"),
 }
-"""Files that no case takes whose calibration is to an angle of repose, and what is said of each."""
+"""Invalid files for a calibration to an angle of repose, and the error message for each."""
 
 
 def check_refused(read, text, message, folder):
-    """A file with a text is refused in these words, and so is one that is not there."""
+    """Check that a file with this text, and an absent file, are refused with such messages."""
     path = folder / "mine.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=message) as error_info:
@@ -40,8 +39,8 @@ def check_refused(read, text, message, folder):
 
 
 def check_another_problem(name, text, calibration, design, folder):
-    """Runs that were judged by other measurements are not used again, though the scenes are the same; returns
-    the problem as it comes, the one of the file, and a scene of a design."""
+    """Check that runs judged by other measurements are not reused, although the scenes are the same. Returns
+    the default problem, the problem of the file, and a scene of a design."""
     path = folder / "mine.csv"
     path.write_text(text)
     case = every()[name]

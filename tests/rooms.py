@@ -1,11 +1,11 @@
-"""The picture of the house: which room uses which, and how high the modules stand on each other.
+"""The dependency graph of the rooms: imports between rooms, and the longest chain of modules.
 
     python tests/rooms.py [FOLDER]      rooms, their order, and figures of the source
     python tests/rooms.py --run         files and changes of room of one ``tisim.run``, and of one design
 
-A room is a package or a module of tisim, the longest name in ``ROOMS`` that a module's
-begins with. A module imports from its own room and from those that stand before it; what a function imports
-when it is called may come from above only where ``LATE`` names it. Imports for type checkers do not count.
+A room is a package or a module of tisim: the longest name in ``ROOMS`` with which the name of a module
+begins. A module imports from its own room and from earlier ones. A function may import from a later room when
+it is called, but only if ``LATE`` lists the import. Imports for type checkers do not count.
 """
 
 import ast
@@ -39,13 +39,13 @@ ROOMS = (
     "tisim.cases.*", "tisim.cli",
     "tisim.__main__",
 )  # fmt: skip
-"""From the ground up. ``tisim.cases.*`` is every other case: each is a room of its own beside the others."""
+"""In order. ``tisim.cases.*`` is every other case: each is a room of its own beside the others."""
 LATE = {
     ("tisim.io.run_folder", "tisim.plotting.cloud"),
     ("tisim.io.read", "tisim.accuracy.storage"),
     ("tisim.engine.simulation", "tisim.io.checkpoint"),
 }
-"""A module, and what one of its functions imports from above."""
+"""A module, and a module of a later room that one of its functions imports."""
 Imports = dict[str, set[str]]
 
 
@@ -60,14 +60,14 @@ def modules(folder: Path) -> dict[str, Path]:
 
 
 def room(module: str) -> int:
-    """The place in ``ROOMS`` of the room of a module."""
+    """The index in ``ROOMS`` of the room of a module."""
     homes = [name for name in ROOMS if module == name or module.startswith(f"{name}.")]
     home = max(homes, key=len)
     return ROOMS.index("tisim.cases.*" if home == "tisim.cases" != module else home)
 
 
 def imports(folder: Path) -> tuple[Imports, Imports]:
-    """What each module imports of the others: with itself, and when its functions are called."""
+    """The imports of each module from the others: at import, and when its functions are called."""
     module_files = modules(folder)
     early: Imports = {name: set() for name in module_files}
     late: Imports = {name: set() for name in module_files}
@@ -79,7 +79,7 @@ def imports(folder: Path) -> tuple[Imports, Imports]:
 
 
 def _statements(node: ast.AST, later: bool) -> Iterator[tuple[ast.AST, bool]]:
-    """The imports below a node, and whether they stand in a function; without those for type checkers."""
+    """The imports below a node, and whether they are in a function; without imports for type checkers."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import | ast.ImportFrom):
             yield child, later
@@ -98,7 +98,7 @@ def _named(node: ast.AST, module_files: dict[str, Path]) -> Iterator[str]:
 
 
 def floors(early: Imports) -> list[str]:
-    """The longest chain of imports, from the top down; ValueError naming a circle where there is one."""
+    """The longest chain of imports, from the top down; raises ValueError for a circular import."""
     chains: dict[str, list[str]] = {}
 
     def chain(name: str, above: tuple[str, ...]) -> list[str]:
@@ -113,7 +113,7 @@ def floors(early: Imports) -> list[str]:
 
 
 def figures(folder: Path) -> Iterator[str]:
-    """Files and lines of the three folders and of the tests, and the part of lines that are imports."""
+    """Files and lines of the three folders and of the tests, and the fraction of lines that are imports."""
     for name in ("tisim", "optimize", "cases", "tests"):
         texts = [file.read_text(encoding="utf-8") for file in (folder / name).rglob("*.py")]
         lines = sum(text.count("\n") for text in texts)
@@ -131,7 +131,8 @@ def figures(folder: Path) -> Iterator[str]:
 
 
 class Passage:
-    """What Python code a call goes through in its thread: the files, and how often the room changes."""
+    """The Python code through which a call passes in its thread: the files, and the number of changes of
+    room."""
 
     def __init__(self, folder: Path) -> None:
         self.rooms = {str(file): room(name) for name, file in modules(folder).items()}
@@ -151,7 +152,7 @@ class Passage:
 
 
 def passages(folder: Path) -> Iterator[str]:
-    """The passages of a run of agglomeration, with its second scene, and of a search of one design."""
+    """The passages of a run of agglomeration (its second run), and of a search of one design."""
     import tisim
     from tisim import optimize
     from tisim.cases.case import every

@@ -1,4 +1,4 @@
-"""Scenes that several tests use, and one compiled simulation for each structure of them."""
+"""Scenes shared by several tests, and one compiled simulation for each of their structures."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from tisim.steppers import Boris, FixedStep, Verlet
 DENSITY = 2000.0
 RADIUS = 1e-3
 GRAIN = DENSITY * 4 / 3 * np.pi * RADIUS**3
-"""kg, of a grain of RADIUS and DENSITY."""
+"""kg, mass of a grain of RADIUS and DENSITY."""
 HEAT_CAPACITY = 500.0
 SOFT = 1.0
-"""Pa; a hardness at which everything bonds."""
+"""Pa; a hardness at which all grains bond."""
 
 _compiled: dict = {}
 
 
 def compiled(scene, worlds=1, capacity=64, schedule=None):
-    """A simulation of the structure of a scene; each is compiled once for all tests."""
+    """A simulation for the structure of a scene; each structure is compiled once for all tests."""
     key = (runtime.generation(), scene.structure(), worlds, capacity, schedule)
     if key not in _compiled:
         _compiled[key] = Simulation(scene, worlds, capacity, schedule)
@@ -31,7 +31,7 @@ def compiled(scene, worlds=1, capacity=64, schedule=None):
 
 
 def usual(schedule):
-    """A schedule, on a CPU; on a device None, which is that of launches, as whoever runs there has it."""
+    """The given schedule on a CPU; None, the default (launches), on a device."""
     return schedule if runtime.current().device == "cpu" else None
 
 
@@ -56,12 +56,13 @@ def by_id(result):
 
 
 def fixed(dt):
-    """Steps of one length."""
+    """Verlet with a constant step."""
     return Verlet(control=FixedStep(dt=dt))
 
 
 def suited(effects, dt):
-    """Steps of one length that suit effects: Verlet's gain energy where velocities gyrate."""
+    """A stepper with a constant step for these effects: Boris if velocities gyrate, when Verlet
+    gains energy."""
     gyrates = any(effect.gyrates(effects) for effect in effects)
     return Boris(control=FixedStep(dt=dt)) if gyrates else fixed(dt)
 
@@ -89,12 +90,12 @@ def scene(
 
 
 def roundoff():
-    """The distance from 1 to the next number of the precision that the suite runs with."""
+    """The difference between 1 and the next number, in the precision of the suite."""
     return float(np.finfo(runtime.current().precision.replace("f", "float")).eps)
 
 
 def head_on(speed, effects, radius=RADIUS, **more):
-    """Two equal grains, just touching, each at ``speed`` (m/s) towards the other."""
+    """Two equal grains, just touching, that approach each other at ``speed`` (m/s) each."""
     reach = radius * (1 - 1e-12)
     return scene(
         [[-reach, 0, 0], [reach, 0, 0]], [[speed, 0, 0], [-speed, 0, 0]], effects, radius=radius, **more
@@ -102,7 +103,7 @@ def head_on(speed, effects, radius=RADIUS, **more):
 
 
 def hit(speed, effects, **more):
-    """The same at room temperature, for a time so short that nothing but the impact happens."""
+    """The same at room temperature, for a very short time, in which only the impact happens."""
     return head_on(speed, effects, dt=1e-15, quantities={"temperature": 300.0}, **more)
 
 
@@ -114,7 +115,7 @@ def laws(
     activation_energy=0.0,
     reaction=1e3,
 ):
-    """All that Z04 has happen in an impact; a hardness that does not depend on temperature by default."""
+    """All impact laws of Z04; by default the hardness does not depend on temperature."""
     return (
         Impact(hardness=hardness),
         Friction(coefficient=0.1),
@@ -160,12 +161,13 @@ def flow(
 
 
 def momentum(state):
-    """kg m/s."""
+    """Momentum, kg m/s."""
     return (state["mass"][:, None] * state["velocity"]).sum(axis=0)
 
 
 def energy(state, heat_capacity=HEAT_CAPACITY):
-    """All that the books hold, J: kinetic, heat, lost by cooling and to new surface, less what was given."""
+    """Energy balance, J: kinetic energy, heat, and losses to cooling and new surface, less supplied
+    energy."""
     kinetic = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
     heat = heat_capacity * (state["mass"] * state["temperature"]).sum()
     spent = sum(state[name].sum() for name in ("cooling_loss", "fracture_energy") if name in state)
@@ -174,7 +176,8 @@ def energy(state, heat_capacity=HEAT_CAPACITY):
 
 
 def check_sums(result):
-    """Mass, volume and momentum to rounding; energy, with all its books, to that of what has passed."""
+    """Check mass, volume and momentum to rounding, and the energy balance to the rounding of all
+    exchanges."""
     start, end = result.start, result.state
     assert result.status.ok, result.status.reason
     assert all(np.isfinite(values).all() for values in end.values())

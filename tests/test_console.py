@@ -1,4 +1,4 @@
-"""Progress that people see: what is compiled is said to be."""
+"""Progress bars: compilation is reported."""
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from tisim.effects import Tether
 from tisim.program.launched_program import LaunchedProgram
 
 
-def test_a_bar_says_while_kernels_are_compiled():
-    """Compiling may be begun within compiling, as of lists that have grown."""
+def test_a_bar_reports_compilation():
+    """Compilation may begin within compilation, for example for lists that have grown."""
     with progress_bar("run") as bar:
         bar.add_task("")
         (column,) = [one for one in bar.columns if isinstance(one, Compiling)]
@@ -22,7 +22,7 @@ def test_a_bar_says_while_kernels_are_compiled():
     assert said == ["", "compiling", ""]
 
 
-def test_making_a_simulation_is_compiling(monkeypatch):
+def test_making_a_simulation_reports_compilation(monkeypatch):
     said, compile_program = [], LaunchedProgram.compile
 
     def noted(program):

@@ -1,4 +1,4 @@
-"""A constant's name stands for one value, wherever it is read."""
+"""Each constant name has one value, everywhere."""
 
 import ast
 from collections import defaultdict
@@ -8,7 +8,7 @@ from tests import rooms
 
 
 def constants(tree):
-    """The public upper-case names that a module defines, and what they are set to, as it is written."""
+    """The public upper-case names that a module defines, with the source text of their values."""
     for node in tree.body:
         targets = node.targets if isinstance(node, ast.Assign) else []
         if isinstance(node, ast.AnnAssign) and node.value:
@@ -29,7 +29,7 @@ FILES = rooms.modules(Path(__file__).parents[1])
 
 
 def owner(module):
-    """The case that a module is of; "" for what all of them read."""
+    """The case to which a module belongs; "" for modules shared by all."""
     package = ".".join(module.split(".")[:3])
     return package if f"{package}.scene" in FILES and package.startswith("tisim.cases.") else ""
 
@@ -37,7 +37,8 @@ def owner(module):
 def ambiguous(files):
     """The names with several values in the packages, or in one case and the packages together.
 
-    A case is a scenario of its own: two of them may each have a DENSITY of their particles.
+    Different cases may give one name different values: two of them may each have a DENSITY of their
+    particles.
     """
     values = defaultdict(lambda: defaultdict(set))
     for module, text in files.items():
@@ -50,7 +51,7 @@ def ambiguous(files):
     }
 
 
-def test_a_name_stands_for_one_value():
+def test_a_name_has_one_value():
     texts = {module: file.read_text(encoding="utf-8") for module, file in FILES.items()}
     assert ambiguous(texts) == set()
 

@@ -1,4 +1,4 @@
-"""The examples of CONTRIBUTING.md run, and so do their tests, as they are printed."""
+"""The examples of CONTRIBUTING.md and their tests run as printed."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the documents say can be done, can."""
+"""The scripts, links and citation in the documents are valid."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SCRIPTS = {
 }
 """The Python code of each page; files and guides are for test_contributing.py and test_guides.py."""
 PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": ["control="]}
-"""What they print, among other things."""
+"""Parts of their output."""
 
 
 @pytest.mark.long
@@ -37,7 +37,7 @@ PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": 
         if scripts
     ],
 )
-def test_the_scripts_of_a_page_run_as_they_stand_there(page, tmp_path, monkeypatch, capsys):
+def test_the_scripts_of_a_page_run_as_printed(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names = {}
     for script in SCRIPTS[page]:
@@ -47,7 +47,7 @@ def test_the_scripts_of_a_page_run_as_they_stand_there(page, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_what_documents_point_to_is_there(page):
+def test_links_in_documents_exist(page):
     text = (ROOT / page).read_text()
     links = re.findall(r"\]\(([^)#:]+)\)", text)
     files = re.findall(r"`((?:tisim|tests|cases|optimize|docs)/[\w/]+\.\w+)`", text)

@@ -1,4 +1,4 @@
-"""The prose keeps clear of turns of phrase that readers stumble over."""
+"""The prose avoids turns of phrase over which readers stumble."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The snippets of the guides run as they are printed, in the order in which they are printed."""
+"""The snippets of the guides run as printed, in order."""
 
 import re
 import shlex
@@ -21,12 +21,12 @@ PRINTED = {
     r"21 frames, the last at 0.001 s\n"
     r"0.0005\d* s: \d+ grains\n",
 }
-"""What a guide prints."""
+"""The output of a guide."""
 SNIPPET = re.compile(r'^```(\w+)(?: title="([\w.]+)")?\n(.*?)^```$', re.M | re.S)
 
 
 def console(text):
-    """Give the commands of a snippet; all end well."""
+    """Run the commands of a snippet; all must succeed."""
     for line in text.splitlines():
         dollar, program, *arguments = shlex.split(line)
         assert dollar == "$"

@@ -1,4 +1,4 @@
-"""What users import: everything is where it is looked for, and nothing is loaded before it is used."""
+"""Public imports: every name is available, and nothing is loaded before it is used."""
 
 import ast
 import importlib
@@ -19,7 +19,7 @@ HEAVY = ("taichi", "quadrants", "numpy", "scipy", "pydantic", "h5py", "matplotli
 
 
 def parts(family):
-    """Names of all parts of scenes that the modules of a family define, contracts too."""
+    """Names of all components of scenes that the modules of a family define, including contracts."""
     package = importlib.import_module(f"tisim.{family}")
     load(package)
     inside = (module for name, module in sys.modules.items() if name.startswith(f"tisim.{family}."))
@@ -32,10 +32,10 @@ def parts(family):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_family_has_all_of_its_parts(family):
+def test_families_export_all_their_parts(family):
     package = importlib.import_module(f"tisim.{family}")
     missing = {name for name in parts(family) if not name.startswith("_")} - set(dir(package))
-    # What laws of one family share, and users do not name.
+    # Base classes shared by laws of one family, which users do not name.
     shared = {
         "AtIntervals",
         "BehindPlanes",
@@ -52,7 +52,7 @@ def test_a_family_has_all_of_its_parts(family):
 @pytest.mark.parametrize(
     "name", ["", *(f".{family}" for family in FAMILIES), ".accuracy", ".analysis", ".testing"]
 )
-def test_every_name_is_there(name):
+def test_every_listed_name_exists(name):
     package = importlib.import_module(f"tisim{name}")
     listed = Path(package.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     names = {alias.name for node in ast.parse(listed).body for alias in node.names}
@@ -72,7 +72,7 @@ def test_importing_tisim_loads_nothing_heavy():
     assert json.loads(completed.stdout) == []
 
 
-def test_names_of_families_are_those_of_the_top_level():
+def test_names_of_families_equal_top_level_names():
     assert tisim.RandomInBox is tisim.packing.RandomInBox
     assert issubclass(tisim.Lattice, Placement)
     assert callable(tisim.accuracy.study)

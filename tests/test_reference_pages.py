@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 @pytest.fixture(scope="module")
 def maker():
-    """docs/reference_pages.py, which is no part of a package."""
+    """docs/reference_pages.py, which does not belong to a package."""
     spec = importlib.util.spec_from_file_location("reference_pages", DOCS / "reference_pages.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -41,7 +41,7 @@ def test_there_is_a_page_for_each_part_each_family_and_one_of_names(pages):
     assert listed == parts
 
 
-def test_pages_of_parts_that_are_no_more_are_removed(maker, tmp_path):
+def test_pages_of_removed_parts_are_deleted(maker, tmp_path):
     (tmp_path / "effects").mkdir()
     (tmp_path / "effects" / "gone.rst").write_text("gone")
     maker.write(tmp_path)
@@ -55,7 +55,7 @@ def test_every_guide_and_case_is_in_the_index():
     assert pages - {"index"} == listed
 
 
-def test_a_page_says_all_of_its_part(pages):
+def test_a_page_describes_its_whole_part(pages):
     for entry in reference.entries():
         page = pages[f"{entry.family}/{entry.name}"]
         assert page.startswith(f".. _{entry.name}:\n\n{entry.name}\n===")
@@ -64,7 +64,7 @@ def test_a_page_says_all_of_its_part(pages):
             assert f"``{one.name}``" in page
 
 
-def test_public_names_are_all_there(pages):
+def test_all_public_names_are_listed(pages):
     assert ".. autofunction:: tisim.init" in pages["api"]
     assert ".. autoclass:: tisim.effects.PairForce" in pages["api"]
     assert ":ref:`Impact <impact>`" in pages["api"]
@@ -96,6 +96,6 @@ def test_docstrings_are_plain_text(maker):
     ]
 
 
-def test_the_list_of_parts_in_the_documents_is_that_of_the_code(maker):
-    """If not: python docs/reference_pages.py."""
+def test_the_documented_list_of_parts_matches_the_code(maker):
+    """If it fails, run: python docs/reference_pages.py."""
     assert (DOCS / "parts.md").read_text(encoding="utf-8") == maker.parts()

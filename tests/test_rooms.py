@@ -1,4 +1,4 @@
-"""The order of the rooms holds: nothing is known to what it stands on."""
+"""The order of the rooms holds: no room imports from a later one."""
 
 import ast
 from collections import Counter
@@ -12,20 +12,20 @@ EARLY, LATE = rooms.imports(Path(__file__).parents[1])
 
 
 def above(imports):
-    """(module, what it imports) where that stands above it."""
+    """(module, imported module) for imports from a later room."""
     pairs = {(module, other) for module, others in imports.items() for other in others}
     return {(module, other) for module, other in pairs if rooms.room(other) > rooms.room(module)}
 
 
-def test_nothing_is_imported_from_above():
+def test_nothing_is_imported_from_a_later_room():
     assert above(EARLY) == set()
 
 
-def test_late_imports_from_above_are_those_listed():
+def test_late_imports_are_listed():
     assert above(LATE) == rooms.LATE
 
 
-def test_every_room_is_there():
+def test_every_room_exists():
     assert {rooms.room(module) for module in EARLY} == set(range(len(rooms.ROOMS)))
 
 
@@ -37,7 +37,7 @@ CASES = {name for name in EARLY if name.startswith("tisim.cases.") and f"{name}.
 
 
 def test_modules_of_a_case_do_not_import_its_package():
-    """Its CASE names what is below it; they import from each other."""
+    """A package's CASE names the modules below it; these import from each other."""
     assert CASES
     homes = {module: module.rpartition(".")[0] for module in EARLY}
     assert not [m for m, home in homes.items() if home in CASES and home in EARLY[m] | LATE[m]]
@@ -54,7 +54,7 @@ def test_listing_cases_loads_no_figures_checks_or_inverse_problems():
 
 
 def test_the_folders_beside_tisim_are_imported_as_parts_of_it():
-    """Under two names a module would be loaded twice, and a class of one not be that of the other."""
+    """Under two names a module would be loaded twice, and its classes would differ."""
     root = Path(__file__).parents[1]
     files = [
         file
@@ -76,7 +76,7 @@ def test_a_circle_is_found():
         rooms.floors({"a": {"b"}, "b": {"a"}})
 
 
-def test_no_class_name_stands_for_two():
+def test_class_names_are_unique():
     names: Counter[str] = Counter()
     for file in rooms.modules(Path(__file__).parents[1]).values():
         nodes = ast.parse(file.read_text(encoding="utf-8")).body

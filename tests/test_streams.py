@@ -1,4 +1,4 @@
-"""Streams that fail lose text and nothing else."""
+"""A stream that fails loses text and nothing else."""
 
 import errno
 import io
@@ -13,7 +13,7 @@ from tisim.streams import SafeStream, say
 
 
 class Failing(io.StringIO):
-    """A stream whose writes fail in this way."""
+    """A stream whose writes raise this error."""
 
     def __init__(self, error):
         super().__init__()
@@ -32,7 +32,7 @@ class Failing(io.StringIO):
         (ValueError("I/O operation on closed file"), "I/O operation on closed file"),
     ],
 )
-def test_a_stream_that_fails_is_complained_of_where_somebody_reads_it(error, complaint):
+def test_a_failing_stream_is_reported(error, complaint):
     stream = SafeStream(Failing(error))
     assert stream.write("some text") == 9
     stream.flush()
@@ -40,7 +40,7 @@ def test_a_stream_that_fails_is_complained_of_where_somebody_reads_it(error, com
     assert stream.complaint == complaint
 
 
-def test_text_goes_through_and_what_cannot_be_encoded_becomes_an_escape():
+def test_text_that_cannot_be_encoded_is_escaped():
     raw = io.BytesIO()
     stream = SafeStream(io.TextIOWrapper(raw, encoding="ascii"))
     print("1 µm", "5", sep=", ", file=stream)
@@ -52,7 +52,7 @@ def test_text_goes_through_and_what_cannot_be_encoded_becomes_an_escape():
 
 
 class Notebook:
-    """What a notebook or an editor may put in place of a stream: it can be written to and no more."""
+    """A replacement for a stream in a notebook or an editor, which supports only writing."""
 
     def __init__(self):
         self.text = ""
@@ -62,7 +62,7 @@ class Notebook:
 
 
 @pytest.mark.parametrize("stream", [None, Notebook()])
-def test_consoles_and_bars_bear_any_stream(monkeypatch, stream):
+def test_consoles_and_bars_accept_any_stream(monkeypatch, stream):
     monkeypatch.setattr(sys, "stdout", stream)
     monkeypatch.setattr(sys, "stderr", stream)
     console.out().print("a table")
@@ -75,7 +75,7 @@ def test_consoles_and_bars_bear_any_stream(monkeypatch, stream):
 
 
 def test_names_that_would_control_the_terminal_are_printed_as_escapes(capsys):
-    """In text, in tables, in the words of a bar and in messages."""
+    """In text, tables, progress bars and messages."""
     name = "\x1b[31mRED\x1b[0m\x1b]0;title\x07"
     shown = r"\x1b[31mRED\x1b[0m\x1b]0;title\x07"
     console.out().print(f"scene: {name}\nsecond line")
@@ -104,7 +104,7 @@ os.write(file, b"data")
 
 
 def test_a_file_never_gets_the_number_of_a_closed_stream(tmp_path):
-    """What is printed to it by its number would go into the file."""
+    """Output printed to that descriptor would go into the file."""
 
     def close():
         os.closerange(0, 3)
@@ -115,7 +115,7 @@ def test_a_file_never_gets_the_number_of_a_closed_stream(tmp_path):
     assert path.read_bytes() == b"data"
 
 
-def test_standard_streams_are_put_back(monkeypatch, capsys):
+def test_standard_streams_are_restored(monkeypatch, capsys):
     before = sys.stdout, sys.stderr
     with streams.safe_standard_streams() as (out, _):
         assert sys.stdout is out

@@ -1,4 +1,5 @@
-"""All laws, operators and steppers of the package keep to their contracts; what does not is named."""
+"""All laws, operators and steppers of the package satisfy their contracts; violations are reported
+by name."""
 
 import numpy as np
 import pytest
@@ -67,8 +68,8 @@ LAWS = (SHELL, Tether(stiffness=(0.0, 0.0, 0.0)), Change())
 
 
 def crossing(stepper, effects=LAWS, velocity=0.0, pull=0.0, leap=0.0, growth=0.0, **quantities):
-    """Three particles cross a lattice of 27 others, which they meet one after the other on their way: at a
-    velocity (m/s), by a spring (N/m) that pulls them 4 m on, or in leaps (m). Or the others grow (m/s)."""
+    """Three particles cross a lattice of 27 others and meet one after another: at a velocity (m/s), by a
+    spring (N/m) whose rest position is 4 m ahead, or in leaps (m). Alternatively, the others grow (m/s)."""
     lattice = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
     bullets = np.array([[-1.0, 0.2, 0.1], [-1.3, 1.1, 0.2], [-1.1, 1.9, 1.8]])
     position, ahead, others = np.concatenate([bullets, lattice]), np.zeros((30, 3)), np.arange(30) > 2
@@ -106,8 +107,8 @@ STEPPERS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STEPPERS)
-def test_a_stepper_says_how_far_particles_have_moved(name):
-    """By itself, and by what operators do."""
+def test_steppers_report_displacements(name):
+    """For motion by the stepper itself, and by operators."""
     stepper, more = STEPPERS[name]
     scenes = [crossing(stepper, **way, **more) for way in WAYS]
     simulation = compiled(scenes[0], worlds=2)
@@ -122,19 +123,19 @@ def test_every_stepper_is_tried():
 
 
 @pytest.mark.slow
-def test_lists_follow_what_is_captured():
+def test_lists_follow_captured_particles():
     sphere = {"centre": (2.5, 1.5, 1.5), "magnetisation": (0.0, 0.0, 1e3), "radius": 0.8}
     effects = (*LAWS, MagneticSpheres(spheres=(sphere,)), Capture())
     assert_lists(crossing(fixed(0.02), effects, **WAYS[0]))
 
 
 @pytest.mark.slow
-def test_lists_follow_what_bonds_breaks_and_cools():
+def test_lists_follow_merging_and_breaking_grains():
     assert_lists(flow(grains=60, stepper=fixed(4e-6), duration=4e-4))
 
 
 class Silent(Stepper):
-    """Moves particles, and does not say how far."""
+    """Moves particles, and does not report their displacement."""
 
     control: FixedStep = FixedStep(dt=0.02)
 
@@ -163,12 +164,12 @@ class Drift(PerParticle):
 
 
 @pytest.mark.slow
-def test_a_stepper_that_does_not_say_so_is_reported():
+def test_a_stepper_that_reports_no_motion_is_detected():
     with pytest.raises(AssertionError, match=r"^position at the end must be the same with lists as"):
         assert_lists(crossing(Silent(), (SHELL,), velocity=3.0))
 
 
-def test_steps_must_not_depend_on_the_pairs_that_are_looked_at():
+def test_steps_must_not_depend_on_listed_pairs():
     with pytest.raises(
         InputError, match="step control must be one that does not look at pairs; received 'app"
     ):
@@ -176,7 +177,7 @@ def test_steps_must_not_depend_on_the_pairs_that_are_looked_at():
 
 
 class TooFar(SoftShell):
-    """Acts twice as far as it says."""
+    """Acts to twice its stated range."""
 
     @ti.func
     def reach(self, s, w, i):
@@ -184,7 +185,7 @@ class TooFar(SoftShell):
 
 
 class TooFarIfUnequal(PairForce):
-    """Acts within three of the larger radii: beyond its reach, where the other is smaller."""
+    """Acts within three times the larger radius: beyond its range if the other particle is smaller."""
 
     short_ranged = True
 
@@ -211,18 +212,18 @@ def two(*effects, **quantities):
         (TooFarIfUnequal(), "on particle 0 by 1, of radii 1 and 0.5 m, at 1 of that distance"),
     ],
 )
-def test_a_force_beyond_its_reach_is_reported(law, said):
+def test_a_force_beyond_its_range_is_reported(law, said):
     with pytest.raises(AssertionError, match=f"^{law.kind()} must be 0 between particles farther .*{said}"):
         assert_reach(two(law))
 
 
 def joined(kinds):
-    """A scene of several effects, with what they need."""
+    """A scene of several effects, with the effects they need."""
     every = [extremes.scenes()[f"effects.{kind.kind()}"] for kind in kinds]
     effects = {name: values for data in every for name, values in data["effects"].items()}
     carried = {name: values for data in every for name, values in data["particles"]["quantities"].items()}
     for insertion in (name for name in effects if name.startswith("insertion_by_")):
-        # A newcomer carries what the others carry.
+        # An inserted particle has the quantities of the others.
         quantities = {name: values[0] for name, values in carried.items()}
         grains = [{**grain, "quantities": quantities} for grain in effects[insertion]["grains"]]
         effects[insertion] = {**effects[insertion], "grains": grains}
@@ -235,7 +236,8 @@ def joined(kinds):
 
 
 def is_short_ranged(kind):
-    """Whether the effect of this kind is, in a scene of extremes.scenes(): that may go by its options."""
+    """Whether the effect is short-ranged in its scene of extremes.scenes(); this may depend on its
+    options."""
     effects = Scene.from_dict(extremes.scenes()[f"effects.{kind.kind()}"]).effects
     return any(type(effect) is kind and getattr(effect, "short_ranged", False) for effect in effects)
 
@@ -244,9 +246,9 @@ SHORT = [kind for kind in known_effects() if is_short_ranged(kind)]
 
 
 @pytest.mark.slow
-def test_every_law_is_zero_beyond_its_reach():
-    """All in one scene but what is summed otherwise; only friction and bonds have nothing to do there before
-    particles have moved."""
+def test_every_law_is_zero_beyond_its_range():
+    """All short-ranged laws in one scene, except those summed in another way. Only friction and bonds have
+    zero force there before particles have moved."""
     most = assert_reach(joined([kind for kind in SHORT if kind not in (*IMAGED, *DIPOLES)]))
     for apart in (IMAGED, DIPOLES):
         most |= assert_reach(joined([kind for kind in SHORT if kind in apart]))
@@ -255,7 +257,7 @@ def test_every_law_is_zero_beyond_its_reach():
 
 
 class Tally(SoftShell):
-    """Sums up how often pairs have been pressed: once for each time that they are computed."""
+    """Counts the computations of pressed pairs."""
 
     fields = (Field("pressed", "", 1, "keep"),)
 
@@ -268,7 +270,7 @@ class Tally(SoftShell):
 
 
 class InverseSquare(PairForce):
-    """Attracts by 1/d^2, and over the inverse of the distance by a power of it."""
+    """Attracts by 1/d^2; the version with the inverse distance uses a power of it."""
 
     power: int = option("power", 3)
 
@@ -282,7 +284,7 @@ class InverseSquare(PairForce):
 
 
 class NeverZero(InverseSquare):
-    """Is not 0 if the inverse is 0."""
+    """Is not 0 if the inverse distance is 0."""
 
     @ti.func
     def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
@@ -290,7 +292,7 @@ class NeverZero(InverseSquare):
 
 
 class Damped(PairForce):
-    """Damps the difference of two velocities, which is not that of images that move."""
+    """Damps the difference of two velocities, which is wrong for images that move."""
 
     depends_on_velocity = True
 
@@ -315,8 +317,8 @@ class Damped(PairForce):
         (NeverZero(), "must be 0 if the inverse is 0; received 1 N on particle 0 by 1 along axis 0"),
     ],
 )
-def test_a_force_that_writes_or_is_another_by_the_inverse_or_of_images_is_reported(law, said):
-    """By the assertion of all contracts too, before it runs anything."""
+def test_invalid_pair_forces_are_reported(law, said):
+    """The assertion of all contracts reports it too, before it runs anything."""
     with pytest.raises(AssertionError, match=said):
         assert_contracts(two(law))
 
@@ -347,10 +349,9 @@ def test_a_field_that_only_others_declare_is_reported():
         assert_fields(two(*effects, charge=[1.0, 1.0]))
 
 
-# Capture, constraints and the virial exclude impacts. No law of its own, and a series that takes long to
-# compile, has the cylinder. What passes is weighed before it is taken out, and permanent moments exclude soft
-# ones. Gravity by a tree has no images, which Ewald sums need. Forces of dipoles go with mutual moments of
-# one cut-off alone.
+# Capture, constraints and the virial exclude impacts. Cylinders have no force law, and their series takes
+# long to compile. Outflow weighs particles before it removes them. Permanent moments exclude soft ones. Tree
+# gravity has no images, which Ewald sums need. Dipole forces go only with mutual moments of the same cut-off.
 HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
 DIPOLES = [DipoleDipole, TruncatedDipoleDipole]

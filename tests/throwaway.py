@@ -1,4 +1,4 @@
-"""Effects that the core has never heard of, and scenes of them."""
+"""Effects that the core does not know, and scenes of them."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ class Coulomb(PairForce):
 
 
 class Trap(Force):
-    """F = -k (r - c) + m g cos(omega t): a spring to a place, and a force that depends on time."""
+    """F = -k (r - c) + m g cos(omega t): a spring to a fixed point, and a time-dependent force."""
 
     stiffness: float = parameter("N/m", "stiffness", ge=0)
     centre: tuple[float, float, float] = parameter("m", "centre", (0.0, 0.0, 0.0))
@@ -39,7 +39,7 @@ class Trap(Force):
 
 
 class RandomKicks(Operator):
-    """v += sigma sqrt(dt) normal, three draws for each particle and step; sums what each has received."""
+    """v += sigma sqrt(dt) normal, three draws for each particle and step; sums the kicks of each particle."""
 
     fields = (Field("kicked", "m/s", 3), "velocity")
     world_fields = (WorldField("kicks", "counter"),)
@@ -56,7 +56,8 @@ class RandomKicks(Operator):
 
 
 class SoftShell(PairForce):
-    """Linear repulsion within a gap: what a contact law needs of the core. Listed pairs only."""
+    """Linear repulsion within a gap, with the features of the core that a contact law needs. Listed pairs
+    only."""
 
     short_ranged = True
     stiffness: float = parameter("N/m", "stiffness", gt=0)
@@ -79,7 +80,7 @@ class SoftShellOfAll(SoftShell):
 
 
 class Bridge(PairForce):
-    """Grains that have touched pull each other with a constant force, until they are too far apart."""
+    """Grains that have touched attract each other with a constant force, until they are too far apart."""
 
     fields = ("radius",)
     short_ranged = True

@@ -1,4 +1,4 @@
-"""Beds, heaps and discharges that are made of known numbers."""
+"""Beds, heaps and discharges with known answers."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_solid_fraction_of_a_cubic_packing_and_of_cut_spheres():
     np.testing.assert_allclose(cut * 2.0 * np.array([1.25, 1.75]), np.pi / 6 * np.array([5 / 32, 27 / 32]))
 
 
-def test_the_largest_overlap_is_found_across_a_face():
+def test_the_largest_overlap_across_a_face_is_found():
     position, radius = np.array([[0.2, 0.0, 0.0], [1.1, 0.0, 0.0], [3.9, 0.0, 0.0]]), [0.5, 0.5, 0.4]
     assert largest_overlap(position, radius) == pytest.approx(0.1)
     # 0.3 apart through the face at 4.
@@ -50,18 +50,19 @@ def test_contacts_of_a_cubic_packing():
     assert (coordination_numbers(64, periodic) >= 5).all()
     assert mean_coordination(64, contacts(position, radius, 1e-9, (4.0, 4.0, 4.0))) == 6.0
     assert len(contacts(position, radius, gap=-1e-9)) == 0
-    # A small sphere in the middle of a cell touches eight, also where others are much larger.
+    # A small sphere in the centre of a cell touches eight grains, even if other grains are much larger.
     small = np.sqrt(3) / 2 - 0.5
     more, sizes = np.vstack([position, [[1.0, 1.0, 1.0]]]), np.append(radius, small)
     assert coordination_numbers(65, contacts(more, sizes, 1e-9))[-1] == 8
 
 
-def test_rattlers_hold_nobody():
-    """Eight corners with 3 contacts go; then edges of a cube of 3, which had 4, have 2."""
+def test_rattlers_are_removed_repeatedly():
+    """In a cube of 3 x 3 x 3 grains the 8 corners (3 contacts) go first; edges then have 2 of 4 contacts
+    left."""
     position, radius = cubic(3)
     pairs = contacts(position, radius, gap=1e-9)
     assert mean_coordination(27, pairs) == pytest.approx(2 * 54 / 27)
-    # What is left are six faces about the middle, with one contact each, and then nothing.
+    # Six face centres around the middle grain remain, each with one contact; in the next pass all go.
     assert mean_coordination(27, pairs, rattlers=False) == 0.0
     position, radius = cubic(5)
     pairs = contacts(position, radius, 1e-9, (5.0,) * 3)
@@ -74,7 +75,7 @@ def test_rattlers_hold_nobody():
 
 @pytest.mark.parametrize("degrees", [18.0, 27.0, 35.0])
 def test_angle_of_a_cone_of_grains(rng, degrees):
-    """Grains of two sizes fill a cone, with strays on the floor."""
+    """Grains of two sizes fill a cone; a few strays lie on the floor."""
     height, slope, step = 0.03, np.tan(np.radians(degrees)), 1.9e-3
     reach = np.arange(-height / slope, height / slope, step)
     sites = np.stack(np.meshgrid(reach, reach, np.arange(0, height, step), indexing="ij"), -1).reshape(-1, 3)

@@ -21,13 +21,13 @@ CORNERS = np.stack(np.meshgrid(*3 * [[-1.0, 1.0]], indexing="ij"), -1).reshape(-
 
 
 def ball(rng, n):
-    """Places in the unit sphere, at random."""
+    """Random points in the unit sphere."""
     r = rng.normal(size=(n, 3))
     return r / np.linalg.norm(r, axis=1)[:, None] * rng.uniform(size=(n, 1)) ** (1 / 3)
 
 
 def test_the_ellipsoid_of_a_box_goes_through_its_corners():
-    """Of a box with half sides a, b, c it has semi-axes sqrt(3) a, ..., turned as the box is; m or km."""
+    """A box with half sides a, b, c has semi-axes sqrt(3) a, ..., rotated with the box; in m or km."""
     turn = Rotation.from_euler("xyz", (0.3, -1.0, 2.0)).as_matrix()
     for scale in (1e-6, 1e5):
         corners = scale * (CORNERS * (1.0, 3.0, 2.0) @ turn.T + (5.0, 0.0, -3.0))
@@ -49,14 +49,15 @@ def test_the_ellipsoid_of_points_on_one_is_that_one(rng):
 
 
 def test_the_ellipsoid_of_spheres_holds_them():
-    """That of one sphere is it; that of two equal ones is known: a minimum over ellipsoids around both."""
+    """A single sphere is its own ellipsoid. For two equal spheres the smallest enclosing ellipsoid is known:
+    a minimum over ellipsoids of revolution around both."""
     one = bounding_ellipsoid([[1.0, 2.0, 3.0]], 0.5, tolerance=1e-6)
     assert one.semi_axes == pytest.approx([0.5] * 3, rel=1e-6)
     two = bounding_ellipsoid([[-2.0, 0, 0], [2.0, 0, 0]], 0.5, tolerance=1e-4)
 
     def volume(across):
-        """Of the ellipsoid of revolution that touches both spheres: a point at angle t of the right one lies
-        on it, none outside."""
+        """Volume of the ellipsoid of revolution that touches both spheres: a point at angle t of the right
+        sphere lies on it, and no point lies outside."""
         t = np.linspace(0, np.pi / 2, 2001)
         x, y = 2 + 0.5 * np.cos(t), 0.5 * np.sin(t)
         along = np.max(x / np.sqrt(np.maximum(1 - (y / across) ** 2, 1e-300)))
@@ -70,7 +71,7 @@ def test_the_ellipsoid_of_spheres_holds_them():
 
 
 def test_points_on_all_spheres_are_in_the_ellipsoid(rng):
-    """Also where one is much larger than the others."""
+    """Also if one sphere is much larger than the others."""
     position, radius = ball(rng, 400) * (5, 3, 2), np.append(np.full(399, 0.1), 2.0)
     found = bounding_ellipsoid(position, radius, tolerance=1e-4)
     u = rng.normal(size=(400, 2000, 3))
@@ -81,7 +82,7 @@ def test_points_on_all_spheres_are_in_the_ellipsoid(rng):
     assert inner.volume < found.volume
 
 
-def test_what_has_no_ellipsoid_is_refused():
+def test_points_without_an_ellipsoid_are_refused():
     flat = np.column_stack([np.random.default_rng(1).normal(size=(10, 2)), np.zeros(10)])
     for measure in (bounding_ellipsoid, hull_volume):
         with pytest.raises(InputError, match="particles must be spheres, or points not all in a plane"):
@@ -94,14 +95,14 @@ def test_what_has_no_ellipsoid_is_refused():
 
 
 def test_hulls(rng):
-    """Of a cube with edges L, and of spheres at its corners: L^3 + 6 L^2 R + 3 pi L R^2 + 4/3 pi R^3."""
+    """For a cube with edges L, and for spheres at its corners: L^3 + 6 L^2 R + 3 pi L R^2 + 4/3 pi R^3."""
     corners = np.vstack([CORNERS, 0.3 * ball(rng, 100)])
     assert hull_volume(corners) == pytest.approx(8.0, rel=1e-12)
     radius = 0.25
     expected = 8 + 24 * radius + 6 * np.pi * radius**2 + 4 / 3 * np.pi * radius**3
     assert hull_volume(corners, radius) == pytest.approx(expected, rel=2e-3)
     assert hull_volume([[3.0, 0, 0]], 2.0) == pytest.approx(32 / 3 * np.pi, rel=1e-9)
-    # A large sphere inside stands out of the small ones.
+    # A large sphere in the middle reaches beyond the small ones.
     sizes = np.append(np.full(107, 1e-3), 1.7)
     assert hull_volume(corners, sizes) > 4 / 3 * np.pi * 1.7**3
     assert hull_density(corners, np.full(108, 2.0), radius) == pytest.approx(216 / expected, rel=2e-3)
@@ -109,12 +110,12 @@ def test_hulls(rng):
 
 @pytest.mark.parametrize("time", [0.0, 2.7])
 def test_voronoi_cells_fill_a_periodic_box(rng, time):
-    """A box that leans has the same volume; each cell is the hull of its corners among many images."""
+    """A sheared box has the same volume; each cell is the hull of its corners among many images."""
     domain = ShearedBox(low=(0, 0, 0), high=(3, 4, 5), rate=0.1)
     position = rng.uniform(size=(200, 3)) ** 2 * (3, 4, 5)
     volumes = voronoi_volumes(position, periodic_sides(domain, time))
     assert volumes.sum() == pytest.approx(60.0, rel=1e-12)
-    # Crowded in a corner, so that cells elsewhere are wide.
+    # Points are crowded in a corner, so that cells elsewhere are wide.
     crowded = rng.uniform(size=(400, 3)) ** 6 * (3, 4, 5)
     assert voronoi_volumes(crowded, periodic_sides(domain, time)).sum() == pytest.approx(60.0, rel=1e-12)
     few = rng.uniform(size=(9, 3)) * (3, 4, 5)
@@ -122,8 +123,8 @@ def test_voronoi_cells_fill_a_periodic_box(rng, time):
 
 
 def test_voronoi_cells_fill_boxes_that_are_long_or_crowded(rng):
-    """A cell reaches half a side along each axis at most, and no layer of images beyond the first has a part
-    in it, however far away all others are; in a plane there are no cells."""
+    """A cell extends at most half a side along each axis, so the first layer of images is enough, however far
+    away the other points are. Points in a plane have no cells."""
     apart = np.column_stack([rng.uniform(size=(30, 2)), rng.uniform(4, 6, 30)])
     volumes = voronoi_volumes(apart, (1, 1, 10))
     assert volumes.sum() == pytest.approx(10.0, rel=1e-12)
@@ -140,7 +141,7 @@ def test_voronoi_cells_fill_boxes_that_are_long_or_crowded(rng):
 
 
 def tiled(points, sides, layers):
-    """Volumes of cells by SciPy's hulls, among so many layers of images along each axis."""
+    """Volumes of cells by SciPy's hulls, with ``layers`` layers of images along each axis."""
     turns = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in layers), indexing="ij"), -1).reshape(-1, 3)
     turns = turns[np.argsort(np.abs(turns).sum(axis=1), kind="stable")]
     diagram = Voronoi(np.vstack([points + turn * np.array(sides) for turn in turns]))
@@ -149,7 +150,7 @@ def tiled(points, sides, layers):
 
 
 def test_one_layer_of_images_is_enough_in_a_box_that_is_far_longer_than_wide(rng):
-    """Of points in one end of it; and of a layer that is flat, whose cells are those in the plane."""
+    """Points in one end of a long box; and a flat layer, whose cells are the two-dimensional ones."""
     points = rng.uniform(size=(30, 3))
     volumes = voronoi_volumes(points, (1, 1, 30))
     np.testing.assert_allclose(volumes, tiled(points, (1, 1, 30), (3, 3, 1)), rtol=1e-9)
@@ -175,7 +176,7 @@ def test_voronoi_cells_of_a_lattice_and_those_that_are_open():
 
 
 def test_voronoi_volumes_by_shell(rng):
-    """Of a lattice; a shell that is so thin that no cell is within the ellipsoid has no mean."""
+    """For a lattice. A shell that is too thin to contain the ellipsoid of any cell has no mean."""
     sites = np.stack(np.meshgrid(*3 * [np.arange(-7.0, 8)], indexing="ij"), -1).reshape(-1, 3)
     sites += 1e-4 * rng.normal(size=sites.shape)
     whole = Ellipsoid(np.zeros(3), np.array([6.0, 5.5, 5.0]), np.eye(3))

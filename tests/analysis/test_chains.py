@@ -18,13 +18,13 @@ SIDES = (6.0, 8.0, 30.0)
 
 
 def rod(start, direction, number):
-    """Places of touching spheres of diameter 1."""
+    """Positions of touching spheres of diameter 1 in a row."""
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     return np.asarray(start, float) + np.arange(number)[:, None] * direction
 
 
 def test_a_rod_a_bend_a_ladder_and_one_alone():
-    """Their order is shuffled, and the rod goes across faces of the box."""
+    """The particles are shuffled, and the rod crosses faces of the box."""
     bend = np.vstack([rod((10, 0, 0), (1, 0, 0), 4), rod((13, 1, 0), (0, 1, 0), 3)])
     ladder = np.vstack([rod((30, 0, 0), (0, 0, 1), 6), rod((31, 0, 0), (0, 0, 1), 6)])
     places = np.vstack([rod((5.5, 7.5, 29.5), (1, 2, 2), 9), bend, ladder, [[50.0, 0, 0]]])
@@ -44,7 +44,7 @@ def test_a_rod_a_bend_a_ladder_and_one_alone():
             continue
         order = np.argsort(shapes.size)
         assert shapes.size[order].tolist() == [1, 7, 12]
-        # Seven along the bend; along the ladder a rung is crossed once at most.
+        # Seven along the bend; the longest path along the ladder crosses at most one rung.
         assert shapes.path[order].tolist() == [1, 7, 7]
         assert shapes.breadth[order[2]] == pytest.approx(12 / 7)
         assert shapes.thickness[order[2]] == pytest.approx(0.5)
@@ -60,13 +60,13 @@ def test_fraction_in_clusters():
 
 
 def test_orientations(rng):
-    """At random, along an axis, across it, and weighted."""
+    """Orientations at random, along an axis, across it, and weighted."""
     n = rng.normal(size=(20000, 3))
     n /= np.linalg.norm(n, axis=1)[:, None]
     np.testing.assert_allclose(orientation_tensor(n), np.eye(3) / 3, atol=0.01)
     assert alignment(n, (1, 1, 0)) == pytest.approx(0.0, abs=0.02)
     assert alignment(np.eye(3)[:2], (0, 0, 5)) == pytest.approx(-0.5)
-    # Of nothing there is no order, and none that is across.
+    # Without directions or pairs, or with zero weights, the results are undefined.
     none = np.zeros((0, 3))
     assert np.isnan(alignment(none, (0, 0, 5)))
     assert np.isnan(orientation_tensor(np.eye(3), np.zeros(3))).all()
@@ -78,22 +78,22 @@ def test_orientations(rng):
 
 
 def test_fabric_of_a_lattice_stretched_along_x():
-    """Rows along x touch; across joined faces too."""
+    """Rows along x touch, also across periodic faces."""
     sites = np.stack(np.meshgrid(*3 * [np.arange(4.0)], indexing="ij"), -1).reshape(-1, 3) * (1.0, 1.2, 1.0)
     sides = (4.0, 4.8, 4.0)
     pairs = contacts(sites, np.full(64, 0.5), 1e-9, sides)
     np.testing.assert_allclose(fabric_tensor(sites, pairs, sides), np.diag([0.5, 0, 0.5]), atol=1e-12)
 
 
-def test_chains_across_joined_faces_are_bound(rng):
+def test_chains_across_periodic_faces_are_connected(rng):
     place = np.array([[0.0, 0, 0.2], [0, 0, 9.2], [0, 0, 5.0]])
     moment = np.tile([0.0, 0, 1.0], (3, 1))
     assert len(head_to_tail(place, moment, 1.0)) == 0
     assert head_to_tail(place, moment, 1.0, sides=(0, 0, 10.0)).tolist() == [[0, 1]]
 
 
-def test_a_long_chain_among_many_takes_no_time(rng):
-    """A ring has half of its particles along its longest way."""
+def test_long_chains_are_fast(rng):
+    """In a ring, the longest of the shortest paths has half of the particles."""
     angle = 2 * np.pi * np.arange(2000) / 2000
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     pairs = np.column_stack([np.arange(2000), (np.arange(2000) + 1) % 2000])

@@ -1,4 +1,4 @@
-"""Fits of flow curves to curves that are known, exact and with noise of a known size."""
+"""Fits of flow curves to known curves, exact and with noise of known size."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_exact_curves_are_found(size):
 
 
 def test_rates_up_to_a_limit_are_left_out():
-    """Below it the curve is bent."""
+    """Below the limit the curve has another slope."""
     stress = np.where(RATE > 200, 40.0 + 0.1 * RATE, 10.0)
     found = fit_bingham(RATE, stress, above=200.0)
     assert found.yield_stress.value == pytest.approx(40.0)
@@ -48,8 +48,8 @@ def test_rates_up_to_a_limit_are_left_out():
         (fit_herschel_bulkley, lambda x: 5.0 + 0.5 * x**0.6, (5.0, 0.5, 0.6)),
     ],
 )
-def test_intervals_hold_the_truth_as_often_as_they_say(rng, fit, law, true, known):
-    """Of 400 noisy curves; with errors that are known, and unlike."""
+def test_intervals_have_their_nominal_coverage(rng, fit, law, true, known):
+    """Over 400 noisy curves, with an estimated noise level or with known errors that vary."""
     error, tries = np.where(RATE > 30, 0.3, 0.1) if known else np.full(len(RATE), 0.2), 400
     held = np.zeros(len(true))
     for _ in range(tries):

@@ -1,4 +1,4 @@
-"""Energy, angular momentum and virial ratio against pairs one by one, closed forms and changes of frame."""
+"""Energy, angular momentum and virial ratio against pair-by-pair sums, closed forms and changes of frame."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def cloud(rng):
 
 @pytest.mark.parametrize("softening", [0.0, 0.7])
 @pytest.mark.parametrize("block", [1, 60, 10**6])
-def test_energy_is_the_sum_over_pairs_however_many_are_taken_at_once(cloud, softening, block, monkeypatch):
+def test_energy_is_the_sum_over_pairs_for_any_block_size(cloud, softening, block, monkeypatch):
     position, _, mass = cloud
     monkeypatch.setattr(module, "BLOCK_PAIRS", block)
     expected = sum(
@@ -31,7 +31,7 @@ def test_one_alone_has_no_energy():
     assert gravitational_energy(np.zeros((1, 3)), np.ones(1)) == 0.0
 
 
-def test_a_circular_pair_is_in_balance_and_turns_with_the_momentum_of_its_reduced_mass():
+def test_a_circular_pair_obeys_the_virial_theorem():
     """2 K = -U, and L = mu d^2 w."""
     mass, d = np.array([1e9, 3e9]), 2.0
     w = np.sqrt(G * 4e9 / d**3)
@@ -45,8 +45,8 @@ def test_a_circular_pair_is_in_balance_and_turns_with_the_momentum_of_its_reduce
     np.testing.assert_allclose(momentum, [0, 0, 0.75e9 * d**2 * w], rtol=1e-12, atol=1e-3)
 
 
-def test_a_rigid_body_has_the_momentum_of_its_moments_of_inertia(cloud):
-    """L = I w with that of each sphere about its centre, 2/5 m R^2."""
+def test_angular_momentum_of_a_rigid_body(cloud):
+    """L = I w; I includes the moment of inertia of each sphere about its own centre, 2/5 m R^2."""
     position, _, mass = cloud
     radius, w = np.linspace(0.1, 0.5, 17), np.array([0.3, -0.2, 0.5])
     arm = position - mass @ position / mass.sum()

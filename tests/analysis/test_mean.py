@@ -12,7 +12,7 @@ def test_mean_and_its_interval():
     mean = Mean.of([1.0, 2.0, 3.0, 4.0])
     assert mean.value == 2.5
     assert mean.half == pytest.approx(3.182446 * np.sqrt(5 / 12), rel=1e-6)
-    # The error of a ratio, by drawing.
+    # The error of a ratio, against random samples.
     rng = np.random.default_rng(0)
     a, b = rng.normal(4.0, 0.1, 200_000), rng.normal(2.0, 0.03, 200_000)
     assert Mean(4.0, 0.1).over(Mean(2.0, 0.03)).half == pytest.approx((a / b).std(), rel=0.02)
@@ -39,7 +39,7 @@ def test_a_mean_has_no_more_digits_than_its_interval(value, half, shown):
 @pytest.mark.parametrize(
     "runs", [[], [1.0, np.nan], [[1.0, 2.0], [3.0, 4.0]], [np.inf, 1.0], ["a"], [[1.0], [2.0, 3.0]]]
 )
-def test_what_is_no_list_of_numbers_is_refused(runs):
+def test_anything_but_numbers_is_refused(runs):
     with pytest.raises(InputError, match="runs must be a list of finite numbers, one for each run; received"):
         Mean.of(runs)
 

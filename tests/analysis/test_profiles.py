@@ -1,4 +1,4 @@
-"""Profiles, radial distributions and slopes that are known."""
+"""Profiles, radial distributions and slopes with known answers."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,8 @@ def test_layer_means_and_empty_layers():
 
 
 def test_granular_temperature_beside_a_mean_flow_and_its_shear(rng):
-    """Means over many layers of few grains each are right too; what is in line has none."""
+    """Means over many layers with few grains each are unbiased. Shear flow alone gives zero; two grains are
+    too few."""
     position = rng.uniform(0, 400, (8000, 3))
     flow = np.column_stack([7 + 3 * position[:, 2], -position[:, 2], 0 * position[:, 2]])
     edges = np.linspace(0, 400, 1001)
@@ -41,7 +42,7 @@ def test_granular_temperature_beside_a_mean_flow_and_its_shear(rng):
     "sides", [None, (9.0, 9.0, 9.0), (9.0, 0, 9.0), [[9.0, 0, 0], [3.0, 9.0, 0], [0, 0, 9.0]]]
 )
 def test_particles_at_random_have_a_radial_distribution_of_one(rng, sides):
-    """In a box, periodic or not, or leaning; what is outside along an open axis does not count."""
+    """In a box: periodic, open or sheared. Grains outside the box along an open axis are not counted."""
     position = rng.uniform(-1.0 if sides is None else 0.0, 9.0, (4000, 3))
     edges = np.array([0.0, 0.8, 1.4, 2.0])
     g = radial_distribution(position, edges, (0, 0, 0), (9, 9, 9), sides)
@@ -67,13 +68,13 @@ def test_the_radial_distribution_of_a_lattice_counts_its_neighbours():
         ([0.0, 3.9], None, "particles must be farther than the last edge"),
     ],
 )
-def test_what_has_no_radial_distribution_is_refused(edges, sides, text):
+def test_invalid_radial_distributions_are_refused(edges, sides, text):
     with pytest.raises(InputError, match=text):
         radial_distribution(np.ones((5, 3)), edges, (0, 0, 0), (8, 8, 8), sides)
 
 
 def slope(rng, profile, length=0.1, depth=0.02, step=1.2e-3):
-    """Grains of two sizes under a surface in a box."""
+    """Grains of two sizes below a surface, in a box."""
     axes = [np.arange(0, side, step) for side in (depth, length, 0.08)]
     sites = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     sites = sites + rng.uniform(-0.5, 0.5, sites.shape) * step
@@ -94,7 +95,7 @@ def test_the_angle_of_a_slope_in_a_box(rng, degrees, back):
 
 @pytest.mark.parametrize("back", [False, True])
 def test_a_slope_of_two_angles(rng, back):
-    """45 degrees above 25, as in a slope that is steeper at the top."""
+    """A slope of 45 degrees above one of 25 degrees."""
     knee, foot = 0.03, np.tan(np.radians(25.0))
 
     def profile(y):

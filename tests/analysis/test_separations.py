@@ -1,4 +1,4 @@
-"""Near pairs against a look at all pairs and their images."""
+"""Near pairs against a search over all pairs and their images."""
 
 from itertools import combinations, product
 
@@ -20,8 +20,8 @@ LEANING = ShearedBox(low=(0, 0, 0), high=(3, 4, 5), rate=0.3, flow="z", gradient
         LEANING.model_copy(update={"flow": "y", "gradient": "z"}),
     ],
 )
-def test_near_pairs_are_those_whose_nearest_images_are(rng, domain):
-    """Also of unlike sizes, and of places outside the box."""
+def test_near_pairs_use_nearest_images(rng, domain):
+    """Also for spheres of unlike sizes, and for positions outside the box."""
     sides, position = periodic_sides(domain, time=7.3), rng.uniform(-1, 6, (70, 3))
     shifts = np.array(list(product(*(range(-4, 5) if side.any() else [0] for side in sides)))) @ sides
     apart = (position[None] - position[:, None])[:, :, None] + shifts

@@ -1,10 +1,10 @@
-"""Hashes of what scenes of every kind give under the backend of this process.
+"""Hashes of the results of scenes of every kind under the backend of this process.
 
     TISIM_BACKEND=quadrants python -m tests.backend.bits FILE [--schedule particle] [NAME ...]
 
-The scenes are those of ``tests/extremes.py``, one of each effect, source and operator, and of each stepper
-with each of its controls; with 27 times as many particles. FILE is JSON: by the scene's name a SHA-256 hash
-of each array of the end, and how the run ended, its time, work and measures.
+The scenes come from ``tests/extremes.py``: one for each effect, source and operator, and for each stepper
+with each of its controls; here with 27 times the number of particles. FILE is JSON: for each scene, a SHA-256
+hash of each final array, and the status, time, work and measures of the run.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from tisim import Scene, Simulation
 from tisim.backend import memory
 
 APART, SIDE = 0.025, 3
-"""m, from each copy of the particles to the next; so many copies along each side of a cube fit the box of
-scenes that need images."""
+"""Distance from each copy of the particles to the next, m; and copies along each side of a cube. These fit
+the box of scenes that need images."""
 ONE_BODY = "effects.rigid_clumps"
-"""Copies of its particles would all be one clump."""
+"""Copies of its particles would all belong to one clump."""
 
 
 def scene_of(name: str) -> Scene:
-    """A scene of ``extremes.scenes()`` with copies of its particles, at slightly other velocities."""
+    """A scene of ``extremes.scenes()`` with copies of its particles, at slightly different velocities."""
     data = copy.deepcopy(extremes.scenes()[name])
     if name == ONE_BODY:
         return Scene.from_dict(data)
@@ -48,7 +48,7 @@ def scene_of(name: str) -> Scene:
 
 
 def bits(scene: Scene, schedule: str) -> dict[str, str]:
-    """What a run gives: hashes of its arrays, and how it ended."""
+    """Run a scene; return hashes of its arrays, and its status."""
     simulation = Simulation(scene, schedule=schedule)
     simulation.load(scene)
     simulation.run()

@@ -1,4 +1,5 @@
-"""Which package compiles the kernels, for every processor and whatever is installed; what a user is told."""
+"""The choice of the kernel compiler, for every processor and set of installed packages; messages to
+the user."""
 
 import os
 import subprocess
@@ -18,7 +19,7 @@ BOTH = ["taichi", "quadrants"]
 
 
 def x86(vendor, family, model):
-    """What /proc/cpuinfo says of a processor."""
+    """The entry of /proc/cpuinfo for a processor."""
     return {"vendor_id": vendor, "cpu family": str(family), "model": str(model)}
 
 
@@ -44,16 +45,17 @@ ZEN_4 = x86("AuthenticAMD", 25, 0x11)
         ({}, "quadrants"),
     ],
 )
-def test_the_compiler_that_knows_the_processor_is_taken(cpu, taken):
-    """The newest where none is known to know it; the only one where there is one."""
+def test_the_compiler_that_supports_the_cpu_is_chosen(cpu, taken):
+    """The newest compiler if none is known to support the processor; the installed one if there is
+    only one."""
     assert choice.automatic(BOTH, cpu) == taken
     for only in BOTH:
         assert choice.automatic([only], cpu) == only
     assert choice.automatic([], cpu) == "taichi"
 
 
-def test_the_table_has_the_llvm_that_is_in_each_package():
-    """The one in use by itself, the other in a process of its own."""
+def test_the_table_has_the_llvm_of_each_package():
+    """One package is loaded in this process, the other in a separate process."""
     assert int(llvm_version().split(".")[0]) == choice.LLVM[BACKEND]
     (other,) = (name for name in BOTH if name != BACKEND)
     code = "from tisim.describe.diagnostics import llvm_version as v; print(v())"
@@ -61,7 +63,7 @@ def test_the_table_has_the_llvm_that_is_in_each_package():
 
 
 def python(code, **environment):
-    """A process that runs this code, with warnings as errors, and TISIM_BACKEND only where it is given."""
+    """A process that runs this code, with warnings as errors, and with TISIM_BACKEND only if it is given."""
     inherited = {name: value for name, value in os.environ.items() if name != choice.VARIABLE}
     command = [sys.executable, "-W", "error::RuntimeWarning", "-W", "error::UserWarning", "-c", code]
     environment = inherited | {name: str(value) for name, value in environment.items()}
@@ -100,11 +102,11 @@ def test_a_wrong_name_and_a_package_that_is_absent_are_refused(monkeypatch):
         r" TISIM_BACKEND left out; received 'quadrants'$",
     ):
         choice.check()
-    # What is imported meanwhile is one that is there.
+    # The installed package is imported nevertheless.
     assert choice.chosen() == "taichi"
 
 
-def test_the_commands_install_what_the_package_asks_for():
+def test_install_commands_equal_the_requirements():
     with (ROOT / "pyproject.toml").open("rb") as file:
         asked = tomllib.load(file)["project"]["dependencies"]
     for name, command in choice.INSTALL.items():
@@ -122,7 +124,7 @@ print(runtime.backend())
 """
 
 
-def test_the_first_run_says_what_is_lost_once_and_where_no_script_reads(tmp_path):
+def test_the_first_run_prints_a_note_once_on_stderr(tmp_path):
     """Without Quadrants, on a processor that Taichi's LLVM does not know."""
     first, second = (python(FIRST_RUN, TI_OFFLINE_CACHE_FILE_PATH=tmp_path) for _ in range(2))
     (line,) = first.stderr.splitlines()
@@ -133,7 +135,7 @@ def test_the_first_run_says_what_is_lost_once_and_where_no_script_reads(tmp_path
     assert first.stdout.startswith("taichi")
 
 
-def test_nothing_is_said_where_nothing_is_lost_or_somebody_has_chosen(tmp_path, monkeypatch, capsys):
+def test_no_note_without_a_loss_or_after_a_choice(tmp_path, monkeypatch, capsys):
     assert choice.lost(BOTH, ZEN_4) == choice.lost(["quadrants"], ZEN_4) == ""
     assert choice.lost(["taichi"], x86("AuthenticAMD", 25, 0x01)) == ""
     assert "may not know" in choice.lost(["taichi"], {})
@@ -142,7 +144,7 @@ def test_nothing_is_said_where_nothing_is_lost_or_somebody_has_chosen(tmp_path, 
     monkeypatch.setenv(choice.VARIABLE, "taichi")
     choice.advise(tmp_path)
     monkeypatch.delenv(choice.VARIABLE)
-    # Where it cannot be kept that it has been said, it would be said every time.
+    # The note is not printed if there is no folder to record it in; it would reappear in every run.
     choice.advise(tmp_path / "absent")
     assert capsys.readouterr() == ("", "")
     closed = (tmp_path / "closed").open("w")
@@ -152,7 +154,7 @@ def test_nothing_is_said_where_nothing_is_lost_or_somebody_has_chosen(tmp_path, 
 
 
 def test_the_first_processor_is_read(tmp_path, monkeypatch):
-    """Of a file that goes on: nothing of the second is read. Where there is none, there is a name."""
+    """Only the first processor of the file is read. Without the file, the result has a model name."""
     info = tmp_path / "cpuinfo"
     info.write_text(
         "vendor_id\t: AuthenticAMD\ncpu family\t: 26\nmodel\t\t: 2\nflags\t\t: a:b\n\nmodel : 3\n"

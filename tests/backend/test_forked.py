@@ -1,5 +1,5 @@
-"""A process that is forked after Taichi has been started says so at once, and reads; it harms nothing of the
-parent's."""
+"""A process forked after Taichi has started refuses to run anything at once, can still read results, and does
+not disturb its parent."""
 
 import multiprocessing
 import os
@@ -25,10 +25,10 @@ FLIGHT = scene([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], (), dt=0.5, steps=4)
 
 
 def forked(function, *arguments):
-    """Return what a function returns in a forked process, or the error that it raises there."""
+    """Run a function in a forked process; return its result, or the error that it raises there."""
     reader, writer = os.pipe()
     with warnings.catch_warnings():
-        # Python warns of a fork where there are threads, as of 3.12: that is what is tried here.
+        # As of Python 3.12, a fork with threads running gives a warning; such a fork is intended here.
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if not child:
@@ -57,7 +57,7 @@ def forked(function, *arguments):
     ],
     ids=["run", "Simulation", "init anew", "init as it is", "current", "restart"],
 )
-def test_whatever_runs_is_refused_at_once(use):
+def test_running_is_refused_at_once(use):
     tisim.run(FLIGHT)
     began = time.monotonic()
     error = forked(use)
@@ -72,20 +72,20 @@ def test_nothing_is_written_before_the_refusal(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_results_are_read_and_the_parent_goes_on(tmp_path):
+def test_results_are_readable_and_the_parent_continues(tmp_path):
     before = tisim.run(FLIGHT, record=Recording(tmp_path / "t.h5", frames=2))
     assert list(forked(lambda: tisim.read(tmp_path / "t.h5").times)) == [0.0, 1.0, 2.0]
     assert forked(lambda: multiprocessing.current_process().name) == "MainProcess"
     assert (tisim.run(FLIGHT).state["position"] == before.state["position"]).all()
 
 
-def test_a_turn_that_another_thread_has_is_not_waited_for():
+def test_a_turn_of_another_thread_is_not_waited_for():
     with runtime.turn:
         assert forked(runtime.turn.acquire, False)
 
 
 def test_a_child_does_not_hold_the_locks_of_its_parent(tmp_path):
-    """Nor takes them from it, as it leaves the context that it was forked in."""
+    """Nor does it release the parent's locks when it leaves the context in which it was forked."""
     path = tmp_path / "lock"
 
     def leave():

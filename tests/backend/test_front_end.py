@@ -1,4 +1,4 @@
-"""What the front end of the compiler remembers is what it would find."""
+"""The cached look-ups of the compiler's front end equal the uncached ones."""
 
 import ast
 import importlib
@@ -22,7 +22,7 @@ from tisim.backend.taichi import BACKEND, ti
 
 
 def decorated(function):
-    """As in the packages: a decorator that calls, at level 0, what asks for the frame at level 3."""
+    """A decorator that asks, at level 0, for the frame at level 3, as in the packages."""
     function.in_class = _in_class_body(3)
     return function
 
@@ -89,7 +89,7 @@ def test_one_definition_is_looked_up_once():
     assert asked == [first]
 
 
-def test_equal_codes_of_two_files_are_two():
+def test_equal_codes_of_two_files_differ():
     code = (
         compile("def f():\n    pass\n", "one.py", "exec"),
         compile("def f():\n    pass\n", "two.py", "exec"),
@@ -127,12 +127,12 @@ def test_text_of_one_line_is_wrapped_as_by_python():
 
 
 @pytest.mark.skipif(BACKEND != "taichi", reason="Quadrants remembers the texts of places itself")
-def test_the_text_of_a_place_is_taichis():
+def test_positions_in_source_text_equal_taichis():
     from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext
 
     tell = ASTTransformerContext.get_pos_info
     assert tell.__wrapped__ is not tell
-    lines, first = inspect.getsourcelines(test_equal_codes_of_two_files_are_two)
+    lines, first = inspect.getsourcelines(test_equal_codes_of_two_files_differ)
     tree = ast.parse(textwrap.dedent("".join(lines)))
 
     def context(src):
@@ -151,13 +151,13 @@ def test_the_text_of_a_place_is_taichis():
             assert remembered(context(edited), node) == tell.__wrapped__(context(edited), node)
 
 
-def test_while_a_package_is_imported_frames_have_the_line_that_they_have():
+def test_quick_imports_report_the_same_frames():
     thorough = inspect.getframeinfo
 
     def told():
         class Here:
             frame = sys._getframe()
-            # The line is the one that runs: asked for in the same line.
+            # Both calls are on one line, because the frame reports the line that is running.
             both = (thorough(frame), inspect.getframeinfo(frame))
 
         return Here.both
@@ -181,7 +181,7 @@ FROZEN = eval(compile("__import__('sys')._getframe()", "<nowhere>", "eval"))
 
 @dataclass
 class Pair:
-    """What a kernel of Quadrants takes apart."""
+    """An argument that a Quadrants kernel takes apart."""
 
     first: ti.i32
     second: ti.i32
@@ -217,7 +217,7 @@ def test_a_kernel_without_dataclasses_is_read_once(monkeypatch):
         return double, total
 
     runtime.current()
-    # Others' kernels are read as ever.
+    # Kernels of other modules are read as usual.
     for module, times in (("tisim.kernels", [1]), ("mine", [0, 1])):
         double, total = kernels(module)
         assert in_taichi_thread(double)(21) == 42

@@ -1,4 +1,5 @@
-"""Compiled kernels on the disk: left locked by a process that was killed, and used by many at once."""
+"""Compiled kernels on disk: after a process was killed with the lock held, and with many processes
+at once."""
 
 import os
 import subprocess
@@ -25,7 +26,7 @@ def wait(handle, path, *how, wait=atomic._wait_for_lock):
 
 atomic._wait_for_lock = wait
 """
-"""Before it: says when it comes to wait for a lock of ours."""
+"""Put before SCRIPT: prints a line when the process begins to wait for tisim's lock."""
 
 
 def begin(script=SCRIPT):
@@ -35,7 +36,7 @@ def begin(script=SCRIPT):
 
 
 def warned(process):
-    """What it says on standard error, once it has ended well."""
+    """Standard error of a process that has ended without error."""
     out, warnings = process.communicate(timeout=300)
     assert "True" in out.split()
     assert process.returncode == 0
@@ -44,14 +45,14 @@ def warned(process):
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A cache of its own, as of another machine."""
+    """A fresh kernel cache, as on another machine."""
     monkeypatch.setenv(kernel_cache.LOCKS[BACKEND][0], str(tmp_path))
     kernel_cache.lock().parent.mkdir(exist_ok=True)
     return tmp_path
 
 
 def leave_lock(age):
-    """A lock of this age, s."""
+    """Make a lock of this age, s."""
     kernel_cache.lock().touch()
     then = time.time() - age
     os.utime(kernel_cache.lock(), (then, then))
@@ -69,7 +70,8 @@ def test_a_lock_that_was_left_behind_is_removed_and_one_that_is_held_is_not(fold
 
 @pytest.mark.long
 def test_kernels_are_kept_after_a_kill_and_nothing_warns(folder):
-    """The lock is where the compiler looks for it: it warns of one that is held, not of one left behind."""
+    """The lock file is the one the compiler uses: the compiler warns of a lock that is held, not of a stale
+    one."""
 
     leave_lock(age=0.0)
     assert kernel_cache.lock().name in warned(begin())
@@ -77,7 +79,7 @@ def test_kernels_are_kept_after_a_kill_and_nothing_warns(folder):
     assert warned(begin()) == ""
     kernels = [path for path in folder.rglob("*") if path.suffix in (".tic", ".qdc")]
     assert len(kernels) > 5
-    # Now there is something to read: who starts while another process writes waits, however long that takes.
+    # The cache has kernels now. A process that starts while another one writes waits, for any length of time.
     with kernel_cache.exclusive_access():
         leave_lock(age=0.0)
         waits = begin(QUEUES + SCRIPT)
@@ -89,6 +91,6 @@ def test_kernels_are_kept_after_a_kill_and_nothing_warns(folder):
 
 @pytest.mark.slow
 def test_many_processes_at_once_do_not_warn(folder):
-    """They begin and end together, with nothing on the disk, and with everything."""
+    """The processes begin and end together, first with an empty cache and then with a full one."""
     for _ in range(2):
         assert {warned(process) for process in [begin() for _ in range(8)]} == {""}

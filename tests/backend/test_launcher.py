@@ -1,4 +1,4 @@
-"""A launcher runs the kernel that it was made of, and costs little."""
+"""A launcher runs its own kernel, and costs little."""
 
 import time
 
@@ -36,17 +36,17 @@ def counter():
     return Counter()
 
 
-def test_each_call_runs_the_kernel_of_its_own_object_and_returns_what_it_does():
+def test_each_call_runs_the_kernel_of_its_own_object():
     @in_taichi_thread
     def run(one, other):
         up, read, other_read = Launcher(one.up), Launcher(one.up_and_read), Launcher(other.up_and_read)
-        # In turns: the first call of each is the one that compiles.
+        # The two alternate: the first call of each compiles.
         return [(up(), read(), other_read()) for _ in range(3)]
 
     assert run(counter(), counter()) == [(None, 2, 1), (None, 4, 2), (None, 6, 3)]
 
 
-def test_arguments_are_those_of_each_call():
+def test_each_call_uses_its_own_arguments():
     @in_taichi_thread
     def run(one):
         add = Launcher(one.add)

@@ -1,4 +1,4 @@
-"""Where fields lie on a device that leaves no gaps: a number of 8 bytes begins at a multiple of 8."""
+"""Layout of fields on a device that leaves no gaps: each 8-byte number begins at a multiple of 8."""
 
 import pytest
 
@@ -9,20 +9,20 @@ from tisim.backend.thread import in_taichi_thread
 
 
 def size(part):
-    """Bytes of a part, all cells of a level together."""
+    """Bytes of a part, for all cells of a level."""
     if isinstance(part, Level):
         return part.cells * sum(map(size, parts(part)))
     return WORD if part.ptr.get_dt().to_string() in ("f64", "i64") else 4
 
 
 def parts(level):
-    """What Taichi lays out in a cell: levels, and each component of a field by itself."""
+    """The parts that Taichi lays out in a cell: levels, and each component of a field separately."""
     for part in level.parts:
         yield from [part] if isinstance(part, Level) else part.vars
 
 
 def wide_places(level, begin=0):
-    """Where numbers of 8 bytes begin, as Taichi lays parts out: in the order of their sizes."""
+    """Offsets of 8-byte numbers; Taichi lays parts out in order of size."""
     for cell in range(level.cells):
         at = begin + cell * size(level) // level.cells
         for part in sorted(parts(level), key=size):
@@ -34,7 +34,7 @@ def wide_places(level, begin=0):
 
 
 def mixed():
-    """A builder with fields of both widths, side by side and in one cell, in numbers that are not even."""
+    """A builder with fields of both widths, side by side and in one cell, in odd numbers."""
     builder = Builder()
     for cells, kind in ((3, ti.i32), (2, ti.f64), (1, ti.i32), (5, ti.i32), (1, ti.i64)):
         builder.dense(ti.i, cells).place(ti.field(kind))
@@ -47,7 +47,8 @@ def mixed():
 
 
 def narrow_vector():
-    """A builder with a vector of narrow numbers beside a wide one, whose components come one by one."""
+    """A builder with a vector of 4-byte numbers and an 8-byte one, whose components are laid out
+    one by one."""
     builder = Builder()
     together = builder.dense(ti.i, 2)
     together.place(ti.Vector.field(3, ti.f32), ti.field(ti.f64))
@@ -62,5 +63,5 @@ def test_numbers_of_eight_bytes_begin_at_multiples_of_eight(made):
     assert any(place % WORD for place in wide_places(builder))
     assert builder.fill_up() == size(builder)
     assert not any(place % WORD for place in wide_places(builder))
-    # Taichi must have placed what has been made.
+    # Taichi must have materialised the fields.
     Tree(builder).destroy()

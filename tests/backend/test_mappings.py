@@ -1,4 +1,4 @@
-"""A process that has used up its mappings of memory says so before the driver crashes."""
+"""A process that has used up its memory mappings reports it before the driver crashes."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tisim.backend import mappings
 
 @pytest.fixture
 def system(monkeypatch, tmp_path):
-    """A system that allows a process 100 mappings; sets how many it has."""
+    """A system that allows a process 100 mappings; the fixture sets how many are in use."""
     monkeypatch.setattr(mappings, "LIMIT", tmp_path / "limit")
     monkeypatch.setattr(mappings, "MAPPINGS", tmp_path / "maps")
 

@@ -1,5 +1,5 @@
-"""The runtime: unknown settings are refused, what an earlier start has made says so when used, any thread may
-call, and the caller's arithmetic stays what it was."""
+"""The runtime refuses unknown settings, objects of an earlier start raise an error when used, any thread may
+call, and the caller's floating-point mode is unchanged."""
 
 import os
 import subprocess
@@ -46,7 +46,7 @@ def test_starting_again_with_the_same_settings_changes_nothing():
     assert runtime.generation() == before
 
 
-def test_a_system_that_does_not_say_how_much_memory_it_has_refuses_nothing(monkeypatch):
+def test_unknown_memory_size_refuses_nothing(monkeypatch):
     monkeypatch.setattr(surroundings, "memory_limit", lambda: sys.maxsize)
     there = runtime.memory()
     assert diagnostics._memory() == f"{there / 2**30:.1f} GiB"
@@ -105,9 +105,9 @@ print(runtime.generation() - before)
 
 
 @pytest.mark.long
-def test_simulation_of_an_earlier_start_says_so():
-    """Not a segmentation fault; it can be closed, and what is made anew works, also where a start has failed,
-    and when it is Taichi's growth that has it started anew."""
+def test_simulations_of_an_earlier_start_raise_an_error():
+    """An error instead of a segmentation fault. The old simulation can be closed and a new one works, also
+    after a failed start and if Taichi was restarted because it had grown."""
     completed = subprocess.run(
         [sys.executable, "-c", STALE], capture_output=True, text=True, timeout=3600, check=False
     )
@@ -117,7 +117,7 @@ def test_simulation_of_an_earlier_start_says_so():
 
 
 def test_absent_device_is_refused():
-    """A machine without a GPU says so; one with a GPU starts it."""
+    """On a machine without a GPU this is an error; on one with a GPU, it starts."""
     code = (
         "from tisim import errors\n"
         "from tisim.backend import runtime\n"
@@ -135,12 +135,13 @@ def test_absent_device_is_refused():
 
 
 def moving(speed, effects=()):
-    """A grain at this speed, m/s."""
+    """A single grain at this speed, m/s."""
     return scene([[0.0, 0.0, 0.0]], [[speed, 0.0, 0.0]], effects, dt=0.5, steps=40)
 
 
 def test_four_threads_get_their_own_results():
-    """Scenes of structures that are compiled meanwhile among them: the bits that each gives alone."""
+    """Other threads compile scenes of new structure meanwhile; each result has the bits of a run on
+    its own."""
     scenes = [moving(1.0 + k, (Trap(stiffness=1e-6),) if k % 2 else ()) for k in range(24)]
     with ThreadPoolExecutor(4) as threads:
         results = list(threads.map(tisim.run, scenes))
@@ -154,7 +155,7 @@ def test_four_threads_get_their_own_results():
 
 
 def test_a_run_from_within_the_progress_of_another():
-    """Neither takes the other's simulation."""
+    """The two runs use different simulations."""
     inner = []
 
     def progress(fraction):
@@ -167,7 +168,8 @@ def test_a_run_from_within_the_progress_of_another():
 
 
 def test_the_callers_arithmetic_keeps_subnormal_numbers():
-    """Starting Taichi has its thread take them for 0; a scene of them comes back from text as it was."""
+    """Taichi's start makes its own thread flush subnormal numbers to 0; a scene with them survives a round
+    trip through text."""
     tisim.run(moving(1.0))
     assert np.float64(5e-324) * 1.0 > 0.0
     for number in (5e-324, 1e-310, 2.2e-308):
@@ -177,7 +179,7 @@ def test_the_callers_arithmetic_keeps_subnormal_numbers():
         assert thread.submit(lambda: np.float64(5e-324) * 1.0).result() > 0.0
 
 
-def test_a_closed_simulation_says_so():
+def test_a_closed_simulation_raises_an_error():
     simulation = Simulation(moving(1.0))
     simulation.load([moving(1.0)])
     simulation.close()
@@ -189,14 +191,14 @@ def test_a_closed_simulation_says_so():
 
 @in_taichi_thread
 def tree():
-    """A field in memory of its own."""
+    """A field tree of its own."""
     column, builder = ti.field(ti.f64), Builder()
     builder.dense(ti.i, 4).place(column)
     return column, Tree(builder)
 
 
-def test_trees_that_are_forgotten_are_destroyed():
-    """More than Taichi can have at once, none of them given back by whoever made it."""
+def test_unreferenced_trees_are_destroyed():
+    """More than Taichi allows at once; none of them is destroyed explicitly."""
     before = len(memory.in_use())
     for _ in range(600):
         column, _ = tree()
@@ -205,7 +207,7 @@ def test_trees_that_are_forgotten_are_destroyed():
 
 
 def test_too_many_trees_are_refused(monkeypatch):
-    """Before Taichi crashes, at 512."""
+    """An error is raised before the limit of 512, at which Taichi crashes."""
     monkeypatch.setattr(memory, "MAX_TREES", len(memory.in_use()) + 3)
     trees = [tree() for _ in range(3)]
     with pytest.raises(RunError, match=r"^at most \d+ sets of fields can be in use at once"):
@@ -218,12 +220,13 @@ def test_too_many_trees_are_refused(monkeypatch):
 
 @in_taichi_thread
 def kernels():
-    """That have been compiled, and not been thrown away."""
+    """Number of compiled kernels that are still held."""
     return ti.lang.impl.get_runtime().get_num_compiled_functions()
 
 
 def test_few_kernels_are_compiled_and_none_again():
-    """Not one for each field and direction; nor all of them because another's fields have been destroyed."""
+    """There is no kernel per field and direction, and destroying another tree does not discard all
+    kernels."""
     before = kernels()
     tisim.run(moving(1.0, (Trap(stiffness=2e-6, omega=1.0),)))
     tree()[1].destroy()
@@ -235,14 +238,15 @@ def test_few_kernels_are_compiled_and_none_again():
 
 
 def grains(number):
-    """Grains side by side, which feel nothing."""
+    """Grains side by side without interaction."""
     at = np.arange(3.0 * number).reshape(number, 3)
     return scene(at, 0 * at, radius=0.1, mass=1.0, dt=0.5)
 
 
 @pytest.mark.slow
-def test_small_scenes_do_not_go_through_the_memory_of_large_ones():
-    """A kept simulation serves scenes of about its size; sizes are rounded, so that like ones share it."""
+def test_small_scenes_do_not_reuse_large_simulations():
+    """An idle simulation is reused for scenes of similar size; sizes are rounded, so that similar ones share
+    it."""
     batches = Batches()
     for number in (10_000, 3, 5, 9_900, 10_100):
         ((_, result),) = batches.run([grains(number)])
@@ -262,8 +266,8 @@ def test_a_few_worlds_of_a_small_scene_compile_nothing_after_one():
 
 
 @pytest.mark.slow
-def test_what_is_kept_for_later_is_given_up_where_there_is_no_room():
-    """Simulations that are idle, and those that nobody has any more but the garbage collector."""
+def test_idle_simulations_are_closed_if_memory_is_short():
+    """Idle simulations are closed, and unreferenced ones that the garbage collector has not yet freed."""
     kept = Batches()
     assert all(result.status.ok for _, result in kept.run([grains(3000)]))
     for _ in range(3):
@@ -278,15 +282,15 @@ def test_what_is_kept_for_later_is_given_up_where_there_is_no_room():
 
 
 def test_rounded_sizes():
-    """At least as large, by less than a quarter."""
+    """A rounded size is at least the size, and less than a quarter larger."""
     for number in range(1, 5000):
         assert number <= rounded(number) <= max(number, 1.25 * number)
     assert len({rounded(number) for number in range(1, 5000)}) < 50
 
 
 @pytest.mark.long
-def test_taichi_is_not_started_anew_under_what_is_in_use(monkeypatch):
-    """A simulation of somebody's goes on, however much has been compiled."""
+def test_taichi_is_not_restarted_while_in_use(monkeypatch):
+    """A simulation in use survives, however many kernels have been compiled."""
     mine, before = Simulation(moving(1.0)), runtime.generation()
     monkeypatch.setattr(memory, "MAX_TREES_PER_START", 0)
     assert tisim.run(grains(9)).status.ok
@@ -306,7 +310,7 @@ print(runtime.generation(), *sizes)
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_scenes_of_changing_structure():
-    """Forty of them, nearly all compiled, and Taichi started anew after every fifth."""
+    """Forty scenes, nearly all of them compiled; Taichi is restarted after every fifth."""
     completed = subprocess.run([sys.executable, "-c", GROWTH], capture_output=True, text=True, check=True)
     starts, *sizes = (float(word) for word in completed.stdout.split())
     assert starts >= 5

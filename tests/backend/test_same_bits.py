@@ -1,4 +1,4 @@
-"""Both packages that compile kernels give the same bits, in scenes of every kind and on every schedule."""
+"""Taichi and Quadrants give the same bits, in scenes of every kind and on every schedule."""
 
 import json
 import os
@@ -17,12 +17,12 @@ from tisim.engine.simulation import SCHEDULES
 pytestmark = pytest.mark.long
 
 FAMILIES = ("effects.granular", "stepper.collocation.0", "stepper.brownian.2")
-"""Contacts with memory, an implicit stepper with forces between all, and noise with hydrodynamics. Impacts
-and noise are compared where ``elsewhere`` is (tests/engine/test_schedules.py)."""
+"""Contacts with history, an implicit stepper with forces between all particles, and noise with hydrodynamics.
+Impacts and noise are compared in tests/engine/test_schedules.py, with ``elsewhere``."""
 
 
 def bits_of(backend, schedule, folder, names=()):
-    """What scenes give with a backend, in a process of its own; all of them unless named."""
+    """Hashes of scenes under a backend, from a separate process; all scenes unless ``names`` selects some."""
     file = folder / f"{backend}-{schedule}.json"
     command = [sys.executable, "-m", "tests.backend.bits", str(file), *names, "--schedule", schedule]
     environment = os.environ | {choice.VARIABLE: backend}
@@ -49,7 +49,7 @@ def test_scenes_of_some_families(tmp_path, names):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """By backend and schedule, what all scenes give: with all passes of the compilers, as users have them."""
+    """Hashes of all scenes by backend and schedule, with all compiler passes on, as in users' runs."""
     folder = tmp_path_factory.mktemp("bits")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TI_ADVANCED_OPTIMIZATION", "1")
@@ -63,7 +63,7 @@ def found(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", extremes.scenes())
 def test_a_scene_of_every_kind_on_every_schedule(found, name):
-    """An hour for all of them."""
+    """Takes an hour for all scenes."""
     first = found["taichi", "world"][name]
     for way, results in found.items():
         assert results[name] == first, way

@@ -1,4 +1,4 @@
-"""The surroundings of a process: variables of the compilers, folders for caches, limits, the working one."""
+"""The environment of a process: compiler variables, cache folders, limits, the working folder."""
 
 import os
 import sys
@@ -12,7 +12,7 @@ from tisim.backend import kernel_cache, surroundings
 
 @pytest.fixture
 def environment(monkeypatch):
-    """An environment of these variables alone, as the process has it after it has been made fit."""
+    """An environment with only these variables, after it has been prepared for tisim."""
 
     def prepared(**variables):
         monkeypatch.setattr(os, "environ", dict(variables))
@@ -24,7 +24,8 @@ def environment(monkeypatch):
 
 @pytest.mark.parametrize("compiler", ["TI", "QD"])
 def test_options_of_the_compilers_are_removed(environment, compiler):
-    """All but where kernels are kept, and how long the compiler takes; those with values that it takes."""
+    """All but the kernel cache folder and compile-time limits are removed; these two stay if their values are
+    valid."""
     removed = {
         f"{compiler}_{option}": value
         for option, value in {
@@ -42,11 +43,11 @@ def test_options_of_the_compilers_are_removed(environment, compiler):
     assert kept.items() <= after.items()
     assert after[f"{compiler}_LOG_LEVEL"] == "warn"
     assert environment(TI_ADVANCED_OPTIMIZATION="0")["TI_ADVANCED_OPTIMIZATION"] == "0"
-    # Quadrants without its passes compiles some kernels to nothing, and says that all is well.
+    # Quadrants without its passes compiles some kernels to nothing, without an error.
     assert "QD_ADVANCED_OPTIMIZATION" not in environment(QD_ADVANCED_OPTIMIZATION="0")
 
 
-def test_the_folder_for_caches_is_named_where_home_is_not(environment):
+def test_the_cache_folder_is_set_without_home(environment):
     home = Path("~").expanduser() if "HOME" in os.environ else surroundings._home()
     assert "XDG_CACHE_HOME" not in environment(HOME=str(home))
     assert environment(HOME="/home/me", XDG_CACHE_HOME="/caches")["XDG_CACHE_HOME"] == "/caches"
@@ -67,7 +68,7 @@ def test_a_locale_that_python_does_not_know_is_replaced(environment):
 
 
 def test_a_machine_without_a_folder_for_temporary_files(monkeypatch):
-    """Its name is asked for on import; only who makes a file there fails."""
+    """The name of this folder is requested on import; only code that makes a file there fails."""
 
     def none():
         raise FileNotFoundError("No usable temporary directory found")
@@ -80,7 +81,7 @@ def test_a_machine_without_a_folder_for_temporary_files(monkeypatch):
         tempfile.mkdtemp()
 
 
-def test_kernels_go_to_a_temporary_folder_or_nowhere_where_theirs_cannot_be_written(monkeypatch, capsys):
+def test_an_unwritable_cache_is_replaced_or_turned_off(monkeypatch, capsys):
     variable = kernel_cache.LOCKS[kernel_cache.BACKEND][0]
     monkeypatch.setenv(variable, "/dev/null/kernels")
     for cached in (kernel_cache._without, kernel_cache._temporary):
@@ -102,7 +103,7 @@ def test_kernels_go_to_a_temporary_folder_or_nowhere_where_theirs_cannot_be_writ
 
 
 def test_limits_of_memory(monkeypatch, tmp_path):
-    """Of the process, and of the control groups that it is in, of both versions."""
+    """Limits of the process, and of the control groups that contain it, of both versions."""
     path = Path.read_text
     groups = {1: "4:memory,cpu:/batch/job\n0::/", 2: "0::/batch/job\n", 0: "4:cpu:/\n"}
     monkeypatch.setattr(surroundings, "CONTROL_GROUPS", tmp_path)
@@ -128,7 +129,7 @@ def test_limits_of_memory(monkeypatch, tmp_path):
         assert surroundings.memory_limit() == 500_000
 
 
-def test_work_goes_on_where_the_working_folder_has_been_removed(tmp_path):
+def test_a_removed_working_folder_is_tolerated(tmp_path):
     before = Path.cwd()
     with surroundings.existing_folder():
         assert Path.cwd() == before

@@ -1,11 +1,11 @@
-"""What the effects that a scene leaves out cost it: memory and time, with and without them in the package.
+"""The cost in memory and time of effects that a scene does not use, with and without them in the package.
 
     python tests/benchmarks/absent_effects.py [--scene impacts] [--repeats 5]
 
-A scene - "impacts": of impact and agglomeration alone; "vibration": charged particles in a binder - is run in
-fresh processes, in turn in a package whose other effects cannot be imported and in the whole one. Prints the
-bytes of its fields and the time of its kernels in both, and then, for comparison, those of impacts with all
-effects.
+A scene - "impacts": impact and agglomeration alone; "vibration": charged particles in a binder - runs in
+fresh processes, in turn in a package whose other effects cannot be imported and in the whole package. Printed
+are the bytes of its fields and the time of its kernels in both, and, for comparison, the bytes of "impacts"
+with all effects.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ SCENES = {
         (*("effects.contact", "effects.impact", "operators.cooling", "operators.fragmentation"),),
     ),
 }
-"""Scenes, and what is left out of the package: from vibration, all laws of contact, impact,
-friction, heat and reaction, and what agglomerates, cools and breaks."""
+"""For each scene, its source and the modules removed from the package. "vibration" runs without all laws of
+contact, impact, friction, heat and reaction, and without agglomeration, cooling and fragmentation."""
 
 WORKER = """
 import json, sys, time

@@ -1,10 +1,11 @@
-"""Particle-steps per second of tisim beside the numba program of the same model, and whether they agree.
+"""Particle-steps per second of tisim beside the numba program of the same model, and the difference of their
+results.
 
     python tests/benchmarks/agglomeration.py [--worlds 240] [--grains 1000] [--repeats 3] [--threads 2]
 
-Z04's six best designs (tables 1 and 2), each from worlds / 6 starts, the same ones for both programs. Runs
-alternate, after both have compiled, so that what else the machine does falls on both; the ratio is the median
-over pairs of runs. TISIM_BACKEND names the kernel compiler.
+Z04's six best designs (tables 1 and 2), each from worlds / 6 random starts (seeds), the same for both
+programs. Runs alternate after both programs have compiled, so that other load on the machine affects both;
+the ratio is the median over pairs of runs. TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse
@@ -16,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-# Small parallel loops get slow where tbb is installed and numba prefers it.
+# Small parallel loops get slow if tbb is installed and numba prefers it.
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
 # Threads that wait must not count as work.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
@@ -39,7 +40,7 @@ DESIGNS = designs()
 
 
 def parameters(design: dict[str, float], start: Arrays) -> dict[str, float]:
-    """What the numba program is given for a design."""
+    """The parameters of the numba program for a design."""
     return {**design, "grain_mass": float(start["mass"][0])}
 
 
@@ -56,7 +57,7 @@ def tisim_run(simulation: Simulation, scenes: list[Scene]) -> tuple[np.ndarray, 
 
 
 def timed(call: Callable, *arguments: object) -> tuple[np.ndarray, Any]:
-    """Wall seconds and CPU seconds of all threads, and what the call returned."""
+    """Wall seconds and CPU seconds of all threads, and the result of the call."""
     began = np.array([time.perf_counter(), time.process_time()])
     value = call(*arguments)
     return np.array([time.perf_counter(), time.process_time()]) - began, value
@@ -69,9 +70,10 @@ def summary(values: list[float]) -> str:
 
 
 def apart(result: Result, final: Arrays) -> float:
-    """Largest difference of any quantity, relative to the largest value of it; inf for other numbers.
+    """Largest difference of any quantity, relative to its largest value; inf if the numbers of grains differ.
 
-    Grains are taken in order of x: which of two merging grains of one size keeps its place is up to rounding.
+    Grains are sorted by x, because rounding decides which of two merging grains of equal size keeps its
+    place.
     """
     if len(final["mass"]) != len(result.state["mass"]):
         return np.inf

@@ -1,17 +1,18 @@
-"""Agglomeration in a thermochemically reacting granular flow, written plainly in numba: a peer and an oracle.
+"""Agglomeration in a thermochemically reacting granular flow, written plainly in numba: a peer and a
+reference.
 
-The model of T. I. Zohdi, Proc. R. Soc. Lond. A 460 (2004) 3421-3445 (Z04): spheres fly straight, impacts are
-found on a cell grid made anew in every step and resolved one after another, bonded grains merge, overloaded
-ones break, all radiate. One world per thread, f64, SI units. Choices that Z04 leaves open:
+The model of T. I. Zohdi, Proc. R. Soc. Lond. A 460 (2004) 3421-3445 (Z04): spheres move in straight lines;
+impacts are found on a cell grid, rebuilt in every step, and resolved one after another; bonded grains merge;
+overloaded ones break; all radiate. One world per thread, f64, SI units. Choices that Z04 leaves open:
 
 - Restitution e follows from its pressure law as the root of a quadratic; only its coupling to temperature is
   iterated, from e = 0. Friction stops at sticking. Energies are those in the pair's own frame.
 - Of simultaneous impacts the one longest overdue (overlap over approach speed, in f32) comes first, of equal
-  ones that with the larger sum of indices; an impact no longer due at its turn is left out.
-- Cooling is implicit (backward Euler). A grain that leaves is moved by the side of the box.
-- The time step asks all approaching pairs that the grid shows. Those it does not show are farther apart than
-  ``reach`` mean spacings, so a step is at most that over twice the fastest speed in the flow's frame.
-  Worlds of at most ``small`` grains ask all pairs instead.
+  ones that with the larger sum of indices. An impact that is no longer due at its turn is skipped.
+- Cooling is implicit (backward Euler). A grain that leaves the box is moved by the side of the box.
+- The time step depends on all approaching pairs that the grid shows. Other pairs are farther apart than
+  ``reach`` mean spacings, so a step is at most that distance over twice the fastest speed in the flow's
+  frame. Worlds of at most ``small`` grains use all pairs instead.
 """
 
 from typing import NamedTuple
@@ -21,13 +22,13 @@ from agglomeration_numba_impact import OPTIONS, Grains, Law, collide, meet, rear
 from numba import njit, parallel_chunksize, prange
 
 STEFAN_BOLTZMANN = 5.670374419e-8  # W/(m^2 K^4)
-CONTACTS = 8  # room for simultaneous contacts, per grain
+CONTACTS = 8  # capacity for simultaneous contacts, per grain
 COUNTS = ("steps", "particle_steps", "impacts", "merges", "fractures")
 HALF = tuple((x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1))[13:]  # and itself
 
 
 class Settings(NamedTuple):
-    """What all worlds share; times in s, lengths in m, temperature in K."""
+    """Settings of all worlds; times in s, lengths in m, temperature in K."""
 
     duration: float
     steps: int = 1 << 60
@@ -54,7 +55,8 @@ class Lists(NamedTuple):
 
 @njit(**OPTIONS)
 def enter(lists, b, i, j, since, k):
-    """Enter contact number k; the larger grain, of equal ones the earlier, comes first (and absorbs)."""
+    """Store contact number k; the larger grain, of equal ones the earlier, comes first (and absorbs the
+    other)."""
     first, second, due = lists.first, lists.second, lists.due
     if b[j] > b[i] or (b[j] == b[i] and j < i):
         i, j = j, i
@@ -137,7 +139,7 @@ def drift(g, n, dt, law, settings):
 
 @njit(**OPTIONS)
 def world(law, settings, g, n, counts):
-    """One world to its end; returns its number of grains, or -1 when there were too many contacts."""
+    """Run one world to its end; returns its number of grains, or -1 if there were too many contacts."""
     room, half = g.b.size, settings.half_side
     cells = (2 * int(np.ceil(np.cbrt(float(n))))) ** 3
     index = np.empty((2, room), np.int64)
@@ -159,10 +161,10 @@ def world(law, settings, g, n, counts):
         moved = counts[2] == before
         if not moved:
             n = rearrange(g, n)
-            continue  # to look again, for the next step only
+            continue  # to survey again, for the next step only
         if time >= settings.duration or counts[0] >= settings.steps:
             return n
-        # A little past the meeting of surfaces, so that rounding does not decide whether they have met.
+        # A little after the surfaces meet, so that rounding does not decide whether they have met.
         soonest *= 1.0 + 1e-6
         if n > settings.small:
             fastest = 0.0
@@ -172,7 +174,7 @@ def world(law, settings, g, n, counts):
             soonest = min(soonest, horizon / (2.0 * fastest + 1e-300))
         dt = max(settings.shortest, min(soonest, settings.longest))
         remaining = settings.duration - time
-        # A remainder that only rounding has left is not worth a step.
+        # A remainder from rounding alone gets no step.
         time, dt = (settings.duration, remaining) if remaining <= dt * (1.0 + 1e-6) else (time + dt, dt)
         counts[0] += 1
         counts[1] += n
@@ -197,7 +199,7 @@ def simulate(starts, parameters, duration, **settings):
     settings : any other field of ``Settings``. counts : shape (worlds, 5), its columns ``COUNTS``.
     """
     number, both = np.array([len(s["mass"]) for s in starts]), list(zip(starts, parameters, strict=True))
-    # Room for all original grains, and once more for pieces made before merged grains are cleared away.
+    # Capacity for all original grains, and again for pieces made before merged grains are removed.
     room = 2 * max(int(s["mass"].sum() / p["grain_mass"] + 1.5) for s, p in both)
     names = ("position", "velocity", "radius", "mass", "temperature")
     columns = [np.zeros((len(both), *((3,) if k < 2 else ()), room)) for k in range(5)]

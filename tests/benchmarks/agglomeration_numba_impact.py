@@ -11,7 +11,7 @@ OPTIONS = {"error_model": "numpy"}
 
 
 class Law(NamedTuple):
-    """What a world is made of."""
+    """The parameters of a world."""
 
     hardness: float  # H_0, Pa
     friction: float  # mu
@@ -25,19 +25,19 @@ class Law(NamedTuple):
 class Grains(NamedTuple):
     """One world's arrays."""
 
-    r: np.ndarray  # (3, room), m
-    v: np.ndarray  # (3, room), m/s
+    r: np.ndarray  # (3, capacity), m
+    v: np.ndarray  # (3, capacity), m/s
     b: np.ndarray  # radius, m
     m: np.ndarray  # kg; 0 for a grain that has merged into another
     T: np.ndarray  # K
-    pieces: np.ndarray  # into how many it breaks at the end of the step
+    pieces: np.ndarray  # number of pieces at the end of the step
 
 
 @njit(**OPTIONS)
 def meet(r, v, b, i, j, horizon):
-    """Time until the surfaces of two grains meet, s; not positive: when they did.
+    """Time until the surfaces of two grains meet, s; zero or negative if they have already met.
 
-    inf where they recede, or have a gap of more than ``horizon`` (m).
+    inf if they recede, or have a gap of more than ``horizon`` (m).
     """
     dx, dy, dz = r[0, j] - r[0, i], r[1, j] - r[1, i], r[2, j] - r[2, i]
     square, sum_b = dx * dx + dy * dy + dz * dz, b[i] + b[j]
@@ -52,7 +52,7 @@ def meet(r, v, b, i, j, horizon):
 
 @njit(**OPTIONS)
 def hardness(law, temperature):
-    """H = H_0 exp(Q/(R T)), Pa (Z04 section 6); the exponent bounded, as it overflows for a cold grain."""
+    """H = H_0 exp(Q/(R T)), Pa (Z04 section 6); the exponent is bounded, as it overflows for a cold grain."""
     return law.hardness * np.exp(min(law.activation_energy / (GAS * max(temperature, 1e-30)), 80.0))
 
 
@@ -126,7 +126,7 @@ def breaks(law, threshold, g, i, absorbed):
 
 @njit(**OPTIONS)
 def rearrange(g, n):
-    """Put pieces, in a cubic block about the same centre, for broken grains; clear merged ones away."""
+    """Put pieces, in a cubic block about the same centre, for broken grains; remove merged ones."""
     for i in range(n):
         count, g.pieces[i], edge = g.pieces[i], 0, 1
         if count > 0:

@@ -1,14 +1,14 @@
-"""Avalanches without a field beside LAMMPS: the slope that is left, from the same random starts in both.
+"""Avalanches without a field beside LAMMPS: the final slope, from the same random starts (seeds) in both.
 
     python -m pip install ".[bench]"
     python tests/benchmarks/avalanche_lammps.py [--starts 10]
 
 300 grains of the case avalanche fall into a column between a wall and a gate, in a cell that is periodic
-across, settle, and run out over the floor when the gate goes. The law is one that both have: Hertz, Mindlin,
-restitution, and rolling SDS, without cohesion. Paths of grains are chaotic, so the programs, whose levers
-differ (granular_lammps.py), are compared by means over starts. Printed are both means, and the mean of the
-differences, with half of their 95 % intervals; and the time for a particle and step of both programs, on one
-thread each, from the first step to the last, without compiling.
+across, settle, and run out over the floor when the gate opens. Both programs have the law: Hertz, Mindlin,
+restitution, and rolling SDS, without cohesion. Grain trajectories are chaotic and the lever arms of the two
+programs differ (granular_lammps.py), so means over starts are compared. Printed are both means and the mean
+difference, with the half widths of their 95 % intervals; and the time per particle and step of both programs,
+on one thread each, from the first step to the last, without compilation.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 D = DIAMETERS[0]
 CELL = Cell(number=300, column=8.0, width=4.0, length=40.0, height=20.0)
 OPENS, DURATION = 25.0, 50.0
-"""When the gate goes, and when the slope is looked at, in sqrt(d/g)."""
+"""Times at which the gate opens and at which the slope is measured, in sqrt(d/g)."""
 LAW = TwinLaw(
     (
         {
@@ -61,7 +61,8 @@ LAW = TwinLaw(
     ),
     rolling="rolling_sds",
 )
-"""Iron; the stiffness against rolling, N/m, is about that of rolling_epsd under a few weights."""
+"""Iron. The rolling stiffness, N/m, is about equal to the stiffness of rolling_epsd under a few grain
+weights."""
 
 
 def scenes(seeds: Sequence[int]) -> list[Scene]:
@@ -79,14 +80,14 @@ def scenes(seeds: Sequence[int]) -> list[Scene]:
 
 
 def by_package(seeds: Sequence[int]) -> tuple[list[State], float]:
-    """The state at the end of each start, and the time for a particle and step, s."""
+    """The final state of each start, and the time per particle and step, s."""
     from tisim import Simulation
 
     made = scenes(seeds)
     simulation = Simulation(made[0], len(made))
     simulation.load(made)
     simulation.run()
-    # Without what is compiled anew as lists grow.
+    # Without the compilation of lists that grow.
     lasted = simulation.wall_s
     results = simulation.results()
     simulation.close()
@@ -101,7 +102,7 @@ def particle_steps() -> float:
 
 
 def by_lammps(seeds: Sequence[int]) -> tuple[list[State], float]:
-    """The same in LAMMPS, in a process of its own."""
+    """The same in LAMMPS, in a separate process."""
     places = np.stack([one.start()["position"] for one in scenes(seeds)])
     mass = scenes(seeds[:1])[0].start()["mass"][0]
     found = lammps_peer.apart(__file__, law=lammps_model(LAW), position=places, mass=mass)
@@ -144,7 +145,7 @@ def worker(folder: Path) -> None:
 
 
 def statistics(state: State) -> dict[str, float]:
-    """What is compared of one slope."""
+    """The compared statistics of one slope."""
     return {
         "angle of repose, degrees": repose(state),
         "volume of the heap over that of its grains": heap_volume(state, CELL.width * D)

@@ -25,11 +25,11 @@ from tisim.backend import runtime
 from tisim.cases.blast.scene import AIR, FLUX, VISCOSITY, scene
 
 WINDOW = 64
-"""Steps of the numba program between two barriers, as many as ours at most."""
+"""Steps of the numba program between two barriers; at most the number that tisim takes."""
 
 
 def peer_control(setup: Scene) -> tuple[tuple[float, ...], int, int]:
-    """What the numba program is given of the stepper of a scene."""
+    """The stepper settings of a scene, as arguments of the numba program."""
     stepper, control = setup.stepper, setup.stepper.control
     names = ("tolerance", "order", "first", "longest", "shortest", "most", "least")
     return (
@@ -40,7 +40,7 @@ def peer_control(setup: Scene) -> tuple[tuple[float, ...], int, int]:
 
 
 def compare(number: int, duration: float, repeats: int) -> None:
-    """One size."""
+    """Compare both programs for one number of particles."""
     setup = scene(number=number, duration=duration)
     start = setup.particles.arrays(setup.domain, setup.seed)
     control, limit, steps = peer_control(setup)

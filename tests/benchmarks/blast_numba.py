@@ -1,8 +1,8 @@
 """The blast of Z16 without interaction as a numba program: the peer of tests/benchmarks/blast.py.
 
-The scheme of tisim's ``Trapezoid`` with ``IterationControl``: each particle by itself takes adaptive implicit
-steps, with magnetic rotation and drag solved exactly with each iterate. One loop over particles in parallel;
-the state of a particle is kept in registers through a whole window of steps.
+The scheme is tisim's ``Trapezoid`` with ``IterationControl``: each particle takes its own adaptive implicit
+steps, with magnetic rotation and drag solved exactly in each iteration. One loop over particles runs in
+parallel; the state of a particle is kept in registers through a whole window of steps.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ import numba
 import numpy as np
 
 FAST = {"contract", "reassoc", "arcp", "nsz", "afn"}
-"""All of fast-math but the promise that nothing is infinite or NaN: the control asks."""
+"""All of fast-math except the assumption that no value is infinite or NaN, because the control tests for
+these."""
 
 
 @numba.njit(fastmath=FAST, error_model="numpy")
 def drag(speed, radius, density, viscosity):
-    """Chow's g (N s/m) of F = -g v, and the power of the speed that it goes with."""
+    """Chow's g (N s/m) in F = -g v, and the power of the speed to which it is proportional."""
     reynolds = 2.0 * radius * density * speed / viscosity
     c, power = 24.0, 0.0
     if reynolds > 2e6:
@@ -92,7 +93,7 @@ def displaced(v, v0, dt, phi):
 
 @numba.njit(parallel=True, fastmath=FAST, error_model="numpy")
 def stretch(r, v, f, own_dt, counts, begins, mass, charge, radius, b, air, control, limit):
-    """Every particle through windows that begin so; adds its steps and iterations to ``counters``."""
+    """Advance every particle through windows of steps; adds its steps and iterations to ``counts``."""
     density, viscosity = air
     phi, tolerance, order, first, longest, shortest, most, least = control
     target = tolerance ** (1.0 / (order * limit))

@@ -4,8 +4,9 @@
 
 Spheres in a trap. Without interaction: 100 in each of 30 worlds, and many in one. With Rotne and Prager's
 tensor: 100 in each of 30 worlds, noise exact and fast. Peers: brownian_numba.py. Times are medians of runs
-that alternate, without compilation. What each program gives for the variance of places is printed beside its
-speed: 1 in the first two, where it is over that of Euler's steps; the same for both in the others.
+that alternate, without compilation. The variance of positions in each program is printed beside its speed. In
+the first two rows it is divided by the variance of Euler's scheme, so it should be 1; in the other rows it
+should be equal in both programs.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-# Small parallel loops get slow where tbb is installed and numba prefers it.
+# Small parallel loops get slow if tbb is installed and numba prefers it.
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 # The peer has a thread for each world.
@@ -40,14 +41,14 @@ SPREAD = float(np.sqrt(DIFFUSIVITY / RATE))
 
 
 def start(worlds: int, number: int, apart: float) -> np.ndarray:
-    """Places in the trap's own distribution, m, wider by a factor where spheres should be apart."""
+    """Positions drawn from the trap's own distribution, m; ``apart`` scales them, to keep spheres apart."""
     return apart * SPREAD * np.random.default_rng(1).standard_normal((worlds, number, 3))
 
 
 def ours(
     places: np.ndarray, steps: int, **options: str
 ) -> tuple[Callable[[], float], Callable[[], np.ndarray]]:
-    """A run that returns its wall seconds, and where it has got to."""
+    """A run that returns its wall seconds, and a function that returns the final positions."""
     scenes = []
     for w, place in enumerate(places):
         setup = colloids(
@@ -67,7 +68,7 @@ def ours(
 def theirs(
     places: np.ndarray, call: Callable[[np.ndarray], None]
 ) -> tuple[Callable[[], float], Callable[[], np.ndarray]]:
-    """The same for a function that changes an array of places."""
+    """The same for a function that changes an array of positions in place."""
     end = [places]
 
     def run() -> float:
@@ -80,7 +81,7 @@ def theirs(
 
 
 def compare(title: str, programs: dict, particle_steps: int, repeats: int, variance: float) -> None:
-    """Print what each does a second, and ours over theirs."""
+    """Print the time per particle-step of each program, and tisim's rate over its rate."""
     times: dict[str, list[float]] = {name: [] for name in programs}
     for run, _ in programs.values():
         run()

@@ -1,10 +1,11 @@
-"""Brownian spheres in a trap, in numba and NumPy: what the stepper is compared with.
+"""Brownian spheres in a trap, in numba and NumPy: the peers of the stepper.
 
-``by_blocks``: without interaction, a counter-based generator and Box and Muller's numbers by series, on
-arrays of particles, so that every loop is vectorised. ``by_library``: the same with numba's own numbers.
-``exact``: Rotne and Prager's matrix filled in numba, factored by LAPACK. ``fast``: the truncated expansion.
+``by_blocks``: without interaction, with a counter-based generator and Box and Muller's numbers by series, on
+arrays of particles, so that every loop is vectorised. ``by_library``: the same with numba's own random
+numbers. ``exact``: Rotne and Prager's matrix filled in numba, factored by LAPACK. ``fast``: the truncated
+expansion.
 """
-# The legacy normal numbers are those that numba draws in parallel loops.
+# The legacy normal numbers are the ones that numba draws in parallel loops.
 # ruff: noqa: NPY002
 
 import math
@@ -37,7 +38,7 @@ def philox(c0, c1, c2, c3, k0, k1):
 
 @numba.njit(parallel=True, **FAST)
 def by_library(r, steps, pull, width):
-    """r (n, 3), m: r += -pull r + width g, so many times."""
+    """``steps`` steps of r += -pull r + width g; r (n, 3), m."""
     for i in numba.prange(len(r)):
         x, y, z = r[i]
         for _ in range(steps):

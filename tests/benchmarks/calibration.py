@@ -1,11 +1,11 @@
-"""How far from the right end runs are for the error that was asked for, by each control that asks for one.
+"""The ratio of the actual error at the end to the requested error, for each control that takes an error.
 
     python tests/benchmarks/calibration.py [--figure docs/steppers_calibration.png]
 
-The scenes are those of tests/steppers/calibrated.py. For each scene and control: the least and the largest of
-the error at the end over the error asked for, over 1e-2 to 1e-6 for the trapezoid, to 1e-10 for collocation;
-and the figure, where each line is a scene. A second table: collocation from the first step that it takes by
-default, and both in single precision, over 1e-2 to 1e-5.
+The scenes are in tests/steppers/calibrated.py. For each scene and control, the table has the smallest and the
+largest ratio of the error at the end to the requested error: over 1e-2 to 1e-6 for the trapezoid, to 1e-10
+for collocation. The figure has a line for each scene. A second table covers collocation with its default
+first step, and both methods in single precision, over 1e-2 to 1e-5.
 """
 
 import argparse
@@ -29,7 +29,7 @@ SINGLE_PRECISION = 10.0 ** -np.arange(2, 6)
 
 
 def table(ratios_by_control: Ratios) -> None:
-    """Least and largest ratio of each scene, a column for each control."""
+    """Smallest and largest ratio for each scene, a column for each control."""
     print("| scene | " + " | ".join(ratios_by_control) + " |")
     print("|---" * (1 + len(ratios_by_control)) + "|")
     for scene in KNOWN:
@@ -40,7 +40,7 @@ def table(ratios_by_control: Ratios) -> None:
 
 
 def draw(ratios_by_control: Ratios, path: Path) -> None:
-    """A panel for each control; the band that is stated for those that aim at the end."""
+    """A panel for each control; controls that aim at the end also show the documented band."""
     figure = empty(11.0, 7.6)
     panels = figure.subplots(2, 2, sharey=True).ravel()
     colours = colormaps["tab20"].colors
@@ -59,7 +59,7 @@ def draw(ratios_by_control: Ratios, path: Path) -> None:
     for panel in panels[::2]:
         panel.set_ylabel("error at the end / error asked for")
     letters(panels)
-    # Of the last, which has the band.
+    # From the last panel, which has the band.
     handles, labels = panels[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", fontsize=8, frameon=False)
     figure.savefig(path, dpi=100)

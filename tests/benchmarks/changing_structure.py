@@ -1,10 +1,10 @@
-"""Memory and time over many scenes of changing structure: what is compiled for each, and what of it remains.
+"""Memory and time over many scenes of changing structure: compilation for each, and the memory that remains.
 
     python tests/benchmarks/changing_structure.py --scenes 1000
 
-Each scene has exponents of its law, and a number of particles, that few before it have had, so nearly all
-are compiled. A line for each hundred: seconds per scene, memory of the process, and so far, field trees that
-have been made and starts of Taichi.
+Each scene has exponents of its law and a number of particles that hardly any scene before it had, so nearly
+all are compiled. A line for each hundred scenes has the seconds per scene, the memory of the process, and the
+number of field trees made and of starts of Taichi to that point.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def resident() -> float:
 
 
 def scenes(number: int, seed: int = 1) -> Iterator[Scene]:
-    """Small scenes, most of a structure of their own."""
+    """Small scenes, most of them with a structure of their own."""
     draw = np.random.Generator(np.random.Philox(seed))
     for _ in range(number):
         n, near, far = (int(k) for k in (draw.integers(2, 40), draw.integers(1, 20), draw.integers(21, 40)))
@@ -49,7 +49,8 @@ def scenes(number: int, seed: int = 1) -> Iterator[Scene]:
 
 
 def soak(number: int, every: int) -> Iterator[tuple[int, float, float]]:
-    """Run so many scenes; of each ``every`` of them the number so far, seconds for one, and memory in MB."""
+    """Run ``number`` scenes; after each ``every`` of them, yield the number of scenes, seconds per scene, and
+    memory in MB."""
     began = time.perf_counter()
     for count, scene in enumerate(scenes(number), 1):
         assert tisim.run(scene).status.ok

@@ -2,10 +2,10 @@
 
     python tests/benchmarks/cheaper_scene.py [--searches 5] [--cheap 200] [--runs 100 200 400]
 
-Searches of 250 grains with different numbers of runs, each from nothing, and from the best six designs of
-a search of 60 grains, whose seconds are counted too. What each returns is run again from 64 starts that no
-search has used. A line has the mean of Pi of 250 grains over the searches, its 95 % interval, and the mean
-seconds of a search.
+Searches of 250 grains with different numbers of runs start from nothing, or from the best six designs of a
+search of 60 grains, whose seconds are also counted. The returned designs are run again from 64 held-out
+random starts (seeds). A line has the mean of Pi of 250 grains over the searches, its 95 % interval, and the
+mean seconds of a search.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from tisim.cases.agglomeration.problem import problem
 from tisim.optimize.evaluation.runs import start_seed
 
 FRESH = 10**6
-"""The seed of the starts that judge."""
+"""The seed of the held-out starts."""
 
 
 def searched(size: str, runs: int, seed: int, begin: list[dict[str, float]]) -> list[dict[str, float]]:

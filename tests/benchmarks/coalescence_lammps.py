@@ -1,16 +1,16 @@
-"""Clouds that fall together by their gravity beside LAMMPS, from the same random starts in both.
+"""Clouds that collapse by their own gravity beside LAMMPS, from the same random starts (seeds) in both.
 
     python -m pip install ".[bench]"
     python tests/benchmarks/coalescence_lammps.py [--starts 10]
 
-It is the case coalescence without magnetisation: a seed and 180 grains with velocities, spins and a rotation
-become a rubble pile, under Hertz, Mindlin, restitution and rolling SDS; without cohesion, with which LAMMPS
-takes no restitution. The gravity of particles is the Coulomb's law of LAMMPS, with charges of G^1/2 m and a
-dielectric constant of -1. Paths of grains are chaotic, so the programs, whose levers differ
-(granular_lammps.py), are compared by means over starts. Printed are both means, the mean of the differences,
-with half of their 95 % intervals, and the largest difference; and the time for a particle and step of both
-programs, on one thread each, from the first step to the last, without compiling: of a batch of all starts,
-and of LAMMPS for one after another.
+This is the case coalescence without magnetisation: a seed grain and 180 grains with velocities, spins and a
+rotation become a rubble pile, under Hertz, Mindlin, restitution and rolling SDS. There is no cohesion,
+because LAMMPS does not combine it with restitution. Gravity in LAMMPS is its Coulomb's law, with charges of
+G^1/2 m and a dielectric constant of -1. Grain trajectories are chaotic and the lever arms of the two programs
+differ (granular_lammps.py), so means over starts are compared. Printed are both means and the mean
+difference, with the half widths of their 95 % intervals; the largest difference; and the time per particle
+and step of both programs, on one thread each, from the first step to the last, without compilation: for tisim
+of a batch of all starts, for LAMMPS of one start after another.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from tisim.cases.runs import sound  # noqa: E402
 from tisim.effects import SelfGravity  # noqa: E402
 
 LOOKS = (5000.0, 10_000.0)
-"""When both are looked at, s: on the way and at the end."""
+"""Times of comparison, s: during the collapse and at the end."""
 SIDE = 400.0
-"""Of the box of LAMMPS, m, in which all grains stay; none of its pairs is left out."""
+"""The side of LAMMPS's box, m, which contains all grains; no pair is beyond its cut-off."""
 LAW = TwinLaw(
     (cloud.rubble(cloud.scale_of(cloud.DEFAULT["number"])).model_dump(exclude_none=True),),
     rolling="rolling_sds",
@@ -63,7 +63,7 @@ def particle_steps(made: Sequence[Scene]) -> float:
 
 
 def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
-    """The states of each start at LOOKS, and the time for a particle and step, s."""
+    """The states of each start at LOOKS, and the time per particle and step, s."""
     simulation = Simulation(made[0], len(made))
     simulation.load(list(made))
     found: list[list[State]] = [[] for _ in made]
@@ -77,15 +77,15 @@ def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
 
 
 def by_lammps(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
-    """The same in LAMMPS, in a process of its own."""
+    """The same in LAMMPS, in a separate process."""
     steps = [round(look / made[0].stepper.control.dt) for look in LOOKS]
     states, lasted = apart(__file__, made, law=lammps_model(LAW), steps=steps)
     return states, lasted / particle_steps(made)
 
 
 def apart(script: str, made: Sequence[Scene], **given: Any) -> tuple[list[list[State]], float]:
-    """What a script's ``worker`` finds from the starts of some scenes, look by look, and how long its steps
-    have taken, s."""
+    """The results of a script's ``worker`` from the initial states of some scenes, time by time, and the
+    seconds of its steps."""
     starts = [one.start() for one in made]
     stacked = {name: np.stack([at[name] for at in starts]) for name in (*FIELDS, *KEPT)}
     found = lammps_peer.apart(script, dt=made[0].stepper.control.dt, **given, **stacked)
@@ -102,8 +102,8 @@ def apart(script: str, made: Sequence[Scene], **given: Any) -> tuple[list[list[S
 def run_each(folder: Path, run: Callable[[Any, State, State], tuple[list[State], float]]) -> None:
     """Run LAMMPS on each start of in.npz of a folder, and write out.npz.
 
-    run : takes a LAMMPS with a cloud, that start, and all that is given; returns the states where it has
-    looked and the seconds that steps have taken.
+    run : takes a LAMMPS with a cloud, the start, and all given arrays; returns the states at the times of
+    comparison and the seconds of its steps.
     """
     with np.load(folder / "in.npz") as given:
         at = dict(given)
@@ -121,14 +121,14 @@ def run_each(folder: Path, run: Callable[[Any, State, State], tuple[list[State],
 
 
 def state_of(machine: Any) -> State:
-    """Where the grains of LAMMPS are, and how they move."""
+    """Positions, velocities and spins of the grains in LAMMPS."""
     return {
         name: np.array(machine.gather_atoms(theirs, 1, 3)).reshape(-1, 3) for name, theirs in FIELDS.items()
     }
 
 
 def fall_together(machine: Any, start: State, at: State) -> tuple[list[State], float]:
-    """Let a cloud of LAMMPS fall together; see ``run_each``."""
+    """Let a cloud of LAMMPS collapse; see ``run_each``."""
     machine.command("run 0")
     looks, lasted, done = [], 0.0, 0
     for steps in at["steps"]:
@@ -167,7 +167,7 @@ def machine_of(at: State, folder: Path, model: str) -> Any:
 
 
 def statistics(states: list[State]) -> dict[str, float]:
-    """What is compared of one cloud."""
+    """The compared statistics of one cloud."""
     way, end = states
     mass, place = end["mass"], end["position"]
     away = ((place - np.average(place, axis=0, weights=mass)) ** 2).sum(axis=1)

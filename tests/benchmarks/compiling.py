@@ -2,11 +2,12 @@
 
     python tests/benchmarks/compiling.py [--repeats 3]
 
-First that of whole processes: which import tisim, and which run the script of README.md. Then in processes
-that have imported it. Medians of repeats, with the least and the largest.
+The first rows time whole processes, which import tisim or run the script of README.md. The other rows time
+scenes in processes that have already imported tisim. Values are medians of repeats, with the smallest and the
+largest.
 
-cold : with nothing on the disk. warm : with what the cold one has left there: without LLVM, but with the
-front end of Taichi, which reads every kernel in each process. kept : the second run in one process.
+cold : with an empty disk cache. warm : with the cache that the cold process has left: without LLVM, but with
+the front end of Taichi, which reads every kernel in each process. kept : the second run in one process.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ IMPORT = "import tisim"
 
 
 def python(code: str, folder: str) -> str:
-    """What a process of its own prints that runs this code, with compiled kernels in a folder."""
+    """The output of this code in a separate process, with the kernel cache in a folder."""
     place = {f"{prefix}_OFFLINE_CACHE_FILE_PATH": folder for prefix in ("TI", "QD")}
     completed = subprocess.run(
         [sys.executable, "-c", code],
@@ -67,7 +68,7 @@ def readme() -> str:
 
 
 def spread(values: list[float]) -> str:
-    """Median, least and largest."""
+    """Median, smallest and largest."""
     return f"{statistics.median(values):7.2f} ({min(values):.2f} .. {max(values):.2f})"
 
 

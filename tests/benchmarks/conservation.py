@@ -1,10 +1,10 @@
-"""How well each stepper keeps energy and momentum of particles that attract and repel each other.
+"""Conservation of energy and momentum by each stepper, for particles that attract and repel each other.
 
     python tests/benchmarks/conservation.py [--sites 7]
 
-The cubic array of Z13 section 4 with the near field as printed, and nothing else: no tether, no field. For
-0.005 s it is thrown apart. For each stepper: force evaluations, change of the energy over the kinetic energy
-at the end, and change of the momentum over the sum of the particles' momenta.
+The cubic array of Z13 section 4 with the published near field and nothing else: no tether, no field. The
+array flies apart for 0.005 s. For each stepper: force evaluations, change of the energy over the kinetic
+energy at the end, and change of the momentum over the sum of the magnitudes of the particles' momenta.
 """
 
 import argparse
@@ -46,7 +46,7 @@ STEPPERS: dict[str, Stepper] = {
 
 
 def energy(mass: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> tuple[float, float]:
-    """Kinetic energy, and that of the pairs: alpha_1 ln d + alpha_2/d. J."""
+    """Kinetic and pair energy: alpha_1 ln d + alpha_2/d for each pair. J."""
     a, b = np.triu_indices(len(mass), 1)
     d = np.linalg.norm(position[a] - position[b], axis=1)
     kinetic = 0.5 * float((mass * (velocity**2).sum(axis=1)).sum())
@@ -54,7 +54,7 @@ def energy(mass: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> tupl
 
 
 def drift(result: Result) -> tuple[float, float]:
-    """Of energy and of momentum, relative."""
+    """Relative drifts of energy and of momentum."""
     names = ("mass", "position", "velocity")
     before, after = ([state[n] for n in names] for state in (result.start, result.state))
     kinetic, pairs = energy(*after)

@@ -2,10 +2,11 @@
 
     python tests/benchmarks/cylinder_field.py [--points 100000] [--repeats 7] [--arithmetic strict]
 
-Field, or field and gradient, exact or from tables. magpylib has no gradient: six more fields, by central
-differences. Runs are interleaved, the fastest of each counts. Points lie around a cylinder of L/D 5/3 (B16
-6.3), outside it and within three diameters, as particles about to be captured do. Errors are relative to
-magpylib's values: of a gradient no less than those of its field over the step of the differences, 1e-5 radii.
+Field, or field and gradient, exact or from tables. magpylib has no gradient, so it computes six more fields
+for central differences. Runs are interleaved, and the fastest of each counts. Points lie around a cylinder
+of L/D 5/3 (B16 6.3), outside it and within three diameters, like particles about to be captured. Errors are
+relative to magpylib's values. The error of a gradient is at least that of its field over the step of the
+differences, 1e-5 radii.
 """
 
 import argparse
@@ -32,7 +33,7 @@ RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
 @in_taichi_thread
 @ti.kernel
 def sample(source: ti.template(), slopes: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
-    """As tisim.sources.sample does, but that gradients may be left out."""
+    """As tisim.sources.sample, but without gradients if ``slopes`` is off."""
     points = r.shape[0]
     for first in range((points + TILE_POINTS - 1) // TILE_POINTS):
         place = [ti.Vector([0.0] * TILE_POINTS) for _ in ti.static(range(3))]
@@ -56,12 +57,12 @@ def bound(digits):
     table = ParameterTable([source], 1, runtime.current().real)
     (magnets,) = connected([table.bind(source)])
     table.write([[source]])
-    # With the table, whose memory lasts as long as it does.
+    # With the table, whose memory must live equally long.
     return table, magnets
 
 
 def relative(values, expected):
-    """Largest and median of what is off, over what is expected: one vector or matrix for each point."""
+    """Largest and median error relative to the expected vector or matrix of each point."""
     axes = tuple(range(1, values.ndim))
     off = np.sqrt(((values - expected) ** 2).sum(axes) / (expected**2).sum(axes))
     return f"  {off.max():9.1e} {np.median(off):8.1e}"

@@ -3,9 +3,8 @@
     python tests/benchmarks/dipole_dipole.py [--number 1000] [--precision f64] [--threads 1] [--repeats 9]
         [--arithmetic strict]
 
-Moments in any direction on a disturbed lattice. The time of tisim is that of a whole step, numba's that of
-the sum alone. Tries alternate; the ratio is the median over them. TISIM_BACKEND names the
-kernel compiler.
+Random moments on a disturbed lattice. For tisim the time of a whole step is measured, for numba the time of
+the sum alone. Tries alternate; the ratio is the median over them. TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse
@@ -54,7 +53,7 @@ def forces(x, y, z, a, b, c, scale, fx, fy, fz):
 
 
 def scene(n: int) -> Scene:
-    """So many dipoles of random directions on a disturbed lattice."""
+    """``n`` dipoles of random directions on a disturbed lattice."""
     draw, side = np.random.default_rng(0), int(np.ceil(n ** (1 / 3)))
     place = np.argwhere(np.ones((side,) * 3))[:n] + draw.uniform(-0.2, 0.2, (n, 3))
     moment = 1e3 * draw.normal(size=(n, 3))

@@ -1,14 +1,14 @@
-"""What is measured of grains of a known design, and what tells it from others.
+"""The measured quantities of a known design, and how well they distinguish it from others.
 
     python tests/benchmarks/draw_down.py [--size small] [--starts 8] [--design 0.4 0.27 0.6]
     python tests/benchmarks/draw_down.py --valley [--size small] [--starts 2]
 
-First each quantity of cases/granular_bench/measured.py with its mean and half of the 95 % interval of that,
-its standard deviation over random starts, which are others than those of a search, and the uncertainty that
-a calibration takes it with; and the misfit of the means, with its 95 % interval. A design is
-friction, rolling friction and restitution. With --valley: of each friction the rolling friction of some with
-which angle of repose and discharge rate, means over the starts, are nearest to those of the known design at
-its restitution; with these and their misfit.
+The first form prints each quantity of cases/granular_bench/measured.py: its mean with the half width of the
+95 % interval, its standard deviation over held-out random starts (seeds), and its uncertainty in a
+calibration; and the misfit of the means, with its 95 % interval. A design is friction, rolling friction and
+restitution. With --valley, for each friction it prints the rolling friction whose angle of repose and
+discharge rate, means over the starts, are nearest to the known design at the same restitution, with these
+values and their misfit.
 """
 
 import argparse
@@ -37,7 +37,7 @@ BULK = ("angle_of_repose", "discharge_rate")
 
 
 def measured(design: dict[str, float], size: str, starts: int) -> None:
-    """Print what a design has."""
+    """Print the quantities of a design."""
     results = tisim.run(other_runs(design, size, starts))
     print("of", ", ".join(f"{name} {value:g}" for name, value in design.items()))
     print(f"{'quantity':16} {'mean':>16} {'deviation':>9} {'uncertainty':>11}")
@@ -51,7 +51,7 @@ def measured(design: dict[str, float], size: str, starts: int) -> None:
 
 
 def valley(size: str, starts: int) -> None:
-    """Print the designs of each friction that are nearest to KNOWN by angle of repose and discharge rate."""
+    """For each friction, print the design nearest to KNOWN in angle of repose and discharge rate."""
     designs = [
         {**KNOWN, "friction": mu, "rolling_friction": rolling}
         for mu in FRICTIONS for rolling in ROLLING_FRICTIONS

@@ -2,12 +2,13 @@
 
     python tests/benchmarks/ewald_dipoles.py [--number 500] [--precision f64]
 
-Iron grains of one size in a field of 0.3 T along z, whose moments are mutual (Froehlich, Kennelly), at random
-at a volume fraction of 0.3 by random sequential addition, and in chains along z that touch, at random across
-it at a volume fraction of 0.1. The sample is a ball: demagnetising factors of 1/3, which is what a cut-off at
-a sphere makes of it. Errors, of moments and of forces, are root mean square over the particles, over the root
-mean square of those by an Ewald sum with an accuracy of 1e-6. ``asked`` is what an accuracy promises: the
-error of forces by F_ref (tisim/effects/magnetic/ewald_accuracy.py), over the same.
+Iron grains of one size in a field of 0.3 T along z, with mutually induced moments (Froehlich, Kennelly). They
+lie at random, at a volume fraction of 0.3, by random sequential addition; or in touching chains along z at
+random lateral positions, at a volume fraction of 0.1. The sample is a ball, with demagnetising factors of
+1/3, as implied by a spherical cut-off. Errors of moments and of forces are root mean squares over the
+particles, relative to the root mean square in an Ewald sum with an accuracy of 1e-6. ``asked`` is the
+requested accuracy: the error of forces in units of F_ref (tisim/effects/magnetic/ewald_accuracy.py), relative
+to the same root mean square.
 """
 
 import argparse
@@ -47,13 +48,13 @@ TRIES = 100_000
 
 
 def side_for(number: int, fraction: float) -> float:
-    """The side (m) of the box of so many grains at a volume fraction."""
+    """The side (m) of the box that holds ``number`` grains at a volume fraction."""
     return float(RADIUS * (number * 4 / 3 * np.pi / fraction) ** (1 / 3))
 
 
 def added(draw: np.random.Generator, number: int, side: float, least: float, axes: int) -> np.ndarray:
-    """Places at random along the first ``axes``, one after the other, none nearer to another than ``least``
-    (m), images counted."""
+    """Random positions along the first ``axes``, added one after the other; none is nearer to another one, or
+    to its images, than ``least`` (m)."""
     place = np.zeros((0, axes))
     for _ in range(TRIES):
         if len(place) == number:
@@ -66,13 +67,13 @@ def added(draw: np.random.Generator, number: int, side: float, least: float, axe
 
 
 def at_random(draw: np.random.Generator, number: int) -> tuple[np.ndarray, float]:
-    """Places, and the side of the box; m."""
+    """Positions, and the side of the box; m."""
     side = side_for(number, 0.3)
     return added(draw, number, side, 2 * RADIUS, 3), side
 
 
 def chains(draw: np.random.Generator, number: int) -> tuple[np.ndarray, float]:
-    """Places, and the side of the box; m. Each chain meets itself."""
+    """Positions, and the side of the box; m. Each chain closes on its own image."""
     side = side_for(number, 0.1)
     length = int(side / (2 * RADIUS))
     feet = added(draw, number // length, side, 2 * RADIUS, 2)
@@ -95,10 +96,10 @@ def scene(place: np.ndarray, side: float, moment, force) -> tisim.Scene:
 
 
 def methods(place: np.ndarray, side: float) -> dict[str, tisim.Scene]:
-    """Scenes by what sums the dipoles in them."""
+    """Scenes by the method that sums the dipoles."""
     iron, box = CARBONYL_IRON.parameters(), tisim.Box(low=(0, 0, 0), high=(side,) * 3)
     settings = {a: ewald_settings(box, len(place), a) for a in ACCURACIES}
-    # Worlds of a batch have room for as many wave vectors.
+    # Worlds of a batch have the same capacity for wave vectors.
     most = {"waves": settings[ACCURACIES[0]]["waves"]}
     scenes = {}
     for accuracy, own in settings.items():
@@ -127,7 +128,7 @@ def size(values: np.ndarray) -> float:
 
 
 def main() -> None:
-    """Print errors of both, by every method."""
+    """Print errors of moments and forces, by every method."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--number", type=int, default=500)
     parser.add_argument("--precision", default="f64")

@@ -1,4 +1,4 @@
-"""Whether the steps of agglomeration in fields are short enough, and what they cost.
+"""Whether the steps of agglomeration in fields are short enough, and their cost.
 
     python tests/benchmarks/field_steps.py [--designs 64] [--starts 16] [--phases 0.2 0.1 0.05] [--grains 60]
         [--strongest]
@@ -28,7 +28,7 @@ STRONGEST = {"surface_charge": 4e-3, "magnetic_field": 1.0, "hardness": 1e5, "fr
 
 
 def drawn(number: int, strongest: bool) -> list[dict[str, float]]:
-    """Return designs of the ranges; strongest : all of them soft, with the largest charges and field."""
+    """Return random designs. strongest : all of them soft, with the largest charges and field."""
     genome = problem("small", "fields").genome
     rng = np.random.default_rng(1)
     designs = [dict(genome.decode(u)) for u in rng.random((number, len(genome)))]
@@ -38,7 +38,8 @@ def drawn(number: int, strongest: bool) -> list[dict[str, float]]:
 
 
 def measured(designs: list[dict[str, float]], starts: int, grains: int) -> tuple[int, np.ndarray, float]:
-    """Return how many runs were stopped, Pi of each design and start (NaN there), and the steps of a run."""
+    """Return the number of stopped runs, Pi for each design and start (NaN if the run was stopped), and the
+    steps of a run."""
     results = tisim.run([scene(one, seed, grains) for one in designs for seed in range(starts)])
     pi = np.array([cost(one) if one.status.ok else np.nan for one in results])
     steps = np.mean([one.work["steps"] for one in results])

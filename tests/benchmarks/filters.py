@@ -1,8 +1,8 @@
-"""The filters that searches have found for capture, and what changing one thing in them does, start by start.
+"""The filters found by searches for capture, and the effect of changing one thing in them, start by start.
 
     python tests/benchmarks/filters.py [--starts 60]
 
-The found ones are those of docs/capture.md; starts are none that a search has used.
+The designs come from docs/capture.md. The random starts (seeds) are held out: no search has used them.
 """
 
 import argparse
@@ -38,7 +38,8 @@ CHANGES = {
     }),
     "throughput": (FAST, {"half the fibres": {"number": 4.0}}),
 }  # fmt: skip
-"""Variant -> what was found, and changes to it. Of throughput: all the wire in a flow of 10 mm/s."""
+"""For each variant, the design that was found and changes to it. For throughput, the design has all of the
+wire, in a flow of 10 mm/s."""
 
 
 def main(starts):

@@ -4,19 +4,19 @@
         [--beside hertz/history granular] [--laws "jkr, twisting"] [--cpu] [--beds FOLDER]
 
 Spheres of diameter 1 and density 1 fall into a box 20 wide under tilted gravity, and come to rest (once for
-each number; a minute of 8000; ``--beds`` keeps them for the next time). Then the steps of all go on from
-there in turns, lists and walls included; ratios are medians of those of each turn, with the least and the
-largest. TISIM_BACKEND names the kernel compiler. What tisim as it is stands beside:
+each number; about a minute for 8000; ``--beds`` keeps the beds for the next time). Then all programs continue
+from there in turns, lists and walls included; ratios are medians of the ratios of each turn, with the
+smallest and the largest. TISIM_BACKEND names the kernel compiler. tisim with its defaults is compared with:
 
-- hertz/history, granular: LAMMPS's gran/hertz/history, which has two roots less a contact as its damping is
-  simpler, and its granular style with the same law (python -m pip install ".[bench]");
+- hertz/history, granular: LAMMPS's gran/hertz/history, which has two roots fewer per contact because of its
+  simpler damping, and its granular style with the same law (python -m pip install ".[bench]");
 - skin=0.1: lists with this skin, in diameters;
 - schedule=world, team or particle: see tisim/program/program.py;
 - order=random: grains in random order, which the package sorts; order=unsorted: it does not;
-- lanes=1: so many pairs are computed at once.
+- lanes=1: the number of pairs computed at once.
 
-``--laws`` has the bed go on under others of the laws that LAMMPS's granular style has too (LAWS of
-granular_lammps.py; ``all`` for each), beside it.
+``--laws`` continues the bed under other laws that LAMMPS's granular style also has (LAWS of
+granular_lammps.py; ``all`` for each of them), and compares with LAMMPS.
 """
 
 import argparse
@@ -53,7 +53,7 @@ OF_BED = {
     **{"rolling_stiffness": 2e3, "rolling_damping": 1.0, "rolling_friction": 0.1},
     **{"twisting_stiffness": 200.0, "twisting_damping": 0.5, "twisting_friction": 0.1},
 }
-"""What a law needs of these its material has: as stiff as the bed, which stays as it is."""
+"""Material values for the laws: as stiff as the bed, which therefore stays at rest."""
 LAWS = {
     name: replace(law, materials=({key: OF_BED[key] for key in law.materials[0]},))
     for name, law in granular_lammps.LAWS.items()
@@ -61,7 +61,7 @@ LAWS = {
 GRAVITY = (0.4383711, 0.0, -0.8987940)
 MASS = np.pi / 6
 STYLES = ("hertz/history", "granular")
-"""Of LAMMPS."""
+"""Styles of LAMMPS."""
 SETTINGS = ("skin", "schedule", "order", "lanes")
 Steps = Callable[[int], None]
 
@@ -69,7 +69,7 @@ Steps = Callable[[int], None]
 def scene(
     position: np.ndarray, velocity: np.ndarray, width: float, skin: float | None = None, law: str = ""
 ) -> tisim.Scene:
-    """Grains in a box without a lid; ``law`` of LAWS, or that of the bed."""
+    """Grains in a box without a lid; ``law`` of LAWS, or else the law of the bed."""
     materials, contacts = MATERIALS, LAW
     if law:
         materials = {"grain": tisim.Material(**LAWS[law].materials[0])}
@@ -92,7 +92,7 @@ def scene(
 
 
 def lattice(n: int, width: float) -> np.ndarray:
-    """Places about 1.2 apart, row by row."""
+    """Positions about 1.2 apart, row by row."""
     across = int(width / 1.2)
     grid = np.stack(np.meshgrid(*[np.arange(k) for k in (-(-n // across**2), across, across)], indexing="ij"))
     noise = np.random.default_rng(0).uniform(-0.09, 0.09, (n, 3))
@@ -100,7 +100,7 @@ def lattice(n: int, width: float) -> np.ndarray:
 
 
 def settled(n: int, width: float) -> np.ndarray:
-    """Positions of grains that have come to rest, neighbours near each other in memory."""
+    """Positions of grains that have come to rest; neighbours are near each other in memory."""
     position, velocity = lattice(n, width), np.zeros((n, 3))
     simulation = tisim.Simulation(scene(position, velocity, width))
     simulation.load(scene(position, velocity, width))
@@ -115,7 +115,7 @@ def settled(n: int, width: float) -> np.ndarray:
 
 
 def kept(n: int, width: float, folder: Path) -> np.ndarray:
-    """The settled bed of a folder, put there where it is not."""
+    """The settled bed of a folder; made and saved there if it is absent."""
     file = folder / f"bed_{n}.npy"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -124,7 +124,7 @@ def kept(n: int, width: float, folder: Path) -> np.ndarray:
 
 
 def by_tisim(position: np.ndarray, width: float, setting: str = "", law: str = "") -> Steps:
-    """tisim as it is, or with a setting, such as ``skin=0.1``, or under another law."""
+    """tisim with its defaults, or with a setting, such as ``skin=0.1``, or under another law."""
     name, _, value = setting.partition("=")
     if name == "order":
         position = np.random.default_rng(0).permutation(position)
@@ -142,7 +142,7 @@ def by_tisim(position: np.ndarray, width: float, setting: str = "", law: str = "
 
 
 def by_lammps(position: np.ndarray, width: float, style: str, threads: int, of: str = "") -> Steps:
-    """LAMMPS with a style, whose law is ``of`` LAWS or that of the bed."""
+    """LAMMPS with a style, under the law ``of`` LAWS or else the law of the bed."""
     peer = lammps_peer.begin(threads)
     height, gravity = position[:, 2].max() + 5, np.array(GRAVITY) / np.linalg.norm(GRAVITY)
     with tempfile.NamedTemporaryFile("w", suffix=".data") as file:
@@ -211,7 +211,7 @@ def main() -> None:
 
 
 def compare(runs: dict[str, Steps], n: int, steps: int, repeats: int, clock: Callable[[], float]) -> None:
-    """Print how long steps of each run take, which are taken in turns."""
+    """Take turns, and print the time of a step of each run."""
     times: dict[str, list[float]] = {name: [] for name in runs}
     for _ in range(repeats):
         for name, take in runs.items():

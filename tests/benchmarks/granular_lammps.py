@@ -1,21 +1,23 @@
-"""Grains under Hertz and Mindlin beside LAMMPS, pair_style granular: a table of how far they are apart.
+"""Grains under Hertz and Mindlin beside LAMMPS, pair_style granular: a table of the differences.
 
     python -m pip install ".[bench]"
     python tests/benchmarks/granular_lammps.py
 
-512 grains of two sizes that overlap, move and spin, without walls and in a cell. The law is that of
-``hertz/material`` with ``mindlin_rescale/force`` and ``coeff_restitution``; the damping aside is that of the
-normal times xgammat = sqrt(S_t / S_n) = sqrt(2 (1 - nu) / (2 - nu)). LAMMPS of July 2025 differs thrice:
+512 grains of two sizes that overlap, move and spin, without walls and in a cell. The law is
+``hertz/material`` with ``mindlin_rescale/force`` and ``coeff_restitution``; the tangential damping is the
+normal one times xgammat = sqrt(S_t / S_n) = sqrt(2 (1 - nu) / (2 - nu)). LAMMPS of July 2025 differs in three
+ways:
 
-- It turns springs with the normal alone ("projected"); here they turn about it too, and are drawn by the
-  surfaces as they are midway in a step.
-- It has the spin move a surface that is R from the centre, but lets forces turn grains at R - delta / 2
-  (at walls, R). So the power of a force is not that by which energy falls. Here both are at R - delta / 2.
-- It drops the tangential force in the step in which a contact begins, if the damping alone is beyond
-  Coulomb's limit. Here it is the limit.
+- LAMMPS turns tangential springs with the normal alone ("projected"). In tisim they also turn about the
+  normal, and are stretched by the relative surface motion at mid-step.
+- LAMMPS computes the surface velocity from the spin at R from the centre, but the torque with a lever arm of
+  R - delta / 2 (at walls, R). So the power of its force differs from its energy loss. In tisim both are at
+  R - delta / 2.
+- LAMMPS drops the tangential force in the first step of a contact, if the damping alone exceeds Coulomb's
+  limit. In tisim the force is then the limit.
 
-All are an option of the NumPy twin, which with it agrees with LAMMPS, and without it with the package, to
-rounding; where none matters, so does the package with LAMMPS.
+All three are options of the NumPy reference. With them it agrees with LAMMPS to rounding, and without them
+with the package. If none of them matters, the package agrees with LAMMPS to rounding.
 """
 
 from __future__ import annotations
@@ -38,20 +40,20 @@ if TYPE_CHECKING:
     from tisim.effects import Granular
 
 SIDE, STEP = 8, 5e-4
-"""Grains along an edge, which are also m; s."""
+"""Grains along an edge, which is also the edge's length in m; s."""
 SOFT = {"young": 1e5, "poisson": 0.3, "restitution": 0.6, "friction": 0.3, "damping": 300.0}
 LAW = TwinLaw((SOFT,))
 """Hertz and Mindlin."""
 TSUJI = 0.5
-"""Coefficient of restitution that ``damping tsuji`` is given."""
+"""Coefficient of restitution given to ``damping tsuji``."""
 
 
 def as_tsuji(restitution: float) -> float:
-    """Return the coefficient of restitution whose damping is ``damping tsuji`` of LAMMPS with another one.
+    """Return the coefficient of restitution that gives the damping of ``damping tsuji`` in LAMMPS.
 
-    Both are alpha sqrt(4/3 E* a m*). Tsuji, Tanaka and Ishida (Powder Technol. 71 (1992) 239) fit alpha by a
-    polynomial, for m in place of m*, which of two equal grains of mass m is m / 2; alpha is -sqrt(5) ln e /
-    sqrt(ln^2 e + pi^2) (D. Antypov and J. A. Elliott, EPL 94 (2011) 50004).
+    Both dampings are alpha sqrt(4/3 E* a m*). Tsuji, Tanaka and Ishida (Powder Technol. 71 (1992) 239) fit
+    alpha by a polynomial, for m in place of m*, which of two equal grains of mass m is m / 2; alpha is
+    -sqrt(5) ln e / sqrt(ln^2 e + pi^2) (D. Antypov and J. A. Elliott, EPL 94 (2011) 50004).
     """
     alpha = np.polynomial.Polynomial([1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218])
     share = alpha(restitution) / np.sqrt(5)
@@ -88,13 +90,13 @@ LAWS = {
         twisting="twisting_sds",
     ),
 }
-"""Those that both have, of one material."""
+"""The laws that both programs have, of one material."""
 FIELDS = {"force": "f", "torque": "torque", "position": "x", "velocity": "v", "spin": "omega"}
-"""What is compared, and what LAMMPS calls it."""
+"""The compared quantities, and their names in LAMMPS."""
 
 
 def start(spinning: float = 3.0) -> dict[str, np.ndarray]:
-    """Grains on a lattice that is too narrow, displaced; ``spinning`` in rad/s."""
+    """Displaced grains on a lattice that is too narrow; ``spinning`` in rad/s."""
     draw = np.random.Generator(np.random.Philox(7))
     n = SIDE**3
     lattice = np.stack(np.meshgrid(*3 * [np.arange(SIDE)], indexing="ij"), axis=-1).reshape(-1, 3) + 0.5
@@ -116,14 +118,14 @@ def planes(walls: bool) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
 
 
 def by_numpy(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
-    """Where the twin is after some steps."""
+    """The state of the NumPy reference after some steps."""
     grains = Grains(law, *at.values(), planes=planes(walls))
     grains.run(steps, STEP)
     return dict(zip(FIELDS, (grains.force, grains.torque, grains.x, grains.v, grains.w), strict=True))
 
 
 def end_of(scene: Scene, steps: int, schedule: str | None = None) -> dict[str, np.ndarray]:
-    """Where the package is after some steps of a scene, in the order of ids."""
+    """The state of the package after some steps of a scene, in the order of ids."""
     from tisim import Simulation
 
     simulation = Simulation(scene, schedule=schedule)
@@ -148,7 +150,7 @@ def composed(law: TwinLaw) -> Granular:
 
 
 def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
-    """Where the package is."""
+    """The state of the package."""
     from tisim import Material, Particles, Scene
     from tisim.effects import Walls
     from tisim.geometry import Plane
@@ -169,7 +171,7 @@ def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int)
 
 
 def lammps_model(law: TwinLaw) -> str:
-    """What pair_style granular calls a law."""
+    """The text of a law for pair_style granular."""
     of = law.materials[0]
     damping = {"restitution_damping": "coeff_restitution", "constant_damping": "velocity"}[str(law.damping)]
     loss = of["restitution"] if damping == "coeff_restitution" else of["damping"]
@@ -204,7 +206,7 @@ def lammps_model(law: TwinLaw) -> str:
 
 
 def by_lammps(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
-    """Where LAMMPS is: in a process of its own."""
+    """The state of LAMMPS, from a separate process."""
     return lammps_peer.apart(__file__, law=lammps_model(law), walls=walls, steps=steps, **at)
 
 
@@ -235,7 +237,7 @@ def worker(folder: Path) -> None:
 
 
 def apart(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> dict[str, float]:
-    """The largest difference of each quantity, over the largest there is."""
+    """The largest difference of each quantity, over its largest value."""
     return {name: float(np.abs(a[name] - b[name]).max() / (np.abs(b[name]).max() or 1.0)) for name in FIELDS}
 
 

@@ -1,9 +1,10 @@
-"""The angle of repose of the design whose slope a calibration of avalanche is to meet, or of another.
+"""The angle of repose of the design whose slope a calibration of avalanche is to reproduce, or of another
+design.
 
     python tests/benchmarks/known_slope.py [--starts 16] [--design 0.6 0.4 10]
 
-Mean, half of its 95 % interval and standard deviation over random starts, which are others than those of a
-search; with the misfit of the mean. A design is friction, rolling friction and cohesion in J/m^3.
+Prints the mean, the half width of its 95 % interval and the standard deviation over held-out random starts
+(seeds), with the misfit of the mean. A design is friction, rolling friction and cohesion in J/m^3.
 """
 
 import argparse

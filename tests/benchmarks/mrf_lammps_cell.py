@@ -1,4 +1,4 @@
-"""The sheared cell of mrf_lammps.py in LAMMPS: what it is given in in.npz of a folder, it runs to out.npz."""
+"""The sheared cell of mrf_lammps.py in LAMMPS: reads in.npz of a folder, runs, and writes out.npz."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.benchmarks.lammps_peer import State
 
 
 def worker(folder: Path) -> None:
-    """Find the forces on grains in each state, and what comes of it after some steps."""
+    """Find the forces on grains in each state, and the result of an experiment."""
     with np.load(folder / "in.npz") as given:
         at = dict(given)
     found: dict[str, list[Any]] = {"force": [], "position": [], "raft_force": []}
@@ -40,10 +40,11 @@ def vectors(machine: Any, name: str) -> np.ndarray:
 
 
 def cell(folder: Path, at: State, place: np.ndarray, velocity: np.ndarray) -> Any:
-    """A LAMMPS that knows the forces on grains at their places, in the oil, between the plates."""
+    """A LAMMPS with grains at the given positions, in the oil, between the plates; forces are computed."""
     machine = lammps_peer.begin()
     machine.commands_list(["units si", "atom_style hybrid sphere dipole", "boundary p p f"])
-    # Of its Coulomb's law, J m / C^2: electric dipoles attract as these magnetic ones do.
+    # The constant of LAMMPS's Coulomb's law, J m / C^2: with it, electric dipoles attract as these magnetic
+    # ones do.
     coulomb = machine.extract_global("qqr2e")
     moment = at["moment"] * np.sqrt(mu_0 / (4 * np.pi * coulomb))
     d, (x, y, z) = at["diameter"], at["sides"]
@@ -60,7 +61,7 @@ def cell(folder: Path, at: State, place: np.ndarray, velocity: np.ndarray) -> An
             f"pair_coeff * * granular {model}", f"pair_coeff * * lj/cut/dipole/cut 0.0 {d}",
             f"timestep {at['dt']:.17g}", f"fix plates all wall/gran granular {model} zplane 0 {z}",
             oil("all", at),
-            # It turns no grains, on which dipoles have torques.
+            # LAMMPS must not rotate grains, on which its dipoles exert torques.
             "fix move all nve", "run 0",
         ]
     )  # fmt: skip
@@ -73,7 +74,7 @@ def oil(group: str, at: State) -> str:
 
 
 def shear(machine: Any, at: State) -> tuple[float, float]:
-    """Run all of an experiment; the mean force along x on the lower and on the upper raft, N."""
+    """Run the whole experiment; return the mean force along x on the lower and on the upper raft, N."""
     joins, begins, ends = (int(one) for one in at["steps"])
     bottom, top = at["raft"], at["sides"][2] - at["raft"]
     speed = at["rate"] * (top - bottom) / 2
@@ -86,12 +87,13 @@ def shear(machine: Any, at: State) -> tuple[float, float]:
             "group free subtract all rafts", oil("free", at), "fix move free nve",
             f"velocity lower set {-speed} 0 0", f"velocity upper set {speed} 0 0",
             f"fix lower lower move linear {-speed} 0 0", f"fix upper upper move linear {speed} 0 0",
-            # What is frozen has no end of mass in impacts, as what is held here; its forces are kept before.
+            # Frozen grains have infinite mass in impacts, as held grains in tisim; their forces are stored
+            # before.
             "fix borne rafts store/force", "fix heavy rafts freeze",
             f"run {begins - joins}",
             "compute lower lower reduce sum f_borne[1]", "compute upper upper reduce sum f_borne[1]",
             "fix mean all ave/time 1 1 1 c_lower c_upper ave running",
-            # The mean is that of forces at the beginnings of steps.
+            # The mean is over forces at the beginnings of steps.
             f"run {ends - begins - 1}",
         ]
     )  # fmt: skip

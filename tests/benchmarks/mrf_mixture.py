@@ -1,11 +1,11 @@
-"""By how much a mixture of grains of two sizes yields later than equal grains, by Bingham's law.
+"""The ratio of the yield stresses of grains of two sizes and of equal grains, by Bingham's law.
 
     python tests/benchmarks/mrf_mixture.py [--starts 3] [--rates 2000 5000 10000]
 
-The cell of a search of mrf_shear, of equal grains and with a third of the volume in grains half as large, at
-each shear rate (1/s). Printed are the stresses, the yield stress and the plastic viscosity of Bingham's law,
-and the yield stress of the mixture over that of equal grains; means over starts with half of their 95 %
-intervals. Mixtures have three times as many grains, and steps half as long: a quarter of an hour.
+The cell of a search of mrf_shear, with equal grains and with a third of the volume in grains half the size,
+at each shear rate (1/s). Printed are the stresses, the yield stress and the plastic viscosity of Bingham's
+law, and the ratio of the two yield stresses; means over starts with the half widths of their 95 % intervals.
+Mixtures have three times the number of grains, and steps half as long: this takes a quarter of an hour.
 """
 
 import argparse

@@ -1,10 +1,10 @@
-"""What the stiffness of grains changes of the stress in a sheared magnetorheological fluid.
+"""The effect of grain stiffness on the stress in a sheared magnetorheological fluid.
 
     python tests/benchmarks/mrf_stiffness.py [--starts 8] [--young 0.5e9 1e9 2e9 4e9]
 
-The cell of a search of mrf_shear at 10 000 1/s, in steps of the stiffest of them. Printed are the stress and
-what it is over that of L21's 1 GPa from the same starts, and the largest overlap over a radius; means with
-half of their 95 % intervals. Some minutes.
+The cell of a search of mrf_shear at 10 000 1/s, in steps that suit the stiffest grains. Printed are the
+stress, its ratio to the stress with L21's 1 GPa from the same starts, and the largest overlap over a radius;
+means with the half widths of their 95 % intervals. Takes some minutes.
 """
 
 import argparse

@@ -1,4 +1,5 @@
-"""Sweeps that solve for mutually induced moments of touching spheres of mu_r without end, plain and mixed.
+"""Sweeps that solve for mutually induced moments of touching spheres in the limit of infinite mu_r, plain and
+mixed.
 
 python tests/benchmarks/mutual_sweeps.py
 """
@@ -13,11 +14,12 @@ from tisim.sources import MagneticField
 from tisim.steppers import FixedStep, Verlet
 
 MOST = 2000
-"""So many sweeps count as none that converge."""
+"""With more sweeps than this, the iteration counts as not converging."""
 
 
 def packed(number: int, fraction: float) -> np.ndarray:
-    """Return centres of spheres of radius 1 at random places that fill a fraction of a cube, shape (n, 3)."""
+    """Return centres of spheres of radius 1 at random positions that fill a fraction of a cube,
+    shape (n, 3)."""
     draw, side, places = np.random.default_rng(0), (number * 4 / 3 * np.pi / fraction) ** (1 / 3), []
     while len(places) < number:
         place = draw.uniform(0, side, 3)
@@ -35,7 +37,7 @@ ARRANGEMENTS = {
 
 
 def sweeps(place: np.ndarray, acceleration: str) -> str:
-    """Return how many sweeps the first moments take, from nothing to a change of 1e-8."""
+    """Return the number of sweeps for the first moments, from zero to a change of 1e-8."""
     law = MutualInducedMoment(susceptibility=1e12, sweeps=MOST, acceleration=acceleration)
     scene = tisim.Scene(
         particles=tisim.Particles(position=place, velocity=0 * place, radius=1.0, mass=1.0),

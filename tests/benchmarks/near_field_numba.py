@@ -1,7 +1,8 @@
-"""The near field of all pairs as a numba program, and how fast this machine takes roots and multiplies.
+"""The near field over all pairs as a numba program, and the rates of roots and multiplications on this
+machine.
 
-Structure of arrays, one loop over particles in parallel, and in it one over the others that the compiler
-turns into vector instructions: the peer of tests/benchmarks/near_field.py.
+Structure of arrays: a parallel loop over particles, and in it a loop over the others, which the compiler
+vectorises. It is the peer of tests/benchmarks/near_field.py.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numba
 import numpy as np
 
 STREAM = 1024
-"""Numbers that a thread works on again and again, in its first cache, when rates are measured."""
+"""Numbers that a thread processes repeatedly, in its level 1 cache, when rates are measured."""
 
 
 @numba.njit(parallel=True, fastmath=True, error_model="numpy")

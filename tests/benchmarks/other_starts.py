@@ -1,10 +1,10 @@
-"""What becomes of designs that a search has found from other random starts than those it had.
+"""Designs that a search has found, run from held-out random starts (seeds).
 
     python tests/benchmarks/other_starts.py valve out/valve-front/best.csv [--starts 6]
 
-The designs are those of the first --most lines of the table. Printed is each objective, and whatever else the
-case tells of a design, as a mean with half of its 95 % interval over the starts in which it is finite, and in
-how many that is so; and in how many starts a run ends well.
+The designs are the first --most lines of the table. Printed are each objective, and each further quantity
+that the case reports for a design: its mean with the half width of the 95 % interval over the starts in which
+it is finite, and the number of these starts; and the number of starts whose runs end without a failure.
 """
 
 import argparse
@@ -33,7 +33,7 @@ def designs(problem: Problem, file: Path, most: int) -> list[dict[str, float]]:
 
 
 def known(problem: Problem, design: Mapping[str, float], result: Result) -> dict[str, float]:
-    """Return what is known of one run: its objectives, and what the case tells beside."""
+    """Return the quantities of one run: its objectives, and further ones that the case reports."""
     objectives = {one.label: one.of(result) for one in problem.objectives}
     return objectives | dict(problem.details(design, result) if problem.details else {})
 

@@ -1,9 +1,9 @@
-"""Prints the heat of reaction of grains in a row that bond and are then pressed together, by number of steps.
+"""Print the heat of reaction of grains in a row that bond and are then pressed together, by number of steps.
 
     python tests/benchmarks/pressed_grains.py
 
-Rows of touching grains close in at 1 m/s and attract each other for 0.1 ms. Heat is over that of one impact
-that bonds; grains in a row hit each other again while the row comes to rest, and stop at that.
+Rows of touching grains close in at 1 m/s and attract each other for 0.1 ms. Heat is over the heat of one
+bonding impact. Grains in a row hit each other repeatedly until the row comes to rest; then impacts end.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ NUMBERS, STEPS = (2, 3, 4, 8), (100, 1000, 10000)
 
 
 def row(number: int, steps: int) -> Scene:
-    """Grains in a row, all on their way to its middle."""
+    """Grains in a row, all moving towards its middle."""
     x = (np.arange(number) - (number - 1) / 2) * 2 * RADIUS * (1 - 1e-9)
     zero = np.zeros(number)
     return Scene(

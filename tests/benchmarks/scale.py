@@ -1,13 +1,13 @@
-"""Time of a particle's step and memory of a particle, from a thousand grains to a million and over worlds.
+"""Time per particle-step and memory per particle, from a thousand grains to a million and over worlds.
 
     python tests/benchmarks/scale.py [--grains 1000 ... 1000000] [--worlds 1 ... 4096] [--threads 2]
         [--turns 3] [--picture docs/scale.png]
 
-Beds of grains at rest within walls (Hertz, Mindlin, memory), in f64, lists and walls included: a thousand
-spheres come to rest in a box ten diameters wide, and a larger bed is many such boxes side by side, without
-the walls between them. And worlds of 100 grains that agglomerate (Zohdi 2004), from their start, side by side
-in a batch. A time is the median of a few turns, wall time over the steps of all particles; memory is that of
-fields and lists. An option without numbers leaves its part out. Some minutes in all.
+Beds of grains at rest within walls (Hertz, Mindlin, contact history), in f64, lists and walls included: a
+thousand spheres come to rest in a box ten diameters wide, and a larger bed is many such boxes side by side,
+without the walls between them. Batches of worlds with 100 grains each that agglomerate (Zohdi 2004), from
+their start. A time is the median of a few turns, wall time over the steps of all particles; memory is the
+memory of fields and lists. An option without numbers leaves its part out. Takes some minutes in all.
 """
 
 import argparse
@@ -35,20 +35,20 @@ from tisim.plotting.style import empty, letters, plain
 from tisim.steppers import FixedStep, Verlet
 
 TILE, WIDTH = 1000, 10.0
-"""Grains of a box that are let come to rest, and its width in diameters."""
+"""Grains of a box that come to rest, and its width in diameters."""
 PER_WORLD = 100
-"""Grains of a world that agglomerates."""
+"""Grains of an agglomerating world."""
 STEPS = 1e7
-"""A turn takes about so many steps of particles."""
+"""Approximate number of particle-steps of a turn."""
 BED, BATCH = "#0072b2", "#d55e00"
 
 
 @dataclass(frozen=True)
 class Point:
-    """A point is what one size has come to.
+    """The measurement for one size.
 
-    number : of grains, or of worlds. seconds : of a step of a particle, in each turn. bytes : of a particle,
-    fields and lists.
+    number : number of grains, or of worlds. seconds : time of a particle-step, in each turn. bytes : memory
+    per particle, fields and lists.
     """
 
     number: int
@@ -66,7 +66,8 @@ class Point:
 
 
 def bed(n: int, tile: np.ndarray) -> tisim.Scene:
-    """Grains at rest in as many boxes as it takes, side by side, as near to a square as they can be."""
+    """Grains at rest in the necessary number of boxes, side by side, in an arrangement as square as
+    possible."""
     boxes = -(-n // TILE)
     across = max(k for k in range(1, int(boxes**0.5) + 1) if boxes % k == 0)
     corners = np.array([(WIDTH * (k % across), WIDTH * (k // across), 0.0) for k in range(boxes)])
@@ -129,7 +130,7 @@ def draw(axis: Axes, beds: Sequence[Point], batches: Sequence[Point], what: str)
 
 
 def picture(beds: Sequence[Point], batches: Sequence[Point], path: Path) -> None:
-    """Draw time of a step and memory, each of a particle, over the number of particles."""
+    """Draw time per particle-step and memory per particle over the number of particles."""
     figure = empty(8.5, 3.4)
     axes = figure.subplots(1, 2)
     draw(axes[0], beds, batches, "time")

@@ -3,10 +3,10 @@
     python tests/benchmarks/scaling.py [--device cpu] [--precision f64] [--most 1000000] [--worlds 4096]
         [--limit 240]
 
-Bed: a lattice of grains (Hertz and Mindlin, five walls) that falls together, lists included. Worlds: 60
-grains that agglomerate, side by side. Near field, dipoles: all pairs. Blast: particles that do not feel
-each other. Captures: worlds of 100 Brownian particles in the field of a cylinder. Each is compiled, run for
-a moment, and timed for about a second. What would begin after the limit (s) is left out.
+Bed: a lattice of grains (Hertz and Mindlin, five walls) that collapses, lists included. Worlds: 60 grains
+that agglomerate, side by side. Near field, dipoles: all pairs. Blast: particles without interaction.
+Captures: worlds of 100 Brownian particles in the field of a cylinder. Each is compiled, run for a moment, and
+timed for about a second. Measurements that would begin after the limit (s) are skipped.
 """
 
 import argparse
@@ -33,16 +33,16 @@ from tisim.cases.blast.scene import scene as blast
 from tisim.cases.capture.scene import scene as capture
 
 SECONDS = 1.0
-"""A measurement lasts about so long."""
+"""Approximate length of a measurement."""
 QUERIES = {
     "cuda": ["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"],
     "vulkan": ["vulkaninfo", "--summary"],
 }
-"""These commands say what a device is; of the second, the names of device and driver."""
+"""Commands that describe a device; the second prints the names of device and driver."""
 
 
 def described(device: str) -> str:
-    """Name and driver of a device, where a command tells."""
+    """Name and driver of a device, if a command tells them."""
     query = QUERIES.get(device, [])
     if not query or not shutil.which(query[0]):
         return platform.processor() or platform.machine()
@@ -52,19 +52,19 @@ def described(device: str) -> str:
 
 
 def bed(n: int) -> tisim.Scene:
-    """A lattice of so many grains, above the floor."""
+    """A lattice of ``n`` grains, above the floor."""
     width = granular_bed.WIDTH * (n / 8000) ** 0.5
     position = granular_bed.lattice(n, width)
     return granular_bed.scene(position, np.zeros_like(position), width)
 
 
 def near(n: int) -> tisim.Scene:
-    """So many charges that feel each other at any distance."""
+    """``n`` charges that interact at any distance."""
     return near_field.scene(*near_field.start(n))
 
 
 def timed(scenes: list[tisim.Scene]) -> tuple[float, float]:
-    """Time of a particle-step, ns, and what compiling took, s."""
+    """Time of a particle-step, ns, and of compilation, s."""
     began = time.perf_counter()
     simulation = tisim.Simulation(scenes[0], worlds=len(scenes))
     simulation.load(scenes)
@@ -82,7 +82,7 @@ def timed(scenes: list[tisim.Scene]) -> tuple[float, float]:
 
 
 def sizes(most: int, first: int) -> Iterator[int]:
-    """Powers of ten times the first, up to the most."""
+    """Powers of ten times the first, up to ``most``."""
     while first <= most:
         yield first
         first *= 10

@@ -1,17 +1,18 @@
-"""Methods of search and those of other libraries, with the same number of runs each.
+"""Search methods of tisim and of other libraries, each with the same number of runs.
 
     python tests/benchmarks/search.py --tasks rosenbrock,zdt1 --budget 400 --seeds 10
     python tests/benchmarks/search.py --tasks agglomeration --methods genetic,pycma,sklearn-gp --budget 1600
 
-The peers are those of ``python -m pip install ".[bench]"``. Each search is a line of JSON in ``--out`` once
-it has ended; the same command goes on with those that are missing, and ``--table`` prints what is there.
+The peers are installed by ``python -m pip install ".[bench]"``. Each finished search is a line of JSON in
+``--out``; the same command continues with the missing searches, and ``--table`` prints the finished ones.
 
-A design of a peer has as many starts as ``Task.starts`` says, the same for all designs; a method of tisim
-has its defaults, with what it spends on choosing and reporting its best within the budget. What is returned
-is judged by its exact cost, or by the mean over fresh starts that no search has used. For one cost is
-printed how far that is from the least there is, less is better; for several the hypervolume of what is
-returned, over the largest that there is or may be, more is better. Then come the mean over the seeds with
-the half width of its 95 % interval, and the seconds of a search beside those of its runs.
+A peer runs each design from ``Task.starts`` random starts (seeds), the same for all designs. A method of
+tisim has its default settings; the runs in which it chooses and reports its best design count towards the
+budget. The returned design is judged by its exact cost, or by its mean cost over held-out starts. For one
+cost, the table prints its distance from the minimum (less is better). For several costs, it prints the
+hypervolume of the returned designs over the largest possible one, or over an upper bound of it (more is
+better). Then come the mean over the seeds with the half width of its 95 % interval, and the seconds of a
+search, without its runs.
 """
 
 from __future__ import annotations
@@ -46,15 +47,16 @@ from tisim.optimize.storage.cache import Cache
 from tisim.optimize.surrogate.selection import beaten_by
 
 FRESH = 10**6
-"""The seed of the starts by which all are judged."""
+"""The seed of the held-out starts by which all designs are judged."""
 MOST_ASKED = 50
-"""A peer may ask for so many designs for each run of the budget: those that cannot be cost none."""
+"""The number of designs that a peer may ask for, for each run of the budget. Designs that cannot be simulated
+do not use up the budget."""
 RUNNING = {"s": 0.0}
-"""Seconds that runs have taken since it was set to 0."""
+"""Seconds taken by runs since it was set to 0."""
 
 
 def clocked(kind: type) -> None:
-    """Let what an evaluator takes be added to RUNNING."""
+    """Let an evaluator add its seconds to RUNNING."""
     evaluate = kind.evaluate
 
     def timed(self: Any, scenes: Sequence[Any], progress: Any = None) -> Iterator[Any]:
@@ -71,7 +73,8 @@ def clocked(kind: type) -> None:
 
 
 def costs_of(problem: Problem, evaluator: Evaluator, points: np.ndarray, seeds: Sequence[int]) -> np.ndarray:
-    """Return the costs of points from starts, (points, starts, costs); inf where a design cannot be."""
+    """Return the costs of points from starts, (points, starts, costs); inf if a design cannot be
+    simulated."""
     costs = np.full((len(points), len(seeds), len(problem.objectives)), np.inf)
     places, scenes = [], []
     for i, point in enumerate(points):
@@ -87,7 +90,8 @@ def costs_of(problem: Problem, evaluator: Evaluator, points: np.ndarray, seeds: 
 
 
 class Purse:
-    """The mean costs of points, until the budget is spent; what peers call (search_peers.Evaluate)."""
+    """The function that peers call (search_peers.Evaluate): mean costs of points, until the budget
+    is spent."""
 
     def __init__(self, problem: Problem, evaluator: Evaluator, starts: int, seed: int, budget: int) -> None:
         self.problem, self.evaluator = problem, evaluator
@@ -120,7 +124,7 @@ class Purse:
 
 
 def peer(name: str, task: Task, evaluator: Evaluator, seed: int, budget: int) -> tuple[np.ndarray, int]:
-    """Search with a peer; return the points that it returns, one or a front, and how many it has tried."""
+    """Search with a peer; return the points that it returns, one or a front, and the number it has tried."""
     problem = task.problem()
     purse = Purse(problem, evaluator, task.starts, seed, budget)
     costs = len(problem.objectives)
@@ -137,11 +141,11 @@ def ours(name: str, task: Task, evaluator: Evaluator, seed: int, budget: int) ->
     settings = {"seed": seed, "method": name, "max_evaluations": budget, "generations": budget}
     if problem.function:
         found = optimize.run(problem, **settings)
-    else:  # as optimize.run does, with an evaluator that has compiled the scene already
+    else:  # as optimize.run does, with an evaluator that has already compiled the scene
         with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / "search.h5") as cache:
             found = search(problem, evaluator, cache, Settings(**settings))
     if found.interrupted:
-        raise KeyboardInterrupt  # and no line of it, so that it is made again
+        raise KeyboardInterrupt  # and no line is written, so that the search is repeated
     assert found.evaluations + found.hits <= budget
     several = found.problem.several
     points = np.array([list(string) for string in (found.hall if several else found.hall[:1])])
@@ -149,7 +153,7 @@ def ours(name: str, task: Task, evaluator: Evaluator, seed: int, budget: int) ->
 
 
 def worth(task: Task, evaluator: Evaluator, points: np.ndarray) -> float:
-    """Return what a search has found: the cost above the least, or a hypervolume over the largest."""
+    """Return the quality of a search: the cost above the minimum, or the hypervolume over its scale."""
     problem = task.problem()
     if task.truth is not None:
         return task.truth(problem.genome.decode(points[0])) - task.least
@@ -177,7 +181,7 @@ def searched(name: str, evaluator: Evaluator, seed: int, budget: int, method: st
 
 
 def show(rows: Sequence[dict[str, Any]]) -> None:
-    """Print what there is of each task and budget, the best method first."""
+    """Print the results of each task and budget, the best method first."""
     groups: dict[tuple[str, int], dict[str, list[dict[str, Any]]]] = {}
     for row in rows:
         groups.setdefault((row["task"], row["budget"]), {}).setdefault(row["method"], []).append(row)

@@ -1,7 +1,7 @@
 """Searches of other libraries: pymoo, Optuna, cma and scikit-learn (python -m pip install ".[bench]").
 
 Each is a function (evaluate, genes, costs, seed), which asks for the costs of points of the unit cube until
-Spent is raised. It may return the point that it holds for the best, which else is the one of the least mean.
+Spent is raised. It may return the point that it considers best; otherwise the point of lowest mean is taken.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from scipy.stats import norm, qmc
 
 
 class Evaluate(Protocol):
-    """Points of the unit cube, (n, genes), to their mean costs, (n, costs).
+    """Mean costs, (n, costs), of points of the unit cube, (n, genes).
 
-    points, values : all so far. variance : of the first of these means, from start to start.
+    points, values : all so far. variance : variance between starts of the first of these means.
     """
 
     points: np.ndarray
@@ -28,11 +28,11 @@ class Evaluate(Protocol):
 
 
 class Spent(Exception):
-    """The budget does not pay for a design more."""
+    """The budget does not allow another design."""
 
 
 def pycma(evaluate: Evaluate, genes: int, costs: int, seed: int) -> None:
-    """CMA-ES from the middle; converged, again from elsewhere with twice the population."""
+    """CMA-ES from the middle; after convergence, again from elsewhere with twice the population."""
     import cma
 
     rng = np.random.default_rng(seed)
@@ -48,7 +48,7 @@ def pycma(evaluate: Evaluate, genes: int, costs: int, seed: int) -> None:
 
 
 def optuna(sampler: str) -> Callable[..., None]:
-    """A sampler of Optuna, asked for one design at a time."""
+    """A sampler of Optuna, which is asked for one design at a time."""
 
     def run(evaluate: Evaluate, genes: int, costs: int, seed: int) -> None:
         import optuna
@@ -69,7 +69,7 @@ def optuna(sampler: str) -> Callable[..., None]:
 
 
 def pymoo(algorithm: str) -> Callable[..., None]:
-    """A genetic algorithm of pymoo with populations of 20, of 36 for three costs."""
+    """A genetic algorithm of pymoo with populations of 20, or of 36 for three costs."""
 
     def run(evaluate: Evaluate, genes: int, costs: int, seed: int) -> None:
         from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -103,7 +103,7 @@ def pymoo(algorithm: str) -> Callable[..., None]:
 def sklearn_gp(evaluate: Evaluate, genes: int, costs: int, seed: int) -> np.ndarray:
     """Bayesian optimisation: a Gaussian process (Matern 5/2) and expected improvement, in batches of four.
 
-    Returned is the design of least posterior mean.
+    It returns the design of lowest posterior mean.
     """
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern

@@ -1,4 +1,4 @@
-"""The problems of search.py: functions whose best is known, and searches of cases and of one scene."""
+"""The problems of search.py: functions with a known minimum, and searches of cases and of one scene."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ Design = Mapping[str, float]
 class Task:
     """A problem, and how its searches are judged.
 
-    problem : made when it is asked for. starts : that a peer gives each design, the same for all. truth : the
-    exact cost of a design; None where it is a mean over ``fresh`` starts that no search has used. least : the
-    cost of the best, which is taken off. reference, scale : of several costs, the point that hypervolumes are
-    measured from, and the volume that is one.
+    problem : a function that makes the problem. starts : number of random starts (seeds) from which a peer
+    runs each design, the same for all. truth : the exact cost of a design; None to take the mean over
+    ``fresh`` held-out starts. least : the minimum of the cost, which is subtracted. reference, scale : for
+    several costs, the reference point of hypervolumes, and the hypervolume that is reported as 1.
     """
 
     problem: Callable[[], Problem]
@@ -56,13 +56,13 @@ def genes(count: int, low: float = 0.0, high: float = 1.0) -> Genome:
 
 
 def rosenbrock(design: Design) -> float:
-    """Least, 0, at 1, 1, ... in a bent valley."""
+    """The minimum, 0, is at 1, 1, ... in a bent valley."""
     x = variables(design)
     return float(np.sum(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2))
 
 
 def ackley(design: Design) -> float:
-    """Least, 0, at 1.7, 1.7, ..., away from the middle of the range."""
+    """The minimum, 0, is at 1.7, 1.7, ..., away from the middle of the range."""
     x = variables(design) - 1.7
     waves = np.exp(np.mean(np.cos(2 * np.pi * x)))
     return float(-20 * np.exp(-0.2 * np.sqrt(np.mean(x**2))) - waves + 20 + np.e)
@@ -80,13 +80,13 @@ HARTMANN_PLACES = 1e-4 * np.array([
 
 
 def hartmann(design: Design) -> float:
-    """Four wells in six dimensions; least -3.32237."""
+    """Four wells in six dimensions; the minimum is -3.32237."""
     squares = (variables(design) - HARTMANN_PLACES) ** 2
     return float(-HARTMANN_WEIGHTS @ np.exp(-np.sum(HARTMANN * squares, axis=1)))
 
 
 def corner(design: Design) -> float:
-    """A bowl that is least, 0, where all genes are at an end of their range."""
+    """A bowl whose minimum, 0, has each gene at an end of its range."""
     x = variables(design)
     return float(np.sum((x - np.arange(len(x)) % 2) ** 2))
 
@@ -97,7 +97,8 @@ def bowl(design: Design) -> float:
 
 
 def noisy_bowl(design: Design, seed: int) -> float:
-    """A bowl, and noise of deviation 0.3 in each start, as much as random designs differ by."""
+    """A bowl with noise of deviation 0.3 in each start. The noise is about as large as the difference between
+    random designs."""
     at = (variables(design) * 2**32).astype(np.int64).tolist()
     return bowl(design) + 1.0 + 0.3 * float(np.random.default_rng([seed, *at]).normal())
 
@@ -110,7 +111,7 @@ def zdt1(design: Design) -> tuple[float, float]:
 
 
 def zdt3(design: Design) -> tuple[float, float]:
-    """As zdt1; a front of five parts."""
+    """As zdt1, with a front of five parts."""
     x = variables(design)
     g = 1 + 9 * x[1:].mean()
     return float(x[0]), float(g * (1 - np.sqrt(x[0] / g) - x[0] / g * np.sin(10 * np.pi * x[0])))
@@ -137,16 +138,17 @@ BENT_TIME = 1e-7
 
 
 def path(design: Design, times: Sequence[float]) -> np.ndarray:
-    """Where a proton is that a magnetic field bends, at times (s); x + i y, m."""
+    """The position of a proton bent by a magnetic field, at times (s); x + i y, m."""
     w = elementary_charge * design["flux"] / proton_mass
     begin = design["speed"] * np.exp(1j * np.radians(design["angle"]))
     return begin * (1 - np.exp(-1j * w * np.array(times))) / (1j * w)
 
 
 def bent_particle() -> Problem:
-    """The field, speed and angle of a proton that ends where BENT_TRUTH does, with its velocity.
+    """Find the field, speed and angle of a proton whose final position and velocity are those of BENT_TRUTH.
 
-    The cost is the distance of the end from there, and that of the velocity, over those of BENT_TRUTH.
+    The cost is the distance of the final positions over that of BENT_TRUTH from the origin, plus the
+    difference of the final velocities over the final speed of BENT_TRUTH.
     """
     (end,) = path(BENT_TRUTH, [BENT_TIME])
     turned = elementary_charge * BENT_TRUTH["flux"] / proton_mass * BENT_TIME
@@ -175,7 +177,8 @@ def bent_particle() -> Problem:
 
 
 def resonance() -> float:
-    """The least cost of vibration: of the closed form over a fine mesh, and around the best of it. mm"""
+    """The minimum of the cost of vibration, mm: the closed form on a fine mesh, refined around its best
+    point."""
     low = np.zeros(2)
     width, best = np.ones(2), (np.inf, np.zeros(2))
     genome = Genome(VIBRATION_GENES)

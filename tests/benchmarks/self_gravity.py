@@ -1,16 +1,16 @@
-"""Gravity of particles on each other, by a tree beside all pairs: errors, times, what is conserved.
+"""Gravity between particles, by a tree and over all pairs: errors, times, conservation.
 
     python tests/benchmarks/self_gravity.py errors [--numbers 1000 10000 100000] [--precision f64]
     python tests/benchmarks/self_gravity.py time [--numbers 1000 3000 10000 30000 100000] [--threads 1]
     python tests/benchmarks/self_gravity.py drift [--numbers 1000]
 
-errors : of the force, root mean square and the largest over the particles (at most 500 of them), each over
-the root mean square of the force, beside a sum over all pairs in NumPy in f64; and the sum of all forces,
-which should be 0, over the sum of their magnitudes. In a uniform ball, and in a Plummer sphere, whose middle
-is dense. time : of a step, CPU time of the process over particles and steps, the least of several tries; the
-crossover is where the two cost the same. drift : of energy and momenta, with softening, of a ball that
-collapses from a slow rotation, and of a Plummer sphere in balance, over five dynamical times
-(a^3 / (G M))^(1/2), by Verlet with the same steps.
+``errors`` compares forces with a sum over all pairs in NumPy in f64, for at most 500 of the particles: root
+mean square and largest error, each over the root mean square of the force; and the sum of all forces, which
+should be 0, over the sum of their magnitudes. It does so in a uniform ball and in a Plummer sphere, whose
+middle is dense. ``time`` prints the CPU time of the process per particle and step, the smallest of several
+tries; the crossover is the number of particles at which both cost the same. ``drift`` prints the drift of
+energy and momenta, with softening, for a ball that collapses from a slow rotation and for a Plummer sphere in
+balance, over five dynamical times (a^3 / (G M))^(1/2), by Verlet with the same steps.
 """
 
 import argparse
@@ -30,9 +30,9 @@ from tisim.effects import SelfGravity, SoftenedSelfGravity, TreeGravity
 from tisim.steppers import FixedStep, Verlet
 
 TOTAL = 1e9
-"""kg, of all particles."""
+"""Total mass, kg."""
 SCALE = 1.0
-"""m; the radius of a ball, and that which a Plummer sphere goes by."""
+"""m; the radius of the ball, and the scale radius of the Plummer sphere."""
 DYNAMICAL = (SCALE**3 / (G * TOTAL)) ** 0.5
 """s."""
 SOFTENING = 0.05 * SCALE
@@ -41,19 +41,19 @@ PROBES = 500
 
 
 def directions(draw: np.random.Generator, n: int) -> np.ndarray:
-    """Unit vectors, even over all directions."""
+    """Unit vectors, uniform over all directions."""
     v = draw.normal(size=(n, 3))
     return np.asarray(v / np.linalg.norm(v, axis=1)[:, None])
 
 
 def ball(draw: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places in a uniform ball, and velocities of a rotation that slow that it collapses."""
+    """Positions in a uniform ball, and velocities of a rotation so slow that the ball collapses."""
     place = SCALE * directions(draw, n) * draw.uniform(0, 1, n)[:, None] ** (1 / 3)
     return place, np.cross([0, 0, 0.2 / DYNAMICAL], place)
 
 
 def plummer(draw: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places and velocities of a Plummer sphere in balance, which ends at 10 times its scale.
+    """Positions and velocities of a Plummer sphere in balance, truncated at 10 times its scale radius.
 
     Source: S. J. Aarseth, M. Henon, R. Wielen, Astron. Astrophys. 37 (1974) 183.
     """
@@ -86,7 +86,7 @@ def scene(start, law, dt: float = 1e-9, duration: float = 1.0) -> Scene:
 
 
 def exact(place: np.ndarray, probes: np.ndarray) -> np.ndarray:
-    """The force on some of the particles, over all pairs."""
+    """The force on the probed particles, summed over all pairs."""
     mass = TOTAL / len(place)
     force = np.zeros((len(probes), 3))
     for k, i in enumerate(probes):
@@ -162,7 +162,8 @@ def drift(numbers: list[int]) -> None:
 
 
 def changes(result) -> str:
-    """The change of energy over that of the start, and those of the momenta over the sum of magnitudes."""
+    """The change of energy over the initial energy, and the changes of momenta over the sum of their
+    magnitudes."""
     told = []
     for state in (result.start, result.state):
         mass, place, velocity = state["mass"], state["position"], state["velocity"]

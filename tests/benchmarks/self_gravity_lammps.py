@@ -3,10 +3,10 @@
     python -m pip install ".[bench]"
     python tests/benchmarks/self_gravity_lammps.py [--numbers 300 1000 3000] [--repeats 9]
 
-LAMMPS has no gravity of its particles, but Coulomb's law: with charges of G^(1/2) m and a dielectric constant
-of -1 it attracts what is alike, pair_style coul/cut with a cut-off beyond the cloud. Particles of unlike
-masses fill a ball. Both programs run on one thread, LAMMPS in a process of its own: forces at the same
-places, and then steps of Verlet, of which the time is a median over repeats.
+LAMMPS has no gravity between particles, but Coulomb's law: with charges of G^(1/2) m and a dielectric
+constant of -1, like charges attract (pair_style coul/cut, with a cut-off larger than the cloud). Particles of
+unlike masses fill a ball. Both programs run on one thread, LAMMPS in a separate process: first forces at the
+same positions, and then steps of Verlet, whose time is a median over repeats.
 """
 
 from __future__ import annotations
@@ -24,15 +24,16 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.benchmarks import lammps_peer
 
 RADIUS, HEAVIEST, STEP = 50.0, 2e3, 1e-3
-"""m, of the ball; kg, of the heaviest particle, whose lightest has a tenth; s, in which nothing moves far."""
+"""Radius of the ball, m; mass of the heaviest particle, kg, while the lightest has a tenth of it; time step,
+in which nothing moves far, s."""
 SIZE = 0.2
-"""The diameter of all, m; they do not touch."""
+"""The diameter of all particles, m; they do not touch."""
 WARM = 5
 """Steps before the time is taken."""
 
 
 def ball(number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places (m) in a ball and masses (kg)."""
+    """Positions (m) in a ball and masses (kg)."""
     draw = np.random.default_rng(number)
     away = draw.normal(size=(number, 3))
     away *= (RADIUS * draw.uniform(0, 1, number) ** (1 / 3) / np.linalg.norm(away, axis=1))[:, None]
@@ -40,7 +41,7 @@ def ball(number: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def steps_of(number: int) -> int:
-    """How many steps are timed at once."""
+    """The number of steps that are timed at once."""
     return max(5, 2_000_000 // number**2)
 
 
@@ -103,7 +104,7 @@ def worker(folder: Path) -> None:
 
 
 def apart(ours: np.ndarray, theirs: np.ndarray) -> float:
-    """The largest difference of forces over the size of that force."""
+    """The largest difference of the forces over the magnitude of that force."""
     off = np.linalg.norm(ours - theirs, axis=1) / np.linalg.norm(theirs, axis=1)
     return float(off.max())
 

@@ -3,11 +3,11 @@
     python -m pip install ".[bench]"
     python tests/benchmarks/settled_lammps.py [--laws LAW ...] [--starts 16]
 
-512 grains of two sizes fall onto a floor between four walls, in both programs from the same random starts.
-Paths of grains are chaotic, so the programs, whose levers differ (granular_lammps.py), are compared by means
-over starts: how high the centre of mass is at the end, how many others a grain touches, how deep they press
-into each other, how much of the contacts' directions is upright, and how much kinetic energy is left on the
-way. Printed are both means, and the mean of the differences, with half of their 95 % intervals.
+512 grains of two sizes fall onto a floor between four walls, in both programs from the same random starts
+(seeds). Grain trajectories are chaotic and the lever arms of the two programs differ (granular_lammps.py), so
+means over starts are compared: the final height of the centre of mass, the coordination number, the overlap,
+the vertical part of the contact directions, and the kinetic energy during the fall. Printed are both means
+and the mean difference, with the half widths of their 95 % intervals.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
 STEP, GRAVITY, LATTICE = 5e-4, 0.5, 1.12
-"""s, m/s2, m between places at the start."""
+"""s, m/s2, m between neighbouring positions at the start."""
 TIMES = (4.0, 16.0)
-"""s; the first is on the way, where energy is compared, and at the last the bed is at rest."""
+"""s; energies are compared at the first time, during the fall; at the last, the bed is at rest."""
 STIFFER = {
     **{"young": 1e7, "stiffness": 1e6, "damping": 3000.0},
     **{"rolling_stiffness": 4e5, "rolling_damping": 200.0},
     **{"twisting_stiffness": 4e4, "twisting_damping": 50.0},
 }
-"""A hundred times as stiff as in granular_lammps.py, as these grains carry others."""
+"""A hundred times the stiffness of granular_lammps.py, because these grains carry others."""
 
 
 def bulk_law(name: str) -> TwinLaw:
@@ -105,7 +105,7 @@ def by_package(law: TwinLaw, starts: list[State]) -> list[list[State]]:
 
 
 def by_lammps(law: TwinLaw, starts: list[State]) -> list[list[State]]:
-    """The same in LAMMPS, in a process of its own."""
+    """The same in LAMMPS, in a separate process."""
     stacked = {name: np.stack([at[name] for at in starts]) for name in starts[0]}
     found = lammps_peer.apart(__file__, law=lammps_model(law), **stacked)
     return [

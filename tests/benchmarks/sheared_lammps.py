@@ -1,16 +1,16 @@
-"""Grains in simple shear beside LAMMPS: a table of how far they are apart, and the stress of a steady flow.
+"""Grains in simple shear beside LAMMPS: a table of the differences, and the stress of a steady flow.
 
     python -m pip install ".[bench]"
     python tests/benchmarks/sheared_lammps.py
 
-512 grains of two sizes, at a volume fraction of 0.56, in a periodic box: ``ShearedBox`` here, ``fix deform``
-with ``xy erate`` and ``remap v`` there, and the law of granular_lammps.py. LAMMPS moves the box at the end of
-a step: the images in its forces are where they should have been a step ago. That, and the levers of
-granular_lammps.py, are options of the NumPy twin, which with them agrees with LAMMPS, and without them with
-the package, to rounding.
+512 grains of two sizes, at a volume fraction of 0.56, in a periodic box: ``ShearedBox`` in tisim, ``fix
+deform`` with ``xy erate`` and ``remap v`` in LAMMPS, and the law of granular_lammps.py. LAMMPS moves the box
+at the end of a step, so its forces use the image positions of the step before. This lag, and the lever arms
+of granular_lammps.py, are options of the NumPy reference. With them the reference agrees with LAMMPS to
+rounding; without them it agrees with the package to rounding.
 
-The stress is the virial of the contacts of grains, without friction and with it, a mean over a strain of 4 in
-steady flow; errors are those of the means of eight parts of it.
+The stress is the virial of the grain contacts, without friction and with it, averaged over a strain of 4 in
+steady flow; errors are the errors of the means of eight parts of it.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ from tisim.effects import Virial  # noqa: E402
 from tisim.steppers import FixedStep, Verlet  # noqa: E402
 
 RATE, FRICTION, EVERY = 0.5, 0.3, 50
-"""1/s; of the comparison grain by grain; steps between looks at the stress."""
+"""1/s, in the grain-by-grain comparison; steps between samples of the stress."""
 LAW = {"young": 1e5, "poisson": 0.3, "restitution": 0.6}
 BEFORE, MEASURED, PARTS = 4.0, 4.0, 8
-"""Strain to steady flow, strain of which the stress is a mean, and parts of that."""
+"""Strain until steady flow, strain over which the stress is averaged, and number of parts of that."""
 VOLUME = float(SIDE**3)
 
 
 def scene(friction: float = FRICTION, spinning: float = 3.0) -> Scene:
-    """Grains that overlap, and move and spin beside the flow."""
+    """Grains that overlap, with velocities relative to the flow and spins."""
     at = start(spinning)
     velocity = at["velocity"] + np.outer(RATE * (at["position"][:, 1] - SIDE / 2), np.eye(3)[ALONG])
     box = ShearedBox(low=(0, 0, 0), high=(SIDE,) * 3, rate=RATE)
@@ -66,7 +66,7 @@ def scene(friction: float = FRICTION, spinning: float = 3.0) -> Scene:
 
 
 def by_numpy(made: Scene, steps: int, levers: str = "contact", lag: float = 0.0) -> State:
-    """Where the twin is."""
+    """The state of the NumPy reference after some steps."""
     grains = ShearedGrains(made, levers, lag)
     grains.run(steps, STEP)
     place, velocity = inside(made.domain, grains.x, grains.v, steps * STEP - lag)
@@ -74,10 +74,10 @@ def by_numpy(made: Scene, steps: int, levers: str = "contact", lag: float = 0.0)
 
 
 def by_lammps(made: Scene, steps: int) -> State:
-    """Where LAMMPS is, in the same box, and what its virial was every EVERY steps, Pa: xx, yy, zz, xy."""
+    """The state of LAMMPS in the same box, and its virial every EVERY steps, Pa: xx, yy, zz, xy."""
     start = made.particles.arrays(made.domain, made.seed)
     end = lammps_peer.apart(__file__, friction=made.materials["grain"].friction, steps=steps, **start)
-    # What is outside is taken in, by the vectors that images are apart there.
+    # Grains outside the box are wrapped with LAMMPS's image vectors.
     end["position"], end["velocity"] = inside(
         made.domain, end["position"], end["velocity"], (steps - 1) * STEP
     )
@@ -116,7 +116,8 @@ def worker(folder: Path) -> None:
 
 
 def apart(a: State, b: State) -> dict[str, float]:
-    """The largest difference of each quantity, over the largest there is; of places, that of images."""
+    """The largest difference of each quantity over its largest value; for positions, the distance of the
+    nearest images."""
     off = {name: np.abs(a[name] - b[name]) for name in FIELDS}
     off["position"] = np.minimum(off["position"], SIDE - off["position"])
     return {name: float(off[name].max() / (np.abs(b[name]).max() or 1.0)) for name in FIELDS}
@@ -137,7 +138,7 @@ def stresses(made: Scene, steps: int) -> np.ndarray:
 
 
 def mean(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pressure and shear stress of the last rows, Pa, and the errors of these means."""
+    """Pressure and shear stress averaged over the last rows, Pa, and the errors of these means."""
     last = rows[-int(len(rows) * MEASURED / (BEFORE + MEASURED)) :]
     values = np.column_stack([last[:, :3].mean(axis=1), -last[:, 3]])
     parts = np.array([part.mean(axis=0) for part in np.array_split(values, PARTS)])

@@ -1,12 +1,12 @@
-"""What becomes of grains that hit one grain in the same instant, resolved one after another.
+"""The outcome of impacts on one grain in the same instant, which are resolved one after another.
 
 python tests/benchmarks/simultaneous_impacts.py
 
-Equal grains close in on one in the middle, which symmetry would keep at rest. For each arrangement, and each
-restitution of the first impact: the speed of the middle grain, and the sum of all velocities, over that of
-approach; the part of the energy that is left, and e^2, which would be left if all impulses acted at once; how
-far velocities are from those where each grain comes 1e-12 s after another. (Six around one touch each other:
-there are more orders.)
+Equal grains close in on one in the middle, which would stay at rest by symmetry. For each arrangement, and
+each restitution of the first impact, the table has: the speed of the middle grain and the sum of all
+velocities, over the approach speed; the remaining part of the energy, and e^2, which would remain if all
+impulses acted at once; and the largest difference to the velocities if each grain arrives 1e-12 s after
+another. (Six grains around one touch each other, so several orders are possible.)
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ SPEED, RADIUS, DENSITY, DT = 2.0, 1e-3, 2000.0, 1e-9
 
 
 def ring(number, restitution, delay=0.0):
-    """Grains around one that they just touch; each is later than the one before by ``delay`` (s)."""
+    """Grains around one that they just touch; they arrive at intervals of ``delay`` (s), last one first."""
     from tests.scenes import scene
     from tisim.effects import Impact
 
     angle = 2 * np.pi * np.arange(number) / number
     out = np.stack([np.cos(angle), np.sin(angle), np.zeros(number)], axis=1)
-    # The last is the first, as it is where pairs are due in the same instant.
+    # The last grain arrives first, as pairs due in the same instant are resolved in that order.
     late = delay * np.arange(number)[::-1, None]
     place = 2 * RADIUS * (1 - 1e-7) * out + SPEED * late * out
-    # Z04 (4.14): e = 1 - v / v*, half of the approach over the speed at which two equal grains bond.
+    # Z04 (4.14): e = 1 - v / v*. v is half of the approach speed, v* the speed at which two equal grains
+    # bond.
     critical = SPEED / 2 / max(1 - restitution, 1e-12)
     hardness = critical**2 * 2 * DENSITY / 3
     return scene(
@@ -46,7 +47,7 @@ def ring(number, restitution, delay=0.0):
 
 
 def outcome(scenes):
-    """Velocities at the end over the speed of approach, by id. Shape (scenes, grains, 3)."""
+    """Final velocities over the approach speed, by id. Shape (scenes, grains, 3)."""
     from tests.scenes import by_id, simulate
 
     results = simulate(scenes, worlds=len(scenes), capacity=8)

@@ -1,11 +1,11 @@
-"""Time of a step of grains of two sizes, by the ratio of their radii, lists that are made anew included.
+"""Time of a step of grains of two sizes, by the ratio of their radii, including rebuilds of neighbour lists.
 
     python tests/benchmarks/size_ratio.py [--number 40000] [--ratios 1 5 10 20] [--threads 1] [--steps 200]
 
-Small grains and large ones, each with half of the volume, are placed at random in a periodic box, of which
-they fill 0.3, and fly about under Hertz and Mindlin. Printed are the time of a particle and step, that
-relative to equal grains, and how many pairs are listed for each grain. Ratios take turns; medians, with the
-least and the largest.
+Small and large grains, each with half of the volume, are placed at random in a periodic box at a volume
+fraction of 0.3, and move under Hertz and Mindlin. Printed are the time per particle and step, its ratio to
+the time of equal grains, and the number of listed pairs per grain. Ratios take turns; values are medians,
+with the smallest and the largest.
 """
 
 from __future__ import annotations
@@ -27,17 +27,18 @@ from tisim.packing import RandomInDomain
 from tisim.steppers import FixedStep, Verlet
 
 FRACTION, SPEED, STEP, DENSITY = 0.3, 10.0, 1e-4, 2.0
-"""Part of the box that is filled, m/s of small grains, s, kg/m3."""
+"""Volume fraction; speed of small grains, m/s; s; kg/m3."""
 
 
 def scene(number: int, ratio: float) -> tisim.Scene:
-    """``number`` small grains of radius 0.5 m, and as many of ``ratio`` times that as have their volume."""
+    """``number`` small grains of radius 0.5 m, and large ones of ``ratio`` times that radius with the same
+    total volume."""
     large = round(number / ratio**3) if ratio > 1 else 0
     radius = np.repeat([0.5, 0.5 * ratio], [number, large])
     side = (4 / 3 * np.pi * (radius**3).sum() / FRACTION) ** (1 / 3)
     box = tisim.Box(low=(0, 0, 0), high=(side,) * 3)
     draw = np.random.Generator(np.random.Philox(7))
-    # All have the same energy in the mean.
+    # All grains have the same mean energy.
     velocity = SPEED * draw.normal(size=(len(radius), 3)) * (0.5 / radius[:, None]) ** 1.5
     return tisim.Scene(
         particles=tisim.Particles(
@@ -69,7 +70,7 @@ def main() -> None:
         made = scene(options.number, ratio)
         simulation = tisim.Simulation(made)
         simulation.load(made)
-        # So that lists have grown as far as they will.
+        # Lists reach their final size before the time is taken.
         simulation.run(steps=options.steps)
         simulations.append(simulation)
         times.append([])

@@ -1,10 +1,11 @@
-"""CPU time of whole runs with a given skin of lists over that with the skin that is chosen: grains that slide
-down a slope (case avalanche, without a field), and dipoles in a sheared cell (case mrf_shear, size small).
+"""CPU time of whole runs with a given neighbour-list skin, over the time with the automatic one: grains that
+slide down a slope (case avalanche, without a field), and dipoles in a sheared cell (case mrf_shear, size
+small).
 
     python tests/benchmarks/skin.py [--skins 0.05 0.1 0.2 0.4] [--repeats 5]
 
 Skins are in diameters of the largest grain. Runs of all skins take turns, on one thread; ratios are medians
-over turns, with the least and the largest. TISIM_BACKEND names the kernel compiler.
+over turns, with the smallest and the largest. TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse
@@ -29,7 +30,7 @@ SCENES = {
 
 
 def compare(scene: Scene, skins: list[float], repeats: int) -> None:
-    """Print a row for each skin; the first is the one that is chosen."""
+    """Print a row for each skin; the first is the automatic one."""
     with closing(Simulation(scene)) as simulation:
         diameter = 2 * float(scene.start()["radius"].max())
         made = {None: scene} | {skin: scene.replace({"skin": skin * diameter}) for skin in skins}

@@ -1,15 +1,15 @@
-"""Piles that are spun up beside LAMMPS, from the same random starts in both.
+"""Piles that are spun up beside LAMMPS, from the same random starts (seeds) in both.
 
     python -m pip install ".[bench]"
     python tests/benchmarks/spin_up_lammps.py [--starts 10] [--first 0]
 
-It is the case spin_up without magnetisation: 80 grains fall together, and their pile is turned faster in
-steps until it breaks, under the laws and the gravity of coalescence_lammps.py. In LAMMPS, too, ``turn`` of
-the case gives a pile its next angular velocity. Paths of grains are chaotic, so the programs are compared by
-means over starts. Printed are both means, the mean of the differences, with half of their 95 % intervals, and
-the largest difference; and the time for a particle and step of both programs, on one thread each, without
-compiling: of a batch of all starts, and of LAMMPS for one after another, with what each of its ten runs sets
-up.
+This is the case spin_up without magnetisation: 80 grains collapse, and their pile is spun up in steps until
+it breaks, under the laws and the gravity of coalescence_lammps.py. In LAMMPS too, ``turn`` of the case sets
+the next angular velocity of a pile. Grain trajectories are chaotic, so means over starts are compared.
+Printed are both means and the mean difference, with the half widths of their 95 % intervals; the largest
+difference; and the time per particle and step of both programs, on one thread each, without compilation: for
+tisim of a batch of all starts, for LAMMPS of one start after another, including the setup of each of its ten
+runs.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from tisim.cases.spin_up.stages import RATES, SpinStep, SpinUp, stage_ends, turn
 from tisim.effects import SelfGravity  # noqa: E402
 
 SPINS = (0.0, *RATES)
-"""The angular velocities that a pile is given, rad/s; 0 while it settles."""
+"""The successive angular velocities of a pile, rad/s; 0 while it settles."""
 MATERIAL = cloud.rubble(cloud.scale_of(DEFAULT["number"], NUMBERS[DIAMETERS[1]]), DEFAULT["softened"])
 LAW = TwinLaw((MATERIAL.model_dump(exclude_none=True),), rolling="rolling_sds")
 
@@ -54,7 +54,7 @@ def scenes(seeds: Sequence[int]) -> list[Scene]:
 
 
 def step_ends(dt: float) -> list[int]:
-    """After how many steps of dt (s) each spin has been held."""
+    """The number of steps of dt (s) after which each spin ends."""
     return [round(end / dt) for end in (SETTLED, *stage_ends(SETTLED))]
 
 
@@ -64,7 +64,7 @@ def particle_steps(made: Sequence[Scene]) -> float:
 
 
 def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
-    """The states of each start at the end of each spin, and the time for a particle and step, s."""
+    """The states of each start at the end of each spin, and the time per particle and step, s."""
     simulation = Simulation(made[0], len(made))
     simulation.load(list(made))
     found: list[list[State]] = [[] for _ in made]
@@ -83,13 +83,13 @@ def by_package(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
 
 
 def by_lammps(made: Sequence[Scene]) -> tuple[list[list[State]], float]:
-    """The same in LAMMPS, in a process of its own."""
+    """The same in LAMMPS, in a separate process."""
     states, lasted = coalescence_lammps.apart(__file__, made, law=lammps_model(LAW))
     return states, lasted / particle_steps(made)
 
 
 def spin_up(machine: Any, start: State, at: State) -> tuple[list[State], float]:
-    """Let a pile of LAMMPS settle and turn it; see ``coalescence_lammps.run_each``."""
+    """Let a pile of LAMMPS settle and spin it up; see ``coalescence_lammps.run_each``."""
     looks: list[State] = []
     lasted, done = 0.0, 0
     for spin, end in zip(SPINS, step_ends(float(at["dt"])), strict=True):
@@ -100,7 +100,7 @@ def spin_up(machine: Any, start: State, at: State) -> tuple[list[State], float]:
                 numbers = np.ascontiguousarray(pile[name]).ravel()
                 machine.scatter_atoms(FIELDS[name], 1, 3, np.ctypeslib.as_ctypes(numbers))
         began = time.perf_counter()
-        # With forces at the beginning, as velocities are others.
+        # Initial forces are computed again, because velocities have changed.
         machine.command(f"run {end - done} post no")
         lasted += time.perf_counter() - began
         done = end
@@ -114,7 +114,7 @@ def worker(folder: Path) -> None:
 
 
 def statistics(states: list[State]) -> dict[str, float]:
-    """What is compared of one pile."""
+    """The compared statistics of one pile."""
     steps = [SpinStep(spin, state) for spin, state in zip(SPINS, states, strict=True)]
     pile = SpinUp(0.0, 0, steps)
     return {

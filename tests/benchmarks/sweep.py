@@ -1,11 +1,11 @@
-"""A sweep as one batch; one run after the other; and so in two processes side by side, half of it in each.
+"""A sweep as one batch; one run after another; and half of it in each of two processes side by side.
 
     python tests/benchmarks/sweep.py vibration       # the eight frequencies of Z13 Fig. 3, 343 particles
     python tests/benchmarks/sweep.py capture         # 13 angles of a cylinder, 30 starts each (B16 6.3)
     python tests/benchmarks/sweep.py agglomeration   # Z04's six designs, 8 starts of 100 grains each
 
-Every way compiles once, before the clock starts; they alternate, and ratios are medians over turns. Each of
-the two processes has one thread. TISIM_BACKEND names the kernel compiler.
+Each of the three compiles once, before the clock starts; they alternate, and ratios are medians over turns.
+Each of the two processes has one thread. TISIM_BACKEND names the kernel compiler.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def timed(simulation: Simulation, scenes: list[Scene]) -> tuple[np.ndarray, list
 
 
 def worker(case: str, first: int, pipe: Connection) -> None:
-    """Take every second run of a sweep, one after the other, as often as asked to."""
+    """Run every second scene of a sweep, one after another, each time it is asked to."""
     runtime.init(threads=1)
     scenes = SWEEPS[case]()[first::PROCESSES]
     single = Simulation(scenes[0], 1)
@@ -68,7 +68,7 @@ def worker(case: str, first: int, pipe: Connection) -> None:
 
 
 def through(pipes: list[Connection]) -> float:
-    """Wall seconds in which all processes go through their runs once, side by side."""
+    """Wall seconds in which all processes finish their runs once, side by side."""
     began = time.perf_counter()
     for pipe in pipes:
         pipe.send(True)
@@ -85,7 +85,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)
     args = parser.parse_args()
-    # Before Taichi has threads, which a copy of this process would lack.
+    # The fork comes before Taichi has threads, which a copy of this process would lack.
     start = multiprocessing.get_context("spawn")
     pipes, processes = [], []
     for k in range(PROCESSES):

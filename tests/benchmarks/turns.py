@@ -1,4 +1,4 @@
-"""How programs that are timed side by side take turns."""
+"""Turns of programs that are timed side by side."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from collections.abc import Iterable
 import numpy as np
 
 REST = 0.05
-"""Threads of GNU's OpenMP, which numba and LAMMPS have, look for more work for some ms, s."""
+"""Seconds. Idle threads of GNU's OpenMP, which numba and LAMMPS use, keep polling for work for some ms."""
 
 
 def rest() -> None:
-    """Wait until the threads of the program that had its turn have gone to sleep: teams of tisim's threads
-    part where others want the cores."""
+    """Wait until the threads of the program before have gone to sleep: while other threads want the cores,
+    tisim's threads do not work as a team."""
     time.sleep(REST)
 
 
 def spread(values: Iterable[float]) -> str:
-    """Return median, and least and greatest."""
+    """Return median, smallest and largest."""
     values = list(values)
     return f"{np.median(values):.3g} ({min(values):.3g} .. {max(values):.3g})"

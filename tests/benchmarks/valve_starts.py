@@ -1,10 +1,11 @@
-"""What a field leaves of the flow of the narrow valve, from other random starts than those of its check.
+"""The remaining flow of the narrow valve in a field, from other random starts (seeds) than its check uses.
 
     python tests/benchmarks/valve_starts.py [--first 100] [--starts 12]
 
-Printed are what is left of the flow before the field, with it and without it, and what flows in it over what
-flows without it from the same start, as late: means with half of their 95 % intervals, and in how many starts
-that is less than a twentieth. Some minutes.
+Printed are the flow over the flow before the field, with the field and without it; and the flow in the field
+over the flow without it, from the same start and at the same time: means with the half widths of their 95 %
+intervals. The number of starts in which the last ratio is below a twentieth is also printed. Takes some
+minutes.
 """
 
 import argparse

@@ -2,13 +2,13 @@
 
     python tests/benchmarks/vibration_precision.py [--repeats 5] [--threads 2] [--out out/vibration_precision]
 
-343 particles, the printed parameters, 0.005 s, Omega = 0.8 w (Z13 section 4; beyond some 0.01 s single paths
-are chaotic). Peers: DOP853 and RK45 of scipy.integrate.solve_ivp, on a right-hand side of vectorised NumPy,
-and on ones compiled by numba with all freedom to vectorise, on one thread and on all. Error: root of the mean
-square distance of particles from those of a reference, over that of their displacements. The reference is
-DOP853 at rtol 1e-13; our own at 1e-12 says how good it is. Time: the median of runs that alternate, without
-compilation. Prints a table, and for every decade of error the fastest of each; writes work_precision.png and
-work_precision.csv.
+343 particles, the published parameters, 0.005 s, Omega = 0.8 w (Z13 section 4; beyond some 0.01 s single
+trajectories are chaotic). Peers: DOP853 and RK45 of scipy.integrate.solve_ivp, with a right-hand side in
+vectorised NumPy, and with ones compiled by numba with all freedom to vectorise, on one thread and on all.
+Error: root mean square distance of particles from the reference, over the root mean square displacement. The
+reference is DOP853 at rtol 1e-13; the run of tisim at 1e-12 indicates its accuracy. Time: the median of runs
+that alternate, without compilation. Prints a table, and for every decade of error the fastest method of each
+kind; writes work_precision.png and work_precision.csv.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# Small parallel loops get slow where tbb is installed and numba prefers it.
+# Small parallel loops get slow if tbb is installed and numba prefers it.
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -40,7 +40,7 @@ OMEGA = RATIO * vibration.CYCLOTRON
 COLOURS = ("#bbbbbb", "#ee8866", "#cc6677", "#777777", "#ddaa33", "#aa4499", "#88ccee", "#4477aa", "#117733",
            "#332288", "#000000")  # fmt: skip
 SLOW = 0.4
-"""Wall seconds above which a setting is run once."""
+"""Settings that take longer than this (wall seconds) are run once."""
 DECADES = range(3, 9)
 """Errors of 1e-3 to 1e-8."""
 
@@ -65,7 +65,7 @@ def in_numba(x):
         for j in range(n):
             dx, dy, dz = xi - x[0, j], yi - x[1, j], zi - x[2, j]
             square = dx * dx + dy * dy + dz * dz
-            square += 1.0 if square == 0.0 else 0.0  # of the particle to itself
+            square += 1.0 if square == 0.0 else 0.0  # of the particle with itself
             push = (repulsion / np.sqrt(square) - attraction) / square
             fx, fy, fz = fx + push * dx, fy + push * dy, fz + push * dz
         out[0, i], out[1, i], out[2, i] = fx, fy, fz
@@ -94,7 +94,7 @@ def rates(near: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> Callab
 
 @dataclass
 class Point:
-    """One setting of one method, and what it found."""
+    """One setting of one method, and its result."""
 
     method: str
     setting: str
@@ -110,7 +110,7 @@ class Point:
         self.error = distance(positions, truth) / distance(truth, start)
 
     def median(self) -> float:
-        """Of the wall seconds."""
+        """Median of the wall seconds."""
         return float(np.median(self.seconds))
 
 
@@ -120,7 +120,7 @@ def distance(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def scipy_point(method: str, near: Callable, name: str, start: np.ndarray, rtol: float) -> Point:
-    """A run of solve_ivp; atol is that part of a micrometre-sized displacement."""
+    """A run of solve_ivp; atol is rtol times a micrometre-sized displacement."""
     y, evaluate = np.concatenate([start.ravel(), np.zeros(start.size)]), rates(near, start)
 
     def run() -> tuple[np.ndarray, int, float]:
@@ -175,7 +175,7 @@ def points(start: np.ndarray) -> list[Point]:
 
 
 def fastest(results: list[Point], ours: bool, error: float) -> Point | None:
-    """The fastest with at most this error, among ours or the others."""
+    """The fastest with at most this error, in tisim or in the others."""
     good = [p for p in results if (", n" in p.method.lower()) != ours and p.error <= error]
     return min(good, key=Point.median, default=None)
 
@@ -222,7 +222,7 @@ def main() -> None:
     results = points(start)
     for _ in range(options.repeats + 1):
         for point in results:
-            # What is many times slower need not be known to the last digit.
+            # A much slower setting need not be timed to the last digit.
             if not point.seconds or min(point.seconds) < SLOW:
                 point.measure(truth, start)
     for point in results:

@@ -1,4 +1,4 @@
-"""The command line in a fresh folder, with a scene file to try it on."""
+"""The command line in a fresh folder, with a scene file."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ from tisim.steppers import FixedStep, Verlet
 
 @pytest.fixture
 def tisim(tmp_path, monkeypatch, capsys):
-    """Runs a command in a fresh folder: (exit code, standard output, standard error)."""
+    """Run a command in a fresh folder; returns (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
 
     def command(*arguments):
@@ -27,7 +27,7 @@ def tisim(tmp_path, monkeypatch, capsys):
 
 @pytest.fixture
 def toml(tmp_path):
-    """A scene file that is quick to compile and run, in several looks at progress."""
+    """A scene file that compiles and runs quickly, with several progress checks."""
     scene = Scene(
         particles=Cloud(number=80, radius=4e-4, density=3000.0, deviation=(60.0, 60.0, 60.0)),
         domain=Box(low=(-5e-3,) * 3, high=(5e-3,) * 3),
@@ -40,7 +40,7 @@ def toml(tmp_path):
 
 @pytest.fixture
 def impacts(tmp_path, toml):
-    """The same with an effect, for what goes wrong before anything is compiled."""
+    """The same with an effect, for errors that occur before anything is compiled."""
     scene = Scene.from_toml(toml).model_copy(update={"effects": (Impact(hardness=2e5),)})
     (tmp_path / toml).write_text(scene.to_toml())
     return toml
@@ -48,7 +48,7 @@ def impacts(tmp_path, toml):
 
 @pytest.fixture
 def press_ctrl_c():
-    """Press Ctrl-C, or send another signal, when progress is looked at for the ``after``-th time."""
+    """Press Ctrl-C, or send another signal, at the ``after``-th progress check."""
 
     def press(monkeypatch, after, times=1, number=signal.SIGINT):
         looked = []

@@ -1,7 +1,7 @@
-"""The surroundings that tisim is tried in: how each is set, and what is to come out.
+"""Environments in which tisim is tested: how each is set up, and the expected outcome.
 
 A script is run by bash in a fresh folder with ``tiny.toml``, ``law.py`` and the scripts below. $TISIM is the
-command, $RUN runs tiny.toml into ``out``, $PYTHON is Python, $SITE what PYTHONPATH is.
+command, $RUN runs tiny.toml into ``out``, $PYTHON is Python, $SITE the value of PYTHONPATH.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ def child(leave):
     os.kill(number, 9)
     return "hung"
 """
-"""What scripts in Python have in common: a run, which ends at 0.02 m, and processes that are forked."""
+"""The common part of Python scripts: a run, which ends at 0.02 m, and forked processes."""
 
 
 @dataclass(frozen=True)
 class Environment:
     """An environment.
 
-    script : for bash. code : its exit code. result : whether out/result.h5 must be that of a plain run, to
-    the bit, or must not be there (None where it does not matter). says, prints : patterns to be found in
-    standard error and output; where ``says`` is None, standard error has nothing but the bar of progress.
-    quick : whether it is tried each time.
+    script : for bash. code : its exit code. result : True if out/result.h5 must equal the result of a plain
+    run bit for bit, False if it must be absent, None for no check. says, prints : patterns to be found in
+    standard error and output; if ``says`` is None, standard error must have only the progress bar. quick :
+    whether the environment is part of the quick tests.
     """
 
     room: str
@@ -76,7 +76,7 @@ class Environment:
 
 
 def python(text: str, how: str = "$PYTHON script.py") -> str:
-    """A script for bash that runs a script in Python."""
+    """A bash script that runs a Python script."""
     return f"cat > script.py <<'END'\n{WORK}\nif __name__ == '__main__':\n    {text}\nEND\n{how}"
 
 
@@ -118,7 +118,7 @@ FOLDERS = (
      {"code": 2, "result": False, "says": "^output folder must be writable"}),
     ("output folder cannot be made", "$TISIM run tiny.toml --out /proc/x",
      {"code": 2, "result": False, "says": "^output folder must be writable; received '/proc/x'"}),
-    # Who may write everywhere, such as root, has no such folder.
+    # A user who may write everywhere, such as root, has no such folder.
     ("output folder read-only", "mkdir out; chmod a-w out; $RUN; [ $? = 2 -o -w out ] && chmod u+w out && "
      "{ [ -e out/result.h5 ] || $RUN; }", {"says": ""}),
     ("output folder removed while it runs", python(
@@ -287,7 +287,7 @@ def _rows(room: str, rows: tuple[tuple, ...]) -> list[Environment]:
 
 
 def _python_rows() -> list[Environment]:
-    """Scripts in Python print the place where the run ends, and leave nothing in ``out``."""
+    """Python scripts print the position at the end of the run, and leave nothing in ``out``."""
     made = []
     for name, text, *more in PYTHONS:
         stands_in = text.startswith("$PYTHON")

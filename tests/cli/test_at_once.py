@@ -1,4 +1,4 @@
-"""Two commands into one folder at once: the second is refused, whatever it was to do there."""
+"""Two commands with the same folder at once: the second is refused, for every command."""
 
 import os
 import subprocess
@@ -23,7 +23,7 @@ def save(*arguments, save=checkpoint.save):
 checkpoint.save = save
 main()
 """
-"""A run that stands still once it has stored something, and holds what it holds."""
+"""A run that stops itself after it has saved a checkpoint, and keeps its locks."""
 REFUSED = (
     "output folder must be without a command that is still at work there; "
     "received {!r}, where another process is running\n"
@@ -32,7 +32,7 @@ REFUSED = (
 
 @pytest.fixture
 def under_way(toml, tmp_path):
-    """A run into the folder ``out`` in another process, which has stored a checkpoint and stands still."""
+    """A run into the folder ``out`` in another process, which has stopped after a checkpoint."""
     process = subprocess.Popen(
         [sys.executable, "-c", STOPPED, "run", toml, "--out", "out", "--frames", "3"],
         cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -53,7 +53,7 @@ def content(folder):
 
 
 @pytest.mark.long
-def test_a_run_is_alone_in_its_folder_until_it_is_gone(tisim, toml, tmp_path, under_way):
+def test_a_run_locks_its_folder_until_it_ends(tisim, toml, tmp_path, under_way):
     before = content(tmp_path / "out")
     assert set(before) == {".tisim", ".tisim.lock", "checkpoint.h5", "trajectory.h5"}
     for more in ((), ("--overwrite",), ("--fresh",), ("--resume", "--frames", "3")):
@@ -69,7 +69,7 @@ def test_a_run_is_alone_in_its_folder_until_it_is_gone(tisim, toml, tmp_path, un
 
 @pytest.fixture
 def at_work(tmp_path):
-    """A folder in which another process is at work."""
+    """A folder in which another process is running."""
     (tmp_path / "out").mkdir()
     with lock.acquire(tmp_path / "out"):
         yield "out"

@@ -1,4 +1,4 @@
-"""tisim optimize granular_bench --variant calibrate --measured FILE.csv, of a small silo and few designs."""
+"""tisim optimize granular_bench --variant calibrate --measured FILE.csv, for a small silo and few designs."""
 
 import csv
 
@@ -20,9 +20,9 @@ def table(path):
 
 
 @pytest.mark.slow
-def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim, tmp_path, monkeypatch):
-    """The misfit of the best design is that of its run from the numbers in the file, in their uncertainties;
-    other numbers are not taken for these."""
+def test_calibration_to_a_file_of_measurements(tisim, tmp_path, monkeypatch):
+    """The misfit of the best design follows from its run, and the values and uncertainties in the file. A
+    file with other values does not continue this search."""
     one_start = {"min_starts": 1, "block": 1, "max_starts": 1, "select": 0, "confirm": 0}
     settings = {**draw_down.SEARCH_SETTINGS, "ensemble": one_start}
     monkeypatch.setitem(draw_down.SIZES, "default", Size("a small draw-down test", SMALL, settings))
@@ -47,18 +47,19 @@ def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim
     best = dict(zip(heading, best, strict=True))
     misfit = sum(one**2 for one in off) / len(off)
     assert float(best["misfit"]) == pytest.approx(misfit, rel=1e-3)
-    # What the single grain on the plate tells is its restitution.
+    # The grain that bounces on the plate determines the restitution.
     assert float(run["rebound_ratio"]) ** 0.5 == pytest.approx(float(best["restitution"]), abs=0.01)
     met = (tmp_path / "found/met.csv").read_text().splitlines()
     assert met[0] == "friction,rolling_friction,restitution,misfit"
     assert (len(met) > 1) == (misfit <= 1)
     assert "designs have misfit of at most 1" in " ".join(out.split())
-    # A quadratic form of three genes has ten coefficients; a search of so few designs does not tell it.
+    # A quadratic form of three genes has ten coefficients; a search of so few designs does not determine
+    # them.
     assert "more are needed" in " ".join(out.split())
     assert (tmp_path / "found/calibration.csv").read_text().startswith("gene,unit,estimate,95 % low")
     for name, low, high in (("friction", 0.05, 1), ("rolling_friction", 0, 0.4), ("restitution", 0.2, 0.9)):
         assert low <= float(best[name]) <= high
-    # What was found for these is not given for others.
+    # The designs found for these measurements are not reported for others.
     mine.write_text("quantity,value,uncertainty\ndischarge_rate,0.05,0.0125\n")
     code, _, err = tisim(*SEARCH)
     assert code == 2

@@ -1,4 +1,4 @@
-"""The commands that tell something: cases, explain, check, doctor."""
+"""Commands that print information: cases, explain, check, doctor."""
 
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Check
@@ -21,7 +21,7 @@ def test_cases_explain_and_version(tisim):
     assert tisim("--version")[1].startswith("tisim 0.")
 
 
-def test_check_tells_right_from_wrong(tisim, monkeypatch):
+def test_check_detects_failures(tisim, monkeypatch):
     checks = [
         Check("one", 1.0, 1.0, 0.0),
         Check("two", 2.1, 2.0, 0.01),
@@ -38,7 +38,8 @@ def test_check_tells_right_from_wrong(tisim, monkeypatch):
 
 
 def doctor(tisim, monkeypatch, taichi, quadrants):
-    """What ``tisim doctor`` prints where steps take so many ms with each backend; none where it is absent."""
+    """The output of ``tisim doctor`` for given step times in ms with each backend; an empty time means that
+    the backend is absent."""
     times = {"taichi": taichi, "quadrants": quadrants}
     there = [name for name, measured in times.items() if measured]
     monkeypatch.setattr("tisim.backend.choice.installed", lambda: there)

@@ -1,4 +1,4 @@
-"""tisim cost: what it writes and answers, how it is stopped and goes on, and what it refuses."""
+"""tisim cost: its files and answers, its interruption and continuation, and its errors."""
 
 import csv
 import os
@@ -48,8 +48,9 @@ def test_wrong_input_is_reported_and_nothing_written(tisim, tmp_path, arguments,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_case_has_a_size_of_its_own_for_costs(tisim, tmp_path, monkeypatch):
-    """granular_bench is measured in a bed, unless another size is given; others as they are run."""
+def test_cases_have_default_sizes_for_cost_studies(tisim, tmp_path, monkeypatch):
+    """granular_bench is measured in a bed, unless another size is given; other cases at their
+    default size."""
     asked = []
 
     def note(target, size, *others):
@@ -91,7 +92,7 @@ def rows(folder):
 
 
 @pytest.mark.long
-def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, monkeypatch):
+def test_cost_answers_and_stores_its_measurements(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--no-fast", "--quick", "--error")
     with monkeypatch.context() as patch:
         patch.setattr(reference, "LARGEST_REFERENCE_ERROR", 1e-12)
@@ -101,7 +102,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, mon
         assert "dt=" not in err
         code, out, err = tisim(*command, "1e-3", "--anyway")
     assert code == 0
-    # Nothing is said at the end only: where the error is from, and what is wrong with it, comes first.
+    # The source of the error, and problems with it, are printed first, not only at the end.
     truth, advice, *measured = [
         line for line in err.splitlines() if not line.startswith(("running", "going"))
     ]
@@ -150,8 +151,8 @@ GIVEN = [
 
 
 @pytest.mark.parametrize("words", GIVEN, ids=lambda words: " ".join(words[1::2]) or "nothing")
-def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, monkeypatch, own_file, words):
-    """Whatever was given to tisim cost, and whatever the setting is: stepper, tolerance, law, precision or
+def test_printed_commands_run_the_measured_scene(tmp_path, monkeypatch, own_file, words):
+    """For all arguments of tisim cost, and for every kind of setting: stepper, tolerance, law, precision or
     arithmetic."""
     monkeypatch.chdir(tmp_path)
     own_file("own_laws.py", LAW)
@@ -174,8 +175,8 @@ def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, mon
 
 
 def parsed(command, *words):
-    """Of the words of a command the scene, precision and arithmetic, and what the parser makes of those of a
-    scene."""
+    """Parse a command; return its scene, its precision and arithmetic, and the parsed arguments that select
+    the scene."""
     parameters = get_command(app).commands[command].make_context(command, list(words)).params
     _, scene = scene_arguments.load_scene(
         parameters["target"],
@@ -190,7 +191,7 @@ def parsed(command, *words):
 
 
 @pytest.mark.long
-def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch):
+def test_ctrl_c_keeps_measurements(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--no-fast", "--repeats", "1", "--out", "cut")
     with monkeypatch.context() as patch:
         write, pressed = storage.write, []

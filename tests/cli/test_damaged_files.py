@@ -1,4 +1,4 @@
-"""Damaged files of every kind that a command reads: one line, exit code 2, and nothing else becomes of it."""
+"""Damaged files of every kind that commands read: one line, exit code 2, and no other effect."""
 
 import os
 import shutil
@@ -59,11 +59,12 @@ DAMAGE = {
     "link to nothing": replaced(lambda path: path.symlink_to("nowhere")),
 }
 RANDOM = 12
-"""More that are hurt at random, which may be read as they were."""
+"""Further files with random damage, which may still be readable."""
 
 
 def damages(path, whole):
-    """Damage the file in one way after another: yields what was done, and whether that must be told."""
+    """Damage the file in one way after another: yields the name of the damage, and whether it must be
+    reported."""
     rng = np.random.default_rng(3)
     random = {f"random {k}": lambda p: p.write_bytes(damage.with_mishap(whole, rng)) for k in range(RANDOM)}
     for name, hurt in (DAMAGE | random).items():
@@ -76,7 +77,7 @@ def damages(path, whole):
 
 
 def is_refusal(answer, must, what):
-    """Whether a command has refused; told in one line then, after its progress bar."""
+    """Whether a command has refused; the refusal must be one line, after the progress bar."""
     code, out, err = answer
     assert code == 2 if must else code in (0, 2), (what, answer)
     if code:
@@ -151,8 +152,8 @@ def test_cost(tisim, tmp_path, monkeypatch):
     ],
     ids=" ".join,
 )
-def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
-    # Drawing is slow; what is drawn is read all the same.
+def test_drawing_and_copying_commands(tisim, tmp_path, monkeypatch, command, name):
+    # Drawing is slow and is replaced; the files are still read.
     monkeypatch.setattr("tisim.plotting.movie.PillowWriter.grab_frame", lambda self, **more: None)
     monkeypatch.setattr("tisim.plotting.movie.PillowWriter.finish", lambda self: None)
     monkeypatch.setattr("tisim.plotting.time_series.start_and_end", lambda *arguments: empty(2.0, 2.0))
@@ -169,7 +170,7 @@ def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
 
 
 @pytest.mark.parametrize("name", [MARKER, lock.LOCK])
-def test_what_is_in_the_place_of_our_own(tisim, impacts, tmp_path, name):
+def test_obstacles_in_place_of_tisims_files(tisim, impacts, tmp_path, name):
     folder = tmp_path / "out"
     folder.mkdir()
     for make in (os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/zero")):

@@ -1,4 +1,4 @@
-"""``tisim effects``: the index, one of them, and what is none of them."""
+"""``tisim effects``: the index, a single effect, and unknown names."""
 
 import re
 import sys
@@ -69,7 +69,7 @@ def test_a_family_or_a_room_is_listed(tisim, group):
     assert group not in reference.names()
 
 
-def test_one_of_them_says_all_that_is_known_of_it(tisim):
+def test_an_entry_prints_its_whole_description(tisim):
     code, out, err = tisim("effects", "impact")
     assert (code, err) == (0, "")
     assert "tisim.effects.impact.impact.Impact" in out
@@ -82,7 +82,7 @@ def test_one_of_them_says_all_that_is_known_of_it(tisim):
     assert "needs: impact" in tisim("effects", "friction")[1]
 
 
-def test_one_of_a_plugin_is_listed_with_its_family(tisim, own_file):
+def test_plugin_effects_are_listed_in_their_family(tisim, own_file):
     own_file("own_laws.py", LAW)
     code, out, err = tisim("effects", "effects", "--plugin", "own_laws.py")
     assert (code, err) == (0, "")
@@ -90,7 +90,7 @@ def test_one_of_a_plugin_is_listed_with_its_family(tisim, own_file):
     assert "own_laws.Pull" in tisim("effects", "pull", "--plugin", "own_laws.py")[1]
 
 
-def test_an_unknown_one_is_wrong_input(tisim):
+def test_an_unknown_name_is_wrong_input(tisim):
     code, out, err = tisim("effects", "impcat")
     assert (code, out) == (2, "")
     assert err.startswith("effect must be one of ")

@@ -1,4 +1,4 @@
-"""tisim in the surroundings of environments.py: the data are there, words are few, and nothing aborts.
+"""tisim in the environments of environments.py: the data are written, messages are short, and nothing aborts.
 
     python -m pytest -n 0 -m slow tests/cli/test_environments.py
 
@@ -22,25 +22,26 @@ from tests.cli.environments import ENVIRONMENTS, SCENE
 from tests.own_files import PROBLEM
 
 TIMEOUT = 900.0
-"""No environment takes so long, s."""
+"""Time limit of an environment, s."""
 FAULTS = re.compile(
     r"Traceback|terminate called|Aborted|core dumped|Segmentation fault|Exception ignored|Assertion"
 )
 PROGRESS = re.compile(r"^\s*$|[━╸-]{5,}|^compiling|^.* steps to go")
-"""Lines of standard error that are of the bar of progress."""
+"""Lines of standard error that belong to the progress bar."""
 QUICK = [environment for environment in ENVIRONMENTS if environment.quick]
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """The end of the run where nothing is the matter."""
+    """The final state of a run in an ordinary environment."""
     path = tmp_path_factory.mktemp("plain") / "tiny.toml"
     path.write_text(SCENE)
     return tisim.run(tisim.Scene.from_toml(path)).state
 
 
 def outcome(environment, folder, plain):
-    """Run an environment in a folder; return what is wrong, nothing where all is well, and the exit code."""
+    """Run an environment in a folder; return a list of faults, which is empty if there is none, and the exit
+    code."""
     (folder / "tiny.toml").write_text(SCENE)
     (folder / "my_drift.py").write_text(PROBLEM)
     site = os.pathsep.join(str(Path(part).absolute()) for part in sys.path if part)
@@ -83,7 +84,7 @@ def _data_faults(environment, folder, plain):
 
 
 def needs(environment):
-    """Skip an environment that this machine cannot have."""
+    """Skip an environment that this machine cannot provide."""
     if "quadrants" in environment.script and importlib.util.find_spec("quadrants") is None:
         pytest.skip("Quadrants is not installed")
 
@@ -100,7 +101,7 @@ def test_environment(environment, tmp_path, plain):
 
 @pytest.mark.slow
 def test_every_environment(tmp_path, plain, capsys):
-    """One table: what is set, what comes out, and how long it takes."""
+    """One table: the environment, the outcome, and the time."""
     assert len(ENVIRONMENTS) >= 60
     assert len({(environment.room, environment.name) for environment in ENVIRONMENTS}) == len(ENVIRONMENTS)
     wrong = {}

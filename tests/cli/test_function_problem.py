@@ -1,4 +1,4 @@
-"""tisim optimize on a plain function in the user's file, with a gene kept at a value."""
+"""tisim optimize on a plain function in the user's file, with one gene fixed at a value."""
 
 import csv
 
@@ -47,7 +47,7 @@ def test_a_gene_is_kept_at_a_value(own_file, tmp_path, capsys):
     assert best(tmp_path / "b") == best(tmp_path / "a")
 
 
-def test_what_cannot_be_fixed_is_told(own_file, tmp_path, capsys):
+def test_invalid_fixed_genes_are_refused(own_file, tmp_path, capsys):
     file = own_file("own_function.py", TEXT)
     for assignment, message in (
         ("walls=flat", "gene to fix must be one of x, wall; received 'walls'"),

@@ -1,4 +1,4 @@
-"""Trajectories from the command line, and what shows them."""
+"""Trajectories from the command line, and the commands that show them."""
 
 from __future__ import annotations
 
@@ -67,10 +67,8 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
     [("export", "out", "--format", "xyz"), ("movie", "out", "--rate", 5), ("figures", "toy", "--out", "out")],
     ids=lambda words: words[0],
 )
-def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(
-    tisim, tmp_path, first, monkeypatch
-):
-    """A folder as version 0.1.0 left it, with pictures that have other names by now."""
+def test_pictures_of_a_version_without_markers_are_replaced(tisim, tmp_path, first, monkeypatch):
+    """A folder as version 0.1.0 left it, with pictures whose names have since changed."""
     monkeypatch.setattr("tisim.plotting.movie.movie", lambda *arguments: None)  # drawing is slow
     sizes = {"default": Size("", {})}
     parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
@@ -88,7 +86,7 @@ def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first
     ownership.check(folder, pictures)  # as tisim plot does
 
 
-def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
+def test_a_folder_without_data_to_draw_is_refused(tisim, tmp_path):
     (tmp_path / "out").mkdir()
     rule = "folder must be one with a trajectory.h5 or result.h5; received 'out', with"
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
@@ -128,10 +126,8 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
 
 
 @pytest.mark.slow
-def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
-    tisim, toml, tmp_path, monkeypatch
-):
-    """The system refuses to let files grow while the run goes on; then there is room again."""
+def test_a_full_disk_keeps_earlier_frames_and_a_checkpoint(tisim, toml, tmp_path, monkeypatch):
+    """The system refuses to let files grow during the run; later there is room again."""
     folder = tmp_path / "out" / "flow"
 
     def crowded(self, run=Simulation.run, **how):
@@ -166,7 +162,7 @@ def test_damaged_trajectories_are_refused_in_a_line(tisim, tmp_path, command):
     Trajectory(Recording(tmp_path / "trajectory.h5", frames=3), [STILL]).close()
     code, out, err = tisim(command, "trajectory.h5")
     assert (code, out) == (2, "")
-    assert "file must be one with" in err  # so many frames
+    assert "file must be one with" in err  # followed by the number of frames
     content = (tmp_path / "trajectory.h5").read_bytes()
     for hurt in (content[: len(content) // 2], content[:9] + bytes(512) + content[521:], bytes(len(content))):
         (tmp_path / "trajectory.h5").write_bytes(hurt)
@@ -231,7 +227,7 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
     assert names == {".tisim", "cloud.png", "time_series.png", "own.png"}
     assert counts == [4]
     code, out, _ = tisim("figures", "toy", "--size", "small")
-    # Numbers are written before a figure can fail.
+    # Tables are written before figures, because drawing a figure can fail.
     assert (code, out.split()) == (0, ["out/toy-figures/many.csv", "out/toy-figures/many.png"])
     assert (tmp_path / "out/toy-figures/many.csv").read_text() == "size\nsmall\n"
     (tmp_path / "out/toy-figures/notes.txt").write_text("the user's own")

@@ -1,4 +1,4 @@
-"""What tisim new writes runs, and so do the tests that it writes."""
+"""Files written by tisim new work, and their tests pass."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tisim.scene import plugins
 
 
 def run_tests(name):
-    """The tests beside a file that has been loaded."""
+    """Run the tests beside a file that has been loaded."""
     tests = [test for word, test in vars(plugins.load(f"test_{name}.py")).items() if word.startswith("test_")]
     assert tests
     for test in tests:
@@ -22,7 +22,7 @@ PARTS = {
     "source": (["source", "sheared_flow"], "0.0, 0.0, rate]", "0.0, rate, 0.0]"),
     "stepper": (["stepper", "own_euler"], "+= dt / s.mass", "+= 0.9 * dt / s.mass"),
 }
-"""Words of the command, and a slip in the law that it writes, for each template."""
+"""Arguments of the command, and an error put into the written law, for each template."""
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""tisim optimize and compare on a Python file of the user's; a case of the user's in all commands."""
+"""tisim optimize and compare on a user's Python file; a user's case in all commands."""
 
 import csv
 from pathlib import Path
@@ -16,7 +16,7 @@ def runs(path="s/search.h5"):
 
 
 @pytest.mark.long
-def test_a_problem_is_searched_and_gone_on_with(tisim, own_file):
+def test_a_search_of_a_problem_and_its_continuation(tisim, own_file):
     own_file("my_drift.py", PROBLEM)
     more = ["--set", "search.ensemble.block=2", "--population", "8", "--seed", "3"]
     code, out, err = tisim(*SEARCH, *more)
@@ -33,7 +33,7 @@ def test_a_problem_is_searched_and_gone_on_with(tisim, own_file):
 @pytest.mark.long
 @pytest.mark.slow
 def test_another_objective_in_the_file_is_another_search(tisim, own_file):
-    """Evaluations of the old one are not taken for those of the new one."""
+    """Evaluations of the old objective are not used for the new one."""
     own_file("my_drift.py", PROBLEM)
     begun = [*SEARCH, "--generations", "0"]
     assert tisim(*begun)[0] == 0
@@ -87,7 +87,7 @@ CASE = Case(
 """
 
 
-def test_what_is_only_shown_is_not_judged(tisim, own_file):
+def test_shown_values_are_not_checked(tisim, own_file):
     more = "Shown('three', 3.0, 'more')", "Check('one', 1.0, 2.0, 0.0)"
     wrong = CASE.replace("4.0, 0.0)", "\n    yield ".join(("4.0, 0.0)", *more)))
     own_file("my_case.py", PROBLEM + "from tisim.cases.statistics import Shown\n" + wrong)
@@ -123,7 +123,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_what_is_wrong_with_a_file_is_a_line(tisim, own_file, text):
+def test_an_invalid_file_gives_one_line(tisim, own_file, text):
     own_file("my_drift.py", text)
     code, out, err = tisim(*SEARCH)
     assert (code, out) == (2, "")

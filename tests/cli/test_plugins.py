@@ -1,4 +1,4 @@
-"""--plugin: an effect of the user's own in all commands that read scenes."""
+"""--plugin: a user's effect in all commands that read scenes."""
 
 import json
 import re
@@ -22,7 +22,7 @@ def pulled(toml, own_file):
 
 
 @pytest.mark.slow
-def test_a_run_is_stopped_gone_on_with_and_drawn(tisim, pulled, press_ctrl_c, monkeypatch, own_file):
+def test_a_run_is_stopped_continued_and_drawn(tisim, pulled, press_ctrl_c, monkeypatch, own_file):
     command = ["run", pulled, "--out", "o", "--frames", "4", *PLUGIN]
     with monkeypatch.context() as patch:
         press_ctrl_c(patch, after=1)
@@ -43,7 +43,7 @@ def test_a_run_is_stopped_gone_on_with_and_drawn(tisim, pulled, press_ctrl_c, mo
     assert "pull" in out
 
 
-def test_without_it_the_effect_is_not_known(tisim, pulled):
+def test_without_the_plugin_the_effect_is_unknown(tisim, pulled):
     code, _, err = tisim("run", pulled)
     assert code == 2
     assert "effects.pull.kind must be one of" in err
@@ -52,7 +52,7 @@ def test_without_it_the_effect_is_not_known(tisim, pulled):
 
 
 @pytest.mark.slow
-def test_a_search_runs_it_in_worker_processes(tisim, own_file):
+def test_a_search_runs_plugins_in_worker_processes(tisim, own_file):
     own_file("own_laws.py", LAW)
     text = PROBLEM.replace("duration=2e-3", "duration=2e-3,\n        effects=(Pull(strength=1e-9),)")
     own_file("my_drift.py", "from own_laws import Pull\n" + text)

@@ -1,4 +1,4 @@
-"""tisim run: what it writes, and how it is stopped, goes on and fails."""
+"""tisim run: its files, its interruption and continuation, and its failures."""
 
 import h5py
 import numpy as np
@@ -87,11 +87,11 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
 
 
 @pytest.mark.parametrize("stopped", [True, False], ids=["interrupted", "finished"])
-def test_nothing_of_a_run_is_left_beside_another_that_was_killed(
+def test_a_killed_run_leaves_nothing_of_an_earlier_run(
     tisim, toml, tmp_path, monkeypatch, press_ctrl_c, stopped
 ):
-    """The second, with --overwrite, ends before its first checkpoint; then the first is not gone on with, nor
-    taken for what the folder holds."""
+    """The second run, with --overwrite, is killed before its first checkpoint. Then the first run is not
+    continued, and is not read as the content of the folder."""
     command, folder = ("run", toml, "--frames", 4), tmp_path / "out" / "flow"
     with monkeypatch.context() as patch:
         if stopped:
@@ -122,7 +122,7 @@ def test_failed_run_says_where_and_keeps_the_last_good_state(tisim, toml, tmp_pa
     code, out, err = tisim("run", toml, *BEYOND_RANGE)
     assert code == 1
     assert "failed" in out
-    # It failed in its first steps: not all of it is done.
+    # The run failed in its first steps, so the progress bar does not reach the end.
     assert "100%" not in err
     assert "at t = " in err
     with h5py.File(tmp_path / "out/flow/result.h5") as file:
@@ -131,7 +131,7 @@ def test_failed_run_says_where_and_keeps_the_last_good_state(tisim, toml, tmp_pa
 
 
 @pytest.mark.slow
-def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim, impacts, tmp_path):
+def test_without_removes_an_effect_from_scene_and_kernels(tisim, impacts, tmp_path):
     assert tisim("run", impacts, "--without", "impact")[0] == 0
     assert Scene.from_toml(tmp_path / "out" / "flow" / "scene.toml").effects == ()
     with h5py.File(tmp_path / "out/flow/result.h5") as file:

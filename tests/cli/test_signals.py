@@ -1,4 +1,4 @@
-"""What asks a command to stop: Ctrl-C, SIGTERM, SIGHUP; and a terminal that is closed."""
+"""Requests to stop a command: Ctrl-C, SIGTERM, SIGHUP; and a closed terminal."""
 
 import contextlib
 import fcntl
@@ -20,7 +20,7 @@ ASKED = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 
 @pytest.fixture(autouse=True)
 def listener():
-    """Signals are heard here, also where the tests run in the background or under nohup."""
+    """Handle signals, even if the tests run in the background or under nohup."""
     before = {number: signal.signal(number, signal.default_int_handler) for number, _ in ASKED}
     yield
     for number, handler in before.items():
@@ -41,7 +41,7 @@ def test_signal_is_reported_at_once_and_raised_at_a_good_moment(number, code):
 
 
 def test_only_ctrl_c_forces():
-    """Whoever ends a session may send SIGTERM and SIGHUP, and each of them to a process and to its group."""
+    """At the end of a session SIGTERM and SIGHUP may both come, each to a process and to its group."""
     with Interrupt(lambda: None) as handler:
         for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGHUP):
             os.kill(os.getpid(), number)
@@ -52,7 +52,7 @@ def test_only_ctrl_c_forces():
 
 
 @pytest.mark.parametrize(("number", "code"), ASKED)
-def test_signal_that_is_ignored_stays_so(number, code):
+def test_an_ignored_signal_stays_ignored(number, code):
     """As SIGHUP under nohup."""
     signal.signal(number, signal.SIG_IGN)
     with interrupt.handle_signals(interrupt.raise_interrupt), Interrupt(lambda: None) as handler:
@@ -74,7 +74,7 @@ def test_run_saves_a_checkpoint(tisim, toml, tmp_path, monkeypatch, press_ctrl_c
 
 
 @pytest.mark.long
-def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c):
+def test_comparison_says_how_to_continue(tisim, tmp_path, monkeypatch, press_ctrl_c):
     monkeypatch.setattr("tisim.cases.case.every", lambda: {CASE.name: CASE})
     press_ctrl_c(monkeypatch, after=9, number=signal.SIGTERM)
     code, _, err = tisim("compare", "drift", "--methods", "random", "--out", "c")
@@ -84,14 +84,14 @@ def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c
 
 
 @pytest.mark.parametrize(("number", "code"), ASKED)
-def test_commands_that_keep_nothing_end_as_well(tisim, monkeypatch, number, code):
+def test_commands_without_files_end_properly_too(tisim, monkeypatch, number, code):
     monkeypatch.setattr(runtime, "init", lambda *settings: os.kill(os.getpid(), number))
     assert tisim("check", "vibration") == (code, "", "")
 
 
 @pytest.mark.slow
 def test_run_whose_terminal_is_closed_saves_a_checkpoint(toml, tmp_path):
-    """All that it prints then fails."""
+    """From then on every print fails."""
     scene = Scene.from_toml(tmp_path / toml).model_copy(update={"duration": 1e3})
     (tmp_path / toml).write_text(scene.to_toml())
     ours, theirs = os.openpty()

@@ -84,7 +84,7 @@ def test_unwritable_folder(tisim, toml):
     assert "output folder must be writable; received 'flow.toml/x'" in err
 
 
-def test_scene_files_that_are_none(tisim, impacts, tmp_path):
+def test_invalid_scene_files_are_refused(tisim, impacts, tmp_path):
     content = (tmp_path / impacts).read_text()
     for text, message in {
         content[: len(content) // 2] + "[": "scene file must be TOML",
@@ -101,7 +101,7 @@ def test_scene_files_that_are_none(tisim, impacts, tmp_path):
 
 
 @pytest.mark.parametrize("seconds", ["x", "nan", "-1", ""])
-def test_checkpoint_seconds_that_are_none(tisim, impacts, monkeypatch, seconds):
+def test_invalid_checkpoint_seconds_are_refused(tisim, impacts, monkeypatch, seconds):
     monkeypatch.setenv("TISIM_CHECKPOINT_SECONDS", seconds)
     code, out, err = tisim("run", impacts)
     said = f"TISIM_CHECKPOINT_SECONDS must be a number of seconds, at least 0; received {seconds!r}\n"
@@ -109,7 +109,7 @@ def test_checkpoint_seconds_that_are_none(tisim, impacts, monkeypatch, seconds):
 
 
 def number_options():
-    """(command, option) of all options that are numbers."""
+    """(command, option) for all numeric options."""
     for name, command in get_command(app).commands.items():
         types = get_type_hints(inspect.unwrap(command.callback))
         for option in command.params:
@@ -118,7 +118,7 @@ def number_options():
 
 
 @pytest.mark.parametrize(("command", "option"), list(number_options()))
-def test_a_word_for_a_number_is_refused_in_one_form(tisim, command, option):
+def test_a_word_for_a_number_is_refused(tisim, command, option):
     code, out, err = tisim(command, "FLOW", option, "many")
     assert (code, out) == (2, "")
     assert re.fullmatch(rf"{option} must be a (whole )?number.*; received 'many'\n", err)
@@ -127,8 +127,8 @@ def test_a_word_for_a_number_is_refused_in_one_form(tisim, command, option):
 @pytest.mark.parametrize(
     "words", [["-c", "from tisim.cli.main import main; main(['cases'])"], ["-m", "tisim", "cases"]]
 )
-def test_a_backend_that_is_none(words):
-    """Told in a line by the command, as importing the package has gone well."""
+def test_an_invalid_backend_is_refused(words):
+    """The command reports it in a line, because importing the package succeeds."""
     environment = {**os.environ, "TISIM_BACKEND": "os"}
     command = [sys.executable, *words]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -1,4 +1,5 @@
-"""Many impacts at once: resolved in parallel, as if one after another, the longest overdue first."""
+"""Many impacts at once: resolved in parallel, with the result of resolving them in order, longest overdue
+first."""
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ class Twin:
         self.impacts = self.merges = 0
 
     def due(self, i, j):
-        """Time since the surfaces met, overlap over approach speed; negative without an impact."""
+        """Time since the surfaces met, overlap over approach speed; negative if there is no impact."""
         gap = self.r[j] - self.r[i]
         distance = np.linalg.norm(gap)
         overlap = self.b[i] + self.b[j] - distance
@@ -85,7 +86,7 @@ class Twin:
 
 
 def jam(rng, hardness, grains=60, sizes=2.0):
-    """Grains thrown into a space too small for them: nearly all touch several others."""
+    """Grains in a space too small for them: nearly all touch several others."""
     radius = RADIUS * sizes ** rng.uniform(-1, 1, grains)
     return scene(
         rng.uniform(-4e-3, 4e-3, (grains, 3)),
@@ -106,8 +107,9 @@ def agree(result, expected, twin):
 
 
 @pytest.mark.parametrize("hardness", [1e8, 1e6, 1e5], ids=["rebound", "some bond", "most bond"])
-def test_many_impacts_are_those_of_resolving_the_list_one_by_one(rng, hardness):
-    """Eight jammed worlds, about a hundred simultaneous impacts in each, against the serial twin."""
+def test_many_impacts_equal_serial_resolution(rng, hardness):
+    """Eight jammed worlds, with about a hundred simultaneous impacts in each, against the serial
+    reference."""
     scenes = [jam(rng, hardness) for _ in range(8)]
     impacts = 0
     for result in run(scenes):
@@ -121,7 +123,7 @@ def test_many_impacts_are_those_of_resolving_the_list_one_by_one(rng, hardness):
 
 
 def test_the_order_of_impacts_matters_in_these_worlds(rng):
-    """So that the test above can fail: earliest first is not what latest first gives."""
+    """Makes sure that the test above can fail: reverse order gives a different result."""
     start = jam(rng, 1e8)
     (result,) = run([start])
     twin = Twin(result.start, 1e8)
@@ -132,7 +134,8 @@ def test_the_order_of_impacts_matters_in_these_worlds(rng):
 
 
 def test_grain_hit_by_twelve_at_once(rng):
-    """The twelve neighbours of a close packing close in together: as the twin, momentum to rounding."""
+    """The twelve neighbours in a close packing approach together: the result equals the reference, and
+    momentum is conserved to rounding."""
     around = np.array([[a, b, 0] for a in (-1, 1) for b in (-1, 1)])
     around = np.vstack([np.roll(around, k, axis=1) for k in range(3)]) / np.sqrt(2)
     scenes = []
@@ -149,8 +152,8 @@ def test_grain_hit_by_twelve_at_once(rng):
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=0, atol=1e-15 * scale)
 
 
-def test_twelve_that_bond_become_one():
-    """All twelve meet the grain in the middle and bond: one sphere of 13, at rest in the middle."""
+def test_twelve_bonding_grains_merge_into_one():
+    """All twelve hit the grain in the middle and bond: one sphere of 13 grains, at rest in the middle."""
     around = np.array([[a, b, 0] for a in (-1, 1) for b in (-1, 1)])
     around = np.vstack([np.roll(around, k, axis=1) for k in range(3)]) / np.sqrt(2)
     position = np.vstack([[[0, 0, 0]], 2 * RADIUS * (1 - 1e-6) * around])
@@ -166,14 +169,15 @@ def test_twelve_that_bond_become_one():
 
 
 def test_middle_grain_of_three_in_contact_from_both_sides():
-    """Both outer grains hit the middle one in the same instant: two binary impacts, momentum exact."""
+    """Both outer grains hit the middle one in the same instant: two binary impacts, exact momentum."""
     reach = 2 * RADIUS * (1 - 1e-7)
     start = scene(
         [[-reach, 0, 0], [0, 0, 0], [reach, 0, 0]], [[1.0, 0, 0], [0, 0, 0], [-1.0, 0, 0]], laws(1e9), dt=DT
     )
     for steps, impacts in ((1, 2), (4000, 3)):
         (result,) = run([start.replace({"duration": steps * DT})])
-        # In turn: the first hands its speed to the middle one, which then meets the other; and once more.
+        # One after another: the first gives its speed to the middle grain, which then hits the other; and
+        # once more.
         assert result.work["impacts"] == impacts
         np.testing.assert_allclose(momentum(result.state), 0, atol=1e-20)
     v = by_id(result)["velocity"][:, 0]
@@ -181,7 +185,7 @@ def test_middle_grain_of_three_in_contact_from_both_sides():
 
 
 def closing_in(number, delay):
-    """Grains around one that they touch, all at 2 m/s towards it; the later in order, the earlier."""
+    """Grains around one that they touch, all at 2 m/s towards it; later indices arrive earlier."""
     angle = 2 * np.pi * np.arange(number) / number
     out = np.stack([np.cos(angle), np.sin(angle), np.zeros(number)], axis=1)
     place = (2 * RADIUS * (1 - 1e-7) + 2.0 * delay * np.arange(number)[::-1, None]) * out
@@ -191,8 +195,9 @@ def closing_in(number, delay):
 
 
 @pytest.mark.parametrize("number", [2, 3, 4])
-def test_a_tie_ends_as_the_limit_of_impacts_one_after_another(number):
-    """Of impacts in one instant that with the highest indices comes first: as if it were just earlier."""
+def test_a_tie_equals_the_limit_of_successive_impacts(number):
+    """Of impacts in one instant the one with the highest indices comes first, as if it were
+    slightly earlier."""
     tie, near = run([closing_in(number, delay) for delay in (0.0, 1e-13)])
     assert tie.work["impacts"] >= number
     assert tie.work == near.work
@@ -204,7 +209,7 @@ def test_a_tie_ends_as_the_limit_of_impacts_one_after_another(number):
 
 
 def test_three_grains_in_a_row():
-    """Newton's cradle with restitution e = 1 - v/v*: the pulse passes by binary impacts, in closed form."""
+    """Newton's cradle with restitution e = 1 - v/v*: binary impacts transmit the pulse, in closed form."""
     hardness, speed = 2e6, 2.0
     critical = np.sqrt(3 * hardness / (2 * DENSITY))
     v, impacts = np.array([speed, 0.0, 0.0]), 0
@@ -231,9 +236,9 @@ def test_three_grains_in_a_row():
     np.testing.assert_allclose(by_id(result)["velocity"][:, 0], v, rtol=0, atol=1e-12)
 
 
-def test_more_contacts_than_there_is_room_for_is_a_clear_failure(rng, monkeypatch):
-    """Sixty grains in one place: more than hard spheres can be. Where such a start gets by, the run says so
-    and stops at once."""
+def test_too_many_contacts_give_a_clear_failure(rng, monkeypatch):
+    """Sixty grains in one place: impossible for hard spheres. If such a start passes validation, the run
+    stops at once with a message."""
     n = 60
     start = scene(rng.normal(size=(n, 3)) * 1e-5, rng.normal(size=(n, 3)), laws(1e9), dt=1e-12, steps=10)
     with pytest.raises(InputError, match="at most 8 pairs overlap for each of them; received about"):
@@ -242,12 +247,12 @@ def test_more_contacts_than_there_is_room_for_is_a_clear_failure(rng, monkeypatc
         patch.setattr("tisim.engine.simulation.check_places", lambda scene, start: [])
         (result,) = run([start])
     assert not result.status.ok
-    # No particle is named: whose pair is one too many is up to the order of threads.
+    # No particle is named: the order of threads decides which pair exceeds the capacity.
     assert "more simultaneous contacts than there is room for; kept t = 0 s" in result.status.reason
     assert result.time == 0.0
     for name in ("position", "velocity", "mass"):
         np.testing.assert_array_equal(result.state[name], result.start[name])
-    # Nothing of it is left to the next scene, in which two meet.
+    # The next scene, in which two grains meet, is not affected.
     place, speed = RADIUS * (1 - 1e-9), [[1.0, 0, 0], [-1.0, 0, 0]]
     (after,) = run([scene([[-place, 0, 0], [place, 0, 0]], speed, laws(1e9), dt=1e-12)])
     assert after.status.ok

@@ -1,4 +1,4 @@
-"""Validated plain data: what a parameter may be, what a message says, what counts as structure."""
+"""Validated plain data: allowed parameters, error messages, and structure."""
 
 from typing import ClassVar
 
@@ -12,7 +12,7 @@ from tisim.errors import must
 
 
 class SampleSpring(Component):
-    """A part with one parameter of each sort."""
+    """A component with one parameter of each kind."""
 
     stiffness: float = parameter("N/m", "stiffness k of the spring", gt=0)
     axis: Vector = parameter("", "axis", (0.0, 0.0, 1.0))
@@ -50,18 +50,18 @@ class SampleSpring(Component):
         ({"stiffness": 1, "axis": (0, 1)}, "sample_spring.axis.2 must be given; received nothing"),
     ],
 )
-def test_messages_say_what_it_must_be_and_what_was_received(settings, message):
+def test_messages_state_rule_and_received_value(settings, message):
     with pytest.raises(InputError) as fault:
         SampleSpring(**settings)
     assert str(fault.value) == message
 
 
-def test_a_list_of_four_is_no_vector():
+def test_a_list_of_four_is_refused_as_vector():
     with pytest.raises(InputError, match=r"sample_spring\.axis must be .*; received"):
         SampleSpring(stiffness=1, axis=(0, 0, 1, 0))
 
 
-def test_every_fault_has_its_line():
+def test_every_error_has_its_line():
     with pytest.raises(InputError) as fault:
         SampleSpring(stiffness=-1, share=2, colour="red")
     lines = str(fault.value).splitlines()
@@ -84,7 +84,7 @@ def test_frozen_named_and_with_units():
 
 
 def test_parameters_vary_and_options_are_structure():
-    """Floats and vectors differ per world; every other option is compiled in."""
+    """Floats and vectors may differ between worlds; every other option is compiled in."""
     part = SampleSpring(stiffness=2, axis=(1, 2, 3))
     assert [(name, size) for name, _, size in part.parameters()] == [
         ("stiffness", 1),
@@ -113,14 +113,14 @@ class SampleRow(Component):
 
 
 class SampleList(Component):
-    """A part with a list of rows, of which each world may have its own number."""
+    """A component with a list of rows, whose number may differ between worlds."""
 
     scale: float = parameter("", "scale", 1.0)
     rows: tuple[SampleRow, ...]
 
 
 def test_a_list_of_rows_varies_in_number_too():
-    """Rows are no structure, up to the room that there is for them; messages say which row is wrong."""
+    """Up to a capacity, the number of rows is no structure; messages say which row is wrong."""
     few, many = ([SampleRow(radius=1)] * n for n in (0, SampleRow.least_rows))
     assert list(SampleList.lists()) == [("rows", SampleRow)]
     assert [name for name, _, _ in SampleList.parameters()] == ["scale"]

@@ -1,4 +1,4 @@
-"""Numbers as users give them, of NumPy too, are kept as they are or refused."""
+"""Numbers given by users, including NumPy's, are stored unchanged or refused."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0])
 
 
 def particles(**given):
-    """Return a particle, or what is given of it."""
+    """Return a single particle, with the given values replaced."""
     whole = {"position": [(0, 0, 0)], "velocity": [(0, 0, 0)], "radius": 1e-3, "density": 1.0}
     return tisim.Particles(**(whole | given))
 
@@ -40,7 +40,7 @@ NO_NUMBERS = [True, np.True_, 1 + 2j, np.complex128(1), np.ma.masked, np.array(T
 
 @pytest.mark.parametrize("where", SETTINGS)
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
-def test_what_is_no_number_is_refused(where, value):
+def test_anything_but_a_number_is_refused(where, value):
     with pytest.raises(tisim.InputError, match=rf"^{where} must be (a number|numbers|without masked)"):
         SETTINGS[where](value)
 
@@ -55,12 +55,12 @@ def test_what_is_no_number_is_refused(where, value):
         ("clump.radii", lambda values: tisim.Clump(centres=3 * np.eye(3), radii=values, density=1.0)),
     ],
 )  # fmt: skip
-def test_arrays_of_no_numbers_are_refused(where, make, values):
+def test_non_numeric_arrays_are_refused(where, make, values):
     with pytest.raises(tisim.InputError, match=rf"^{where} must be (numbers|without masked entries)"):
         make(values)
 
 
-def test_an_array_with_nothing_masked_is_as_it_is():
+def test_an_array_without_masked_entries_is_unchanged():
     whole = np.ma.array([1.0, 2.0, 3.0], mask=False)
     assert Gravity(acceleration=whole).acceleration == (1.0, 2.0, 3.0)
     assert particles(position=whole[None]).position.tolist() == [[1.0, 2.0, 3.0]]
@@ -85,6 +85,6 @@ def test_a_gene_of_eight_bits_has_its_whole_range():
     assert gene.decode(0.7) == pytest.approx(40.0)
 
 
-def test_flags_may_be_given_as_such():
+def test_booleans_are_accepted_as_flags():
     fixed = particles(quantities={"fixed": np.array([True])})
     assert fixed.arrays(tisim.Box(low=(-1, -1, -1), high=(1, 1, 1)), 0)["fixed"].tolist() == [1.0]

@@ -1,4 +1,4 @@
-"""What ``tisim doctor`` times are steps of the package, as its benchmarks time them."""
+"""``tisim doctor`` times steps of the package, as its benchmarks do."""
 
 import os
 import re
@@ -18,12 +18,12 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.slow
 def test_steps_of_all_pairs_and_of_contacts_are_timed():
-    """In a process of its own; no time is that of a step which computes nothing."""
+    """In a separate process; no time belongs to a step that computes nothing."""
     laws = [type(make().effects[0]) for make in diagnostics.TIMED_SCENES.values()]
     assert laws == [NearField, Granular]
     times = diagnostics.step_times_of(BACKEND)
     assert times.keys() == diagnostics.TIMED_SCENES.keys()
-    # A pair of charges takes a root and a division: not less than 0.1 ns, nor more than 100 ns.
+    # A pair of charges takes a root and a division: between 0.1 ns and 100 ns.
     pairs = diagnostics.TIMED_SIDE**6
     assert 0.1e-9 * pairs < times["charges"] < 100e-9 * pairs
     assert 1e-6 < times["grains in contact"] < 0.1
@@ -46,8 +46,8 @@ def benchmark_time(backend):
 
 @pytest.mark.slow
 @pytest.mark.skipif(len(choice.installed()) < 2, reason="one backend is installed")
-def test_the_ratio_of_both_backends_is_that_of_the_benchmark():
-    """On a machine that is not busy otherwise: the shortest of three turns of each."""
+def test_the_ratio_of_both_backends_equals_the_benchmark():
+    """On an otherwise idle machine: the shortest of three turns of each."""
     ratios = []
     for time in (lambda backend: diagnostics.step_times_of(backend)["charges"], benchmark_time):
         turns = [[time(backend) for backend in choice.LLVM] for _ in range(3)]

@@ -1,4 +1,4 @@
-"""What explain says is what is compiled: nothing more is allocated, nothing less is listed."""
+"""The report of explain matches the compiled program: it lists all allocated memory and nothing else."""
 
 import io
 from dataclasses import replace
@@ -37,7 +37,7 @@ def text(explanation):
     return stream.getvalue()
 
 
-def test_whole_flow_leaves_nothing_out():
+def test_every_effect_of_the_flow_is_listed():
     flow = agglomeration(BEST, 1, grains=60)
     explanation = explain(flow)
     assert [part.name for part in explanation.effects] == [effect.kind() for effect in flow.effects]
@@ -84,7 +84,7 @@ def test_memory_is_what_is_allocated():
 
 
 def pair(*effects, **more):
-    """Two particles that do not move, under these effects."""
+    """Two fixed particles under these effects."""
     return scene([[0.0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)), effects, **more)
 
 
@@ -98,12 +98,12 @@ BESIDE = {
     "collocation": (lambda: pair(SHELL, stepper=Collocation()), 2),
     "diffusion": (lambda: colloids([[0.0, 0, 0]], together=True, hydrodynamics="rotne-prager"), 2),
 }
-"""Scenes, and room for particles, whose steps have all memory beside the state that there is."""
+"""Scenes, and capacities for particles, whose steps use every kind of memory besides the state."""
 
 
 @pytest.mark.parametrize("kind", BESIDE)
 @in_taichi_thread
-def test_memory_beside_the_state_is_what_is_allocated_for_a_step(kind):
+def test_step_memory_is_what_is_allocated(kind):
     made, capacity = BESIDE[kind]
     with memory.collected() as trees:
         allocation = Allocation(made(), 3, capacity)
@@ -136,8 +136,8 @@ def test_parameters_have_units_and_sources():
     assert "Resolve*" in output
 
 
-def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
-    """By the names that a scene file gives them, with the numbers that kernels get."""
+def test_parts_of_a_law_and_pairs_of_materials():
+    """Under the names of a scene file, with the numbers that kernels get."""
     law = Granular(tangential=MindlinForce(), rolling=RollingEPSD(damping_ratio=0.2))
     materials = {
         "steel": Material(young=2e11, poisson=0.3, friction=0.4, rolling_friction=0.1),
@@ -162,7 +162,7 @@ def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
     assert mixed["rolling_friction"] == (pytest.approx(0.02**0.5, rel=1e-5), "geometric mean")
     expected = 1 / ((1 - 0.09) / 2e11 + (1 - 0.49**2) / 2e8)
     assert mixed["E*"][0] == pytest.approx(expected, rel=1e-5)
-    # Of what one of them lacks there is nothing to tell.
+    # A property that one of the materials lacks is not listed for the pair.
     assert "stiffness" not in mixed
     bare = agglomeration(BEST, 1, grains=60)
     explanation = explain(bare.without(*(effect.kind() for effect in bare.effects)))
@@ -172,8 +172,8 @@ def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
     assert "granular.rolling: rolling_epsd" in output
 
 
-def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
-    """Z13: forces on charges, and nothing else; no fields, lists or phases of anything more."""
+def test_a_vibrating_cloud_has_no_contact_spin_or_temperature():
+    """Z13: only forces on charges; no fields, lists or phases of anything else."""
     explanation = explain(vibration(sites=2))
     effects = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}
     assert {part.name for part in explanation.effects} == effects

@@ -1,4 +1,4 @@
-"""What tisim says of itself is complete: parts, parameters and options have texts; templates make parts."""
+"""The reference texts are complete: parts, parameters and options have texts; templates make parts."""
 
 import re
 import tomllib
@@ -19,7 +19,7 @@ from tisim.effects import Force
 ENTRIES = [entry for entry in reference.entries() if entry.kind.__module__.startswith("tisim.")]
 ALL = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
 TABLES = [entry for entry in ENTRIES if entry.toml]
-"""Without rows of lists, which stand in the tables of their sources."""
+"""Without rows of lists, which are described in the tables of their sources."""
 LISTS = (
     tuple[float, ...],
     tuple[float, ...] | None,
@@ -51,7 +51,7 @@ class Buoy(Force):
 
 
 @ALL
-def test_every_part_says_what_it_is(entry):
+def test_every_part_has_a_description(entry):
     assert re.fullmatch(r"[A-Z].*[^.:]", entry.summary)
     assert len(entry.summary) <= 120
     assert "``" not in entry.summary
@@ -66,7 +66,7 @@ def test_every_setting_has_a_text_and_every_quantity_a_unit(entry):
 
 
 @ALL
-def test_what_is_cited_in_short_is_known_in_full(entry):
+def test_short_citations_have_a_full_reference(entry):
     short = set(re.findall(r"\b[BLZ]\d\d\b", f"{entry.source} {entry.body}"))
     assert short <= set(docstrings.PUBLICATIONS)
 
@@ -85,7 +85,7 @@ def test_a_template_makes_its_part_with_its_defaults(entry):
         assert f"# {text_of(info)}" in entry.toml or name in dict(entry.kind.lists()), name
 
 
-def test_an_effect_of_the_users_own_is_among_them():
+def test_user_effects_are_listed():
     buoy = reference.find("buoy")
     assert buoy.summary == "Water carries a buoy, F = k z"
     assert buoy.body == "    F = k z\n\nz is its depth."
@@ -115,22 +115,22 @@ def test_only_rows_of_lists_have_no_table_of_their_own():
     }
 
 
-def test_families_share_nothing_and_leave_nothing_out():
+def test_families_are_disjoint_and_complete():
     names = [entry.name for entry in ENTRIES]
     assert len(set(names)) == len(names)
     kinds = {kind.kind() for kind in Component.known().values() if kind.__module__.startswith("tisim.")}
-    # Templates of clumps are made in Python alone.
+    # Clump templates are made in Python only.
     assert kinds - set(names) == {"clump", "component", "scene"}
 
 
-def test_what_a_part_needs():
+def test_needs_of_parts():
     needs = {entry.name: entry.needs for entry in ENTRIES}
     assert needs["friction"] == ("impact",)
     assert needs["contact_bond"] == ("contact or hertz", "a stepper with inertia, not brownian")
     assert needs["lorentz"][0] == "a source of electric_field or magnetic_flux_density"
     assert needs["sphere"] == ("magnetic_spheres, a row of its spheres",)
     assert needs["collocation"] == ("a step control: stage_control",)
-    # "no impact or recorder", where a test of another file has an event of its own.
+    # If a test of another file defines an event of its own, the text is "no impact or recorder".
     assert any(one.startswith("no impact") for one in needs["capture"])
 
 
@@ -143,7 +143,7 @@ def test_an_unknown_name_lists_the_known_ones():
         reference.find("mei")
 
 
-def test_units_are_those_of_the_declaration():
+def test_units_equal_the_declaration():
     impact = reference.find("impact")
     units = {name: unit_of(info) for name, info in template.fields(impact.kind).items()}
     assert {one.name: one.unit for one in impact.settings} == units

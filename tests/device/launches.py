@@ -1,4 +1,4 @@
-"""The kernels that steps launch, counted."""
+"""Counts of the kernels that steps launch."""
 
 from collections import Counter
 
@@ -11,11 +11,12 @@ from tisim.state.state import State
 
 
 def assert_launches(simulation, steps, each):
-    """A step of all worlds is ``each`` launches, and those of lists that are due, in fewer than half of the
-    steps; no field is read.
+    """Assert that a step of all worlds takes ``each`` launches, besides launches for list rebuilds in fewer
+    than half of the steps, and that no field is read.
 
-    A CPU tells after each launch how far worlds have come. A device is asked when they begin, and then of
-    several steps at once, the more the longer no list is due; few launches find nobody whose turn it is.
+    A CPU returns the progress of worlds after each launch. A device is asked at the beginning, and then only
+    once for several steps; the number of steps grows while no list is due. Few launches find no world to work
+    on.
     """
     program = simulation.program
     launched, others, copies = Counter(), Counter(), []
@@ -48,7 +49,7 @@ def assert_launches(simulation, steps, each):
     else:
         assert steps <= rounds < 2 * steps
         assert launched.pop(program.look) < 0.7 * steps
-    # Those of lists.
+    # Launches of list rebuilds.
     assert 0 < sum(launched.values()) < steps / 2
     assert not others
     assert not copies

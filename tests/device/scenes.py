@@ -1,4 +1,4 @@
-"""Small scenes of which a device and the CPU must make the same, to rounding."""
+"""Small scenes for which a device and the CPU must give the same result, to rounding."""
 
 import numpy as np
 
@@ -12,17 +12,17 @@ STEPS = 20
 
 
 def grains():
-    """Grains that overlap, spin and slide in a cell: each pair once, with memory, and walls."""
+    """Grains that overlap, spin and slide in a cell: each pair once, with contact history, and walls."""
     return heap(np.random.default_rng(5), n=40, steps=STEPS)
 
 
 def impacts():
-    """A cloud under all laws of impact, which bonds and cools, and a step control that watches pairs."""
+    """A cloud under all impact laws, which bonds and cools, and a step control that monitors pairs."""
     return flow(grains=60, duration=4e-5)
 
 
 def fast():
-    """A drag whose law is a power of the speed, and a field that oscillates."""
+    """A drag law with a power of the speed, and an oscillating field."""
     places, speeds = np.arange(12.0)[:, None], np.geomspace(1.0, 1e4, 12)[:, None]
     field = MagneticField(amplitude=(0.0, 0.0, 0.5), omega=(0.0, 0.0, 1e5))
     return scene(

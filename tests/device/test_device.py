@@ -1,4 +1,4 @@
-"""A device makes of a scene what the CPU makes of it, to rounding; and how often a step has to wait for it.
+"""A device gives the CPU's result for a scene, to rounding; and the number of times that a step waits for it.
 
 TISIM_DEVICE=cuda python -m pytest -n 0 -m gpu
 """
@@ -24,7 +24,7 @@ pytestmark = [
     ),
 ]
 MAGNIFIED = {"grains": 1e-11, "impacts": 1e-9, "fast": 1e-11}
-"""What rounding may have grown to in so few steps, relative to the largest value."""
+"""The largest growth of rounding errors in these few steps, relative to the largest value."""
 ON_CPU = """
 import sys
 import numpy as np
@@ -43,7 +43,7 @@ for name, scene in SCENES.items():
 
 @pytest.fixture(scope="module")
 def on_cpu(tmp_path_factory):
-    """The states that the CPU makes, by name of the scene."""
+    """The states computed by the CPU, by name of the scene."""
     folder = tmp_path_factory.mktemp("cpu")
     command = [sys.executable, "-c", ON_CPU, str(folder)]
     subprocess.run(command, check=True, env={**os.environ, "TISIM_DEVICE": "cpu"})
@@ -51,7 +51,7 @@ def on_cpu(tmp_path_factory):
 
 
 def simulation(name, *more):
-    """The compiled simulation of a scene, and of more effects, loaded with it."""
+    """The compiled simulation of a scene and further effects, with the scene loaded."""
     scene = SCENES[name]()
     scene = scene.model_copy(update={"effects": (*scene.effects, *more)})
     loaded = compiled(scene, capacity=scene.capacity())
@@ -70,17 +70,18 @@ def test_a_device_and_the_cpu_agree(name, on_cpu):
         np.testing.assert_allclose(result.state[field], expected, rtol=0, atol=tolerance, err_msg=field)
 
 
-def test_a_sum_carries_its_rounding_error_along():
-    """As the clocks of steps do: drivers that regroup sums would lose it, and 2e-8 of this sum of tenths."""
+def test_sums_are_compensated():
+    """As for the clocks of steps: a driver that regroups sums would lose the compensation, which is 2e-8 of
+    this sum of tenths."""
     _, total = numbers()
     assert total == pytest.approx(1e4, rel=1e-15)
 
 
-def test_a_step_is_two_launches_and_few_ask_how_far_worlds_have_come():
+def test_a_step_takes_two_launches_and_few_queries():
     assert_launches(simulation("grains"), STEPS, each=2)
 
 
 @pytest.mark.parametrize("look", [AtRest(time=9.0), Outflow(planes=[Plane(point=(0.0, 0.0, -9.0))])])
-def test_a_step_that_something_looks_at_the_grains_after_is_five_launches(look):
-    """It acts between two fillings of slots, after which forces may be summed again."""
+def test_a_step_with_a_later_operator_takes_five_launches(look):
+    """The operator acts between two fillings of slots, after which forces may be summed again."""
     assert_launches(simulation("grains", look), STEPS, each=5)

@@ -1,4 +1,5 @@
-"""The box: what leaves through one face comes back through the other, and meets what is there."""
+"""The box: particles that leave through one face return through the opposite one, and meet
+particles there."""
 
 import numpy as np
 import pytest
@@ -25,8 +26,8 @@ def drift(position, velocity, steps=1, domain=None):
     return scene(position, velocity, (), dt=1.0, steps=steps, domain=domain or BOX)
 
 
-def test_comes_back_through_the_opposite_face_with_the_same_velocity(rng):
-    """Position is that of the straight line, modulo the sides; velocity to the bit."""
+def test_particles_return_through_the_opposite_face(rng):
+    """The position is on the straight line, modulo the sides; the velocity is equal bit for bit."""
     low, high = (np.asarray(x) for x in (BOX.low, BOX.high))
     r = rng.uniform(low, high, (60, 3))
     v = rng.normal(size=(60, 3)) * 10.0 ** rng.uniform(-1, 2, (60, 1))
@@ -38,8 +39,8 @@ def test_comes_back_through_the_opposite_face_with_the_same_velocity(rng):
     assert (np.abs(r + v).max(axis=1) > 20).any(), "some must leave by several boxes"
 
 
-def test_along_an_axis_that_is_not_periodic_space_goes_on_beyond_the_faces():
-    """A start may lie there too, and what flies on comes back along the other axes alone."""
+def test_open_axes_continue_beyond_the_faces():
+    """A particle may also start there, and one that moves on is wrapped along the other axes only."""
     box = Box(low=BOX.low, high=BOX.high, periodic=(True, False, True))
     place, speed = [[0.9, 1.9, -2.9], [0.0, -7.0, 0.0]], [[0.3, 5.0, -0.3], [0.0, -1e20, 0.0]]
     (result,) = run([drift(place, speed, domain=box)])
@@ -48,7 +49,7 @@ def test_along_an_axis_that_is_not_periodic_space_goes_on_beyond_the_faces():
     np.testing.assert_allclose(by_id(result)["position"], expected, rtol=0, atol=1e-14)
 
 
-def test_faces_belong_to_one_side():
+def test_positions_are_in_a_half_open_range():
     """Always low <= r < high: on the far face, just below the near one, at the last number inside."""
     low, high = (np.asarray(x) for x in (BOX.low, BOX.high))
     inside = np.nextafter(high, low)
@@ -62,8 +63,8 @@ def test_faces_belong_to_one_side():
     np.testing.assert_array_equal(place[1], inside)
 
 
-def test_a_rounding_below_the_near_face_is_the_near_face():
-    """1 - 1e-300 rounds to 1, which is outside: the far face is the near one."""
+def test_rounding_to_the_far_face_gives_the_near_face():
+    """1 - 1e-300 rounds to 1, which is outside: the particle on the far face is put on the near one."""
     unit = Box(low=(0.0,) * 3, high=(1.0,) * 3, images=False)
     (result,) = run([drift(np.zeros((1, 3)), [[-1e-300, -1e-18, -1e-17]], domain=unit)])
     np.testing.assert_array_equal(result.state["position"], np.zeros((1, 3)))
@@ -74,8 +75,9 @@ def test_a_start_outside_the_box_is_refused():
         run([drift([[5.0, 0, 0]], [[0.0, 0, 0]])])
 
 
-def test_a_box_in_which_two_could_touch_twice_is_refused():
-    """Of another particle each sees one image. Without images, or open, a box may be narrower."""
+def test_boxes_too_narrow_for_one_image_are_refused():
+    """Each particle interacts with one image of another. A box without images, or an open one, may be
+    narrower."""
     for settings in ({}, {"images": False}, {"periodic": (True, False, True)}):
         box = Box(low=(0.0,) * 3, high=(2.0, 1.0, 2.0), **settings)
         made = scene([[0.5] * 3, [1.5, 0.5, 0.5]], np.zeros((2, 3)), (Impact(hardness=1e9),), 0.3, domain=box)
@@ -90,15 +92,15 @@ def test_a_box_in_which_two_could_touch_twice_is_refused():
 
 
 class FarShell(SoftShell):
-    """One that reaches farther the larger the larger grain is."""
+    """A shell whose range grows with the radius of the larger grain."""
 
     @ti.func
     def reach(self, s, w, i):
         return self.width(w) * s.radius[w, i]
 
 
-def test_the_volume_of_what_is_empty_is_that_around_the_largest_that_come():
-    """Whatever the order of their classes."""
+def test_the_volume_of_an_empty_scene_fits_the_largest_grain():
+    """For every order of their classes."""
     classes = [GrainClass(sizes=EqualSizes(radius=radius), density=1.0) for radius in (0.1, 0.4)]
     for grains in (classes, classes[::-1]):
         coming = InsertionByFlux(flux=1.0, number=5, grains=grains, low=(0.0,) * 3, high=(9.0,) * 3)
@@ -107,8 +109,9 @@ def test_the_volume_of_what_is_empty_is_that_around_the_largest_that_come():
 
 
 @pytest.mark.slow
-def test_a_box_is_wide_enough_for_those_that_are_put_in_later():
-    """Grains of 0.1 m are there, and up to 0.4 m come: four radii and twice the reach must have room."""
+def test_the_box_must_be_wide_enough_for_inserted_grains():
+    """Grains of 0.1 m are present, and grains of up to 0.4 m will be inserted: the box must have room for
+    four radii and twice the interaction range."""
 
     def filled(side, width, number=5):
         coming = InsertionByFlux(
@@ -138,8 +141,8 @@ def test_a_box_is_wide_enough_for_those_that_are_put_in_later():
 
 
 @pytest.mark.slow
-def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
-    """A joined box with images has contacts across its faces; Z04's control volume has not."""
+def test_contacts_cross_faces_only_with_images():
+    """A periodic box with images has contacts across its faces; Z04's control volume has not."""
     place, speed = [[-0.9995, 0, 0], [0.9995, 0, 0]], [[-1.0, 0, 0], [1.0, 0, 0]]
     impacts = []
     for settings in ({}, {"images": False}, {"periodic": (False, True, True)}):
@@ -150,8 +153,8 @@ def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
 
 
 @pytest.mark.slow
-def test_two_leave_the_box_in_one_step_and_meet_inside_it():
-    """Both cross the face, one of them twice over; wrapped, they overlap, and collide once there."""
+def test_two_wrapped_grains_collide_inside_the_box():
+    """Both cross the face, one of them twice; after wrapping they overlap, and collide once there."""
     box = Box(low=(0.0,) * 3, high=(1.0,) * 3, images=False)
     place = [[0.9, 0.5, 0.5], [0.95, 0.5, 0.5]]
     # After one second: 0.1 + 2 and 0.1005 + 1; the first is faster, and behind.
@@ -173,8 +176,9 @@ def test_two_leave_the_box_in_one_step_and_meet_inside_it():
 
 
 @pytest.mark.parametrize("images", [False, True])
-def test_a_step_that_loses_the_place_in_the_box_is_a_clear_failure(images):
-    """1e12 boxes in a step leave three digits of the place; 1e14 leave one, and 1e300 none at all."""
+def test_too_many_crossings_in_a_step_are_a_clear_failure(images):
+    """A step over 1e12 boxes leaves three digits of the position; one over 1e14 leaves one, and over 1e300
+    none."""
     box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, images=images)
     far, *others = run(
         [drift([[0.1, 0.2, 0.3]], [[v, 0, 0]], domain=box) for v in (1e12, 1e14, -1e14, 1e300)]

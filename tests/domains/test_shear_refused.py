@@ -1,4 +1,4 @@
-"""What does not go with a box in simple shear."""
+"""Parts that cannot be combined with a box in simple shear."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("box", "more", "message"), WRONG.values(), ids=WRONG)
-def test_what_does_not_go_with_shear_is_refused(box, more, message):
+def test_parts_incompatible_with_shear_are_refused(box, more, message):
     settings = {
         "effects": (HERTZ_MINDLIN,),
         "materials": MATERIALS,
@@ -80,11 +80,11 @@ def test_what_does_not_go_with_shear_is_refused(box, more, message):
         scene([[0, 0, 0]], [[0, 0, 0]], domain=ShearedBox(**{**BOX, **box}), **settings)
 
 
-def test_what_is_the_same_in_every_layer_goes_with_shear():
+def test_uniform_fields_are_accepted_with_shear():
     scene([[0, 0, 0]], [[0, 0, 0]], (Gravity(), ElectricField()), domain=ShearedBox(**BOX))
 
 
-def test_what_does_not_go_with_shear_is_not_tried_by_a_study_of_cost(rng):
+def test_a_cost_study_tries_no_stepper_without_shear(rng):
     made = crowd(rng)
     tried = {type(one.base.stepper) for one in methods(made, DT, 1.0, (0.0,), (("f64", "strict"),), 1)}
     assert tried == {Verlet}

@@ -1,4 +1,4 @@
-"""The box in simple shear: images, particles that cross, lists, files, and what does not go with it."""
+"""The box in simple shear: images, crossing particles, lists, files."""
 
 import ase.io
 import h5py
@@ -31,11 +31,11 @@ WORLDS, CAPACITY = 2, 64
 Array = ti.types.ndarray()
 END = STEPS * DT
 GROWTH = 5000
-"""Contacts make what rounding leaves at most so many times as large in a run."""
+"""Factor by which contacts amplify rounding errors in a run, at most."""
 
 
 def run(*scenes, schedule=None):
-    """Their results, run side by side in the simulation that all tests share."""
+    """Run scenes side by side in the simulation that all tests share; return their results."""
     simulation = compiled(scenes[0], WORLDS, CAPACITY, schedule)
     simulation.load(scenes)
     simulation.run()
@@ -46,12 +46,12 @@ def run(*scenes, schedule=None):
 
 
 def assert_images(result, place, velocity):
-    """Assert that the grains are the images in the box of those at these places."""
+    """Assert that the grains are at the images, inside the box, of these positions, with these velocities."""
     box, state, tolerance = result.scene.domain, by_id(result), GROWTH * roundoff()
     place, velocity = inside(box, place, velocity, result.time)
     sides = np.subtract(box.high, box.low)
     off = state["position"] - place
-    # On a face an image may be taken for the other.
+    # A grain on a face may be taken for its image on the opposite face.
     off -= sides * np.round(off / sides)
     assert np.abs(off).max() <= tolerance
     np.testing.assert_allclose(state["velocity"], velocity, rtol=0, atol=tolerance * np.abs(velocity).max())
@@ -69,7 +69,7 @@ def _images(domain: ti.template(), a: Array, b: Array, t: Array, out: Array):
 
 @pytest.mark.slow
 def test_an_image_is_the_nearest_of_all(rng):
-    """Of 75 images of each, as they lie in NumPy, after up to a thousand turns; either way round."""
+    """Of 75 images of each, computed in NumPy, at strains up to a thousand; in both directions."""
     made = [crowd(rng, rate=rate, low=-0.3) for rate in (RATE, -7.0)]
     simulation = compiled(made[0], WORLDS, CAPACITY)
     simulation.load(made)
@@ -87,15 +87,16 @@ def test_an_image_is_the_nearest_of_all(rng):
         nearest = images[which, np.arange(2000)]
         near = np.linalg.norm(nearest, axis=1) < SIDES.min() / 2
         assert (turns[which, 0, ACROSS][near] != 0).sum() > 100
-        # Sides are rounded, and so many of them lie between a particle and where its image began.
+        # The error of rounded sides grows with the number of sides between a particle and the origin of its
+        # image.
         passed = abs(rate) * SIDES[ACROSS] * time.max() / SIDES[ALONG]
         np.testing.assert_allclose(out[w, near], nearest[near], rtol=0, atol=passed * roundoff())
 
 
 @pytest.mark.slow
-def test_grains_in_shear_are_those_of_a_twin_that_wraps_nothing(rng):
-    """Two rates side by side, and a box of many cells; many cross the faces, stick and slide across them.
-    Momentum stays."""
+def test_grains_in_shear_equal_an_unwrapped_twin(rng):
+    """Two rates side by side, and a box of many cells; many grains cross the faces, and stick and slide
+    across them. Momentum is conserved."""
     made = [crowd(rng, rate=rate, low=low) for rate, low in ((RATE, 0.0), (-20.0, -0.7))]
     wide = crowd(rng, rate=9.0, sides=2.3 * SIDES)
     for one, result in zip((*made, wide), (*run(*made), *run(wide)), strict=True):
@@ -112,12 +113,13 @@ def test_grains_in_shear_are_those_of_a_twin_that_wraps_nothing(rng):
 
 
 def flow(shift, rate=RATE):
-    """The velocity of the flow that is farther on by a shift."""
+    """The flow velocity, relative to the origin, at a position shifted by ``shift``."""
     return np.array([rate * shift[ACROSS], 0.0, 0.0])
 
 
 def pair(shift, stepper=None):
-    """Two grains that touch in the middle of the box, with the flow there; or elsewhere in it."""
+    """Two touching grains in the middle of the box, moving with the flow there; or shifted to another
+    position."""
     middle, apart = SIDES / 2, np.array([0.1, 0.4, 0.0])
     place, velocity = middle + np.outer([-0.5, 0.5], apart), np.array([[1.0, 3.0, 0.5], [-1.0, -3.0, 0.0]])
     place, velocity = place + shift, velocity + flow(shift)
@@ -135,8 +137,8 @@ def pair(shift, stepper=None):
 @pytest.mark.parametrize(
     "stepper", [None, pytest.param(Boris(control=FixedStep(dt=DT)), marks=pytest.mark.slow)]
 )
-def test_a_pair_across_the_face_is_one_in_the_middle(stepper):
-    """It touches, sticks and parts as there; the face lies between the two, or both cross it."""
+def test_a_pair_across_a_face_moves_as_in_the_middle(stepper):
+    """It touches, sticks and separates as in the middle; the face lies between the two, or both cross it."""
     (there,) = run(pair(np.zeros(3), stepper))
     touched = by_id(there)
     assert np.abs(touched["velocity"] - there.start["velocity"]).max() > 1
@@ -150,8 +152,9 @@ def test_a_pair_across_the_face_is_one_in_the_middle(stepper):
 
 
 @pytest.mark.long
-def test_what_a_study_compares_does_not_jump_at_a_face():
-    """The velocity of a pair relative to the flow is the same wherever it is, also after it has crossed."""
+def test_compared_quantities_are_continuous_at_faces():
+    """The velocity of a pair relative to the flow is the same at every position in the box, also after it has
+    crossed a face."""
     (there,), (here,) = run(pair(np.zeros(3))), run(pair(np.array([0.0, -0.75, 0.0])))
     (quantity,) = usual(here.scene)
     assert quantity.name == "velocity relative to the flow"
@@ -161,7 +164,7 @@ def test_what_a_study_compares_does_not_jump_at_a_face():
 
 
 def layers(rate=RATE, steps=3000):
-    """Layers of grains that follow the flow, and touch where one layer has slid far enough past the next."""
+    """Layers of grains that follow the flow, and touch once a layer has slid far enough past the next."""
     sites = np.stack(np.meshgrid(*3 * [np.arange(4)], indexing="ij"), axis=-1).reshape(-1, 3)
     place = (sites + np.array([0.1, 0.5, 0.5])) * [0.7, 0.5, 0.7] + np.outer(
         sites[:, ACROSS] % 2, [0.35, 0, 0.02]
@@ -176,8 +179,8 @@ def layers(rate=RATE, steps=3000):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("made", ["crowd", "sparse", "layers", "reverse"])
-def test_lists_give_what_all_pairs_give(rng, made):
-    """Also where grains do not move but with the flow, so that shear alone brings them together."""
+def test_lists_give_the_result_of_all_pairs(rng, made):
+    """Also if grains move only with the flow, so that shear alone brings them together."""
     one = {
         "crowd": lambda: crowd(rng),
         "sparse": lambda: crowd(rng, sides=2.3 * SIDES, low=-1.0, rate=30.0, steps=1000),
@@ -186,7 +189,7 @@ def test_lists_give_what_all_pairs_give(rng, made):
     }[made]()
     simulation = compiled(one, WORLDS, CAPACITY)
     assert_lists(one, simulation)
-    # A list is worth having: it lasts.
+    # The list lasts for several steps.
     simulation.load([one])
     column, times = simulation.assembly.pairs.half_list.made, set()
     for _ in range(30):
@@ -195,8 +198,8 @@ def test_lists_give_what_all_pairs_give(rng, made):
     assert len(times) < 10
 
 
-def test_a_restart_has_its_images_where_they_were(rng, tmp_path):
-    """The same bits as in one go, alone or beside another world."""
+def test_a_restart_keeps_the_positions_of_images(rng, tmp_path):
+    """The same bits as without a restart, alone or beside another world."""
     one, other = crowd(rng), crowd(rng, rate=-1.0, n=40)
     whole, _ = run(one, other)
     (alone,) = run(one)
@@ -213,7 +216,7 @@ def test_a_restart_has_its_images_where_they_were(rng, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_bits_are_those_of_the_other_schedule(rng):
+def test_both_schedules_have_the_same_bits(rng):
     made = crowd(rng), layers()
     for one, other in zip(run(*made, schedule="world"), run(*made, schedule="particle"), strict=True):
         for name, values in one.state.items():
@@ -221,8 +224,8 @@ def test_the_bits_are_those_of_the_other_schedule(rng):
 
 
 @pytest.mark.slow
-def test_any_two_axes_may_be_those_of_the_shear(rng):
-    """The same grains with x, y and z turned round to z, x and y; the third axis need not be periodic."""
+def test_any_two_axes_can_be_sheared(rng):
+    """The same grains with x, y and z permuted to z, x and y; the third axis need not be periodic."""
     turned, other = [1, 2, 0], crowd(rng)
     start = other.particles.arrays(other.domain, 0)
     box = ShearedBox(low=(0,) * 3, high=tuple(SIDES[turned]), rate=RATE, flow="z", gradient="x")
@@ -241,8 +244,8 @@ def test_any_two_axes_may_be_those_of_the_shear(rng):
         np.testing.assert_allclose(by_id(here)[name], values, rtol=0, atol=atol)
 
 
-def test_files_say_where_images_are(rng, tmp_path):
-    """H5MD for each frame, as its edges; extended XYZ too. They lead to the place of an image."""
+def test_files_have_the_positions_of_images(rng, tmp_path):
+    """Both H5MD, as box edges, and extended XYZ, for each frame. They give the position of an image."""
     made, path = crowd(rng), tmp_path / "t.h5"
     simulation = compiled(made, WORLDS, CAPACITY)
     simulation.load([made])

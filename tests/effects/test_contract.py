@@ -1,4 +1,4 @@
-"""The core takes effects it has never heard of: those of tests/throwaway.py."""
+"""The core accepts effects that it does not know: the effects of tests/throwaway.py."""
 
 import copy
 import time
@@ -15,7 +15,7 @@ from tisim.describe.explain import known_effects
 from tisim.effects import Agglomeration, ContactFriction, Force, Impact, PairForce, Tether
 
 
-def test_forces_are_their_numpy_twin(rng):
+def test_forces_equal_their_numpy_twin(rng):
     """Random charges in a trap: the force on each, at the start and after a step."""
     scenes = []
     for _ in range(10):
@@ -62,7 +62,7 @@ def kicked(sigma=2.0, seed=5, steps=200, n=30):
 
 
 def test_an_operator_with_noise_a_field_and_a_counter():
-    """Velocities are normal with variance sigma^2 t; the field adds up the kicks; each is counted."""
+    """Velocities are normal with variance sigma^2 t; the field sums the kicks; each kick is counted."""
     results = run([kicked(seed=seed) for seed in range(WORLDS)])
     v = np.concatenate([result.state["velocity"] for result in results])
     assert stats.kstest(v.ravel() / (2.0 * np.sqrt(2.0)), "norm").pvalue > 0.01
@@ -76,7 +76,7 @@ def test_an_operator_with_noise_a_field_and_a_counter():
 
 
 def test_every_parameter_may_differ_per_world():
-    """Two designs in one batch each get their own numbers, vectors among them, as if alone."""
+    """Two designs in one batch each have their own numbers, including vectors, as in separate runs."""
     one = charges([[1, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 1.0, "centre": (0, 1, 0)}, dt=0.1, steps=5)
     two = charges([[1, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 9.0, "centre": (0, 0, 2)}, dt=0.05, steps=20)
     together, alone = run([one, two, one]), [run([one])[0], run([two])[0]]
@@ -88,8 +88,8 @@ def test_every_parameter_may_differ_per_world():
 
 
 @pytest.mark.slow
-def test_what_no_effect_needs_is_not_allocated():
-    """A scene pays for the fields, the bytes, the counters and the phases of its own effects only."""
+def test_unused_fields_are_not_allocated():
+    """Only the fields, bytes, counters and phases of a scene's own effects are allocated."""
     core = {"position", "velocity", "mass", "radius", "id"}
     bare = Simulation(scene([[0, 0, 0]], [[0, 0, 0]]), worlds=3, capacity=7)
     assert {f.name for f in bare.s.fields} == core
@@ -114,7 +114,7 @@ def test_what_no_effect_needs_is_not_allocated():
 
 
 def test_other_designs_compile_nothing():
-    """Loading and running a second design takes a small part of what the first took."""
+    """Loading and running a second design takes a small part of the time of the first."""
     first = scene([[1, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), dt=1e-3, steps=3)
     second = scene([[2, 0, 0], [3, 0, 0]], np.zeros((2, 3)), (Trap(stiffness=7.0),), dt=5e-4, steps=3)
     simulation = Simulation(first, worlds=2, capacity=2)
@@ -137,8 +137,8 @@ def test_a_scene_of_another_structure_is_refused():
     simulation.close()
 
 
-def test_a_scene_finds_them_by_name():
-    """No registry: a class that exists can be written in a file."""
+def test_a_scene_finds_effects_by_name():
+    """Without a registry: any existing class can be named in a file."""
     setup = charges([[0, 0, 0]], [[0, 0, 0]], [1.0], {"stiffness": 2.0})
     again = Scene.from_dict(setup.to_dict())
     assert again.digest() == setup.digest()
@@ -158,14 +158,15 @@ def test_a_force_that_gives_its_derivatives_by_velocity_depends_on_it(kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", FORCES, ids=[kind.kind() for kind in FORCES])
-def test_a_force_says_whether_it_depends_on_velocity(kind):
-    """Forces after a step that moves nothing, from the same places with and without velocity and spin."""
+def test_forces_declare_dependence_on_velocity(kind):
+    """Forces after a step in which nothing moves, at the same positions with and without velocity
+    and spin."""
     data = copy.deepcopy(extremes.scenes()[f"effects.{kind.kind()}"])
     control = {"kind": "fixed_step", "dt": 1e-12}
     data |= {"duration": 1e-12, "stepper": {"kind": "verlet", "control": control}}
     data["particles"]["quantities"] |= {"anchor": [[0.0, 0.0, 1e-3]] * 3} if kind is Tether else {}
     if kind is ContactFriction:
-        # Its grip carries the time step.
+        # Its sticking force contains the time step.
         data["effects"]["contact_friction"]["stiffness"] = 1e18
     effects = Scene.from_dict(data).effects
     at_rest = copy.deepcopy(data)

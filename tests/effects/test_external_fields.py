@@ -1,4 +1,4 @@
-"""Charged and magnetic particles in external fields, against their NumPy twins."""
+"""Charged and magnetic particles in external fields, against their NumPy references."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def lorentz_twin(setup, state, t=0.0):
     ],
 )
 def test_lorentz_force(kinds, rng):
-    """Both fields, oscillating, or one alone."""
+    """Both fields, oscillating, or a single one."""
     scenes = [
         cloud(
             rng,
@@ -62,7 +62,7 @@ def test_lorentz_force(kinds, rng):
         close(state["force"], lorentz_twin(one, state))
 
 
-def test_charges_that_a_magnetic_field_does_not_turn_feel_the_electric_field_alone(rng):
+def test_the_electric_field_alone_acts_without_a_magnetic_one(rng):
     electric, magnetic = (oscillating(kind, rng) for kind in (ElectricField, MagneticField))
     law = Lorentz(magnetic=False)
     setup = cloud(rng, (electric, magnetic, law), quantities={"charge": rng.normal(size=12)})
@@ -75,7 +75,8 @@ def test_charges_that_a_magnetic_field_does_not_turn_feel_the_electric_field_alo
 
 
 def test_fields_oscillate_in_time(rng):
-    """Heavy charges keep their velocity: the force after steps is that of the field then."""
+    """Heavy charges keep their velocity: the force after some steps is the force in the field at
+    that time."""
     scenes = [
         cloud(
             rng,
@@ -92,8 +93,8 @@ def test_fields_oscillate_in_time(rng):
         assert result.time > 0.3
 
 
-def test_no_oscillation_no_sine_is_the_same_field(rng):
-    """A field of amplitude 0 in one world of a batch beside one that oscillates."""
+def test_zero_amplitude_is_a_constant_field(rng):
+    """A field of zero amplitude in one world of a batch beside one that oscillates."""
     still = ElectricField(constant=vector(rng), omega=vector(rng), phase=vector(rng))
     scenes = [
         cloud(rng, (field, Lorentz()), quantities={"charge": 1.0})
@@ -104,7 +105,7 @@ def test_no_oscillation_no_sine_is_the_same_field(rng):
 
 
 def test_magnetic_body_force_is_the_gradient_of_gamma_b_squared(rng):
-    """Against a central difference of gamma B.B, of two sources together."""
+    """Against a central difference of gamma B.B, for two sources together."""
     scenes = [
         cloud(
             rng,
@@ -144,7 +145,7 @@ def test_the_velocity_jacobian_of_the_lorentz_force(rng):
         close(claimed, difference, 1e-9)
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     field = MagneticField(constant=(0, 0, 1))
     extra = {
         (field,): set(),
@@ -174,7 +175,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

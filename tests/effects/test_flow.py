@@ -1,4 +1,4 @@
-"""Flows that drag laws feel, against NumPy and a closed form."""
+"""Flows that act on particles through drag laws, against NumPy and a closed form."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_drag_in_both_flows_together(packed, mean, per_size, rng):
         np.testing.assert_allclose(state["force"], expected, rtol=1e-12, atol=1e-12)
 
 
-def test_permeability_is_that_of_blake_kozeny_and_carman():
+def test_permeability_of_blake_kozeny_and_carman():
     """Spheres with C = 5: eps^3 D^2 / (180 (1 - eps)^2), the textbook form."""
     assert kozeny_carman(0.4, 1e-3 / 6, 5.0) == pytest.approx(0.4**3 * 1e-6 / (180 * 0.6**2), rel=1e-14)
 
@@ -70,7 +70,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     right = {"pressure_gradient": (0, 0, 1), "viscosity": 1e-3, "porosity": 0.5, "diameter": 1e-3}
     with pytest.raises(InputError) as fault:
         DarcyFlow(**{**right, **WRONG[message]})

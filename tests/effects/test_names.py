@@ -1,4 +1,4 @@
-"""Two effects of one kind in a scene, told apart by their names; without names nothing is another."""
+"""Two effects of one kind in a scene, distinguished by their names."""
 
 import json
 import re
@@ -22,19 +22,19 @@ ONE = ([[0, 0, 0]], [[0, 0, 0]])
 
 
 class Remembering(SoftShell):
-    """One whose pairs remember two values."""
+    """A shell whose pairs store two values."""
 
     memory = 2
 
 
 def one(*effects, **more):
-    """A scene of one grain under these."""
+    """A scene of one grain under these effects."""
     return scene(*ONE, effects, mass=1.0, **more)
 
 
 @pytest.mark.slow
-def test_each_acts_with_its_own_parameters(rng):
-    """The forces of two Mie pairs, one of them without a name, are the sum of their twins in NumPy."""
+def test_named_effects_have_their_own_parameters(rng):
+    """The forces of two Mie pairs, one of them without a name, are the sum of their NumPy references."""
     for other in (CORE, Mie(epsilon=2.0)):
         setup = crowd(rng, SHELL).model_copy(update={"effects": (other, SHELL)})
         (result,) = simulate([setup])
@@ -46,7 +46,7 @@ def test_each_acts_with_its_own_parameters(rng):
         )
 
 
-def test_files_name_them_by_their_tables():
+def test_files_use_names_as_table_names():
     setup = one(CORE, Mie(epsilon=2.0), SHELL)
     tables = setup.to_dict()["effects"]
     assert list(tables) == ["core", "mie", "shell"]
@@ -58,7 +58,7 @@ def test_files_name_them_by_their_tables():
     assert '[effects.core]\nkind = "mie"\n' in setup.to_toml()
 
 
-def test_settings_and_leaving_out_go_by_name():
+def test_settings_and_removal_use_names():
     setup = one(CORE, SHELL)
     changed = setup.replace({"effects.core.epsilon": 5.0})
     assert [effect.epsilon for effect in changed.effects] == [5.0, 0.3]
@@ -73,7 +73,7 @@ def test_settings_and_leaving_out_go_by_name():
         setup.replace({"effects.core.depth.x": 1})
 
 
-def test_a_name_is_part_of_the_digest_and_the_kind_is_no_name():
+def test_names_are_in_the_digest_and_kinds_are_no_names():
     plain = one(Mie(epsilon=1.0))
     assert list(plain.to_dict()["effects"]) == ["mie"]
     assert "kind" not in plain.to_dict()["effects"]["mie"]
@@ -83,7 +83,7 @@ def test_a_name_is_part_of_the_digest_and_the_kind_is_no_name():
 
 @pytest.mark.long
 def test_two_oscillating_fields_add_up():
-    """The force on a charge in both is that of the sum, with a frequency for each."""
+    """The force on a charge in both fields is the force in their sum; each field has its own frequency."""
     slow = ElectricField(name="slow", amplitude=(1.0, 0, 0), omega=(3.0, 0, 0))
     fast = ElectricField(name="fast", amplitude=(0, 2.0, 0), omega=(0, 50.0, 0), phase=(0, 0.3, 0))
     setup = one(slow, fast, Lorentz(), quantities={"charge": 1e-6}, dt=0.01, steps=7)
@@ -93,7 +93,7 @@ def test_two_oscillating_fields_add_up():
     np.testing.assert_allclose(result.state["force"][0], expected, rtol=1e-12)
 
 
-def test_what_touching_pairs_remember_is_kept_for_each_by_name():
+def test_each_effect_has_its_own_contact_history():
     two = (Remembering(stiffness=1.0, width=1e-3), Remembering(name="other", stiffness=1.0, width=1e-3))
     users = needed_fields(two, Verlet())
     memories = {
@@ -103,13 +103,13 @@ def test_what_touching_pairs_remember_is_kept_for_each_by_name():
 
 
 class Anchored(Gravity):
-    """One that declares a field of its own, in another unit than Tether does."""
+    """An effect that declares a field of its own, in another unit than Tether does."""
 
     fields = (Field("anchor", "mm", 3, "mean", default="position"),)
 
 
-def test_fields_that_two_declare_must_agree():
-    """Two tethers share the place where a particle began; what is declared differently is refused."""
+def test_shared_fields_must_be_declared_equally():
+    """Two tethers share the field of initial positions; a conflicting declaration is refused."""
     tethers = (Tether(stiffness=(1.0,) * 3), Tether(name="other", stiffness=(2.0,) * 3))
     shared = resolve_fields(needed_fields(tethers, Verlet()))
     assert [field.name for field in shared].count("anchor") == 1
@@ -142,14 +142,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("message", REFUSED)
-def test_what_makes_no_sense_twice_and_wrong_names_are_refused(message):
+def test_invalid_duplicates_and_names_are_refused(message):
     with pytest.raises(InputError) as fault:
         REFUSED[message]()
     assert str(fault.value).startswith(message)
 
 
 @pytest.mark.long
-def test_a_failure_says_which_of_them():
+def test_a_failure_names_the_effect():
     control = IterationControl(first=1e-2, longest=1e-2, shortest=1e-2)
     traps = (Trap(stiffness=1.0), Trap(name="stiff", stiffness=1e7))
     setup = scene([[1, 0, 0]], [[0, 0, 0]], traps, mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
@@ -158,7 +158,7 @@ def test_a_failure_says_which_of_them():
 
 
 @pytest.mark.long
-def test_explain_lists_them_by_name():
+def test_explain_lists_effects_by_name():
     from tisim.describe.explain import explain
 
     shells = SoftShell(stiffness=1.0, width=1e-3), SoftShell(name="outer", stiffness=0.1, width=2e-3)

@@ -1,4 +1,4 @@
-"""Starts in which grains lie in each other: refused, or warned of."""
+"""Starts with deep overlaps between grains: refused, or accepted with a warning."""
 
 import subprocess
 import sys
@@ -30,7 +30,7 @@ MATERIALS = {"grain": Material(young=1e7, poisson=0.3, restitution=0.5, friction
 
 
 def start(position, *others, radius=R, **more):
-    """Grains at rest, held apart by a granular law."""
+    """Grains at rest under a granular law, which keeps them apart."""
     position = np.asarray(position, float)
     return scene(
         position, np.zeros_like(position), (HERTZ_MINDLIN, *others), radius, materials=MATERIALS, **more
@@ -38,7 +38,7 @@ def start(position, *others, radius=R, **more):
 
 
 def found(*scenes):
-    """The warning of some scenes; none where there is nothing to warn of."""
+    """The warning for some scenes; empty if there is none."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         warn_of_overlaps([check_places(one, one.start()) for one in scenes])
@@ -48,14 +48,14 @@ def found(*scenes):
 
 
 def refused(one):
-    """Why a start is refused."""
+    """The error message for a start."""
     with pytest.raises(InputError) as fault:
         check_places(one, one.start())
     return str(fault.value)
 
 
 def test_grains_at_one_place_are_refused_by_name():
-    """However many there are, in no time and little memory."""
+    """For any number of particles, in short time and little memory."""
     rule = (
         "particles.position must be a different place for each particle, as effects.granular holds them apart"
     )
@@ -66,8 +66,8 @@ def test_grains_at_one_place_are_refused_by_name():
     assert time.perf_counter() - began < 20
 
 
-def test_what_holds_nothing_apart_may_be_at_one_place():
-    """Nor are the members of one body held apart."""
+def test_without_repulsion_particles_may_coincide():
+    """Members of one body are not kept apart either."""
     assert check_places(*alone(scene([[0, 0, 0]] * 3, [[0, 0, 0]] * 3, (Gravity(),)))) == []
     plate = PrescribedMotion(group=1)
     together = start([[0, 0, 0]] * 2, plate, quantities={"group": [1.0, 1.0]})
@@ -75,8 +75,8 @@ def test_what_holds_nothing_apart_may_be_at_one_place():
     assert "particles 0 and 1" in refused(start([[0, 0, 0]] * 2, plate, quantities={"group": [1.0, 0.0]}))
 
 
-def test_a_skin_that_takes_in_thousands_is_refused(rng):
-    """Lists of 2e8 pairs kept a run from its first step; a few particles may all be listed."""
+def test_a_skin_with_thousands_of_neighbours_is_refused(rng):
+    """Lists of 2e8 pairs prevented a run from starting. A few particles may all be listed."""
     places = rng.uniform(0, 0.1, (20_000, 3))
     with pytest.raises(
         InputError, match=r"scene.skin must be so small .*; received 1000 m, within which each "
@@ -84,7 +84,7 @@ def test_a_skin_that_takes_in_thousands_is_refused(rng):
         check_places(*alone(start(places, radius=1e-5, skin=1e3)))
     check_places(*alone(start(places, radius=1e-5, skin=0.01)))
     check_places(*alone(start(places[:1000], radius=1e-5, skin=1e3)))
-    # Nothing is listed.
+    # This scene has no lists.
     check_places(*alone(scene(places, 0 * places, (Gravity(),), 1e-5, skin=1e3)))
 
 
@@ -95,7 +95,7 @@ def alone(one):
 
 @pytest.mark.parametrize("number", [1000, 10_000, 100_000])
 def test_a_crowd_is_refused_before_lists_are_made(number):
-    """A box of ten radii; how many one grain overlaps is counted."""
+    """In a box of ten radii; the message counts the grains that one grain overlaps."""
     side, radius = 1e-3, 1e-4
     place = np.random.default_rng(0).uniform(0, side, (number, 3))
     made = start(place, radius=radius, domain=Box(low=(0, 0, 0), high=(side,) * 3))
@@ -108,15 +108,15 @@ def test_a_crowd_is_refused_before_lists_are_made(number):
 
 
 def test_hard_spheres_in_a_crowd_are_refused():
-    """Of these no more pairs can touch than eight for each."""
+    """At most eight pairs per grain can be in contact."""
     place = np.random.default_rng(0).uniform(0, 1e-3, (3000, 3))
     crowd = scene(place, np.zeros((3000, 3)), (Impact(hardness=1e5),), 1e-4)
     assert "at most 8 pairs overlap for each of them; received about" in refused(crowd)
 
 
-def test_deep_overlaps_are_warned_of():
-    """By half of the smaller radius, in open space and across a joined face, of equals and of unlike ones;
-    one warning for all scenes says how many."""
+def test_deep_overlaps_give_a_warning():
+    """Overlaps of half of the smaller radius, in open space and across a periodic face, between equal and
+    unlike grains; one warning for all scenes states their number."""
     assert found(start([[0, 0, 0], [1.51 * R, 0, 0]])) == ""
     words = (
         "particles 0 and 1 overlap by 0.000505 m, 0.505 of the smaller radius, at (0, 0, 0) m, at the start"
@@ -153,8 +153,8 @@ TRIANGLES = TriangulatedSurface(
 
 @pytest.mark.parametrize("kind", [*SHEETS, "triangles"])
 @pytest.mark.parametrize("side", [1, -1])
-def test_grains_in_a_sheet_are_warned_of(kind, side):
-    """From either side of it."""
+def test_grains_in_a_sheet_give_a_warning(kind, side):
+    """From either side of the sheet."""
     wall = Walls(surface=TRIANGLES) if kind == "triangles" else Walls(**{kind: (SHEETS[kind],)})
     assert found(start([[0, 1e-2, side * 0.9 * R + bend(kind)]], wall)) == ""
     words = found(start([[0, 1e-2, side * 0.4 * R + bend(kind)]], wall))
@@ -162,12 +162,12 @@ def test_grains_in_a_sheet_are_warned_of(kind, side):
 
 
 def bend(kind):
-    """How far (m) a sheet that is bent is above z = 0 at y = 1 cm."""
+    """The height (m) of a curved sheet above z = 0 at y = 1 cm."""
     return 1 - np.sqrt(1 - 1e-4) if kind in ("spheres", "cylinders") else 0.0
 
 
-def test_grains_behind_a_plane_are_warned_of():
-    """Those of a wall that moves too, where it is at the start."""
+def test_grains_behind_a_plane_give_a_warning():
+    """Also behind a moving wall, at its initial position."""
     floor = Walls(planes=(Plane(),))
     assert found(start([[0, 0, R], [1, 0, 0.51 * R]], floor)) == ""
     words = (
@@ -182,8 +182,8 @@ def test_grains_behind_a_plane_are_warned_of():
     "placement",
     [RandomInBall(centre=(0, 0, 0), radius=0.02), RandomInBox(low=(-0.02,) * 3, high=(0.02,) * 3)],
 )
-def test_the_packings_of_the_package_are_apart(placement):
-    """Of unlike sizes too."""
+def test_packings_of_the_package_do_not_overlap(placement):
+    """Also with unlike sizes."""
     classes = tuple(GrainClass(sizes=EqualSizes(radius=r), density=2e3) for r in (R, 0.1 * R))
     for grains in (classes, classes[:1]):
         cloud = Cloud(number=300, grains=grains, placement=placement)
@@ -193,14 +193,14 @@ def test_the_packings_of_the_package_are_apart(placement):
         assert check_places(one, one.start()) == []
 
 
-def test_lists_that_would_not_fit_are_refused_before_they_are_made(monkeypatch):
-    """At the start by an error that says where, and how many are there; in a run the world fails, and others
-    go on."""
+def test_lists_beyond_memory_are_refused_in_advance(monkeypatch):
+    """At the start, an error states the position and the number of grains there; in a run, the world fails
+    and others continue."""
 
     def thrown(speed):
         place = np.random.default_rng(1).uniform(-1, 1, (64, 3))
         place *= 50 * R / np.linalg.norm(place, axis=1)[:, None] * np.linspace(0.5, 1, 64)[:, None]
-        # Each is at the middle after so many steps.
+        # Each grain is at the middle after this number of steps.
         return scene(place, -speed * place, (Hertz(young=1e-9, poisson=0.3),), R, dt=1e-4, steps=120)
 
     made = [thrown(100.0 * part) for part in (1.0, 0.0)]
@@ -223,7 +223,7 @@ def test_lists_that_would_not_fit_are_refused_before_they_are_made(monkeypatch):
 
 @pytest.mark.slow
 def test_a_command_prints_the_warning_on_one_line(tmp_path):
-    """On standard error, whatever the place in the code."""
+    """On standard error, for any place in the code."""
     two = scene([[0, 0, 0], [R, 0, 0]], np.zeros((2, 3)), (Hertz(young=1e-9, poisson=0.3),), R)
     (tmp_path / "two.toml").write_text(two.to_toml())
     command = [sys.executable, "-m", "tisim", "run", "two.toml", "--out", "out"]

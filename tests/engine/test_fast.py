@@ -1,4 +1,4 @@
-"""Fast arithmetic, in a process of its own: what it may change, and what it must not."""
+"""Fast arithmetic, in a separate process: the effects it may have, and those it must not have."""
 
 import numpy as np
 import pytest
@@ -19,14 +19,14 @@ from tisim.sources import Cylinder, MagneticCylinders, sample
 pytestmark = pytest.mark.long
 
 CLOSE = 1e-12
-"""Forces in fast arithmetic differ from those of their twins by less than this part of the largest."""
+"""Largest difference between forces in fast arithmetic and in NumPy, over the largest force."""
 
 GRANULAR_STEPS = 100
-"""So few that rounding grows to no more than 1e-12 of what grains do."""
+"""Few enough steps for rounding errors to stay below 1e-12 of the grains' motion."""
 
 
 class Wall(Force):
-    """A spring that is stiffer beyond a place than numbers hold."""
+    """A spring whose stiffness overflows beyond some position."""
 
     place: float = parameter("m", "where it begins", 0.5)
     stiffness: float = parameter("N/m", "stiffness beyond", 1e308)
@@ -38,7 +38,7 @@ class Wall(Force):
 
 
 class Screened(NearField):
-    """A near field that decays; what it inherits for sums by the inverse of the distance does not."""
+    """A near field that decays; the inherited sum over inverse distances does not."""
 
     length: float = parameter("m", "length of decay", 0.1)
 
@@ -49,7 +49,7 @@ class Screened(NearField):
 
 
 class Reversed(NearField):
-    """A near field of the other sign, which changes what the law calls."""
+    """A near field of opposite sign, which overrides a function that the law calls."""
 
     @ti.func
     def between(self, s, w, i, j, separation, distance):
@@ -58,7 +58,7 @@ class Reversed(NearField):
 
 
 class Named(NearField):
-    """A near field that changes no device function."""
+    """A near field that overrides no device function."""
 
     def approximations(self, extent):
         return ()
@@ -86,7 +86,7 @@ def _kinds(x: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[vali
 
 
 def numbers():
-    """What kernels say of numbers; and a sum of tenths, carried along."""
+    """Classification of numbers in kernels; and a compensated sum of tenths."""
     x = np.array([0.0, 1.0, -3.0, 1e100, 1e160, -1e300, np.inf, np.nan])
     out, total = np.zeros((len(x), 3), np.int32), np.zeros(2)
     _kinds(x, out)
@@ -95,7 +95,7 @@ def numbers():
 
 
 def twins():
-    """The largest errors of forces over all pairs, beside NumPy, over the largest force."""
+    """The largest errors of forces over all pairs, against NumPy, over the largest force."""
     rng, n, errors = np.random.default_rng(3), 100, []
     position, charge, moment = rng.uniform(0, 1, (n, 3)), rng.normal(size=n), rng.normal(size=(n, 3))
     d = position[None] - position[:, None]
@@ -120,15 +120,15 @@ def twins():
 
 
 def failure():
-    """How a world ends whose force becomes infinite half-way, and one beside it."""
+    """The end of a world whose force becomes infinite half-way, and of another world beside it."""
     start = scene([[0.0, 0, 0]], [[1.0, 0, 0]], (Wall(),), mass=[1.0], stepper=fixed(1e-3), duration=1.0)
     bad, good = simulate([start, start.replace({"effects.wall.place": 2.0})], worlds=2)
     return [bad.status.reason, bad.time, good.status.ok, good.time, float(good.state["position"][0, 0])]
 
 
 def beside_a_long_cylinder():
-    """Flux density (T) beside one of 2e7 radii in an odd direction, magnetised across it, far from its
-    middle."""
+    """Flux density (T) beside a cylinder of length 2e7 radii in an oblique direction, magnetised
+    transversely, far from its middle."""
     axis = np.array([0.3, -0.7, 0.648])
     magnet = Cylinder(
         centre=(1 / 3000, 1 / 7000, 1 / 900),
@@ -144,7 +144,7 @@ def beside_a_long_cylinder():
 
 
 def derived():
-    """The forces (N) on one of two, a distance of 1 m apart, by laws derived from the near field."""
+    """The forces (N) on one of two particles 1 m apart, by laws derived from the near field."""
     forces = []
     for law in (Screened(alpha1=1.0), Reversed(alpha1=1.0)):
         (result,) = simulate([scene([[0.0, 0, 0], [1, 0, 0]], np.zeros((2, 3)), (law,), dt=1e-15)])
@@ -153,14 +153,14 @@ def derived():
 
 
 def error(result, place, velocity, spin):
-    """The largest error of grains beside NumPy, over the largest value."""
+    """The largest error of grains against NumPy, over the largest value."""
     expected, state = {"position": place, "velocity": velocity, "spin": spin}, by_id(result)
     return max(float(np.abs(state[name] - x).max() / np.abs(x).max()) for name, x in expected.items())
 
 
 def piled():
-    """The error of a heap in a cell, and how many contacts slid; how a world beside it ends that begins too
-    deep for its step."""
+    """The error of a heap in a cell, and the number of sliding contacts; and the end of another world, whose
+    initial overlap is too deep for its step."""
     pile = heap(np.random.default_rng(5), steps=GRANULAR_STEPS)
     couple = grains([[0, 0, 9], [1.9, 0, 9]], np.zeros((2, 3)), law={"young": 1e10}, dt=1e-3)
     result, deep = simulate([pile, couple], worlds=2)
@@ -170,7 +170,7 @@ def piled():
 
 
 def flowing():
-    """The error of a crowd in shear, and how many contacts slid."""
+    """The error of a crowd in shear, and the number of sliding contacts."""
     crowd = sheared.crowd(np.random.default_rng(5), n=40, steps=GRANULAR_STEPS)
     (result,) = simulate([crowd])
     known = sheared.ShearedGrains(crowd)
@@ -180,7 +180,7 @@ def flowing():
 
 
 def everything():
-    """All of this, from one process."""
+    """Results of the functions above, from one process."""
     settings = tisim.run(scene([[0.0, 0, 0]], [[1.0, 0, 0]])).settings
     return [settings["arithmetic"], numbers(), twins(), failure(), beside_a_long_cylinder(), derived()]
 
@@ -190,11 +190,11 @@ def fast(in_fast_arithmetic):
     return in_fast_arithmetic("engine.test_fast", "everything")
 
 
-def test_results_say_so(fast):
+def test_results_state_the_arithmetic(fast):
     assert fast[0] == "fast"
 
 
-def test_what_is_not_finite_is_found_and_sums_carry_their_rounding_error_along(fast):
+def test_non_finite_values_are_found_and_sums_are_compensated(fast):
     kinds, total = fast[1]
     assert [kind[0] for kind in kinds] == [1, 1, 1, 1, 0, 0, 0, 0]
     assert [kind[1] for kind in kinds] == [0] * 8
@@ -202,11 +202,11 @@ def test_what_is_not_finite_is_found_and_sums_carry_their_rounding_error_along(f
     assert total == 10_000.0
 
 
-def test_forces_are_those_of_their_twins(fast):
+def test_forces_equal_their_twins(fast):
     assert max(fast[2]) < CLOSE
 
 
-def test_a_law_derived_from_one_by_the_inverse_is_its_own(fast):
+def test_derived_laws_do_not_inherit_the_inverse_sum(fast):
     np.testing.assert_allclose(fast[5], [np.exp(-10.0), -1.0], rtol=1e-9)
     assert not Screened.offers_inverse()
     assert NearField.offers_inverse()
@@ -228,7 +228,7 @@ def test_the_field_beside_a_long_cylinder_keeps_its_digits(fast):
 
 
 @pytest.mark.slow
-def test_a_heap_is_that_of_its_twin_and_grains_too_deep_in_each_other_are_reported(in_fast_arithmetic):
+def test_a_heap_equals_its_twin_and_deep_overlaps_are_reported(in_fast_arithmetic):
     off, sliding, reason, time = in_fast_arithmetic("engine.test_fast", "piled")
     assert off < CLOSE
     assert sliding > 1000
@@ -238,7 +238,7 @@ def test_a_heap_is_that_of_its_twin_and_grains_too_deep_in_each_other_are_report
 
 
 @pytest.mark.slow
-def test_a_crowd_in_shear_is_that_of_its_twin(in_fast_arithmetic):
+def test_a_crowd_in_shear_equals_its_twin(in_fast_arithmetic):
     off, sliding = in_fast_arithmetic("engine.test_fast", "flowing")
     assert off < CLOSE
     assert sliding > 1000

@@ -1,5 +1,5 @@
-"""Steps launched unasked, as on a GPU, and those of teams of threads are those of worlds that are asked after
-each launch."""
+"""Steps launched without asking for progress, as on a GPU, and steps by teams of threads are equal to steps
+of worlds that are asked after each launch."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ WORLDS, STEPS, ITEMS = 5, 60, 1000
 
 
 class Mark(Phase):
-    """This phase leaves a trace of its number, and changes what repeats wait for."""
+    """A phase that leaves a trace of its number, and changes the flags of repeats."""
 
     def __init__(self, s, number):
         self.s, self.number = s, number
@@ -35,7 +35,8 @@ class Mark(Phase):
         s.trace[w] = 0.75 * s.trace[w] + self.number + s.inner[w]
         if ti.static(self.number == 1):
             s.steps[w] += 1
-            # A turn in some steps only, in each world by itself, and then up to three of the inner repeat.
+            # The outer repeat runs in some steps only, independently in each world; the inner one up to three
+            # times in it.
             s.outer[w] = ti.cast((s.steps[w] + w) % 5 // 3, ti.i32)
         elif ti.static(self.number == 2):
             s.inner[w] = (s.outer[w] + w + ti.cast(s.steps[w], ti.i32)) % 4
@@ -50,7 +51,7 @@ class Mark(Phase):
 
 
 class Mix(Phase):
-    """Every item reads what another member of a team has made of it in the phase before."""
+    """Every item reads a value that another member of a team wrote in the phase before."""
 
     def __init__(self, s, source, target):
         self.s, self.source, self.target, self.extent = s, source, target, ITEMS
@@ -66,7 +67,7 @@ class Mix(Phase):
 
 
 class While(Repeat):
-    """This repeat goes on while a flag is up."""
+    """A repeat that continues while a flag is positive."""
 
     def __init__(self, flag, *items, usual):
         super().__init__(items)
@@ -79,7 +80,7 @@ class While(Repeat):
 
 @in_taichi_thread
 def make():
-    """A state with two columns of items, and a step with a repeat in a repeat that is not in every step."""
+    """A state with two columns of items, and a step with nested repeats, which do not run in every step."""
     own = (WorldField("trace", "real"), WorldField("outer", "integer"), WorldField("inner", "integer"))
     s = State(WORLDS, 1, CORE, (*CORE_OF_WORLDS, *own))
     columns, builder = (ti.field(ti.i32), ti.field(ti.i32)), Builder()
@@ -93,7 +94,7 @@ def make():
 
 @pytest.fixture(scope="module")
 def made():
-    """What ``make`` makes."""
+    """The result of ``make``."""
     with collected() as trees:
         yield make()
     for tree in trees:
@@ -101,7 +102,7 @@ def made():
 
 
 def ends(made, schedule, asks=False, threads=1, number=1, steps=STEPS):
-    """What becomes of the worlds, and how many launches and looks it takes."""
+    """The final states of the worlds, and the launches or queries for progress."""
     s, items = made
     s.fill({**dict.fromkeys(s.columns, 0), "pause_time": np.inf, "goal": NEVER})
     in_taichi_thread(lambda: [column.fill(0) for column in s.mixed])()
@@ -111,7 +112,7 @@ def ends(made, schedule, asks=False, threads=1, number=1, steps=STEPS):
         program.asks, learn = asks, program._learn
         program._learn = lambda found: looks.append(found) or learn(found)
     else:
-        # The list beside it shares items with the step, and is not taken.
+        # The first list shares items with the step, and is not run.
         _, program = world_programs(s, (items[2:4], items), Teams(WORLDS, ITEMS, threads, number))
         launch = program._launch
         program._launch = lambda *a: looks.append(a) or launch(*a)
@@ -126,7 +127,7 @@ def same(found, expected, what):
         np.testing.assert_array_equal(found[name], values, err_msg=f"{name}, {what}")
 
 
-def test_what_recurs_in_steps_is_a_piece_of_its_own():
+def test_phases_common_to_steps_form_their_own_pieces():
     a, b, c, d = (Phase() for _ in range(4))
     pieces, spans = in_pieces(((a, b, c, a), (d, d, b), ()))
     assert pieces == (((a,), (0, 3)), ((b,), (1, 6)), ((c,), (2,)), ((d,), (4, 5)))
@@ -134,14 +135,14 @@ def test_what_recurs_in_steps_is_a_piece_of_its_own():
     assert in_pieces(((a, b, c), (d,))) == ((((a, b, c), (0,)), ((d,), (1,))), (range(1), range(1, 2)))
 
 
-def test_all_schedules_and_ways_to_ask_take_the_same_steps_and_devices_are_asked_seldom(made):
+def test_all_schedules_take_the_same_steps(made):
     expected, _ = ends(made, "world")
     np.testing.assert_array_equal(expected["steps"], [60, 60, 60, 40, 50])
     assert len(set(expected["trace"])) == WORLDS
     for asks in (True, False):
         found, looks = ends(made, "particle", asks)
         same(found, expected, f"asks: {asks}")
-        # A world waits in every other step, which asks for more looks than lists of pairs do.
+        # A world waits in every other step, which takes more queries than pair lists do.
         assert len(looks) < STEPS if not asks else not looks
 
 
@@ -150,12 +151,12 @@ TEAMS = (
     *((2, 1, IN_TIME, STEPS), (3, 1, IN_TIME, 6), (8, 1, IN_TIME, 6)),
     *((8, 3, IN_STEPS, STEPS), (8, 1, NEVER_WAITED_FOR, STEPS)),
 )
-"""Threads, of which Taichi has eight, how many teams they are in, how often they look for the others before
-these are late, and steps. Where there are fewer cores they wait long for each other."""
+"""Number of threads (Taichi has eight), number of teams, polls before the other threads count as late, and
+steps. With fewer cores, threads wait long for each other."""
 
 
 def of_eight_threads():
-    """The teams that do not take the same steps as threads alone."""
+    """Differences between the steps of these teams and of single threads."""
     made, wrong = make(), []
     expected = {steps: ends(made, "world", steps=steps)[0] for steps in (6, STEPS)}
     for threads, number, late, steps in TEAMS:
@@ -173,20 +174,20 @@ def test_teams_take_the_same_steps_late_or_not():
     assert elsewhere_with("threads=8")("engine.test_launches", "of_eight_threads") == []
 
 
-def test_a_team_that_parts_is_tried_again(made, monkeypatch):
-    """After each step here, and threads alone take some steps before the next trial."""
+def test_a_parted_team_is_tried_again(made, monkeypatch):
+    """Here it parts after each step; single threads then run some steps before the next trial."""
     expected, _ = ends(made, "world", threads=2, number=2)
     monkeypatch.setattr(team, "TIMES_LATE", 0)
     found, launches = ends(made, "team", False, 2, 1)
     same(found, expected, "parting")
     assert len(launches) > STEPS * WORLDS / 50
-    # Whom nobody waits for is not in the team.
+    # A thread that no other waits for does not belong to the team.
     monkeypatch.setattr(team, "LOOKS_WHEN_LATE", -1)
     found, _ = ends(made, "team", False, 64, 1)
     same(found, expected, "without each other")
 
 
-def test_what_has_one_item_is_not_shared():
+def test_phases_with_one_item_are_not_shared():
     one, two, three = (Phase() for _ in range(3))
     many = Phase()
     many.extent = 2
@@ -199,12 +200,12 @@ def test_teams_are_tried_again_at_little_cost():
     trials = TeamTrials(worlds=2)
     trials.learn(100, 100, 1.0, parted=False)
     assert not trials.alone
-    # What threads take alone is not known yet.
+    # The time of steps by single threads is not known yet.
     trials.learn(100, 100, 1.0, parted=True)
     assert trials.alone == FIRST_ALONE
     trials.learn(FIRST_ALONE, FIRST_ALONE, 2e-3 * FIRST_ALONE, parted=True)
     assert not trials.alone
-    # Faster all the same, and slower.
+    # First the team is faster even so, then slower.
     trials.learn(100, 1000, 0.19, parted=True)
     assert not trials.alone
     trials.learn(100, 1000, 0.21, parted=True)
@@ -225,9 +226,9 @@ def test_teams_are_tried_again_at_little_cost():
         (2000, "light", 1, 16, 3),
     ],
 )
-def test_tasks_of_a_phase_are_as_many_for_each_thread(extent, kind, worlds, threads, tasks):
-    """2000 particles are not cut into three for two threads, one of which would wait for the other; a world
-    that is alone in room for many is shared, too."""
+def test_tasks_of_a_phase_are_balanced(extent, kind, worlds, threads, tasks):
+    """2000 particles are not divided into three tasks for two threads, one of which would idle; a single
+    world with a large capacity is shared, too."""
     phase = Phase()
     phase.extent, phase.long, phase.light = extent, kind == "long", kind != "heavy"
     assert tasks_of(phase, worlds, threads) == tasks

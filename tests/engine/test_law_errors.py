@@ -1,4 +1,4 @@
-"""A law that cannot be compiled is told in a line, with the line of its author's file."""
+"""A law that does not compile gives a one-line error, with the line number in its author's file."""
 
 import pytest
 
@@ -20,8 +20,8 @@ class TypedIn(Force):
 """
 
 
-def test_a_law_without_a_source_is_told_so():
-    """As those are that are typed in, or read from standard input or the command line."""
+def test_a_law_without_source_text_is_refused():
+    """Such laws are typed in, or read from standard input or the command line."""
     names = {"__name__": "typed_in"}
     exec(TYPED_IN, names)
     bare = scene([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], (names["TypedIn"](),))
@@ -86,8 +86,8 @@ def test_in_python(own_file, name):
 
 
 @pytest.mark.parametrize("stepper", [Trapezoid(), Collocation()])
-def test_what_a_stepper_keeps_is_not_that_of_an_effect(own_file, stepper):
-    """Both would write one number."""
+def test_names_of_stepper_and_effect_must_differ(own_file, stepper):
+    """Both would write the same counter."""
     own = python_file.load(own_file("laws.py", LAWS)).OfStepper()
     rule = r"^name of .* must be a name of no other use on a state; received 'rejections'$"
     with pytest.raises(InputError, match=rule):
@@ -107,14 +107,14 @@ def test_on_the_command_line(own_file, capsys):
 
 
 def test_a_method_of_the_contract_must_be_for_kernels(own_file):
-    """Said when the class is made, with the line of the file that a command is given."""
+    """The error is raised when the class is defined, with the line of the file given to a command."""
     plain = LAWS.replace("    @ti.func\n", "", 1)
     rule = r"UnknownName\.force must be decorated with ti\.func, as in its contract; received 'function'"
     with pytest.raises(InputError, match=rule):
         python_file.load(own_file("plain.py", plain))
 
 
-def test_what_is_run_must_be_scenes():
+def test_only_scenes_can_be_run():
     for wrong in ("scene.toml", ["scene.toml"], [None]):
         with pytest.raises(InputError, match="scenes must be a Scene or a list of them"):
             tisim.run(wrong)

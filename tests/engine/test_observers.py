@@ -1,4 +1,4 @@
-"""Runs of a part of the way, and what looks at them meanwhile."""
+"""Partial runs, and observers called during them."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def simulation():
 
 @pytest.fixture(scope="module")
 def whole():
-    """Results in one go, and the times of all ends of steps of each world, s."""
+    """Results of a run in one go, and the end times of all steps of each world, s."""
     sim = compiled(FLOWS[0], 2, CAPACITY)
     sim.load(FLOWS)
     times = [sim.s.read("time")]
@@ -39,12 +39,12 @@ def same(results, expected):
 
 
 def first_end(times, pause):
-    """The first of these times at or after one; the last where none is."""
+    """The first of these times at or after ``pause``; the last if there is none."""
     return times[min(np.searchsorted(times, pause), len(times) - 1)]
 
 
 class Waits(Observer):
-    """Has each world wait at times of its own, and keeps when it has seen it."""
+    """Makes each world wait at given times, and records the times at which it observes."""
 
     def __init__(self, *pauses):
         self.pauses, self.observed = [list(times) for times in pauses], []
@@ -58,12 +58,12 @@ class Waits(Observer):
         self.pauses = [[t for t in times if t > now[w]] for w, times in enumerate(self.pauses)]
 
 
-def test_until_is_the_first_end_of_a_step_there_and_a_later_run_goes_on(simulation, whole):
+def test_until_stops_at_the_next_step_end_and_runs_continue(simulation, whole):
     results, times = whole
     simulation.run(until=2e-4)
     assert [r.time for r in simulation.results()] == [first_end(times[w], 2e-4) for w in range(2)]
     assert [r.status.reason for r in simulation.results()] == ["running", "running"]
-    simulation.run(until=2e-4)  # where they are already
+    simulation.run(until=2e-4)  # they are already there
     simulation.run(until=3e-4, steps=2)
     assert simulation.results()[0].time < 3e-4
     simulation.run(until=5e-4)
@@ -84,7 +84,7 @@ def test_worlds_wait_for_the_earliest_of_all_observers(simulation, whole):
             assert {first_end(times[w], t) for t in pauses} <= set(observed_times[:, w])
 
 
-def test_a_pause_that_has_passed_is_none(simulation, whole):
+def test_past_pauses_are_ignored(simulation, whole):
     class Stubborn(Observer):
         observed = 0
 
@@ -122,7 +122,7 @@ def test_an_observer_that_raises_stops_between_two_steps(simulation, whole):
     same(simulation.results(), whole[0])
 
 
-def test_a_checkpoint_now_and_then(simulation, whole, tmp_path):
+def test_periodic_checkpoints(simulation, whole, tmp_path):
     path = tmp_path / "c.h5"
     with pytest.raises(InputError, match="seconds between checkpoints must be at least 0; received -1"):
         PeriodicCheckpoint(path, seconds=-1)
@@ -149,7 +149,7 @@ def test_a_checkpoint_now_and_then(simulation, whole, tmp_path):
         ({"observers": [Observer]}, "an observer must be an Observer or a function"),
     ],
 )
-def test_what_cannot_be_asked_for(simulation, arguments, message):
+def test_invalid_arguments_of_run_are_refused(simulation, arguments, message):
     with pytest.raises(InputError, match=message):
         simulation.run(**arguments)
     assert simulation.fraction() == 0
@@ -166,7 +166,7 @@ def test_what_cannot_be_asked_for(simulation, arguments, message):
     ],
     ids=["run", "results", "state", "checkpoint", "restore"],
 )
-def test_what_is_not_loaded_is_refused(monkeypatch, tmp_path, use):
+def test_an_unloaded_simulation_is_refused(monkeypatch, tmp_path, use):
     sim = compiled(FLOWS[0], 2, CAPACITY)
     monkeypatch.setattr(sim, "scenes", [])
     monkeypatch.delattr(sim, "monitor", raising=False)

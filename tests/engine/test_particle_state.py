@@ -1,4 +1,5 @@
-"""Particles read and written between runs: what follows is as from a start, and other worlds know nothing."""
+"""Particles read and written between steps: the run continues as from a start, and other worlds are
+unchanged."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ CAPACITY = max(scene.capacity() for scene in FLOWS)
 
 
 def crystal(seed=0, lattice=None, speed=None):
-    """Particles under a short-ranged pair force, which pair lists and forces at the start are of."""
+    """Particles under a short-ranged pair force, with pair lists and initial forces."""
     draw = np.random.Generator(np.random.Philox(seed))
     axis = np.arange(4) * 1.1 if lattice is None else lattice
     sites = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
@@ -41,7 +42,7 @@ def same(actual, expected):
         np.testing.assert_array_equal(values, expected.state[name], err_msg=name)
 
 
-def test_it_is_what_a_result_would_have(simulation):
+def test_the_state_equals_a_result(simulation):
     simulation.run(steps=5)
     for state, result in zip(simulation.states, simulation.results(), strict=True):
         assert (set(state), state.time) == (set(result.state), result.time)
@@ -54,8 +55,8 @@ def test_it_is_what_a_result_would_have(simulation):
 
 
 @pytest.mark.slow
-def test_a_world_written_to_goes_on_as_one_that_starts_so():
-    """Same forces, lists and steps, to the bit, wherever the particles have been put; time has gone on."""
+def test_a_written_state_continues_as_a_start():
+    """Forces, lists and steps are equal bit for bit, for any new positions; time has advanced."""
     simulation = compiled(crystal(), 2)
     start = crystal(7, lattice=np.arange(4) * 1.3 - 20.0)
     simulation.load([start, crystal(1)])
@@ -83,7 +84,7 @@ def test_a_world_written_to_goes_on_as_one_that_starts_so():
     assert simulation.results()[0].start["id"].tolist() == list(range(len(result.start["mass"])))
 
 
-def test_forces_are_those_of_what_was_written():
+def test_forces_follow_written_positions():
     simulation = compiled(crystal(), 2)
     simulation.load(crystal())
     force = simulation.state["force"]
@@ -93,8 +94,9 @@ def test_forces_are_those_of_what_was_written():
 
 
 @pytest.mark.slow
-def test_lists_that_are_too_short_for_what_was_written_grow():
-    """The next step begins with the forces of what was written, as from a start, not with those of before."""
+def test_short_lists_grow_after_a_write():
+    """The next step begins with forces at the written positions, as from a start, not with the previous
+    forces."""
     close = crystal(lattice=np.arange(4) * 0.55)
     simulation = compiled(crystal(), 2)
     simulation.load(crystal())
@@ -106,8 +108,8 @@ def test_lists_that_are_too_short_for_what_was_written_grow():
     np.testing.assert_array_equal(force, simulation.state["force"])
 
 
-def test_to_write_what_is_there_changes_nothing(simulation):
-    """Nor in what comes: events, steps and bits, in both worlds."""
+def test_writing_the_same_values_changes_nothing(simulation):
+    """Later events, steps and bits are unchanged too, in both worlds."""
     simulation.run()
     expected = simulation.results()
     simulation.load(FLOWS)
@@ -120,7 +122,7 @@ def test_to_write_what_is_there_changes_nothing(simulation):
     assert simulation.results()[1].work["merges"] > 0
 
 
-def test_a_checkpoint_knows_of_it(simulation, tmp_path):
+def test_a_checkpoint_includes_written_values(simulation, tmp_path):
     simulation.run(steps=5)
     simulation.states[0]["velocity"] = 2.0 * simulation.states[0]["velocity"]
     simulation.checkpoint(tmp_path / "c.h5")
@@ -136,7 +138,7 @@ def test_a_checkpoint_knows_of_it(simulation, tmp_path):
 
 
 def test_an_observer_may_write_too(simulation):
-    """A thermostat by hand: the run stops where it was asked to."""
+    """A thermostat by hand: the run stops at the requested step."""
 
     def cool(sim):
         if sim.fraction() > 0:
@@ -166,14 +168,14 @@ N = 60
         ("temperature", np.full(N, -1.0), "particles.temperature must be at least 0 K; received -1.0"),
     ],
 )
-def test_what_cannot_be_written(simulation, name, values, message):
+def test_invalid_writes_are_refused(simulation, name, values, message):
     before = simulation.results()[0]
     with pytest.raises(InputError, match=message):
         simulation.states[0][name] = values
     same(simulation.results()[0], before)
 
 
-def test_what_is_over_cannot_be_written_to(simulation):
+def test_a_finished_world_cannot_be_changed(simulation):
     simulation.run()
     velocity = simulation.states[0]["velocity"]
     with pytest.raises(InputError, match="must be one that runs; received 'reached its end'"):
@@ -182,7 +184,7 @@ def test_what_is_over_cannot_be_written_to(simulation):
         _ = simulation.states[0]["speed"]
 
 
-def test_a_write_that_cannot_be_gone_on_from_is_a_failure_in_words():
+def test_an_impossible_write_gives_a_clear_failure():
     """Two particles in one place: the force between them is not finite."""
     simulation = compiled(crystal(), 2)
     simulation.load([crystal(), crystal(1)])
@@ -197,7 +199,7 @@ def test_a_write_that_cannot_be_gone_on_from_is_a_failure_in_words():
 
 
 @pytest.mark.slow
-def test_a_world_begins_anew_with_its_forces_also_after_a_run_of_no_steps():
+def test_forces_are_kept_over_a_run_of_no_steps():
     made = crystal()
     simulation = compiled(made, 1, 64)
     simulation.load([made])

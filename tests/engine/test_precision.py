@@ -1,4 +1,4 @@
-"""Single precision: the same scenes as in test_schedules, in a process of their own."""
+"""Single precision: the scenes of test_schedules, in a separate process."""
 
 import numpy as np
 import pytest
@@ -39,14 +39,14 @@ def test_single_precision_stays_finite_and_keeps_mass_and_energy(in_single_preci
 
 @pytest.mark.slow
 def test_single_and_double_precision_agree_on_how_much_merges(elsewhere, in_single_precision):
-    """Chaotic trajectories part, and in few of 240 worlds (measured: 3) the number of grains left too."""
+    """Chaotic trajectories diverge; in 3 of 240 worlds (measured) the final number of grains differs too."""
     single, double = in_single_precision["left"], elsewhere["left"]
     assert (single != double).sum() <= 12
     assert single.sum() == pytest.approx(double.sum(), rel=0.01)
 
 
 def rebounds_of_cold_grains():
-    """Status, impacts, bonds and impacts that have not settled, of grains with an immense hardness."""
+    """Status, impacts, bonds and unsettled impacts for grains with an immense hardness."""
     rows = []
     for hardness, activation, temperature in ((1e5, 2e5, 300.0), (1e6, 1e3, 0.0), (1e9, 1e3, 1e-3)):
         effects = (
@@ -59,18 +59,18 @@ def rebounds_of_cold_grains():
 
 @pytest.mark.slow
 def test_grains_too_hard_for_single_precision_rebound(single):
-    """exp(Q / (R T)) is capped where hardness still fits f32: nothing turns into a NaN that bonds."""
+    """exp(Q / (R T)) is capped so that hardness fits f32: no NaN causes a bond."""
     assert single("engine.test_precision", "rebounds_of_cold_grains") == [[True, 1, 0, 0]] * 3
 
 
 @pytest.mark.slow
 def test_cooling_is_as_right_as_single_precision_can_be(single):
-    """From 0 K to 1e5 K; a stop criterion of double precision would be below the last digit here."""
+    """From 0 K to 1e5 K. A stop criterion for double precision would be below the last digit here."""
     assert max(single("operators.test_cooling", "errors_of_steps")) < 8 * np.finfo(np.float32).eps
 
 
 def refusals():
-    """What is said of scenes whose numbers f64 holds and f32 does not."""
+    """Error messages for scenes whose numbers fit f64 but not f32."""
     messages = []
     for hardness, more in (
         (1e200, {"quantities": {"temperature": 1.0}}),
@@ -85,8 +85,9 @@ def refusals():
 
 
 @pytest.mark.slow
-def test_what_single_precision_cannot_hold_is_refused(single):
-    """Not an infinite hardness, nor a mass of zero, which would make the particle vanish."""
+def test_values_beyond_single_precision_are_refused(single):
+    """Such scenes are refused: an infinite hardness, and a mass of zero, which would make the particle
+    vanish."""
     hardness, mass, temperature = single("engine.test_precision", "refusals")
     assert hardness.startswith("impact.hardness must be within the range of f32; received 1e+200")
     assert mass.startswith("particles.mass must be within the range of f32; received 8.37")

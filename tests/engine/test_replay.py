@@ -1,4 +1,4 @@
-"""Images of the whole state, from which a failed world is run once more."""
+"""Snapshots of the whole state, from which a failed world is run again."""
 
 import time
 from types import SimpleNamespace
@@ -8,8 +8,8 @@ import numpy as np
 from tisim.engine import replay
 
 
-def test_images_that_take_long_are_made_seldom(monkeypatch):
-    """Of a million grains one takes seconds, which would be most of the time."""
+def test_slow_snapshots_are_made_rarely(monkeypatch):
+    """A snapshot of a million grains takes seconds, and would otherwise take most of the time."""
     made = []
 
     def image():

@@ -1,4 +1,4 @@
-"""A parameter that is a list of parts: in files, by dotted keys, and what a kernel sees of it."""
+"""A parameter that is a list of components: in files, by dotted keys, and in kernels."""
 
 import tomllib
 
@@ -47,7 +47,7 @@ def hung(rng, n, share=1.0):
 
 @pytest.mark.long
 def test_each_world_has_its_own_number(rng):
-    """None, one, and so many that the table is longer; the same bits alone."""
+    """None, one, and more than the initial size of the table; the same bits alone."""
     worlds = [hung(rng, 5), hung(rng, 0), hung(rng, 1, share=0.5), hung(rng, 31)]
     together = simulate(worlds, worlds=4, capacity=4)
     for setup, result in zip(worlds, together, strict=True):
@@ -81,7 +81,7 @@ def test_files_and_dotted_keys(rng):
     [("effects.springs.springs.2.stiffness", "'2'"), ("effects.springs.springs.first.stiffness", "'first'"),
      ("effects.springs.springs.-1", "'-1'")],
 )  # fmt: skip
-def test_a_row_that_is_not_there(rng, key, received):
+def test_an_absent_row_is_refused(rng, key, received):
     with pytest.raises(InputError) as fault:
         hung(rng, 2).replace({key: 1.0})
     rule = "a setting of this scene (effects.springs.springs has rows 0 to 1)"

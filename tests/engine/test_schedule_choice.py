@@ -1,4 +1,4 @@
-"""The schedule that worlds run on unless one is given goes by the work of a step."""
+"""The default schedule of worlds depends on the work of a step."""
 
 from types import SimpleNamespace
 
@@ -20,7 +20,7 @@ TWO_THREADS = SimpleNamespace(device="cpu", threads=2)
 
 
 def two(*effects, **quantities):
-    """Two particles that feel each other however far apart."""
+    """Two particles that interact at any distance."""
     place = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
     return scene(place, np.zeros((2, 3)), effects, stepper=fixed(1e-3), quantities=quantities)
 
@@ -34,7 +34,7 @@ def dipoles():
 
 
 def merging():
-    """Sums of forces stand twice in a step: after events they are made anew."""
+    """Sums of forces occur twice in a step: they are computed again after events."""
     return scene([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], np.zeros((2, 3)), (NearField(alpha2=1.0), *laws()))
 
 
@@ -52,12 +52,12 @@ CASES = {
     "many grains": (grains, 1, 3000, "team"),
     "each by itself": (lambda: colloids([[0.0, 0.0, 0.0]]), 1, 10, "particle"),
 }
-"""What is made, how many worlds with how much room, and what runs them on two threads."""
+"""A scene, the number of worlds, their capacity, and the expected schedule on two threads."""
 
 
 @in_taichi_thread
 def chosen(made, worlds, capacity):
-    """The schedule of worlds with room for so many particles."""
+    """The schedule for worlds of this capacity."""
     with memory.collected() as trees:
         allocation = Allocation(made, worlds, capacity)
     found = choose(allocation.assembly.step, allocation.s, TWO_THREADS)
@@ -67,7 +67,7 @@ def chosen(made, worlds, capacity):
 
 
 @pytest.mark.parametrize("what", CASES)
-def test_what_is_worth_sharing_is_shared(what):
+def test_the_schedule_follows_the_work_of_a_step(what):
     made, worlds, capacity, expected = CASES[what]
     assert chosen(made(), worlds, capacity) == expected
 
@@ -77,10 +77,10 @@ def test_more_threads_share_more_work():
     assert [members(step, worlds, threads) for threads in (1, 2, 64)] == [1, 2, 5]
 
 
-def test_a_team_waits_for_as_long_as_looks_can_be_counted():
+def test_the_patience_of_a_team_is_bounded():
     assert Teams(1, 10**12, 2, 1).late == MOST_LOOKS
 
 
-def test_devices_take_phases_of_all_worlds():
+def test_devices_use_the_particle_schedule():
     card = SimpleNamespace(device="cuda", threads=2)
     assert choose((), SimpleNamespace(worlds=1, capacity=10), card) == "particle"

@@ -1,5 +1,5 @@
-"""The same scene gives the same bits: on all schedules, one thread or two, alone or in a batch, and whichever
-backend compiles it."""
+"""A scene gives the same bits on all schedules, on one thread or two, alone or in a batch, and with either
+compiler."""
 
 import numpy as np
 import pytest
@@ -17,14 +17,14 @@ WORLDS = [
     flow(seed=3, grains=60, surface_energy=30.0, grain_mass=GRAIN / 8, sizes=4.0),
     flow(seed=4, grains=20),
 ]
-"""Most of their grains merge; few merge; agglomerates break; small enough to need no lists."""
+"""In these worlds most grains merge; few merge; agglomerates break; there are too few grains for lists."""
 
 
 BATCH = 240
 
 
 def crowd():
-    """The four in the midst of others: the last of all, and three anywhere."""
+    """The four worlds among others: one is the last of all, the other three are at arbitrary places."""
     scenes = [flow(seed=100 + k, grains=20 + k % 7, hardness=10.0 ** (4 + k % 5)) for k in range(BATCH)]
     for at, scene in zip((BATCH - 1, 0, 97, 120), WORLDS, strict=True):
         scenes[at] = scene
@@ -32,13 +32,13 @@ def crowd():
 
 
 def pick(results):
-    """Those of the four."""
+    """Results of the four worlds."""
     return [results[at] for at in (BATCH - 1, 0, 97, 120)]
 
 
 @pytest.fixture(scope="module")
 def usual():
-    """The four among 236 others, a thread to a world."""
+    """The four worlds among 236 others, one thread for each world."""
     batch = simulate(crowd(), worlds=BATCH, capacity=200, schedule="world")
     results = pick(batch)
     assert all(result.status.ok for result in batch)
@@ -50,7 +50,7 @@ def usual():
 
 
 def same(a, b):
-    """To the last bit, counts of work included."""
+    """Assert equality bit for bit, including the counts of work."""
     assert b.status.ok
     assert a.work == b.work
     assert a.time == b.time
@@ -59,8 +59,8 @@ def same(a, b):
         np.testing.assert_array_equal(values, b.state[name], err_msg=name)
 
 
-def test_two_runs_the_second_in_portions(usual):
-    """Three steps at a time: where a run is interrupted does not matter."""
+def test_a_run_in_portions_is_the_same(usual):
+    """Three steps at a time: an interruption of a run does not change it."""
     simulation = compiled(WORLDS[0], BATCH, 200, "world")
     simulation.load(crowd())
     for _ in range(100):
@@ -72,7 +72,7 @@ def test_two_runs_the_second_in_portions(usual):
 
 @pytest.mark.long
 def test_a_launch_for_each_phase(usual):
-    """A launch per phase over all particles, against a thread that takes a world through all phases."""
+    """A launch for each phase over all particles, against a thread that runs all phases of a world."""
     launched = simulate(WORLDS, worlds=len(WORLDS), capacity=200, schedule="particle")
     for a, b in zip(usual, launched, strict=True):
         same(a, b)
@@ -83,8 +83,8 @@ def test_a_launch_for_each_phase(usual):
     ("worlds", "times"), [(4, 8), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((4, 0), (1, 8)))]
 )
 def test_a_team_of_threads(usual, monkeypatch, worlds, times):
-    """All threads share a world, here one after the other; once they part after each step. What each has
-    done the others see: events of two grains of different shares, lists, failures."""
+    """All threads share a world, here one world after another; in one case they part after each step. Each
+    thread must see the work of the others: events of two grains in different shares, lists, failures."""
     monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
     monkeypatch.setattr(team, "TIMES_LATE", times)
     simulation = Simulation(WORLDS[0], worlds, 200, "team")
@@ -99,7 +99,7 @@ def test_a_team_of_threads(usual, monkeypatch, worlds, times):
 
 @pytest.mark.slow
 def test_alone_and_in_a_batch_of_240(usual):
-    """A batch of one, with no more room than each needs."""
+    """A batch of one, with no more capacity than each world needs."""
     capacity = max(scene.capacity() for scene in WORLDS)
     for a, scene in zip(usual, WORLDS, strict=True):
         (alone,) = simulate([scene], worlds=1, capacity=capacity)
@@ -117,7 +117,8 @@ def test_one_thread_and_two_and_both_backends(usual, elsewhere):
 
 @pytest.mark.long
 def test_noise_with_one_thread_and_two_and_both_backends(elsewhere):
-    """Counter-based noise does not know which thread draws it: each particle a launch of its own here."""
+    """Counter-based noise does not depend on the thread; here each particle is drawn in a launch of
+    its own."""
     (result,) = simulate([kicked()], worlds=1, capacity=32, schedule="particle")
     for name, values in result.state.items():
         np.testing.assert_array_equal(values, elsewhere[f"kicked/{name}"], err_msg=name)

@@ -1,4 +1,4 @@
-"""Which law is named as the one that has stopped a world."""
+"""The law that is named when a world stops."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tisim.effects import PairForce, RigidClumps
 
 
 class Apart(PairForce):
-    """No number where surfaces overlap."""
+    """NaN if surfaces overlap."""
 
     short_ranged = True
 
@@ -21,7 +21,7 @@ class Apart(PairForce):
 
 
 class Near(PairForce):
-    """No number where centres are far apart."""
+    """NaN if centres are far apart."""
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
@@ -29,7 +29,7 @@ class Near(PairForce):
 
 
 @pytest.mark.slow
-def test_a_law_that_does_not_act_within_a_clump_is_not_named_for_what_it_would_do_there():
+def test_a_law_excluded_within_a_clump_is_not_named():
     clump = Clump(centres=[(0, 0, 0), (1.0, 0, 0)], radii=[1.0], density=1.0)
     sphere = Particles(position=[[7.0, 0, 0]], velocity=[[1.0, 0, 0]], radius=1.0, mass=1.0)
     made = Scene(

@@ -1,4 +1,4 @@
-"""What is said of a mesh: whether it is closed and of one orientation, and the faces that are suspect."""
+"""The report on a mesh: whether it is closed and consistently oriented, and its suspect faces."""
 
 import numpy as np
 import pytest
@@ -20,11 +20,11 @@ def counts(faces, vertices=CORNERS):
 
 def test_a_tetrahedron_is_closed_and_of_one_orientation():
     assert counts(TETRAHEDRON) == (4, 0, 0, 0, 0, 0)
-    # Each triangle with vertices of its own, as in an STL file.
+    # Each triangle has its own vertices, as in an STL file.
     assert counts(np.arange(12).reshape(4, 3), CORNERS[TETRAHEDRON].reshape(-1, 3)) == (4, 0, 0, 0, 0, 0)
 
 
-def test_what_is_wrong_with_a_mesh_is_counted():
+def test_mesh_defects_are_counted():
     assert counts(TETRAHEDRON[:3]) == (3, 0, 0, 3, 0, 0)
     assert counts([*TETRAHEDRON[:3], [1, 3, 2]]) == (4, 0, 0, 0, 0, 3)
     assert counts([*TETRAHEDRON, [1, 0, 2], [0, 0, 1]]) == (5, 1, 1, 0, 0, 0)
@@ -34,14 +34,14 @@ def test_what_is_wrong_with_a_mesh_is_counted():
     assert counts([*TETRAHEDRON, [0, 1, 4]], np.vstack([CORNERS, [[2, 0, 0]]])) == (4, 1, 0, 0, 0, 0)
 
 
-def test_explain_says_it_once():
+def test_explain_reports_the_mesh_once():
     open_one = geometry.TriangulatedSurface(vertices=CORNERS, faces=TETRAHEDRON[:3])
     rows = [row for row in explained(open_one).parameters if row[0] == "mesh"]
     assert [row[1] for row in rows] == ["3 triangles; open, with 3 edges of one face; of one orientation"]
     assert "; closed; of one" in str(MeshCheck.of(CORNERS, TETRAHEDRON))
 
 
-def test_suspect_faces_of_a_file_are_warned_of_once(tmp_path):
+def test_suspect_faces_of_a_file_give_one_warning(tmp_path):
     faces = "f 1 2 3\nf 1 3 4\n"
     read(tmp_path, "open.obj", VERTICES + faces)
     twice = r"^surface: 1 faces without area, which are left out and 2 faces that are duplicates \(.*obj\)$"

@@ -1,4 +1,4 @@
-"""Mesh files: valid ones are read as they are meant, all others are refused with the place of the fault."""
+"""Mesh files: valid ones are read correctly, all others are refused with the position of the error."""
 
 import os
 import struct
@@ -94,15 +94,15 @@ def test_each_way_to_write_a_square_is_read_as_the_square(name, tmp_path):
 
 
 def test_relative_indices_count_from_the_face(tmp_path):
-    """Of two squares, at 0 and 5 m, none goes from one to the other."""
+    """Two squares, at 0 and 5 m; no triangle connects them."""
     faces = "f -4 -3 -2\nf -4 -2 -1\n"
     content = VERTICES + faces + VERTICES.replace("0\n", "5\n") + faces
     heights = read(tmp_path, "two.obj", content).corners()[..., 2]
     assert heights.tolist() == [[0] * 3, [0] * 3, [5] * 3, [5] * 3]
 
 
-def test_a_polygon_that_is_not_convex_is_cut_within_it(tmp_path):
-    """An L of 3 m^2 in a plane aslant; a fan from its first vertex would go beyond it."""
+def test_non_convex_polygons_are_triangulated_inside(tmp_path):
+    """An L of 3 m^2 in a tilted plane; a fan from its first vertex would extend beyond it."""
     flat = np.array([[2, 1], [1, 1], [1, 2], [0, 2], [0, 0], [2, 0]], float)
     places = flat @ np.array([[1, 0, 1], [0, 1, 1]]) / np.sqrt([1, 1, 1])
     content = "".join(f"v {x} {y} {z}\n" for x, y, z in places) + "f 1 2 3 4 5 6\n"
@@ -113,7 +113,7 @@ def test_a_polygon_that_is_not_convex_is_cut_within_it(tmp_path):
 
 
 def test_other_formats_are_read_by_meshio(tmp_path):
-    """Quadrilaterals are cut; lines bound nothing; a volume is no surface."""
+    """Quadrilaterals are split; lines bound no area; a volume is no surface."""
     cells = [("line", [[0, 1]]), ("triangle", [[0, 1, 2]]), ("quad", [[0, 1, 2, 3]])]
     for name in ("mesh.vtk", "mesh.ply"):
         meshio.Mesh(SQUARE, cells[name.endswith("ply") :]).write(tmp_path / name)
@@ -192,7 +192,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_file_that_is_damaged_is_refused_with_the_place(name, tmp_path, capfd):
-    """In one line, and nothing else is printed."""
+    """The message is one line, and nothing else is printed."""
     content, message = FAULTS[name]
     with pytest.raises(InputError, match=f"^surface must be .*{message}") as refused:
         read(tmp_path, name, content)
@@ -203,7 +203,7 @@ def test_a_file_that_is_damaged_is_refused_with_the_place(name, tmp_path, capfd)
 
 @pytest.mark.parametrize("suffix", ["stl", "obj"])
 def test_a_file_cut_anywhere_is_refused_or_the_whole_mesh(suffix, tmp_path):
-    """But for the last face of an OBJ file, which has no end, and a word of the name of a solid."""
+    """Exceptions are the last face of an OBJ file, which has no end mark, and a word of a solid's name."""
     whole = {"stl": SOLID, "obj": VERTICES + "f 1 2 3\nf 1 3 4\n"}[suffix]
     least = whole.rindex({"stl": " floor", "obj": "\nf 1 3"}[suffix])
     for end in range(len(whole) + 1):
@@ -217,8 +217,8 @@ def test_a_file_cut_anywhere_is_refused_or_the_whole_mesh(suffix, tmp_path):
         assert suffix == "obj" or len(surface.corners()) == 2
 
 
-def test_a_reader_that_waits_for_more_is_ended(tmp_path, monkeypatch):
-    """Of a PLY file without the end of its head meshio reads lines for ever."""
+def test_a_reader_that_hangs_is_stopped(tmp_path, monkeypatch):
+    """meshio reads endlessly from a PLY file whose header has no end."""
     monkeypatch.setattr(mesh_files, "READING_TIME", 3.0)
     with pytest.raises(InputError, match=r"^surface must be a file that meshio reads to its end; "):
         read(tmp_path, "head.ply", PLY[:20])
@@ -226,7 +226,7 @@ def test_a_reader_that_waits_for_more_is_ended(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "vtk", "msh", "inp", "vtu"])
 def test_noise_is_refused(suffix, tmp_path, capfd):
-    """Whatever a reader raises of it."""
+    """For any exception of the reader."""
     rng = np.random.default_rng(0)
     for size in (0, 1, 83, 84, 85, 1000) if suffix in ("stl", "obj") else (1000,):
         for content in (rng.bytes(size), b"solid" + rng.bytes(size)):
@@ -238,8 +238,8 @@ def test_noise_is_refused(suffix, tmp_path, capfd):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no fifos")
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
 @pytest.mark.parametrize("kind", ["fifo", "device", "folder"])
-def test_what_is_no_regular_file_is_refused(tmp_path, kind, suffix):
-    """One waits for ever, another has no end."""
+def test_only_regular_files_are_read(tmp_path, kind, suffix):
+    """A fifo waits for ever, and a device has no end."""
     path = tmp_path / f"drum.{suffix}"
     if kind == "fifo":
         os.mkfifo(path)
@@ -253,7 +253,7 @@ def test_what_is_no_regular_file_is_refused(tmp_path, kind, suffix):
 
 @pytest.mark.parametrize("suffix", ["stl", "obj"])
 def test_a_link_to_a_file_of_another_kind_is_not_quoted(tmp_path, suffix):
-    """The scene may be someone else's, and the file private."""
+    """The scene may come from someone else, and the file may be private."""
     (tmp_path / "passwords").write_text("root:secret\n")
     link = tmp_path / f"drum.{suffix}"
     link.symlink_to("passwords")

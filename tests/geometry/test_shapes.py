@@ -1,4 +1,4 @@
-"""Shapes: how far places are from them, against samples of their faces, in one kernel."""
+"""Shapes: distances of points, against samples of their faces, in one kernel."""
 
 import numpy as np
 import pytest
@@ -16,11 +16,11 @@ from tisim.state.parameter_table import ParameterTable
 POINTS = 300
 LISTS = ("planes", "discs", "spheres", "cylinders", "cones", "boxes")
 MESH = 6
-"""Which column is that of the triangles."""
+"""The column of the triangles."""
 
 
 class Shapes(Component):
-    """Some of each kind, as walls have them."""
+    """Some shapes of each kind, as in walls."""
 
     planes: tuple[geometry.Plane, ...] = option("planes")
     discs: tuple[geometry.Disc, ...] = option("discs")
@@ -39,7 +39,7 @@ def vector(values):
 
 
 def mesh(rng, count=40):
-    """A heap of triangles of unlike sizes, one without an area, and one far off."""
+    """A heap of triangles of unlike sizes, one of zero area, and a distant one."""
     sites = np.concatenate(
         [rng.uniform(-1, 1, (count, 3)) * [1, 1, 0.3], [[9, 9, 9], [9.1, 9, 9], [9, 9.1, 9]]]
     )
@@ -53,7 +53,7 @@ SURFACE = mesh(np.random.default_rng(0))
 
 
 def some(seed):
-    """One of each, anywhere; closed and open."""
+    """One shape of each kind, at random; closed and open."""
     rng = np.random.default_rng(seed)
     a, b, c, d = (vector(rng.normal(size=3)) for _ in range(4))
     odd = bool(seed % 2)
@@ -73,7 +73,7 @@ def some(seed):
 
 
 def revolved(shape, n=400):
-    """Samples of a surface of revolution, and how far apart they are."""
+    """Samples of a surface of revolution, and their spacing."""
     start, along, length, low, high = shape.generator()
     axis = np.array(along) / np.linalg.norm(along)
     e = np.linalg.svd(axis[None])[2][1:]
@@ -147,7 +147,7 @@ def distances(worlds, points):
 
 
 def beside_cones():
-    """Distances of some places from closed cones with an apex at the end, and at the start."""
+    """Distances of some points from closed cones with an apex at the end, and at the start."""
     cone = {"start": (0.0, 0.0, 0.0), "end": (0.0, 0.0, 1.0), "closed": True}
     radii = ({"start_radius": 1.0, "end_radius": 0.0}, {"start_radius": 0.0, "end_radius": 1.0})
     worlds = [
@@ -159,7 +159,7 @@ def beside_cones():
 
 @pytest.mark.parametrize("arithmetic", ["strict", pytest.param("fast", marks=pytest.mark.slow)])
 def test_a_closed_cone_with_an_apex_has_a_distance_everywhere(arithmetic, request):
-    """On the axis beyond the apex and beyond the base, within, and aside."""
+    """On the axis beyond the apex and beyond the base, within, and beside it."""
     found = beside_cones()
     if arithmetic == "fast":
         found = request.getfixturevalue("in_fast_arithmetic")("geometry.test_shapes", "beside_cones")
@@ -172,7 +172,7 @@ def test_a_closed_cone_with_an_apex_has_a_distance_everywhere(arithmetic, reques
 def measured():
     worlds = [some(seed) for seed in range(3)]
     points = np.random.default_rng(5).uniform(-2.5, 2.5, (3, POINTS, 3))
-    # On axes and in corners too.
+    # Also on axes and in corners.
     for w, shapes in enumerate(worlds):
         points[w, 0] = shapes.cylinders[0].start
         points[w, 1] = shapes.spheres[0].centre
@@ -181,7 +181,7 @@ def measured():
     return worlds, points, distances(worlds, points)
 
 
-def test_no_sample_of_a_face_is_nearer_and_one_is_as_near(measured):
+def test_distances_agree_with_samples_of_faces(measured):
     worlds, points, out = measured
     for w, shapes in enumerate(worlds):
         for m, name in enumerate(LISTS):
@@ -201,13 +201,15 @@ def test_no_sample_of_a_face_is_nearer_and_one_is_as_near(measured):
 def check(points, distance, samples, apart):
     sampled = cKDTree(samples).query(points)[0]
     assert (distance <= sampled + 1e-12).all()
-    # A place beside a sample is at most this much nearer, on a surface that curves by less than 5 / m.
+    # On a surface of curvature below 5 / m, the true distance of a point is at most this much smaller than a
+    # sample's.
     assert (np.sqrt(distance**2 + (1 + 5 * distance) * apart**2) >= sampled).all()
     assert sampled.max() > 1
 
 
-def test_triangles_are_as_far_as_their_cells_tell(measured):
-    """Never nearer; and often told by more than the box around all."""
+def test_cells_give_lower_bounds_of_distances(measured):
+    """The bound is never above the distance, and often better than the bound from the box around all
+    triangles."""
     *_, out = measured
     true, told = out[..., MESH], out[..., MESH + 1]
     assert (told <= true + 1e-12).all()
@@ -215,7 +217,7 @@ def test_triangles_are_as_far_as_their_cells_tell(measured):
 
 
 def tetrahedron():
-    """The text of an STL file, where each triangle has vertices of its own."""
+    """The text of an STL file, in which each triangle has its own vertices."""
     facet = "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n"
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     faces = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]
@@ -237,15 +239,15 @@ def test_a_file_is_read(tmp_path):
 
 
 @pytest.mark.parametrize("scale", [-1.0, 0.0, float("nan"), "1", True])
-def test_a_scale_that_is_no_length_is_refused(scale, tmp_path):
-    """One below 0 would mirror the surface."""
+def test_an_invalid_scale_is_refused(scale, tmp_path):
+    """A negative scale would mirror the surface."""
     (tmp_path / "t.stl").write_text(tetrahedron())
     with pytest.raises(InputError, match=r"^surface.scale must be a number of m above 0; received "):
         geometry.TriangulatedSurface.read(tmp_path / "t.stl", scale)
 
 
 def in_a_scene(tmp_path, surface):
-    """A scene file, with a surface in its walls as it is written there; next to it, a folder with t.stl."""
+    """A scene file with a surface in its walls, written as given; beside it a folder with t.stl."""
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "t.stl").write_text(tetrahedron())
     path = tmp_path / "scene.toml"
@@ -261,7 +263,8 @@ def in_a_scene(tmp_path, surface):
 
 
 def test_a_scene_file_names_the_file_of_a_surface(tmp_path, monkeypatch):
-    """Its name leads from the folder of the scene file; the scene has the triangles, and needs no file."""
+    """The file name is relative to the folder of the scene file; the scene stores the triangles, and needs no
+    file."""
     path = in_a_scene(tmp_path, 'file = "parts/t.stl"\nscale = 1e-3')
     monkeypatch.chdir(tmp_path / "parts")
     for made in (Scene.from_toml(path), tisim.read(path)):
@@ -280,7 +283,7 @@ FILES = {
 
 
 @pytest.mark.parametrize(("surface", "message"), FILES.items())
-def test_a_surface_that_is_not_in_a_file_is_named(surface, message, tmp_path):
+def test_invalid_files_of_surfaces_are_refused(surface, message, tmp_path):
     with pytest.raises(InputError, match=message):
         Scene.from_toml(in_a_scene(tmp_path, surface))
 
@@ -305,7 +308,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

@@ -1,4 +1,4 @@
-"""Solids: what is in them, how far places are from them, how they are filled, against NumPy and samples."""
+"""Solids: containment, distances and uniform filling, against NumPy and samples."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ HALVES = {"box": (0.5, 0.8, 0.3), "cylinder": (0.7, 0.7, 1.1), "ball": (0.9, 0.9
 SHAPES = tuple(enumerate(HALVES))
 POINTS = 4096
 RADIUS, HALF_LENGTH = 0.5, 0.7
-"""m, of the solids that places are beside."""
+"""m, for the solids whose distances are measured."""
 
 
 @in_taichi_thread
@@ -57,7 +57,7 @@ def measure(r: ti.types.ndarray(), ball: ti.types.ndarray(), cylinder: ti.types.
 
 
 def within(shape, away):
-    """Whether places are in a shape, as a distance from its axis or its centre tells."""
+    """Whether points are in a shape, from their distance to its axis or centre."""
     half = np.array(HALVES[shape])
     if shape == "ball":
         return np.linalg.norm(away, axis=-1) <= half[0]
@@ -68,10 +68,11 @@ def within(shape, away):
 
 @pytest.fixture(scope="module")
 def filled():
-    """Places somewhat beyond each box and whether they are inside, those that fill it, and its volume."""
+    """Points in slightly more than each box and whether they are inside, points that fill the shape, and its
+    volume."""
     u, halves = qmc.Sobol(3, rng=1).random(POINTS), np.array(list(HALVES.values()))
     away = 1.2 * halves[:, None] * (2 * qmc.Sobol(3, rng=2).random(POINTS) - 1)
-    # A place on the surface, one beyond it, and one beyond an end that is not round.
+    # A point on the surface, one beyond it, and one beyond an end that is not round.
     away[:, :3] = halves[:, None] * np.array([[1, 0, 0], [-1 - 1e-12, 0, 0], [0, 0, 1 + 1e-12]])
     inside, places, volumes = np.zeros((3, POINTS), np.int32), np.zeros((3, POINTS, 3)), np.zeros(3)
     fill(u, away, halves, inside, places, volumes)
@@ -79,7 +80,7 @@ def filled():
 
 
 @pytest.mark.parametrize(("m", "shape"), SHAPES)
-def test_a_place_is_in_a_shape_in_kernels_and_in_python(filled, m, shape):
+def test_containment_agrees_in_kernels_and_python(filled, m, shape):
     away, inside = filled[0][m], filled[1][m]
     np.testing.assert_array_equal(inside, within(shape, away))
     np.testing.assert_array_equal(inside[:3], [True, False, False])
@@ -88,8 +89,8 @@ def test_a_place_is_in_a_shape_in_kernels_and_in_python(filled, m, shape):
 
 
 @pytest.mark.parametrize(("m", "shape"), SHAPES)
-def test_the_volume_is_the_part_of_places_inside(filled, m, shape):
-    """Places lie in a box that is wider by a fifth; by 4096 of them it is known to half a percent."""
+def test_the_volume_is_the_fraction_of_points_inside(filled, m, shape):
+    """The points lie in a box that is a fifth wider; 4096 of them give the volume to half a percent."""
     _, inside, _, volumes = filled
     sides = 2 * np.array(HALVES[shape])
     assert volumes[m] == pytest.approx(inside[m].mean() * np.prod(1.2 * sides), rel=5e-3)
@@ -98,7 +99,7 @@ def test_the_volume_is_the_part_of_places_inside(filled, m, shape):
 
 @pytest.mark.parametrize(("m", "shape"), SHAPES)
 def test_a_shape_is_filled_evenly(filled, m, shape):
-    """As even as places that are taken in the box and dropped outside: means, and those of squares."""
+    """As uniform as points drawn in the box and rejected outside the shape: first and second moments."""
     places, half = filled[2][m], np.array(HALVES[shape])
     assert within(shape, places * (1 - 1e-12)).all()
     tried = half * (2 * qmc.Sobol(3, rng=3).random(8 * POINTS) - 1)
@@ -106,12 +107,12 @@ def test_a_shape_is_filled_evenly(filled, m, shape):
     np.testing.assert_allclose(places.mean(axis=0), 0.0, atol=5e-3)
     np.testing.assert_allclose((places**2).mean(axis=0), (kept**2).mean(axis=0), rtol=1e-2)
     np.testing.assert_allclose(np.cov(places.T)[np.triu_indices(3, 1)], 0.0, atol=5e-3)
-    # So many lie in the shape of half the size.
+    # An eighth of the points lie in the shape of half the size.
     assert within(shape, 2 * places).mean() == pytest.approx(1 / 8, rel=2e-2)
 
 
 def surfaces(n=400):
-    """Samples of the surfaces of the ball and the cylinder, m, and how far apart they are at most."""
+    """Samples of the surfaces of the ball and the cylinder, m, and their largest spacing."""
     turn = np.linspace(0, 2 * np.pi, n, endpoint=False)[:, None]
     tilt = np.linspace(0, np.pi, n)
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
@@ -126,10 +127,10 @@ def surfaces(n=400):
     return on_ball.reshape(-1, 3), np.concatenate(on_cylinder).reshape(-1, 3), 2 * np.pi * RADIUS / n
 
 
-def test_solids_are_as_far_as_samples_of_their_surfaces():
-    """Negative inside; along the normal lies the nearest place."""
+def test_distances_of_solids_agree_with_surface_samples():
+    """The distance is negative inside; the nearest point lies along the normal."""
     points = np.random.default_rng(4).uniform(-1.2, 1.2, (500, 3))
-    # The centre, and places on the axis within and beyond.
+    # The centre, and points on the axis within and beyond.
     points[:3] = [[0, 0, 0], [0, 0, 0.3], [0, 0, -1.0]]
     ball, cylinder = np.zeros((500, 4)), np.zeros((500, 4))
     measure(points, ball, cylinder)
@@ -140,7 +141,7 @@ def test_solids_are_as_far_as_samples_of_their_surfaces():
         distance, normal = out[:, 0], out[:, 1:]
         sampled = cKDTree(samples).query(points)[0]
         np.testing.assert_array_equal(distance < 0, inner)
-        # From the axis of the cylinder, inside, the way is to the end even where that is farther.
+        # From inside, on the axis of the cylinder, the distance is taken to the end, even if that is farther.
         axis = (rho == 0) & inner & (samples is on_cylinder)
         assert (np.abs(distance) <= sampled + 1e-12)[~axis].all()
         np.testing.assert_allclose(np.abs(distance)[~axis], sampled[~axis], atol=apart)

@@ -1,4 +1,4 @@
-"""Unions of spheres, beside closed forms of one and two, and the same from elsewhere."""
+"""Unions of spheres, against closed forms for one and two, and under rotation."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ def between(area, low, high):
 
 
 def two(a, b, d):
-    """Volume, centre along the axis, and moments along and across it, of spheres of radii a and b, d apart:
-    slices are discs."""
+    """Volume, centre along the axis, and moments along and across it, for spheres of radii a and b at a
+    distance d: slices are discs."""
     x = Polynomial([0, 1])
     plane = (d * d + a * a - b * b) / (2 * d)
     parts = ((a * a - x**2, -a, plane), (b * b - (x - d) ** 2, plane, d + b))
@@ -41,7 +41,7 @@ def test_spheres_apart_are_summed_exactly():
 
 
 @pytest.mark.parametrize("d", [0.45, 0.7, 1.2, 1.55])
-def test_two_that_overlap_are_two_caps(d, rng):
+def test_two_overlapping_spheres_are_two_caps(d, rng):
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)
     place = rng.normal(size=3)
@@ -53,8 +53,8 @@ def test_two_that_overlap_are_two_caps(d, rng):
     np.testing.assert_allclose(solid.inertia, expected, rtol=0, atol=2e-8 * across)
 
 
-def test_many_are_the_same_turned_and_what_points_at_random_find(rng):
-    """The quadrature goes by an axis: turned, it is another."""
+def test_many_spheres_under_rotation_and_by_random_points(rng):
+    """The quadrature uses an axis: after a rotation it is a different one."""
     centre, radius = 0.6 * rng.normal(size=(8, 3)), rng.uniform(0.5, 1.0, 8)
     solid = sphere_union(centre, radius)
     turn = Turn.from_rotvec([0.3, -1.0, 0.5]).as_matrix()
@@ -70,7 +70,7 @@ def test_many_are_the_same_turned_and_what_points_at_random_find(rng):
     np.testing.assert_allclose(points[within].mean(axis=0), solid.centre, rtol=0, atol=0.01)
 
 
-def test_a_sphere_that_is_there_twice_counts_once(rng):
+def test_duplicate_spheres_count_once(rng):
     centre, radius = 0.6 * rng.normal(size=(4, 3)), rng.uniform(0.5, 1.0, 4)
     once = sphere_union(centre, radius)
     twice = sphere_union(np.vstack([centre, centre[[2, 0, 2]]]), np.append(radius, radius[[2, 0, 2]]))

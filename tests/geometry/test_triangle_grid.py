@@ -1,4 +1,4 @@
-"""Grids of triangles: every triangle near a place is listed there, and lists are bounded."""
+"""Grids of triangles: every triangle near a point is listed there, and lists are bounded."""
 
 import time
 
@@ -10,7 +10,7 @@ from tisim.geometry.triangle_grid import TriangleGrid
 
 
 def uneven(fine, long):
-    """A sheet of a few long facets, aslant, with a finely meshed bolt on it; (triangles, 3, 3), m."""
+    """A sheet of a few long, tilted facets with a finely meshed bolt on it; (triangles, 3, 3), m."""
     t = np.linspace(0, 2 * np.pi, fine // 2 + 1)
     foot = np.column_stack([0.02 * np.cos(t), 0.02 * np.sin(t), 0 * t])
     top = foot + np.array([0, 0, 0.02])
@@ -31,7 +31,7 @@ def slivers(number, thin=1e-5):
     "corners", [uneven(2000, 40), uneven(4000, 200), slivers(5000)], ids=["sheet", "body", "slivers"]
 )
 def test_a_mesh_of_some_thousand_triangles_takes_seconds_and_few_entries(corners):
-    """There were 1e8 and more."""
+    """Earlier there were more than 1e8 entries."""
     began = time.perf_counter()
     grid = TriangleGrid.of(corners)
     assert time.perf_counter() - began < 60
@@ -41,7 +41,7 @@ def test_a_mesh_of_some_thousand_triangles_takes_seconds_and_few_entries(corners
 
 
 def test_large_triangles_are_listed_in_every_cell_that_they_meet():
-    """Places all over each triangle lie in cells that list it, and none of these is told to be clear."""
+    """Points all over each triangle lie in cells that list it, and none of these cells is marked as clear."""
     corners = uneven(200, 20)
     grid, rng = TriangleGrid.of(corners), np.random.default_rng(0)
     assert (grid.first[-20:] < 0).all()
@@ -54,7 +54,7 @@ def test_large_triangles_are_listed_in_every_cell_that_they_meet():
         for cell in np.unique(cells):
             assert k in grid.members[grid.begin[cell] : grid.begin[cell + 1]]
             assert grid.clear[cell] == 0
-    # Few of the cells of its box list a large one.
+    # A large triangle is listed in few of the cells of its bounding box.
     box = np.ptp(corners[200], axis=0) / grid.width
     assert (grid.members == 200).sum() < 0.2 * box.prod()
 

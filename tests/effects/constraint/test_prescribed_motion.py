@@ -1,4 +1,4 @@
-"""Groups that are frozen or driven: where they go, what they bear, and what is refused."""
+"""Groups that are frozen or driven: their motion, the forces on them, and errors."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ G = 9.81
 
 
 def driven(motion, place, velocity=None, group=(1,), effects=(), **more):
-    """Particles of the groups given, of which the first moves as prescribed."""
+    """Particles of the given groups; group 1 moves as prescribed."""
     velocity = np.zeros_like(np.asarray(place, float)) if velocity is None else velocity
     acting = (PrescribedMotion(name="plate", motion=motion), *effects)
     return scene(place, velocity, acting, quantities={"group": list(group)}, **more)
@@ -38,8 +38,8 @@ def driven(motion, place, velocity=None, group=(1,), effects=(), **more):
 @pytest.mark.parametrize(
     "motion", ["oscillation", "rotation", "translation", "translation later", "translation after"]
 )
-def test_a_driven_group_is_where_its_motion_says(motion):
-    """Whatever the gravity, and whatever velocity the start gives; also through the faces of a box."""
+def test_a_driven_group_follows_its_motion(motion):
+    """For any gravity and any initial velocity; also through the faces of a box."""
     rate, centre, amplitude = np.array([0.3, -2.0, 1.0]), np.array([1e-2, 0, 0]), np.array([1e-3, 2e-3, 0])
     going = (0.5, -0.1, 0.2)
     kinds = {
@@ -78,12 +78,12 @@ def test_a_driven_group_is_where_its_motion_says(motion):
 
 
 BASE = np.array([[x, y, 0.0] for x in range(3) for y in range(3)]) * 1.9 * RADIUS
-"""m; nine grains that overlap each other, as those of a rough plate may."""
+"""m; nine grains that overlap each other, as in a rough plate."""
 SEAT = np.array([0.95, 0.95, 0.0]) * RADIUS * 2 - [0.95 * RADIUS, 0.95 * RADIUS, 0]
 
 
 def on_plate(height, velocity=(0.0, 0.0, 0.0), motion=None, over=SEAT, **more):
-    """A grain above a plate of grains, in the hollow of four; until it is at rest."""
+    """A grain above a plate of grains, over the hollow between four; it comes to rest."""
     place = np.vstack([BASE, over])
     place[-1, 2] = height
     going = np.zeros((10, 3))
@@ -94,7 +94,7 @@ def on_plate(height, velocity=(0.0, 0.0, 0.0), motion=None, over=SEAT, **more):
 
 
 @pytest.mark.slow
-def test_a_frozen_group_stays_and_bears_the_weight_of_what_rests_on_it():
+def test_a_frozen_group_carries_the_weight_on_it():
     height = np.sqrt(4 - 2 * 0.95**2) * RADIUS
     (result,) = simulate([on_plate(height * (1 - 1e-3), steps=1_000_000)], capacity=10)
     assert result.status.reason == "grains are at rest, by effects.at_rest"
@@ -107,11 +107,11 @@ def test_a_frozen_group_stays_and_bears_the_weight_of_what_rests_on_it():
     torque = [result.measures[f"plate_torque_{axis}"] for axis in "xyz"]
     expected = np.cross([*BASE, SEAT], [0, 0, -weight]).sum(axis=0)
     np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-    # The grains of the plate overlap each other: only the one on it pushes them.
+    # The grains of the plate overlap each other, but only the grain on top exerts a force on them.
     np.testing.assert_allclose(state["force"][[2, 5, 6, 7, 8]], np.tile([0, 0, -weight], (5, 1)), rtol=1e-12)
 
 
-def test_a_group_goes_on_from_where_another_run_left_it():
+def test_a_group_continues_from_an_earlier_run():
     place, fall = (
         np.array([[0.0, 0.0, 0.0], [3e-3, 1e-3, 0.0], [0.0, 9e-3, 0.0]]),
         Gravity(acceleration=(0, 0, -G)),
@@ -130,7 +130,7 @@ def test_a_group_goes_on_from_where_another_run_left_it():
 
 @pytest.mark.slow
 def test_a_driven_group_is_as_heavy_as_a_wall():
-    """A grain that meets it head on leaves with e times the speed at which they met, seen from the group."""
+    """A grain in a head-on impact leaves with e times the approach speed, in the frame of the group."""
     plate, speed, e = np.array([0.0, 0.0, 0.3]), -0.2, GRAINS["grain"].restitution
     hit = on_plate(
         2.001 * RADIUS,
@@ -178,7 +178,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("why", REFUSED)
-def test_what_cannot_be_is_refused(why):
+def test_invalid_scenes_are_refused(why):
     wrong, message = REFUSED[why]
     with pytest.raises(InputError, match=message):
         simulate([driven(**{"motion": Fixed(), "place": GRAIN, "group": (1, 0), **wrong})])
@@ -191,8 +191,9 @@ def test_a_scene_file_names_group_and_motion():
 
 
 @pytest.mark.slow
-def test_two_held_groups_push_each_other_as_grains_do():
-    """They meet head on, a hundredth of a radius deep: damping goes by the mass of a grain, not of a wall."""
+def test_held_groups_repel_each_other_as_grains_do():
+    """They meet head on, with an overlap of a hundredth of a radius: damping uses the mass of a grain, not of
+    a wall."""
     place, speed, dt = [[0, 0, 0], [0, 0, 1.99 * RADIUS]], -1e-3, 1e-7
     forces = []
     for other in (1, 0):

@@ -1,4 +1,4 @@
-"""Rigid clumps: tops, pendulums and dumbbells that hit a floor, beside NumPy twins and closed forms."""
+"""Rigid clumps: tops, pendulums and dumbbells that hit a floor, against NumPy references and closed forms."""
 
 import numpy as np
 import pytest
@@ -52,8 +52,8 @@ def clumps(shape, place, effects=(), dt=1e-5, steps=1, **more):
 
 
 def twin(scene, stiffness, times, acceleration=0.0):
-    """One clump on springs, from its members to where they began, in NumPy: position, velocity, quaternion
-    and angular momentum at some times."""
+    """One clump on springs from its members to their initial positions, in NumPy: position, velocity,
+    quaternion and angular momentum at some times."""
     start = scene.start()
     body = clump_bodies(start)
     offset, mass, inertia = start["clump_offset"], body.mass[0], body.inertia[0]
@@ -80,7 +80,7 @@ def spun(dt, steps, spin=(100.0, 500.0, -300.0), effects=()):
 
 
 def turned_apart(q, p):
-    """The angle (rad) between two orientations, for small ones."""
+    """The angle (rad) between two orientations, for small angles."""
     return 2 * np.linalg.norm(np.cross(q[1:], p[1:]) + p[0] * q[1:] - q[0] * p[1:])
 
 
@@ -110,7 +110,7 @@ def test_a_free_top_turns_to_second_order_and_keeps_its_momentum():
 
 
 def test_a_top_spun_about_its_intermediate_axis_flips():
-    """Energy stays within a bound over thousands of turns, and the axis goes over and back (Dzhanibekov)."""
+    """Energy stays bounded over thousands of turns, and the axis flips back and forth (Dzhanibekov)."""
     axes = PEAR.body.axes
     spin = axes @ np.array([1.0, 500.0, 1.0])
     made = spun(2e-5, 20_000, tuple(spin))
@@ -133,7 +133,7 @@ def test_a_top_spun_about_its_intermediate_axis_flips():
 
 
 def random_clump(rng):
-    """Some spheres, each beside the one before, with an inertia that such spheres can have."""
+    """Some spheres, each near the one before; repeated until the clump is accepted."""
     while True:
         number = rng.integers(2, 5)
         steps = rng.normal(size=(number, 3))
@@ -166,13 +166,13 @@ def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
         print(f"\nenergy of free tops: median {np.median(largest):.1e}, largest {largest.max():.1e}")
     assert 2e-5 < np.median(largest) < 5e-5
     assert largest.max() < 1e-4
-    # It does not grow: the second half is as the first.
+    # The error does not grow: it is the same in both halves.
     assert (errors[15:].max(axis=0) < 1.5 * errors[:15].max(axis=0)).all()
 
 
 @pytest.mark.long
-def test_a_clump_on_springs_is_its_numpy_twin():
-    """Forces on the members make force and torque on the body: to second order."""
+def test_a_clump_on_springs_equals_its_numpy_twin():
+    """Forces on the members give the force and torque on the body: convergence is second order."""
     stiffness, time, errors = 0.2, 0.02, []
     springs = (Tether(stiffness=(stiffness,) * 3), Gravity(acceleration=(0, 3, -9.81)))
     (expected,) = twin(spun(1e-4, 1), stiffness, [time], np.array([0, 3, -9.81]))
@@ -189,7 +189,7 @@ def test_a_clump_on_springs_is_its_numpy_twin():
 
 @pytest.mark.long
 def test_weight_acts_at_the_centre_of_mass():
-    # Springs of no stiffness: the structure of the test before.
+    # Springs of zero stiffness, for the same structure as in the test above.
     weight = Tether(stiffness=(0.0,) * 3), Gravity(acceleration=(0, 0, -9.81))
     (result,) = simulate([clumps(PEAR, [(0, 0, 0)], weight, 1e-3, 100)], capacity=4)
     body = clump_bodies(result.state)
@@ -203,7 +203,7 @@ WORLDS, CAPACITY = 4, 16
 
 
 def floored(shape, place, gravity=(0.0, 0.0, 0.0), floor=0.0, law=None, **more):
-    """Clumps above a floor; of one structure, compiled once."""
+    """Clumps above a floor; all scenes have one structure, which is compiled once."""
     wall = Walls(planes=[Plane(point=(0, 0, floor), normal=(0, 0, 1))])
     given = {"dt": 1e-6, "materials": {"grain": Material(**{**USUAL, **(law or {})})}, **more}
     return clumps(shape, place, (LAW, wall, Gravity(acceleration=gravity)), **given)
@@ -218,7 +218,8 @@ def run(scenes, **more):
 
 @pytest.mark.slow
 def test_a_clump_of_one_is_a_sphere():
-    """Two that meet each other and the floor, spinning; beside them the same as ordinary spheres."""
+    """Two single-sphere clumps that hit each other and the floor, spinning; and the same as
+    ordinary spheres."""
     far, spin, place = np.array([0.1, 0, 0]), (10.0, 200.0, -30.0), [(0, 0, 1.05e-3), (1.98e-3, 1e-4, 1.2e-3)]
     velocity = np.array([(0.3, 0, -0.4), (-0.2, 0, -0.1)])
     spheres = Particles(
@@ -234,9 +235,9 @@ def test_a_clump_of_one_is_a_sphere():
 
 
 @pytest.mark.slow
-def test_a_dumbbell_hits_the_floor_as_the_impulse_says():
-    """Without friction and loss, J = 2 v / (1/M + (r x n)^2 / I) at the place of contact; on end, with loss,
-    v turns to -e v, as the mass of the contact is that of the body."""
+def test_a_dumbbell_hits_the_floor_with_the_right_impulse():
+    """Without friction and loss, J = 2 v / (1/M + (r x n)^2 / I) at the contact point. Upright and with loss,
+    v changes to -e v, because the mass of the contact is the mass of the body."""
     body, speed, lean = DUMBBELL.body, 0.05, 0.6
     stiff = {"young": 1e9, "restitution": 1.0, "friction": 0.0}
     made = [
@@ -255,15 +256,16 @@ def test_a_dumbbell_hits_the_floor_as_the_impulse_says():
     arm = R * np.cos(lean)
     impulse = 2 * speed / (1 / body.mass + arm**2 / body.moments[1])
     assert eccentric.velocity[0, 2] == pytest.approx(-speed + impulse / body.mass, rel=2e-3)
-    # With y turned by +lean the end at +x is below: what pushes it up turns the body the other way.
+    # With a rotation of +lean about y, the end at +x is below: the upward push turns the body the other way.
     np.testing.assert_allclose(eccentric.angular_velocity[0, 1], -impulse * arm / body.moments[1], rtol=2e-3)
     assert upright.velocity[0, 2] == pytest.approx(0.6 * speed, rel=5e-3)
 
 
 @pytest.mark.slow
-def test_an_end_that_sticks_to_the_floor_swings_on_within_the_limit_of_its_lever():
-    """The guard of a contact takes the body for a sphere of its mass: its steps are below 2 sqrt(M/k). At a
-    lever l they must be below that over sqrt(1 + M l^2/I), or what sticks shakes itself off, unseen."""
+def test_a_sticking_end_is_stable_within_its_lever_limit():
+    """The contact guard treats the body as a sphere of its mass and requires steps below 2 sqrt(M/k). With a
+    lever arm l, steps must be below that over sqrt(1 + M l^2/I); otherwise a sticking end shakes itself off,
+    without a message."""
     body, lean, stiffness, surface_energy = DUMBBELL.body, 0.3, 1000.0, 0.5
     arm = R * np.cos(lean)
     lever = np.sqrt(1 + body.mass * arm**2 / body.moments[1])
@@ -274,7 +276,7 @@ def test_an_end_that_sticks_to_the_floor_swings_on_within_the_limit_of_its_lever
     scenes = [
         clumps(
             DUMBBELL,
-            # Its end at +x is below, and drawn into the floor by a tenth less than at rest.
+            # Its end at +x is below, and overlaps the floor by a tenth less than at rest.
             [(0, 0, R * (1 + np.sin(lean)) - 0.9 * held)],
             (law, floor),
             orientation=np.roll(Turn.from_rotvec([0, lean, 0]).as_quat(), 1),
@@ -361,8 +363,8 @@ def test_runs_have_the_same_bits_by_any_schedule_in_a_batch_and_restarted(tmp_pa
 
 
 @pytest.mark.long
-def test_clumps_go_through_the_faces_of_a_box():
-    """They may lie across one from the start."""
+def test_clumps_cross_the_faces_of_a_box():
+    """A clump may lie across a face at the start."""
     box, velocity = Box(low=(0, 0, 0), high=(0.01, 0.01, 0.01)), np.array([1.0, -0.73, 0.31])
     made = clumps(
         DUMBBELL, [(1e-4, 5e-3, 5e-3)], dt=1e-4, steps=500, velocity=velocity, angular_velocity=(0, 300, 0),
@@ -379,7 +381,7 @@ def test_clumps_go_through_the_faces_of_a_box():
 
 
 @pytest.mark.long
-def test_spheres_may_be_put_in_beside_clumps():
+def test_spheres_may_be_inserted_beside_clumps():
     rain = InsertionByFlux(
         grains=[GrainClass(sizes=EqualSizes(radius=5e-4), density=2500.0)], number=5, low=(0, 0, 0.05),
         high=(0.02, 0.02, 0.07), flux=1e6,
@@ -402,13 +404,13 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("why", REFUSED)
-def test_what_cannot_be_is_refused(why):
+def test_invalid_scenes_are_refused(why):
     wrong, message = REFUSED[why]
     with pytest.raises(InputError, match=message):
         clumps(PEAR, [(0, 0, 0)], **wrong)
 
 
-def test_particles_that_are_no_clumps_are_refused():
+def test_particles_without_clumps_are_refused():
     made = clumps(PEAR, [(0, 0, 0)])
     bare = made.model_copy(update={"particles": LOOSE})
     with pytest.raises(InputError, match=r"particles must be made by Particles\.of_clumps with effects"):
@@ -426,8 +428,8 @@ def test_a_scene_file_holds_clumps():
 
 
 def put_in(shape, side):
-    """A scene into whose periodic box clumps come, of a box that is wide enough to start from."""
-    # Of the volume of the two spheres of a dumbbell.
+    """A scene that inserts clumps into a periodic box, which is wide enough for the (empty) start."""
+    # The radius of a sphere with the volume of the two spheres of a dumbbell.
     grains = GrainClass(sizes=EqualSizes(radius=2 ** (1 / 3) * R), density=2500.0, clump=shape)
     return Scene(
         particles=Particles(position=np.zeros((0, 3)), velocity=np.zeros((0, 3)), radius=R, density=2500.0),
@@ -444,8 +446,8 @@ def put_in(shape, side):
 
 
 @pytest.mark.parametrize(("side", "fits"), [(0.0759, False), (0.0761, True)])
-def test_a_rod_whose_ends_another_may_touch_at_once_in_an_image_is_refused(side, fits):
-    """66 mm long, with spheres of 10 mm."""
+def test_rods_longer_than_the_box_allows_are_refused(side, fits):
+    """The rod is 66 mm long, with spheres of 10 mm."""
     rod = Clump(centres=[(8e-3 * k, 0, 0) for k in range(8)], radii=[5e-3] * 8, density=2500.0)
     box = Box(low=(0, 0, 0), high=(side,) * 3)
     made = Scene(
@@ -462,20 +464,20 @@ def test_a_rod_whose_ends_another_may_touch_at_once_in_an_image_is_refused(side,
             made.acting()[0].check_start(made.start(), made)
 
 
-def test_the_longest_clump_is_found_whatever_the_order_of_its_members():
+def test_the_longest_clump_is_found_for_any_order_of_members():
     box = Box(low=(-1, -1, -1), high=(1, 1, 1))
     start = Particles.of_clumps(DUMBBELL, position=[(0, 0, 0), (9 * R, 0, 0)]).arrays(box, 0)
     order = [0, 2, 1, 3]
     assert longest_clump({name: values[order] for name, values in start.items()}) == pytest.approx(4 * R)
 
 
-def test_clumps_may_all_be_put_in_later_in_a_periodic_box():
+def test_all_clumps_may_be_inserted_in_a_periodic_box():
     made = put_in(DUMBBELL, 0.1)
     made.acting()[0].check_start(made.start(), made)
 
 
-def test_clumps_that_are_put_in_later_must_fit_the_box_too():
-    """Of the largest of their sizes: a dumbbell is 4 R long, and another takes 2 R."""
+def test_inserted_clumps_must_fit_the_box():
+    """The largest inserted clump decides: a dumbbell is 4 R long, and another one needs 2 R."""
     for side, fits in ((6.1 * R, True), (5.9 * R, False)):
         made = put_in(DUMBBELL, side)
         if fits:

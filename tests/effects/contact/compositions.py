@@ -1,6 +1,6 @@
-"""Scenes of three contact laws that have all other parts between them, of two materials each.
+"""Scenes of three contact laws that together contain all other parts, with two materials each.
 
-Each law is compiled once. A test of one part has the others do nothing, by their numbers.
+Each law is compiled once. A test of one part turns the others off by their parameters.
 """
 
 import numpy as np
@@ -87,7 +87,7 @@ NEUTRAL = {
         "surface_energy": 0.0,
     },
 }
-"""Materials that press alone, SI."""
+"""Materials with a normal force only, SI."""
 TWO = {
     "hooke": (
         {
@@ -152,12 +152,12 @@ TWO = {
         },
     ),
 }
-"""Two materials of each law in which every part does something."""
+"""Two materials for each law, with which every part acts."""
 
 
 def grains(name, position, velocity, spin=None, planes=(AWAY,), gravity=(0.0, 0.0, 0.0), **more):
-    """Grains given one by one under a law, 1 kg each and 1 m in radius unless said; of the first of two alike
-    materials, which press alone but for what ``first`` and ``second`` change of them."""
+    """Grains given one by one under a law, by default of 1 kg and 1 m radius. They have the first of two
+    equal materials with a normal force only; ``first`` and ``second`` change their values."""
     spin = np.zeros_like(np.asarray(velocity, float)) if spin is None else spin
     made = {
         "first": Material(**{**NEUTRAL[name], **more.pop("first", {})}),
@@ -170,8 +170,8 @@ def grains(name, position, velocity, spin=None, planes=(AWAY,), gravity=(0.0, 0.
 
 
 def heap(name, rng, n=30, side=1.5, dt=1e-4, steps=200, pairs=False):
-    """Grains of unlike sizes and of two materials that overlap, spin and slide, in a cell too small for
-    them."""
+    """Grains of unlike sizes and of two materials that overlap, spin and slide, in a cell too small
+    for them."""
     radius, (first, second) = rng.uniform(0.1, 0.3, n), TWO[name]
     return grains(
         name,
@@ -192,7 +192,7 @@ def heap(name, rng, n=30, side=1.5, dt=1e-4, steps=200, pairs=False):
 
 
 def loaded(scenes):
-    """The simulation that scenes of one law share, with these in it."""
+    """The simulation shared by scenes of one law, loaded with these scenes."""
     simulation = compiled(scenes[0], WORLDS, CAPACITY)
     simulation.load(scenes)
     return simulation
@@ -200,13 +200,13 @@ def loaded(scenes):
 
 Array = ti.types.ndarray()
 DT = 1e-5
-"""s, of a step along a path."""
+"""s, a step along a path."""
 
 
 @in_taichi_thread
 @ti.kernel
 def _along(law: ti.template(), path: Array, out: Array):
-    """Forces along a path of overlap, slip and relative spin, of R* = 1 m, m* = 1 kg and the normal x."""
+    """Forces along a path of overlap, slip and relative spin, with R* = 1 m, m* = 1 kg and the normal x."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         at_wall = ti.Vector([1.0, 3.5, 2.5, 2.5])
@@ -225,11 +225,11 @@ def _along(law: ti.template(), path: Array, out: Array):
 
 
 def along(name, overlap, moved=0.0, turned=0.0, **first):
-    """Force (N) and couple (N m) on i at each point of a path of one contact, and whether there is one; (n,
-    3), (n, 3), (n,).
+    """Force (N) and torque (N m) on i at each point of a path of one contact, and whether it exists; (n, 3),
+    (n, 3), (n,).
 
-    The contact faces x, with R* = 1 m and m* = 1 kg; ``moved`` is how far its surfaces have moved past each
-    other since the point before (m), and ``turned`` by how much the other grain has turned (rad).
+    The contact faces x, with R* = 1 m and m* = 1 kg; ``moved`` is the tangential displacement of its surfaces
+    since the point before (m), and ``turned`` the rotation of the other grain since then (rad).
     """
     simulation = loaded([grains(name, [[0, 0, 0]], [[0, 0, 0]], first=first)])
     (bound,) = simulation.assembly.effects.of(Granular)
@@ -240,7 +240,7 @@ def along(name, overlap, moved=0.0, turned=0.0, **first):
 
 
 def alone(law, overlap, **material):
-    """Force (N) of another law at some overlaps of a contact of R* = 1 m and m* = 1 kg at rest; (n, 3)."""
+    """Force (N) of another law at some overlaps of a contact with R* = 1 m and m* = 1 kg at rest; (n, 3)."""
     made = scene([[0, 0, 0]], [[0, 0, 0]], (law,), materials={"grain": Material(**material)})
     out = np.zeros((len(overlap), 7))
     with started(made) as (allocation, _):

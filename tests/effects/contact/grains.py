@@ -1,4 +1,4 @@
-"""Scenes of grains under Hertz and Mindlin that several tests share: one structure, compiled once."""
+"""Scenes of grains under Hertz and Mindlin, shared by several tests: one structure, compiled once."""
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from tisim.geometry import Plane
 
 WORLDS, CAPACITY = 32, 64
 USUAL = {"young": 1e7, "poisson": 0.3, "restitution": 0.8, "friction": 0.4}
-"""The material unless a test asks for another; young in Pa."""
+"""The material unless a test requires another; young in Pa."""
 HERTZ_MINDLIN = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
 FAR = 1e6
-"""m; where a wall is out of the way."""
+"""m; position of a wall that must not be touched."""
 FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 AWAY = ((0.0, 0.0, -FAR), (0.0, 0.0, 1.0))
 
@@ -25,13 +25,13 @@ def cell(side):
 
 
 def effects(planes=(AWAY,), gravity=(0.0, 0.0, 0.0), law=HERTZ_MINDLIN):
-    """A law, that of Hertz and Mindlin unless another is given, walls, and gravity."""
+    """A law, by default Hertz and Mindlin, walls, and gravity."""
     walls = tuple(Plane(point=point, normal=normal) for point, normal in planes)
     return law, Walls(planes=walls), Gravity(acceleration=gravity)
 
 
 def grains(position, velocity, spin=None, planes=(AWAY,), gravity=(0.0, 0.0, 0.0), law=None, **more):
-    """Grains given one by one, 1 kg each and 1 m in radius unless said."""
+    """Grains given one by one, by default 1 kg and 1 m in radius."""
     spin = np.zeros_like(np.asarray(velocity, float)) if spin is None else spin
     given = {"radius": 1.0, "mass": 1.0, **more}
     materials = {"grain": Material(**{**USUAL, **(law or {})})}
@@ -40,7 +40,7 @@ def grains(position, velocity, spin=None, planes=(AWAY,), gravity=(0.0, 0.0, 0.0
 
 
 def run(scenes, **more):
-    """Their results, each of which goes well."""
+    """Results of scenes, which must all end without failure."""
     results = simulate(scenes, worlds=WORLDS, capacity=CAPACITY, **more)
     for result in results:
         assert result.status.ok or result.status.reason == "running", result.status.reason
@@ -66,7 +66,7 @@ def heap(rng, n=40, side=1.6, dt=2e-4, steps=300, **law):
 
 
 def twin(made):
-    """The same in NumPy, at its start."""
+    """The same grains in NumPy, at their start."""
     start = made.start()
     planes = [plane for one in made.effects if isinstance(one, Walls) for plane in one.planes]
     (acceleration,) = [one.acceleration for one in made.effects if isinstance(one, Gravity)]

@@ -10,21 +10,22 @@ import numpy as np
 from tisim.effects import Granular
 
 ATTACHED, SLIP, ROLL, TWIST, SLOTS = 0, slice(1, 5), slice(5, 9), slice(9, 11), 11
-"""What the twin has a contact remember: whether it has begun, and of each part a value and its stiffness."""
+"""Slots of the contact history: whether the contact has begun, and a value and its stiffness for
+each part."""
 SERIES = ("stiffness", "rolling_stiffness", "twisting_stiffness")
 
 
 @dataclass
 class TwinLaw:
-    """A composition by the names of its parts, its materials, and what is given of pairs of these.
+    """A contact law: the names of its parts, its materials, and values given for pairs of materials.
 
-    levers : "contact" has spins move surfaces that are R - delta / 2 from the centres, where forces act;
-    "radius" does as LAMMPS: spins move surfaces at R, where walls act too; a contact that begins has no
-    tangential or rolling force if its damping alone is beyond the limit; a couple of twisting that is beyond
-    its limit acts against the twist of now; JKR ends where its pull is largest; and forces that jump at the
-    touch, or where JKR ends, are not spread over two steps.
-    frame : "turning" has springs turn with the normal and about it, by the mean of both spins, and be drawn
-    by the surfaces midway in a step; "projected" puts them into the plane of now, as LAMMPS does.
+    levers : with "contact", spins move the surfaces at R - delta / 2 from the centres, where forces act.
+    "radius" does as LAMMPS: spins move surfaces at R, which is also the lever arm at walls; a new contact has
+    no tangential or rolling force if its damping alone exceeds the limit; a twisting torque beyond its limit
+    opposes the current twist rate; JKR ends at its largest pull; and forces that jump at contact, or at the
+    end of JKR, are not spread over two steps. frame : with "turning", springs rotate with the normal and
+    about it, by the mean of both spins, and are stretched by the surface motion at mid-step. "projected"
+    projects them into the current tangential plane, as LAMMPS does.
     """
 
     materials: tuple[dict[str, float], ...]
@@ -40,7 +41,7 @@ class TwinLaw:
     frame: str = "turning"
 
     def of(self, name, which):
-        """A property of each of some pairs of materials, (n, 2)."""
+        """A property for each of some pairs of materials, (n, 2)."""
         values = []
         for i, j in which:
             a, b = self.materials[i].get(name), self.materials[j].get(name)
@@ -57,7 +58,7 @@ class TwinLaw:
         return 1 / ((1 - nu**2) / e).sum(axis=1), 1 / (2 * (2 - nu) * (1 + nu) / e).sum(axis=1)
 
     def gap(self, which, radius):
-        """How far surfaces may part before a contact that has begun ends, m."""
+        """The gap (m) at which an existing contact ends."""
         if self.normal != "jkr":
             return np.zeros(len(radius))
         ratio = np.pi * self.of("surface_energy", which) / self.moduli(which)[0]
@@ -65,7 +66,7 @@ class TwinLaw:
         return most / 9 ** (1 / 3) if self.levers == "radius" else most
 
     def press(self, which, overlap, radius):
-        """Radius of the circle, S_n, elastic force, F_c, and the energy that is stored."""
+        """Radius of the contact circle, S_n, elastic force, F_c, and the stored energy."""
         circle = np.sqrt(radius * np.maximum(overlap, 0))
         if self.normal == "hooke":
             k = self.of("stiffness", which)
@@ -91,27 +92,28 @@ class TwinLaw:
         if self.damping == "viscoelastic_damping":
             return self.of("viscous_time", which) * stiffness
         e = self.of("restitution", which)
-        # That of e = 0 to rounding.
+        # To rounding, the damping of e = 0.
         log = np.log(np.maximum(e, 1e-300)) * np.where(e > 0, 1, 1e9)
         shape = 1.0 if self.normal == "hooke" else np.sqrt(5 / 6)
         return -2 * shape * log / np.sqrt(np.pi**2 + log**2) * np.sqrt(stiffness * mass)
 
     def pull(self, which, radius, overlap):
-        """Cohesion."""
+        """Cohesive force."""
         if self.cohesion == "sjkr":
             return self.of("cohesion_energy_density", which) * 2 * np.pi * radius * overlap
         return 4 * np.pi * self.of("surface_energy", which) * radius if self.cohesion == "dmt" else 0 * radius
 
     @property
     def turns(self):
-        """Whether springs turn about the normal too."""
+        """Whether springs also rotate about the normal."""
         springs = {"mindlin_force", "mindlin_displacement", "linear_spring"}
         held = self.tangential in springs or self.twisting or self.rolling in ("rolling_sds", "rolling_epsd")
         return bool(held) and self.frame == "turning" and self.levers == "contact"
 
     def contact(self, which, normal, overlap, radius, mass, slip, spinning, way, past, dt):
-        """Force and couple on each of some contacts, and what they remember then; ``which`` materials touch,
-        (n, 2), and ``way`` they turned in the step: tilt of the normal and half of the turn about it."""
+        """Force and torque for each of some contacts, and their new history. ``which`` : the materials in
+        contact, (n, 2). ``way`` : the rotation in the step, tilt of the normal and half of the turn about it.
+        """
         tilt, turn = way
         if self.turns:
             carry, past = carrying(normal, tilt, turn), past.copy()
@@ -206,7 +208,7 @@ class TwinLaw:
         return ratio * stiffness, np.sqrt(ratio) * damping, friction
 
     def rolled(self, which, normal, stiffness, mass, limit, rolling, past, dt):
-        """The force of which R* n x it is the couple of rolling, and what is remembered."""
+        """The force F for which R* n x F is the rolling torque, and the new history."""
         most = self.of("rolling_friction", which) * limit
         if self.rolling == "rolling_cdt":
             speed = np.linalg.norm(rolling, axis=1)
@@ -222,7 +224,7 @@ class TwinLaw:
         )[:2]
 
     def twisted(self, which, circle, spring, drag, friction, limit, twisting, past, dt):
-        """The couple of twisting, and what is remembered."""
+        """The twisting torque, and the new history."""
         if self.twisting == "twisting_sds":
             stiffness, arm = self.of("twisting_stiffness", which), self.of("twisting_friction", which)
             damping, elastic = self.of("twisting_damping", which), past[:, 0]
@@ -241,8 +243,8 @@ class TwinLaw:
 
 
 def spread(depth, speed, dt, force, mass):
-    """The factor of a force that jumps at depth 0: so that its work from there on does not depend on the
-    place of the first step within. Nothing where it hardly changes the speed in a step, or turns it."""
+    """The factor on a force that jumps at depth 0. With it, the work does not depend on the depth in the
+    first step of contact. The factor is 1 if the force hardly changes the speed in a step, or reverses it."""
     moves = (force * dt < mass * speed) & (force * dt > 1e-6 * mass * speed)
     s = np.maximum(depth, 0) / np.where(moves, speed * dt, np.nan)
     return np.where(s < 1, 1.5 * s, np.where(s < 2, 2 - s / 2, 1.0))
@@ -254,22 +256,23 @@ def cross(n):
 
 
 def carrying(normal, tilt, turn):
-    """Matrices by which springs turn in a step: from the plane before to that of now, along the normal midway
-    (R. Cayley's for the turn about it)."""
+    """Matrices that rotate springs in a step: from the previous tangential plane to the current one, along
+    the normal at mid-step (by R. Cayley's formula for the turn about it)."""
     flat = np.eye(3) - np.einsum("na,nb->nab", normal + tilt, normal)
     k = turn[:, None, None] * cross(normal)
     return np.linalg.solve(np.eye(3) - k, (np.eye(3) + k) @ flat)
 
 
 def seen_midway(slip, normal, tilt, turn):
-    """What is across the normal midway in the step, which half of the step then turns on; across that of
-    now."""
+    """The part of slip perpendicular to the normal at mid-step, rotated by half of the step, so that it is
+    perpendicular to the current normal."""
     along = (slip * normal).sum(axis=1)[:, None]
     return slip - along * (normal + tilt) + turn[:, None] * np.cross(normal, slip)
 
 
 def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, levers="contact", carried=False):
-    """Force of a spring, a dashpot and a slider; what they remember: force or displacement, and stiffness."""
+    """Force of a spring, a dashpot and a slider, and their new history: force or displacement, and
+    stiffness."""
     held, was = past[:, :3], past[:, 3]
     if form == "force":
         eased = (spring < was) & (was > 0)
@@ -295,7 +298,7 @@ def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, leve
 
 
 def law_of(scene, levers="contact"):
-    """The law of a scene."""
+    """The contact law of a scene."""
     (law,) = (effect for effect in scene.effects if isinstance(effect, Granular))
     names, parts = list(scene.materials), law.members()
     given = {
@@ -324,10 +327,10 @@ def hertz_mindlin(young, poisson, restitution, friction, levers="contact"):
 class Grains:
     """Spheres and planes (point, normal), under one law and a constant acceleration.
 
-    turning : (angular velocity, centre) of all planes, which that maps onto themselves. material : index of
-    that of each; planes are of the first. Between loads ``past`` and ``held`` keep what contacts remember, of
-    pairs i < j and of grains at planes. ``sliding`` and ``sticking`` count contacts of all loads so far.
-    ``virial`` is the sum of r F over pairs, J, (3, 3), which presses outwards where it is positive.
+    turning : (angular velocity, centre) of all planes; the rotation must map each plane onto itself. material
+    : index of each grain's material; planes have the first. ``past`` and ``held`` keep the contact history
+    between loads, for pairs i < j and for grains at planes. ``sliding`` and ``sticking`` count contacts of
+    all loads so far. ``virial`` is the sum of r F over pairs, J, (3, 3); it is positive for repulsion.
     """
 
     law: Any
@@ -347,7 +350,7 @@ class Grains:
         self.load(0.0)
 
     def load(self, dt):
-        """Sum forces and torques, ``dt`` after the last time."""
+        """Sum forces and torques, ``dt`` after the last call."""
         self.force, self.torque = self.mass[:, None] * self.acceleration, np.zeros_like(self.x)
         self.stored = 0.0
         self._pairs(dt)
@@ -363,11 +366,11 @@ class Grains:
         return force, couple, known
 
     def apart(self):
-        """From i to j: how far each other is, m, and its velocity, m/s, both (n, n, 3)."""
+        """Relative positions, m, and velocities, m/s, from i to j, both (n, n, 3)."""
         return self.x[None] - self.x[:, None], self.v[None] - self.v[:, None]
 
     def lasting(self, which, overlap, radius, attached):
-        """Which contacts there are."""
+        """Which pairs are in contact."""
         return (overlap >= 0) | ((attached > 0) & (overlap >= -self.law.gap(which, radius)))
 
     def _pairs(self, dt):
@@ -396,7 +399,7 @@ class Grains:
             back = dt / 2 / far
             tilt = ((1 + back * along) * back)[:, None] * (along[:, None] * n - passing[i, j])
             half = dt / 4 * ((self.w[i] + self.w[j]) * n).sum(axis=1)
-            # As if both were arms of what lay between the centres midway.
+            # Lever arms are proportional parts of the line between the centres at mid-step.
             lain = gap[i, j] - dt / 2 * passing[i, j]
             arms = (arm * self.w[i] + other * self.w[j]) / far[:, None]
             slip = seen_midway(passing[i, j] - np.cross(arms, lain), n, tilt, half) + along[:, None] * n
@@ -422,7 +425,7 @@ class Grains:
             arm = self.radius[i][:, None]
         rate, centre = self.turning
         tilt = -dt / 2 * np.cross(rate, n) * self.law.turns
-        # The wall too is where it was midway in the step.
+        # The wall too is taken at its position at mid-step.
         surface = np.cross(rate, self.x[i] + arm * (n + tilt) - dt / 2 * self.v[i] - centre)
         slip, spinning = surface - self.v[i] - np.cross(arm * self.w[i], n + tilt), rate - self.w[i]
         half = dt / 4 * ((self.w[i] + rate) * n).sum(axis=1)
@@ -450,16 +453,17 @@ class Grains:
             self.w += dt / 2 * self.torque / inertia
 
     def remove(self, i):
-        """Take grain i away; the others go on as they are."""
+        """Remove grain i; the others continue unchanged."""
         for name in ("x", "v", "w", "radius", "mass", "held", "material"):
             setattr(self, name, np.delete(getattr(self, name), i, axis=0))
         self.past = np.delete(np.delete(self.past, i, axis=0), i, axis=1)
-        # Forces are summed again as velocities now are; no time has gone by that contacts remember.
+        # Forces are computed again with the current velocities. No time has passed, so the history is
+        # unchanged.
         past, held = self.past.copy(), self.held.copy()
         self.load(0.0)
         self.past, self.held = past, held
 
     def energy(self):
-        """Kinetic, of spin, and stored in contacts, J."""
+        """Kinetic and spin energy, and energy stored in contacts, J."""
         moving = (self.mass * (self.v**2).sum(axis=1)).sum()
         return (moving + 0.4 * (self.mass * self.radius**2 * (self.w**2).sum(axis=1)).sum()) / 2 + self.stored

@@ -1,4 +1,5 @@
-"""Random particles, the forces on them at the start, read without a step, and what NumPy twins share."""
+"""Random particles, the initial forces on them, read without a step, and helpers shared by NumPy
+references."""
 
 import numpy as np
 
@@ -11,11 +12,11 @@ from tisim.state.fields import CORE, resolve_fields
 from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
 
 WORLDS = 8
-"""At a time: one number for all, so that each structure is compiled once."""
+"""Number of worlds at a time: the same for all, so that each structure is compiled once."""
 
 
 def vector(rng, scale=1.0):
-    """Random components."""
+    """A vector of random components."""
     return tuple(float(x) for x in rng.normal(size=3) * scale)
 
 
@@ -26,9 +27,9 @@ def cloud(rng, effects, n=12, **more):
 
 
 def loads(scenes, dt=0.0, capacity=16):
-    """Of each scene of one structure: the state at its start with force, and torque where there is one.
+    """Initial states of scenes of one structure, with force, and with torque if there is one.
 
-    dt : of the step (s) that the forces are told they are in.
+    dt : the step (s) in which the forces are evaluated.
     """
     simulation = compiled(scenes[0], worlds=WORLDS, capacity=capacity)
     simulation.load(scenes)
@@ -71,8 +72,8 @@ def jacobians(scenes, step, capacity=16):
 
 
 def fields_beside_the_core(setup):
-    """Names of what the effects of a scene need and so have allocated, beyond position, velocity, mass,
-    radius and id; the guard of explicit steps has fields of its own."""
+    """Names of the fields that the effects of a scene allocate, in addition to position, velocity, mass,
+    radius and id. Fields of the guard of explicit steps are left out."""
     fields = resolve_fields(needed_fields(setup.effects, setup.stepper))
     return {field.name for field in fields} - {field.name for field in (*CORE, FORCE_BEFORE, TORQUE_BEFORE)}
 
@@ -85,12 +86,12 @@ def pairs(state):
 
 
 def close(actual, expected, tolerance=1e-12):
-    """Equal to within a part of the largest component."""
+    """Assert that two arrays are equal to within a fraction of the largest component."""
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * np.abs(expected).max())
 
 
 def balanced(state, tolerance=1e-13):
-    """Forces add up to nothing, and so do torques and the moments of the forces."""
+    """Assert that forces sum to zero, and so does the total torque."""
     force, moment = state["force"], np.cross(state["position"], state["force"])
     np.testing.assert_allclose(force.sum(axis=0), 0, atol=tolerance * np.abs(force).sum())
     scale = np.abs(moment).sum()

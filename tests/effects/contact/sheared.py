@@ -1,5 +1,5 @@
-"""Grains under Hertz and Mindlin in a box in simple shear, and their twin in NumPy, whose places are never
-wrapped."""
+"""Grains under Hertz and Mindlin in a box in simple shear, and their NumPy reference, whose positions are
+never wrapped."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def crowd(rng, n=60, rate=RATE, sides=SIDES, steps=STEPS, low=0.0, **more):
 
 
 def inside(box, place, velocity, time):
-    """Places and velocities of a twin as those of the images in the box."""
+    """Wrap positions and velocities of the reference into the box."""
     low, high = box.bounds()
     turns = np.floor((place[:, ACROSS] - low[ACROSS]) / (high - low)[ACROSS])[:, None]
     back, jump = np.zeros(3), np.zeros(3)
@@ -38,9 +38,10 @@ def inside(box, place, velocity, time):
 
 
 class ShearedGrains(Grains):
-    """The grains of a scene of a crowd: each sees the image of another that is nearest, and its velocity.
+    """The grains of a sheared crowd: each interacts with the nearest image of each other grain, at the
+    image's velocity.
 
-    lag : images are where they should have been this time (s) ago.
+    lag : images are taken at their positions this time (s) ago.
     """
 
     def __init__(self, made, levers="contact", lag=0.0):

@@ -1,4 +1,4 @@
-"""Scenes of grains at walls of all shapes, which rest: one structure, compiled once."""
+"""Scenes of grains at fixed walls of all shapes: one structure, compiled once."""
 
 import numpy as np
 
@@ -9,9 +9,9 @@ from tisim.effects import Gravity, Walls
 
 WORLDS, CAPACITY = 32, 2
 RADIUS, YOUNG, POISSON = 0.1, 1e7, 0.3
-"""m, Pa; of grains of 1 kg."""
+"""m, Pa; for grains of 1 kg."""
 AWAY = 1e6
-"""m; where a shape is out of the way."""
+"""m; position of a shape that must not be touched."""
 SHEET = -100.0
 """m; the height of the flat sheet of triangles, from -2 to 2 along x and y."""
 
@@ -46,7 +46,7 @@ FAR = {
 
 
 def beside(position, velocity, shapes, gravity=(0.0, 0.0, 0.0), law=None, spin=None, **more):
-    """A grain at some shapes, by the names of their lists."""
+    """A grain at some shapes, given by the names of their lists."""
     law = {"young": YOUNG, "poisson": POISSON, "restitution": 1.0, "friction": 0.0, **(law or {})}
     acting = (
         HERTZ_MINDLIN,
@@ -60,7 +60,7 @@ def beside(position, velocity, shapes, gravity=(0.0, 0.0, 0.0), law=None, spin=N
 
 
 def run(scenes, **more):
-    """Their results, each of which goes well."""
+    """Results of scenes, which must all end without failure."""
     results = simulate(scenes, worlds=WORLDS, capacity=CAPACITY, **more)
     for result in results:
         assert result.status.ok, result.status.reason

@@ -1,4 +1,5 @@
-"""Adhesion that jumps at the touch does the same work wherever in a step two grains meet."""
+"""The work of adhesion that jumps at contact does not depend on the phase of the step in which two grains
+meet."""
 
 import numpy as np
 import pytest
@@ -13,18 +14,18 @@ GRAIN = Material(young=1e7, poisson=0.3, surface_energy=1e-2)
 SOFT, REDUCED, MEAN = 0.5 * 1e7 / (1 - 0.3**2), MASS / 2, RADIUS / 2
 """E*, m* and R*."""
 PHASES = np.arange(16) / 16
-"""Parts of a step that have gone by when two grains touch."""
+"""Fractions of a step at which two grains touch."""
 
 
 def rest():
-    """Overlap at which two grains with DMT's adhesion rest, m, and the energy that this takes from them."""
+    """Overlap at which two grains with DMT adhesion rest, m, and the energy that adhesion takes there."""
     pull = 4 * np.pi * GRAIN.surface_energy * MEAN
     overlap = (3 * np.pi * GRAIN.surface_energy / (SOFT * MEAN)) ** (2 / 3) * MEAN
     return overlap, pull * overlap
 
 
 def parting():
-    """The work that it takes to part two grains with JKR's adhesion, from the touch to the end, J."""
+    """The work of separating two grains with JKR adhesion, from the touch to the end, J."""
     ratio = np.pi * GRAIN.surface_energy / SOFT
     circle = np.geomspace((MEAN**2 * ratio / 4) ** (1 / 3), (4 * MEAN**2 * ratio) ** (1 / 3), 20_001)
     gap = 2 * np.sqrt(ratio * circle) - circle**2 / MEAN
@@ -33,8 +34,8 @@ def parting():
 
 
 def left_over(law, steps):
-    """Return the kinetic energy that an impact leaves, over what it began with, at each of some phases; a
-    swing of the contact takes some number of ``steps``."""
+    """Return the kinetic energy after an impact over the initial one, for each phase. ``steps`` is the number
+    of steps in an oscillation of the contact."""
     overlap, adhesion = rest()
     stiffness = 2 * SOFT * np.sqrt(MEAN * overlap)
     dt = 2 * np.pi * np.sqrt(REDUCED / stiffness) / steps
@@ -67,8 +68,8 @@ LAWS = {"dmt": Granular(cohesion=DMT()), "jkr": Granular(normal=JKR())}
 @pytest.mark.long
 @pytest.mark.parametrize("name", [pytest.param("dmt", marks=pytest.mark.slow), "jkr"])
 def test_work_of_adhesion_does_not_depend_on_the_phase_of_a_step(name):
-    """DMT's energy is kept; JKR takes the work of parting. A force that simply jumps is off by up to 0.036
-    and 0.013 here, by chance."""
+    """DMT adhesion conserves energy; JKR takes the work of separation. A force that simply jumps is off by up
+    to 0.036 and 0.013 here, depending on the phase."""
     law = LAWS[name]
     lost = 0.0 if name == "dmt" else parting() / (3 * max(rest()[1], parting()))
     coarse, fine = (left_over(law, steps) - (1 - lost) for steps in (100, 200))
@@ -78,7 +79,8 @@ def test_work_of_adhesion_does_not_depend_on_the_phase_of_a_step(name):
 
 
 def left_over_in_numpy(steps, spreads):
-    """Return the same of DMT's adhesion in NumPy, by a leapfrog, whose force jumps or is spread."""
+    """Return the same for DMT adhesion in NumPy, by a leapfrog, with a force that jumps or is spread over two
+    steps."""
     overlap, adhesion = rest()
     dt = 2 * np.pi * np.sqrt(REDUCED / (2 * SOFT * np.sqrt(MEAN * overlap))) / steps
     before = 3 * max(adhesion, parting())
@@ -99,7 +101,7 @@ def left_over_in_numpy(steps, spreads):
     return (v / speed) ** 2
 
 
-def test_a_force_that_jumps_is_off_by_what_the_docs_say():
+def test_errors_of_jumping_forces_are_as_documented():
     """docs/granular.md has both figures: 3.6e-2 for a force that jumps, 7e-4 for one that is spread."""
     jumps, spread_out = (np.abs(left_over_in_numpy(100, spreads) - 1).max() for spreads in (False, True))
     print(f"off by {jumps:.1e} where the force jumps, {spread_out:.1e} where it is spread")
@@ -108,10 +110,11 @@ def test_a_force_that_jumps_is_off_by_what_the_docs_say():
 
 
 def test_the_spread_force_does_the_work_of_a_jump():
-    """At a constant speed, with the half steps of a leapfrog, wherever the first step within ends."""
+    """At constant speed, with the half steps of a leapfrog, for any end of the first step within
+    the contact."""
     within = np.arange(100)[None] + PHASES[:, None]
     work = spread(within, 1.0, 1.0, 0.1, 1.0).sum(axis=1) - 0.5
     np.testing.assert_allclose(work, within[:, -1], rtol=1e-14)
-    # At rest, slow, and of heavy bodies it is the force of the law.
+    # At rest, at low speed, and between heavy bodies the force is not changed.
     for speed, mass in ((0.0, 1.0), (0.09, 1.0), (1.0, 1.1e5)):
         assert (spread(np.array([0.0, 1e-9]), speed, 1.0, 0.1, mass) == 1).all()

@@ -1,4 +1,4 @@
-"""Hertz and Mindlin beside LAMMPS: to rounding, wherever the law is the same."""
+"""Hertz and Mindlin beside LAMMPS: equal to rounding if the law is the same."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ NARROW = {
     "kinetic energy on the way, J": 0.6,
     "that of spin, J": 0.6,
 }
-"""Half of an interval over the mean of what is narrow."""
+"""Largest half width of an interval over the mean, for the narrow statistics."""
 
 
 def rough(friction):
@@ -32,9 +32,9 @@ def rough(friction):
 
 
 @pytest.mark.parametrize("name", bench.LAWS)
-def test_each_law_that_both_have_is_the_same(name):
-    """After a step and after 100, NumPy with the points of LAMMPS is LAMMPS, and the package is NumPy without
-    them."""
+def test_common_laws_are_equal(name):
+    """After 1 step and after 100, the NumPy reference with LAMMPS's options equals LAMMPS, and without them
+    it equals the package."""
     at, law = bench.start(), bench.LAWS[name]
     theirs = replace(law, levers="radius")
     for steps in (1, 100):
@@ -45,33 +45,34 @@ def test_each_law_that_both_have_is_the_same(name):
 
 
 def compared(law, walls, steps, ours, **start):
-    """How far LAMMPS is from ``ours``, of the largest quantity that is furthest."""
+    """The largest difference of LAMMPS and ``ours`` over all quantities."""
     at = bench.start(**start)
     return max(bench.apart(ours(at, law, walls, steps), bench.by_lammps(at, law, walls, steps)).values())
 
 
 @pytest.mark.parametrize("walls", [False, True])
 @pytest.mark.parametrize("steps", [1, 100])
-def test_numpy_with_the_two_points_of_lammps_is_lammps(walls, steps):
-    """Memory, turning, easing, sliding and damping are the same, of hundreds of contacts."""
+def test_numpy_with_lammps_options_equals_lammps(walls, steps):
+    """History, rotation, unloading, sliding and damping are the same, over hundreds of contacts."""
     assert compared(LIKE_LAMMPS, walls, steps, bench.by_numpy) < ROUNDING
 
 
-def test_the_package_is_numpy_without_them():
+def test_without_lammps_options_numpy_equals_the_package():
     at = bench.start()
     ours, twin = (by(at, bench.LAW, True, 100) for by in (bench.by_package, bench.by_numpy))
     assert max(bench.apart(ours, twin).values()) < ROUNDING
 
 
-def test_the_package_is_lammps_where_levers_do_not_matter():
-    """Without friction, also with damping, for 100 steps; and the first forces of grains that do not spin,
-    with friction that holds them."""
+def test_the_package_equals_lammps_if_levers_do_not_matter():
+    """Without friction, also with damping, for 100 steps; and the first forces of grains without spin, with
+    friction that makes them stick."""
     assert compared(rough(0.0), True, 100, bench.by_package) < ROUNDING
     assert compared(rough(1e3), False, 0, bench.by_package, spinning=0.0) < ROUNDING
 
 
 def test_in_a_sheared_box_the_package_is_numpy_and_numpy_is_lammps():
-    """The latter with the levers of LAMMPS, and with images that lag a step behind, as there."""
+    """With the lever arms of LAMMPS, and with images that lag a step behind as in LAMMPS, NumPy equals
+    LAMMPS."""
     made, steps = sheared_lammps.scene(), 300
     ours, twin = (by(made, steps) for by in (bench.end_of, sheared_lammps.by_numpy))
     assert max(sheared_lammps.apart(ours, twin).values()) < ROUNDING
@@ -79,8 +80,8 @@ def test_in_a_sheared_box_the_package_is_numpy_and_numpy_is_lammps():
     assert max(sheared_lammps.apart(theirs, sheared_lammps.by_lammps(made, steps)).values()) < ROUNDING
 
 
-def test_the_levers_are_what_makes_the_difference():
-    """With the package's own lever NumPy is as far from LAMMPS as the package is."""
+def test_the_levers_cause_the_difference():
+    """With the package's lever arm, NumPy differs from LAMMPS exactly as the package does."""
     at = bench.start()
     there = bench.by_lammps(at, bench.LAW, False, 1)
     ours, twin = (
@@ -92,9 +93,9 @@ def test_the_levers_are_what_makes_the_difference():
 
 @pytest.mark.parametrize("name", bench.LAWS)
 def test_a_bed_that_settles_has_the_bulk_statistics_of_lammps(name):
-    """Zero is within the interval of the mean difference between the programs, which is so wide that one of a
-    thousand tests fails by chance. All are narrow beside the mean itself, but for the last speed, which is
-    nearly none."""
+    """The mean difference between the programs is zero within its interval, which is wide enough that one of
+    a thousand tests fails by chance. All intervals are narrow relative to the mean, except for the final
+    speed, which is almost zero."""
     law, starts = settled_lammps.bulk_law(name), [settled_lammps.random_start(100 + k) for k in range(10)]
     ours, theirs = (
         settled_lammps.table(starts, by(law, starts))

@@ -1,4 +1,4 @@
-"""Liquid bridges and cemented bonds, each against its closed form; one structure of scenes."""
+"""Liquid bridges and cemented bonds, each against its closed form; all scenes have one structure."""
 
 import numpy as np
 import pytest
@@ -19,14 +19,14 @@ CEMENT = {"young": 1e8, "stiffness_ratio": 2.0, "radius_ratio": 0.8, "tensile_st
 R = 0.01
 """m."""
 HEAVY = 1e9
-"""kg; what is so heavy goes on as it began."""
+"""kg; grains of this mass keep their velocity."""
 RUPTURE = bridge_rupture(0.4, 1e-9)
 """m."""
 X, Y, Z = np.eye(3)
 
 
 def grains(position, velocity, spin=None, charge=0.0, liquid=None, cement=None, field=None, **more):
-    """Grains with a liquid or a cement; without, neither does anything."""
+    """Grains with a liquid or a cement; the absent one of the two has no effect."""
     n = len(position)
     effects = (
         CapillaryBridge(**{**LIQUID, **({"surface_tension": 0.0} if liquid is None else liquid)}),
@@ -49,14 +49,14 @@ def simulated(scenes, until=None):
 
 
 def bridge(gap, radius=(R, R), **liquid):
-    """Its force, N."""
+    """Force of a liquid bridge, N."""
     law = {**LIQUID, **liquid}
     mean = 2 * radius[0] * radius[1] / sum(radius)
     return float(bridge_force(gap, mean, law["surface_tension"], law["contact_angle"], law["volume"]))
 
 
-def test_a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures():
-    """Of heavy grains that part slowly: at each gap the force; none before they have touched."""
+def test_a_liquid_bridge_follows_willett():
+    """Heavy grains separate slowly: the force at each gap; no force before they have touched."""
     sizes, gaps, dt = ((R, R), (R, 0.3 * R)), np.array([0.1, 0.5, 0.98, 1.02]) * RUPTURE, 1e-3
     made = []
     for a, b in sizes:
@@ -74,8 +74,8 @@ def test_a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures()
             np.testing.assert_array_equal(dry["force"], 0)
 
 
-def test_a_bridge_takes_its_work_from_grains_that_part():
-    """The integral of the force up to the rupture, to first order in the step."""
+def test_a_bridge_dissipates_its_rupture_work():
+    """The integral of the force up to rupture, to first order in the step."""
     work, mass = quad(bridge, 0, RUPTURE)[0], 1e-3
     v = 1.5 * (4 * work / mass) ** 0.5
     made = grains([[0, 0, 0], [2 * R - 1e-12, 0, 0]], [-v / 2 * X, v / 2 * X], liquid={}, mass=mass,
@@ -86,7 +86,7 @@ def test_a_bridge_takes_its_work_from_grains_that_part():
 
 
 SIDE = 2 * R
-"""m, of centres that touch."""
+"""m, positions of touching centres."""
 CEMENT_RADIUS = 0.8 * R
 AREA, SECOND = np.pi * CEMENT_RADIUS**2, np.pi * CEMENT_RADIUS**4 / 4
 STIFF, SOFT = 1e8 / SIDE, 1e8 / SIDE / 2
@@ -94,14 +94,14 @@ TIME, STEPS = 1e-3, 100
 
 
 def led(velocity=(0.0, 0.0, 0.0), spins=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), steps=STEPS, **cement):
-    """A scene of two heavy grains that are bonded and led."""
+    """A scene of two heavy bonded grains that are driven at constant velocity and spin."""
     return grains([[0, 0, 0], [SIDE, 0, 0]], [[0, 0, 0], velocity], spins, cement={"gap": 1e-6, **cement},
                   mass=HEAVY, dt=TIME / STEPS, duration=TIME / STEPS * steps)  # fmt: skip
 
 
 def test_a_bond_is_a_disc_of_cement():
-    """Stretched, sheared, bent and twisted a little: k_n A, k_s A, k_n I and k_s J; moments about each centre
-    have the arm of the force."""
+    """Slightly stretched, sheared, bent and twisted: stiffnesses k_n A, k_s A, k_n I and k_s J. Torques about
+    each centre include the lever arm of the force."""
     w = 1e-2
     made = [led(1e-3 * X), led(1e-3 * Y), led(spins=(-w * Z, w * Z)), led(spins=(-w * X, w * X)),
             led(spins=(w * Z, w * Z))]  # fmt: skip
@@ -115,7 +115,7 @@ def test_a_bond_is_a_disc_of_cement():
 
 
 def test_a_bond_breaks_at_its_strength_and_stays_broken():
-    """In each way by its own stress: it holds at 0.98 of what it can carry, and not at 1.02, nor again."""
+    """In each mode by its own stress: it holds at 0.98 of its strength, breaks at 1.02, and stays broken."""
     limits = {
         "stretch": (lambda v: {"velocity": v * X}, 1e6 / (STIFF * TIME)),
         "shear": (lambda v: {"velocity": v * Y}, 8e5 / (SOFT * TIME)),
@@ -131,8 +131,8 @@ def test_a_bond_breaks_at_its_strength_and_stays_broken():
 
 
 def beam(n, load, rises=False):
-    """A row of n grains that are bonded to a heavy one, the last of which is pulled aside (N): from the
-    start, or by a load that rises slowly to that."""
+    """A row of n grains that are bonded to a heavy one. The last is pulled sideways with ``load`` (N): from
+    the start, or by a load that rises slowly."""
     place = SIDE * np.arange(n + 1)[:, None] * X
     mass = np.full(n + 1, 1e-2)
     mass[0] = HEAVY
@@ -147,8 +147,8 @@ def beam(n, load, rises=False):
 
 
 def test_a_row_of_bonded_grains_bends_like_a_beam():
-    """P L^3 / (3 E I) of Euler and Bernoulli, less 1 / (4 n^2) of it as it bends between grains
-    alone, and the shear of each bond."""
+    """P L^3 / (3 E I) of Euler and Bernoulli, less 1 / (4 n^2) of it because bending occurs only between
+    grains, plus the shear of each bond."""
     for n, load in ((3, 0.5), (6, 0.25)):
         (state,) = simulated([beam(n, load)])
         assert np.abs(state["velocity"]).max() < 0.1 * np.abs(state["position"][:, 1]).max()
@@ -159,7 +159,7 @@ def test_a_row_of_bonded_grains_bends_like_a_beam():
 
 
 def test_a_beam_breaks_at_its_root_by_the_load_of_its_strength():
-    """sigma_c = P l r / I with the arm l from the middle of the first bond; slowly."""
+    """sigma_c = P l r / I with the lever arm l from the middle of the first bond; the load rises slowly."""
     n = 4
     arm = (n - 0.5) * SIDE
     most = 1e6 * SECOND / (CEMENT_RADIUS * arm)
@@ -169,14 +169,15 @@ def test_a_beam_breaks_at_its_root_by_the_load_of_its_strength():
 
 
 def critical(stiffness, damping, mass):
-    """The step (s) beyond which a spring and a dashpot of a reduced mass, kicked by halves, alternate and
-    grow."""
+    """The step (s) beyond which a spring and a dashpot with a reduced mass, integrated with half kicks,
+    oscillate with growing amplitude."""
     return (np.sqrt(damping**2 + 4 * stiffness * mass) - damping) / stiffness
 
 
-def test_what_no_step_can_follow_stops_the_world():
-    """A bond that is stretched, sheared, bent or twisted, whichever is the stiffest: in steps of 0.98 of its
-    limit it holds, in those of 1.02 it is named; with damping too. So is it in a row."""
+def test_too_long_steps_stop_the_world():
+    """A bond that is stretched, sheared, bent or twisted, with each of these as the stiffest mode: with steps
+    of 0.98 of its limit it is stable, with 1.02 the world stops and names it; also with damping, and in a
+    row."""
     n, ways = 0.5e-2, (("stretch", 100, 0.8), ("shear", 2, 0.8), ("bend", 100, 2.5), ("twist", 1, 4.0))
     turning, made, names = 0.4 * n * R**2, [], []
     for name, kappa, wide in ways:
@@ -220,9 +221,9 @@ def test_what_no_step_can_follow_stops_the_world():
     assert np.abs(result.state["velocity"]).max() < 1e-5
 
 
-def test_what_no_step_can_follow_of_unlike_grains_stops_the_world():
-    """Of unlike grains shear bends and bending shears: springs K with inverse masses B are followed where B K
-    dt^2 has no eigenvalue above 4."""
+def test_too_long_steps_for_unlike_grains_stop_the_world():
+    """For unlike grains shear and bending are coupled: springs K with inverse masses B are stable if B K dt^2
+    has no eigenvalue above 4."""
     radius, mass, wide, kappa = np.array([R, R / 3]), np.array([1e-2, 4e-4]), 1.0, 2.0
     place = [[0, 0, 0], radius.sum() * X]
     stiff, r = 1e8 / radius.sum(), wide * radius.min()
@@ -253,8 +254,8 @@ def test_what_no_step_can_follow_of_unlike_grains_stops_the_world():
 
 
 def test_bonded_grains_turn_as_one():
-    """A dumbbell with a third that spins, bends and shears: momentum and angular momentum stay, and so does
-    its size."""
+    """A dumbbell and a third grain that spins, bends and shears the bond: momentum, angular momentum and the
+    bond lengths are conserved."""
     place = [[0, 0, 0], [SIDE, 0, 0], [SIDE, SIDE, 0]]
     velocity = [[0, 0.2, 0.1], [0, -0.2, 0.0], [0.1, 0, 0]]
     spin = [[30.0, 0, 0], [30.0, 5, 0], [0, 0, -9.0]]
@@ -274,7 +275,7 @@ def test_bonded_grains_turn_as_one():
 
 
 def held_by_bonds(state, n):
-    """What the bonds of a row of n equal grains hold, J."""
+    """Energy stored in the bonds of a row of n equal grains, J."""
     past = state["parallel_bond_past"].reshape(-1, 8)
     past = past[past[:, 0] > 0]
     assert len(past) == n - 1
@@ -287,11 +288,12 @@ def held_by_bonds(state, n):
 
 @pytest.mark.parametrize("axis", [(1.0, 0, 0), (0.6, 0.8, 0)])
 def test_a_row_that_spins_keeps_its_energy(axis):
-    """Six grains without damping, at up to 5 % of the frequency of a pair, about the row and askew, for 1500
-    periods in steps of a 25th, 50th and 100th: the error has a bound that goes with dt^2.
+    """Six grains without damping, spinning at up to 5 % of the frequency of a pair, about the row and about a
+    tilted axis, for 1500 periods in steps of a 25th, 50th and 100th: the error is bounded and proportional to
+    dt^2.
 
-    With bonds that are drawn along the normal at the end of a step it grows without one: of the energy of the
-    vibration 3e5 times that much at 1.6 % in steps of a 50th, about the row.
+    If bonds are stretched along the normal at the end of a step, the error grows without bound: at 1.6 % in
+    steps of a 50th, about the row, it reaches 3e5 times the vibrational energy.
     """
     n, mass = 6, 1e-2
     period = 2 * np.pi * np.sqrt(mass / 2 / (STIFF * AREA))
@@ -314,7 +316,7 @@ def test_a_row_that_spins_keeps_its_energy(axis):
         held = [held_by_bonds(state, n) for state in states] if looks else 0.0
         energies.append(np.add(moving, held))
     energies = np.array(energies)
-    # What stretches the row is more than the vibration where it is flung outwards.
+    # Centrifugal stretching of the row contains more energy than the vibration.
     size = 0.5 * mass * (swing**2).sum() + energies[0] * (axis[0] < 1)
     off = (np.abs(energies - energies[0]).max(axis=0) / size).reshape(3, 3)
     assert (off < 3e-3).all()

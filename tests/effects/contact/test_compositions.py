@@ -1,4 +1,4 @@
-"""Composed contact laws against the twin in NumPy, of two materials, between grains and at walls."""
+"""Composed contact laws against the NumPy reference, with two materials, between grains and at walls."""
 
 import numpy as np
 import pytest
@@ -20,9 +20,9 @@ EACH = [name if name == "jkr" else pytest.param(name, marks=pytest.mark.slow) fo
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_one_step_and_some_hundred_are_those_of_the_twin(name, rng):
-    """Every part of a law acts, remembers, sticks and slides; pairs of materials by their rules, and by a
-    table."""
+def test_steps_equal_the_twin(name, rng):
+    """Every part of a law acts, stores history, sticks and slides; pairs of materials follow their rules, or
+    a table."""
     made = [heap(name, rng), heap(name, rng, pairs=True)]
     for steps in (1, 100):
         for one, result in zip(made, run(made, steps=steps), strict=True):
@@ -36,7 +36,7 @@ def test_one_step_and_some_hundred_are_those_of_the_twin(name, rng):
 
 
 def couples(name, rng, each=16, **more):
-    """Couples that fly at each other, far apart, a third of them grazing, and spin."""
+    """Pairs of spinning grains, far from each other, that collide; a third of the impacts are grazing."""
     radius, mass = rng.uniform(0.3, 1, (each, 2)), rng.uniform(0.5, 2, (each, 2))
     grazing = 1 - 10 ** rng.uniform(-6, -2, each)
     aside = np.where(rng.uniform(size=each) < 0.3, grazing, rng.uniform(0, 1, each))
@@ -65,8 +65,8 @@ def couples(name, rng, each=16, **more):
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_energy_never_grows_in_impacts_and_momentum_stays(name, rng):
-    """Of grains of two materials that have met and parted; those that adhere have given up more."""
+def test_impacts_never_gain_energy_and_conserve_momentum(name, rng):
+    """For grains of two materials that have collided and separated; adhesive ones have dissipated more."""
     met = 0
     for result in run([couples(name, rng) for _ in range(8)]):
         start, end = result.start, by_id(result)
@@ -81,7 +81,7 @@ def test_energy_never_grows_in_impacts_and_momentum_stays(name, rng):
 
 
 def momenta(state):
-    """Momentum of each couple, and its angular momentum about the origin."""
+    """Momentum of each pair, and its angular momentum about the origin."""
     momentum = state["mass"][:, None] * state["velocity"]
     inertia = 0.4 * (state["mass"] * state["radius"] ** 2)[:, None]
     turning = np.cross(state["position"], momentum) + inertia * state["spin"]

@@ -1,4 +1,4 @@
-"""Contact of overlapping spheres against its NumPy twins, each law alone with contact and all together."""
+"""Contact of overlapping spheres against NumPy references, each law alone with contact and all together."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,8 @@ GRAINS, DT = 12, 1e-3
 
 
 def law(rng, kind):
-    """One of a world; stiffnesses such that grains stick and slip, and bond and do not."""
+    """One law for a world; with these stiffnesses some grains stick and some slip, some bond and
+    some do not."""
     return {
         Contact: lambda: Contact(stiffness=rng.uniform(50, 100), exponent=2),
         Hertz: lambda: Hertz(young=rng.uniform(10, 30), poisson=rng.uniform(0, 0.5)),
@@ -44,7 +45,7 @@ def heap(rng, kinds):
 
 
 class Twin:
-    """All pairs [i, j] of a state at once, as printed in Z16; forces are on i by j."""
+    """All pairs [i, j] of a state at once, as printed in Z16; forces on i by j."""
 
     def __init__(self, setup, state):
         self.laws = {type(effect): effect for effect in setup.effects}
@@ -78,7 +79,7 @@ class Twin:
         return total
 
     def slip(self):
-        """Tangential velocity of the surface of j past that of i, at the point of contact."""
+        """Tangential velocity of the surface of j relative to that of i, at the point of contact."""
         lever = self.arm[..., None] * self.n
         surface = self.v[:, None] + np.cross(self.spin[:, None], lever)
         past = surface.transpose(1, 0, 2) - surface
@@ -131,7 +132,7 @@ COMBINATIONS = {
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name == "all" else pytest.mark.slow) for name in COMBINATIONS]
 )
-def test_contact_is_its_numpy_twin(name, rng):
+def test_contact_equals_its_numpy_twin(name, rng):
     """Random heaps, all worlds of one batch; forces and torques; momentum and angular momentum."""
     kinds = COMBINATIONS[name]
     scenes = [heap(rng, kinds) for _ in range(WORLDS)]
@@ -147,7 +148,7 @@ def test_contact_is_its_numpy_twin(name, rng):
             assert np.abs(torque).max() > 1e-3 * np.abs(force).max()
         balanced(state)
         counts = {key: count + np.sum(getattr(twin, key, 0)) for key, count in counts.items()}
-    # The states are worth something: of everything that a law can meet there are many.
+    # The states cover many examples of every branch of the laws.
     assert min(counts["touch"], counts["apart"]) > 100
     if ContactSoftening in kinds:
         assert min(counts["softest"], counts["stiffer"]) > 8
@@ -171,7 +172,7 @@ def pair(effects, gap, radius, velocity=(0, 0), spin=None):
 
 @pytest.mark.slow
 def test_a_grain_inside_another_is_not_pushed():
-    """Where surfaces do not meet there is no contact area; nor is there a NaN."""
+    """If the surfaces do not intersect, there is no contact area and no NaN."""
     scenes = [pair((Contact(stiffness=1e3),), gap, [1.0, 0.3]) for gap in (0.5, 0.7, 0.71, 1.3, 1.31)]
     inside, edge, meeting, touching, apart = (state["force"][1, 0] for state in loads(scenes))
     assert inside == apart == 0
@@ -192,7 +193,7 @@ def test_light_contact_keeps_its_digits():
 
 @pytest.mark.slow
 def test_friction_of_grains_that_roll_on_each_other():
-    """Spins that make the surfaces move as one leave no friction; the opposite doubles the slip."""
+    """There is no friction if the spins make the surfaces move together; opposite spins double the slip."""
     friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))
     arm = 0.9
     scenes = [
@@ -207,7 +208,7 @@ def test_friction_of_grains_that_roll_on_each_other():
 
 @pytest.mark.long
 def test_grains_that_just_touch_at_rest_rub_with_no_force():
-    """Neither pressure nor speed, so neither a direction nor a NaN; none either without friction at all."""
+    """Without pressure and speed there is no direction of friction, and no NaN; nor without any friction."""
     smooth = ContactFriction(stiffness=10.0, static=0.0, dynamic=0.0)
     rough = ContactFriction(stiffness=10.0, static=1e3, dynamic=1.0)
     law = Contact(stiffness=1e3)
@@ -223,7 +224,7 @@ def test_grains_that_just_touch_at_rest_rub_with_no_force():
 
 @pytest.mark.long
 def test_stick_vanishes_with_the_time_step():
-    """What the docstring says of the paper's regularisation."""
+    """The docstring's statement on the paper's regularisation."""
     friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))
     scenes = [pair(friction, 1.8, 1.0, (1.0, -1.0))]
     at = [loads(scenes, dt)[0]["force"][0, 1] for dt in (1e-3, 1e-6, 0.0)]

@@ -1,4 +1,4 @@
-"""Contact: what is wrong in a scene is named."""
+"""Contact: invalid scenes are refused by name."""
 
 import pytest
 
@@ -33,7 +33,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

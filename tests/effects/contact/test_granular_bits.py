@@ -1,4 +1,5 @@
-"""Grains that remember their contacts: the same bits however run, and as in NumPy when one is taken."""
+"""Grains with contact history: the same bits for every way to run them, and equal to NumPy if a grain is
+removed."""
 
 import subprocess
 import sys
@@ -28,7 +29,7 @@ pytestmark = [
 
 GRAINS, STEPS, DT = 150, 120, 2e-4
 CHUNK_SLOTS = 32
-"""Small, so that most pairs are of two chunks."""
+"""Small, so that most pairs span two chunks."""
 
 
 class TakeAway(Operator):
@@ -59,7 +60,7 @@ def simulated(schedule):
 
 
 def ends(simulation, scenes):
-    """What becomes of scenes."""
+    """Run scenes; return their final states by id."""
     simulation.load(scenes)
     simulation.run()
     results = simulation.results()
@@ -81,12 +82,12 @@ def simulation():
 
 @pytest.fixture(scope="module")
 def usual(simulation):
-    """Of three beds side by side."""
+    """Final states of three beds side by side."""
     return ends(simulation, [bed(k) for k in range(3)])
 
 
 @pytest.mark.long
-def test_of_one_alone_in_a_batch_and_restarted(simulation, usual, tmp_path):
+def test_the_same_bits_alone_in_a_batch_and_restarted(simulation, usual, tmp_path):
     same(ends(simulation, [bed(2)])[0], usual[2])
     simulation.load([bed(k) for k in range(3)])
     simulation.run(steps=STEPS // 2)
@@ -100,8 +101,8 @@ def test_of_one_alone_in_a_batch_and_restarted(simulation, usual, tmp_path):
         same(by_id(result), expected)
 
 
-def test_of_any_skin(simulation, usual):
-    """Lists are made at other times, and hold other pairs."""
+def test_the_same_bits_with_any_skin(simulation, usual):
+    """Lists are built at other times, and contain other pairs."""
     skins = (2e-3, 2e-2, 0.1)
     for found in ends(simulation, [bed(2).model_copy(update={"skin": skin}) for skin in skins]):
         same(found, usual[2])
@@ -113,18 +114,18 @@ def skin_of(simulation, w):
     return simulation.assembly.pairs.half_list.grid.skin[w, 0]
 
 
-def test_a_step_is_few_launches_which_tell_how_far_worlds_have_come(simulation):
-    """Two more than a step has without what takes grains away: operators act between two fillings of slots,
-    after which forces may be summed again."""
+def test_a_step_takes_few_launches(simulation):
+    """Two more launches than for a step without an operator that removes grains: operators act between two
+    fillings of slots, after which forces may be summed again."""
     simulation.load([bed(k) for k in range(3)])
     assert_launches(simulation, 64, each=5)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["world", "team"])
-def test_of_all_schedules(usual, monkeypatch, schedule):
+def test_the_same_bits_on_all_schedules(usual, monkeypatch, schedule):
     if schedule == "team":
-        # All threads take the three beds one after the other.
+        # All threads process the three beds one after the other.
         monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
     simulation = simulated(schedule)
     for found, expected in zip(ends(simulation, [bed(k) for k in range(3)]), usual, strict=True):
@@ -133,8 +134,8 @@ def test_of_all_schedules(usual, monkeypatch, schedule):
 
 
 @pytest.mark.long
-def test_a_grain_that_is_taken_away_leaves_what_the_others_remember(simulation):
-    """In NumPy, row and column are cut out; here indices move and lists are made anew."""
+def test_removing_a_grain_keeps_the_history_of_others(simulation):
+    """In NumPy, a row and a column are deleted; here indices change and lists are rebuilt."""
     made = [bed(5, after=(60 - 0.5) * DT, which=which) for which in (0, 77, 149)]
     for which, one, found in zip((0, 77, 149), made, ends(simulation, made), strict=True):
         known = twin(one)
@@ -165,7 +166,7 @@ np.savez(sys.argv[1], **kept)
 
 
 @pytest.mark.slow
-def test_of_one_thread_and_two_and_nearly_those_of_single_precision(usual, tmp_path):
+def test_the_same_bits_on_one_and_two_threads(usual, tmp_path):
     command = [sys.executable, "-c", ELSEWHERE, str(tmp_path / "results.npz")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -180,8 +181,9 @@ def test_of_one_thread_and_two_and_nearly_those_of_single_precision(usual, tmp_p
 
 
 @pytest.mark.slow
-def test_no_room_for_longer_lists_is_no_fault_of_what_follows(simulation, monkeypatch):
-    """Grains remember beside their pairs, in fields that are made before there is room for them or not."""
+def test_failing_to_grow_lists_leaves_the_simulation_usable(simulation, monkeypatch):
+    """The contact history is stored beside the pairs, in fields that are allocated before the memory limit is
+    checked."""
     row = simulation.assembly.pairs.half_list.row
     present = memory.bytes_in_use()
     monkeypatch.setattr(runtime, "memory", lambda: present + 1000)

@@ -1,4 +1,4 @@
-"""Impacts under Hertz and Mindlin: restitution, Hertz's time and depth, friction, and what energy is left."""
+"""Impacts under Hertz and Mindlin: restitution, Hertz's duration and depth, friction, and energy loss."""
 
 import numpy as np
 import pytest
@@ -14,12 +14,12 @@ E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
 
 
 def depth(speed, radius=1.0, mass=1.0):
-    """Greatest overlap (m) of an elastic impact at a speed, of R* and m*."""
+    """Largest overlap (m) of an elastic impact at a speed, for R* and m*."""
     return float(hertz_depth(speed, radius, mass, E_STAR))
 
 
 def duration(speed, radius=1.0, mass=1.0):
-    """How long an elastic impact lasts, s."""
+    """Duration of an elastic impact, s."""
     return float(hertz_duration(speed, radius, mass, E_STAR))
 
 
@@ -28,8 +28,8 @@ EXACT = np.array(RESTITUTIONS)[:, None]
 
 
 def restitutions(steps):
-    """Of a head-on impact of two unlike grains, and of one at a wall: by speed (rows) and e; ``steps`` are
-    those of an elastic impact at the wall."""
+    """Restitution of a head-on impact of two unlike grains, and of one at a wall: by speed (rows) and e.
+    ``steps`` is the number of steps in an elastic impact at the wall."""
     made = [
         grains(
             [[10, 0, 50], [11.5, 0, 50], [0, 0, 1]],
@@ -54,31 +54,31 @@ def restitutions(steps):
 
 @pytest.mark.slow
 def test_an_impact_has_the_restitution_at_any_speed():
-    """Over three decades, of grains and at a wall; the error falls as the step."""
+    """Over three decades, between grains and at a wall; the error is first order in the step."""
     for steps in (25, 100, 400):
         found = restitutions(steps)
         np.testing.assert_allclose(found, np.broadcast_to(EXACT, found.shape), rtol=0, atol=0.2 / steps)
-        # In units of its own an impact is the same at any speed.
+        # In its own units an impact is the same at any speed.
         assert np.ptp(found, axis=0).max() < 1e-9
 
 
 def critically_damped(tau, speed):
-    """Time (s), overlap (m) and speed of approach (m/s) in an impact at a wall of e = 0, after Antypov and
+    """Time (s), overlap (m) and approach speed (m/s) in an impact at a wall with e = 0, after Antypov and
     Elliott: x = delta^(5/4) is a damped oscillator in the time tau (m^(1/4) s), d tau = delta^(1/4) dt."""
     rate = (5 / 3 * E_STAR) ** 0.5
 
     def stretched(tau):
         return 1.25 * speed * tau * np.exp(-rate * tau)
 
-    # By tau = u^(5/4), as the integrand tau^(-1/5) grows at 0.
+    # Substitute tau = u^(5/4), because the integrand tau^(-1/5) diverges at 0.
     time, _ = quad(lambda u: 1.25 * u**0.25 * stretched(u**1.25) ** -0.2, 0, tau**0.8)
     return time, stretched(tau) ** 0.8, speed * (1 - rate * tau) * np.exp(-rate * tau)
 
 
 @pytest.mark.slow
-def test_without_restitution_a_grain_stays_where_it_hits():
-    """At e = 0 damping is critical: the overlap goes to 0 as Antypov and Elliott have it, at a wall and at
-    another grain; at no time does a grain part."""
+def test_without_restitution_a_grain_does_not_rebound():
+    """At e = 0 damping is critical: the overlap decays to 0 as in Antypov and Elliott, at a wall and at
+    another grain; the grains never separate."""
     speed, unit = 1.0, (5 / 3 * E_STAR) ** -0.5
     made = grains(
         [[0, 0, 1], [10, 0, 9], [12, 0, 9]], [[0, 0, -speed], [speed, 0, 0], [-speed, 0, 0]],
@@ -107,8 +107,8 @@ def test_without_restitution_a_grain_stays_where_it_hits():
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_an_elastic_impact_is_as_deep_as_hertz_found_and_as_long():
-    """At half its time it is at rest, with the overlap and the force of the formulas."""
+def test_elastic_impacts_have_hertz_depth_and_duration():
+    """After half its duration the grain is at rest, with the overlap and the force of the formulas."""
     errors = []
     for steps in (200, 400):
         made = grains([[0, 0, 1]], [[0, 0, -1]], planes=[FLOOR], law={"restitution": 1.0},
@@ -129,9 +129,9 @@ def test_an_elastic_impact_is_as_deep_as_hertz_found_and_as_long():
 
 
 @pytest.mark.slow
-def test_other_steppers_find_the_same():
-    """Boris with the same steps, and the implicit trapezoid, which starts with steps of a whole impact and
-    shortens them where it is: an oblique impact of a grain that spins, with friction and damping."""
+def test_other_steppers_agree():
+    """Boris with the same steps; and the implicit trapezoid, which starts with steps as long as the impact
+    and shortens them during it. The impact is oblique, of a spinning grain, with friction and damping."""
     ends = []
     for stepper in (
         fixed(duration(1.0) / 100),
@@ -160,7 +160,7 @@ def test_other_steppers_find_the_same():
 
 
 def oblique(angles, **law):
-    """A grain that hits the floor at 1 m/s downwards, and angles (tangents) to the upright: at its end."""
+    """Final states of grains that hit the floor at 1 m/s downwards, at angles (tangents) to the vertical."""
     made = [
         grains([[0, 0, 1]], [[tangent, 0, -1.0]], planes=[FLOOR], law=law, dt=duration(1.0) / 400, steps=600)
         for tangent in angles
@@ -168,22 +168,22 @@ def oblique(angles, **law):
     return [result.state for result in run(made)]
 
 
-def test_a_grain_that_slides_through_its_impact_loses_mu_times_the_push():
-    """Delta v = mu (1 + e) v_n, and a spin of 5/2 of that over R, however fast it slid."""
+def test_a_sliding_impact_loses_mu_times_the_normal_impulse():
+    """Delta v = mu (1 + e) v_n, and a spin of 5/2 of that over R, for any sliding speed."""
     angles, friction = (4.0, 8.0, 30.0), 0.2
     for tangent, state in zip(angles, oblique(angles, restitution=1.0, friction=friction), strict=True):
         loss = tangent - state["velocity"][0, 0]
         assert loss == pytest.approx(2 * friction, rel=1e-4)
-        # The lever is R - delta / 2 of the depth that the impact has.
+        # The lever arm is R - delta / 2 at the depth of the impact.
         spin = 2.5 * loss * (1 - 0.5 * depth(1.0))
         assert state["spin"][0, 1] == pytest.approx(spin, rel=0.3 * depth(1.0))
         np.testing.assert_array_equal(state["spin"][0, [0, 2]], 0)
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.5, 5.0])
-def test_friction_slows_the_surface_and_no_more(friction):
-    """At any angle: never beyond Coulomb's push, never faster back than it came, and no energy from nowhere;
-    what spin gains over what motion loses is 5/2 of the lever."""
+def test_friction_only_slows_the_surface(friction):
+    """At any angle: the friction impulse is within Coulomb's limit, the surface speed does not reverse to a
+    larger value, and energy does not grow. The gained spin is 5/2 of the lost velocity over the lever arm."""
     angles = np.tan(np.linspace(0.02, 1.5, 32))
     for tangent, state in zip(angles, oblique(angles, restitution=1.0, friction=friction), strict=True):
         loss, spin = tangent - state["velocity"][0, 0], state["spin"][0, 1]
@@ -197,7 +197,7 @@ def test_friction_slows_the_surface_and_no_more(friction):
 
 @pytest.mark.long
 def test_energy_never_grows(rng):
-    """Of a thousand impacts of unlike grains that spin, a third of them grazing; e of 0.1 to 1, mu to 3."""
+    """A thousand impacts of unlike spinning grains, a third of them grazing; e from 0.1 to 1, mu up to 3."""
     couples, made = CAPACITY // 2, []
     for k in range(WORLDS):
         radius, mass = rng.uniform(0.3, 1, (couples, 2)), rng.uniform(0.5, 2, (couples, 2))
@@ -231,7 +231,7 @@ def test_energy_never_grows(rng):
 
 
 def couple_energies(state):
-    """Of each two that follow each other, J."""
+    """Energies of the pairs of consecutive grains, J."""
     inertia = 0.4 * state["mass"] * state["radius"] ** 2
     moving = state["mass"] * (state["velocity"] ** 2).sum(axis=1)
     return 0.5 * (moving + inertia * (state["spin"] ** 2).sum(axis=1)).reshape(-1, 2).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Hertz, Mindlin and walls: what is wrong in a scene is named; what no step can follow stops the world."""
+"""Hertz, Mindlin and walls: invalid scenes are refused by name; steps that are too long stop the world."""
 
 import numpy as np
 import pytest
@@ -83,7 +83,8 @@ WRONG = {
 
 
 def cohesive(normal, density, radius, pairs=None, material=None, acting=(), **given):
-    """Asks whether grains that lie in a row, and walls, may cohere so; grain is of the given constants."""
+    """Check cohesion for grains in a row, and for walls, as at the start of a run; ``given`` changes the
+    values of "grain"."""
     law = Granular(normal=normal, cohesion=SJKR())
     own = {"stiffness": 2e4, "young": 1e6, "poisson": 0.3, "cohesion_energy_density": density, **given}
     other = {**own, "cohesion_energy_density": 1.0}
@@ -102,7 +103,7 @@ def cohesive(normal, density, radius, pairs=None, material=None, acting=(), **gi
 
 FLAT = Walls(planes=[Plane()], material="grain")
 MOST = 2e4 / (2 * np.pi)
-"""J/m^3; the cohesion beyond which nothing holds grains of R* = 1 m apart, of this stiffness."""
+"""J/m^3; the largest cohesion for which this stiffness keeps grains of R* = 1 m apart."""
 COHESIVE = {
     "of the largest two": ("1 m touches grain of 0.5 m", (Hooke(), 3 * MOST, [0.2, 0.5, 1.0])),
     "of a wall": ("1 m in radius touches walls", (Hooke(), MOST, [1.0], None, None, (FLAT,))),
@@ -112,12 +113,13 @@ COHESIVE = {
     ),
     "beside hertz": ("3 m touches grain of 3 m", (HertzMaterial(), 1e6 / (1.82 * 1.5 * np.pi), [3.0, 3.0])),
 }
-"""Where a cohesion is just what is too much."""
+"""Cohesions at exactly their limit."""
 
 
 @pytest.mark.parametrize("case", COHESIVE)
-def test_cohesion_that_nothing_holds_is_refused(case):
-    """Above k / (2 pi R*) beside a spring, and 2 E* / (3 pi) beside Hertz; just below it is none."""
+def test_cohesion_without_an_equilibrium_is_refused(case):
+    """Above k / (2 pi R*) with a linear spring, and 2 E* / (3 pi) with Hertz; just below, the scene is
+    accepted."""
     words, (normal, density, *more) = COHESIVE[case]
 
     def answer(part):
@@ -135,9 +137,9 @@ def test_cohesion_that_nothing_holds_is_refused(case):
     assert words in message
 
 
-def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
-    """Two of one class, one of each of two classes, one that is put in beside one of the start, and one at a
-    wall."""
+def test_cohesion_is_checked_for_inserted_grains():
+    """Two grains of one class, grains of two classes, an inserted grain with one of the start, and a grain at
+    a wall."""
     dense = {"dust-grain": MaterialPair(cohesion_energy_density=3.1 * MOST)}
     coarse, fine = ("grain", 1.0), ("dust", 0.5)
     for words, classes, density, more in (
@@ -161,8 +163,9 @@ def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
         assert words in str(fault.value)
 
 
-def test_walls_say_what_the_laws_of_the_scene_say():
-    """Of cohesion where a law has one that grows with the overlap; a bridge holds on to what parts."""
+def test_failure_hints_of_walls_follow_the_laws():
+    """The failure hint mentions cohesion for a law whose cohesion grows with the overlap; a liquid bridge
+    adds none."""
     long, held = (
         "a step is too long for the springs and dashpots of a contact, or for how fast surfaces meet",
         "or no elastic force holds the cohesion there",
@@ -176,8 +179,8 @@ def test_walls_say_what_the_laws_of_the_scene_say():
         assert FLAT.may_stop((FLAT, *laws), Open()) == words
 
 
-def test_a_scene_is_asked_before_it_runs():
-    """By whoever loads it."""
+def test_a_scene_is_checked_before_it_runs():
+    """The check runs whenever a scene is loaded."""
     made = one(Granular(normal=Hooke(), cohesion=SJKR()), Walls(planes=[Plane()]), radius=1.0,
                materials={"grain": Material(stiffness=1.0, cohesion_energy_density=1.0)})  # fmt: skip
     wrong = "granular.cohesion must be below the repulsion of hooke at an overlap of R*, 1 N, when grain of "
@@ -187,7 +190,7 @@ def test_a_scene_is_asked_before_it_runs():
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message
@@ -198,9 +201,9 @@ def ends(scenes):
 
 
 @pytest.mark.long
-def test_what_no_step_can_follow_stops_the_world_and_is_named():
-    """A modulus beyond numbers, and steps too long for a pair, its damping and a wall;
-    the state of before is kept."""
+def test_too_long_steps_stop_the_world_and_are_named():
+    """A modulus that overflows, and steps too long for a pair, its damping and a wall; the previous state is
+    kept."""
     far = {"dt": 1e-3, "steps": 1000}
     stiff = {"law": {"young": 1e15}, **far}
     couple = [[0, 0, 9], [2.1, 0, 9]]
@@ -215,7 +218,7 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
             grains([[0, 0, 9], [1.9, 0, 9]], [[0, 0, 0]] * 2, law={"young": 1e10}, **far),
             "granular",
         ),
-        # S_n dt^2 is 1.2 m* after a step: too long by its damping alone.
+        # S_n dt^2 is 1.2 m* after a step: too long because of its damping alone.
         "damping": (
             grains([[0, 0, 9], [1.9, 0, 9]], [[0, 0, 0]] * 2, law={"restitution": 1e-3}, dt=6.4e-4, steps=9),
             "granular",
@@ -236,9 +239,9 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
 
 
 @pytest.mark.long
-def test_what_is_pressed_far_into_each_other_gives_back_what_it_holds():
-    """A grain far beyond a wall, one within a larger one, and centres 1e-6 radii apart: Hertz's 8/15 E*
-    sqrt(R*) delta^2.5, by steps that resolve it."""
+def test_deep_overlaps_return_their_stored_energy():
+    """A grain far beyond a wall, one within a larger one, and centres 1e-6 radii apart: the energy is Hertz's
+    8/15 E* sqrt(R*) delta^2.5, in steps that resolve the motion."""
     e_star = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
     more = {"law": {"restitution": 1.0}, "dt": 1e-5, "steps": 4000}
     still = [[0, 0, 0]] * 2

@@ -1,5 +1,5 @@
-"""What the parts of a contact law say of one contact led along a path, and of one impact, each against
-its closed form."""
+"""The parts of a contact law along the path of one contact, and in one impact, each against its
+closed form."""
 
 import numpy as np
 import pytest
@@ -23,20 +23,20 @@ X, Y, Z = np.eye(3)
 
 
 def held(n, value=PRESSED):
-    """A path at one overlap."""
+    """A path at constant overlap."""
     return np.full(n, value)
 
 
 def at(n, *steps):
-    """A path that does something in its first steps, and nothing then."""
+    """A path with displacements in its first steps, and none afterwards."""
     path = np.zeros((n, 3))
     path[: len(steps)] = steps
     return path
 
 
 @pytest.mark.slow
-def test_hooke_pushes_like_a_spring_and_damping_goes_by_speed():
-    """k delta; of constant damping gamma v, beside Hertz's force."""
+def test_hooke_spring_and_constant_damping():
+    """k delta; with constant damping gamma v, in addition to Hertz's force."""
     force, _, _ = along("hooke", np.linspace(0, 0.1, 5))
     np.testing.assert_allclose(force[:, 0], -K * np.linspace(0, 0.1, 5), rtol=1e-14)
     force, _, _ = along("dmt", held(1), at(1, 1e-5 * X), damping=30.0)
@@ -44,7 +44,8 @@ def test_hooke_pushes_like_a_spring_and_damping_goes_by_speed():
 
 
 def impacts(name, speeds, duration, steps, **first):
-    """The restitution of two that meet head-on, at each speed; steps in so many parts of a duration (s)."""
+    """The restitution of head-on impacts of two grains, at each speed, with ``steps`` steps in a duration
+    (s)."""
     made = [
         grains(
             name,
@@ -61,7 +62,7 @@ def impacts(name, speeds, duration, steps, **first):
 
 
 @pytest.mark.slow
-def test_beside_hookes_spring_an_impact_has_the_restitution_too():
+def test_restitution_with_hookes_spring():
     """From e = 0.01 to 1, to first order in the step."""
     e = np.array([0.01, 0.1, 0.5, 0.9, 1.0])
     for steps in (100, 400):
@@ -81,8 +82,8 @@ def test_viscoelastic_restitution_falls_as_the_fifth_root_of_the_speed():
     np.testing.assert_allclose(1 - found, small - 0.6 * small**2, rtol=0.02)
 
 
-def test_a_linear_spring_is_remembered_and_slides():
-    """0.4 k xi, up to mu N, and back from there at once."""
+def test_a_linear_spring_has_history_and_slides():
+    """0.4 k xi, up to mu N; it decreases at once when the motion reverses."""
     moved = np.concatenate([np.tile(1e-3 * Y, (10, 1)), np.tile(-1e-4 * Y, (5, 1))])
     force, _, _ = along("hooke", held(15), moved, friction=0.2)
     limit = 0.2 * K * PRESSED
@@ -92,16 +93,16 @@ def test_a_linear_spring_is_remembered_and_slides():
 
 
 @pytest.mark.slow
-def test_the_displacement_of_mindlins_spring_is_remembered_whatever_the_pressure():
-    """8 G* a xi; pressed at a displacement it holds more."""
+def test_mindlins_spring_stores_its_displacement():
+    """8 G* a xi; if pressed further at a constant displacement, the force grows."""
     overlap = np.array([0.01, 0.01, 0.04, 0.0025])
     force, _, _ = along("jkr", overlap, at(4, 0 * Y, 1e-6 * Y), friction=1e6)
     np.testing.assert_allclose(force[1:, 1], 8 * G_STAR * np.sqrt(overlap[1:]) * 1e-6, rtol=1e-9)
 
 
 @pytest.mark.slow
-def test_viscous_friction_forgets():
-    """x gamma u up to mu N, and nothing at rest."""
+def test_viscous_friction_has_no_history():
+    """x gamma u up to mu N, and zero at rest."""
     moved = np.array([[0, 1e-7, 0], [0, 1, 0], [0, 0, 0]])
     force, _, _ = along("dmt", held(3), moved, friction=0.3, damping=30.0)
     expected = [0.7 * 30.0 * 1e-2, 0.3 * 4 / 3 * E_STAR * PRESSED**1.5, 0]
@@ -120,15 +121,15 @@ ROLLS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROLLS)
-def test_a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once(name):
-    """k_r R* theta, up to mu_r R* N, at right angles to the normal; about that it does nothing."""
+def test_a_rolling_spring_slips_at_its_limit(name):
+    """k_r R* theta, up to mu_r R* N, perpendicular to the normal; it has no component along the normal."""
     first, spring, push = ROLLS[name]
     limit = 0.1 * push
     reached = limit / spring
     turned = np.concatenate(
         [np.tile(0.1 * reached * Z + 7 * X, (20, 1)), np.tile(-0.01 * reached * Z, (9, 1))]
     )
-    # Of no damping.
+    # "hooke" has no rolling damping.
     mass_drag = 0.0 if name == "hooke" else 2 * 0.2 * spring**0.5 / 1e-5
     _, couple, _ = along(name, held(29), 0.0, turned, **first)
     np.testing.assert_array_equal(couple[:, :2], 0)
@@ -158,7 +159,7 @@ TWISTS = {
 
 
 @pytest.mark.parametrize("name", ["hooke", pytest.param("jkr", marks=pytest.mark.slow)])
-def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(name):
+def test_a_twisting_spring_slips_at_its_limit(name):
     first, spring, limit = TWISTS[name]
     turned = np.concatenate(
         [np.tile(-0.1 * limit / spring * X, (20, 1)), np.tile(0.01 * limit / spring * X, (9, 1))]
@@ -169,8 +170,8 @@ def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(nam
 
 
 @pytest.mark.slow
-def test_a_contact_that_is_pressed_twisted_unloaded_and_twisted_back_yields_no_work():
-    """Twisted: half of what the spring has lost times the square of the angle is lost."""
+def test_a_closed_path_with_twisting_gains_no_work():
+    """In twisting, half of the loss of stiffness times the square of the angle is dissipated."""
     n, angle = 500, 1e-4
     still, down = np.zeros(n), np.linspace(PRESSED, 0.005, n)
     overlap = np.concatenate([still + PRESSED, down, still + 0.005, down[::-1]])
@@ -185,14 +186,14 @@ def test_a_contact_that_is_pressed_twisted_unloaded_and_twisted_back_yields_no_w
 
 
 def test_cohesion_pulls_while_surfaces_touch():
-    """SJKR k_c 2 pi R* delta; DMT 4 pi gamma R*, of which friction at no load holds mu times."""
+    """SJKR k_c 2 pi R* delta; DMT 4 pi gamma R*, which carries friction of mu times that at zero load."""
     overlap = np.array([-1e-9, 0.0, PRESSED])
     force, _, lasts = along("hooke", overlap, cohesion_energy_density=2e3)
     np.testing.assert_allclose(force[:, 0], (4e3 * np.pi - K) * np.maximum(overlap, 0), rtol=1e-14)
     most = K / (2 * np.pi)
     for part in (0.999, 1.001):
         force, _, _ = along("hooke", held(1), cohesion_energy_density=part * most)
-        # Beyond it nothing holds them apart, and the world stops.
+        # Above this cohesion nothing keeps the grains apart, and the world stops.
         assert np.isfinite(force).all() == (part < 1)
     force, _, lasts = along("dmt", overlap, surface_energy=5.0)
     np.testing.assert_array_equal(lasts, [0, 1, 1])
@@ -203,8 +204,8 @@ def test_cohesion_pulls_while_surfaces_touch():
 
 
 @pytest.mark.slow
-def test_beside_hertz_cohesion_by_the_overlap_has_two_rest_at_a_root():
-    """(3 pi k_c / (2 E*))^2 R*, of R* = 1 m, found in NumPy too; up to k_c = 2 E* / (3 pi), of which it is
+def test_sjkr_beside_hertz_has_an_equilibrium():
+    """(3 pi k_c / (2 E*))^2 R* for R* = 1 m, also found in NumPy; up to k_c = 2 E* / (3 pi), at which it is
     R*."""
     law = Granular(normal=HertzMaterial(), cohesion=SJKR())
     elastic, most = {"young": YOUNG, "poisson": POISSON}, 2 * E_STAR / (3 * np.pi)
@@ -213,7 +214,7 @@ def test_beside_hertz_cohesion_by_the_overlap_has_two_rest_at_a_root():
         rest = brentq(lambda d, k=density: 4 / 3 * E_STAR * d**1.5 - k * 2 * np.pi * d, 1e-6, 2, xtol=1e-15)
         assert rest == pytest.approx((1.5 * np.pi * density / E_STAR) ** 2, rel=1e-10)
         assert rest == pytest.approx(part**2, rel=1e-10)
-        # Pulled where they lie less deep, and pushed where deeper.
+        # The force is attractive at smaller overlap, and repulsive at larger.
         near = rest * np.array([0.9, 1.0, 1.1])
         force = alone(law, near, **elastic, cohesion_energy_density=density)
         assert force[0, 0] > 0 > force[2, 0]
@@ -222,21 +223,21 @@ def test_beside_hertz_cohesion_by_the_overlap_has_two_rest_at_a_root():
 
 
 GAMMA = 20.0
-"""J/m^2; of soft grains that adhere much."""
+"""J/m^2; for soft and strongly adhesive grains."""
 PARTS = closed_forms.jkr_pull_off(GAMMA, 1.0)
-"""N; the force that parts them, of R* = 1 m."""
+"""N; the pull-off force for R* = 1 m."""
 STRETCH = closed_forms.jkr_stretch(GAMMA, 1.0, E_STAR)
-"""m; how far they stretch."""
+"""m; the gap to which they stretch."""
 
 
 def jkr_force(overlap):
-    """The stable force (N) of R* = 1 m."""
+    """The stable branch of the force (N) for R* = 1 m."""
     return closed_forms.jkr_force(overlap, GAMMA, 1.0, E_STAR)
 
 
 @pytest.mark.slow
-def test_jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_most():
-    """-8/9 of that at the first touch and -5/9 where it ends; dry before."""
+def test_jkr_force_from_contact_to_pull_off():
+    """-8/9 of that at the first touch and -5/9 at the end of the contact; no force before the first touch."""
     ways = np.concatenate([[-0.1 * STRETCH, 0.0, 0.03], np.linspace(0.03, -0.999999 * STRETCH, 300)])
     force, _, lasts = along("jkr", [*ways, -1.000001 * STRETCH, -0.5 * STRETCH], surface_energy=GAMMA)
     np.testing.assert_array_equal(lasts, [0, *[1] * 302, 0, 0])
@@ -249,14 +250,15 @@ def test_jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_mos
     )
 
 
-def test_friction_of_adhesive_grains_goes_by_the_force_that_parts_them():
+def test_friction_of_adhesive_grains_includes_pull_off():
     """mu |F_n + 2 F_c|: 10/9 mu F_c at the first touch."""
     force, _, _ = along("jkr", held(1, 0.0), at(1, 0.1 * Y), surface_energy=GAMMA, friction=0.3)
     assert force[0, 1] == pytest.approx(0.3 * 10 / 9 * PARTS, rel=1e-12)
 
 
 def test_parting_takes_the_work_of_adhesion():
-    """7.09 (W^5 R*^4 / E*^2)^(1/3), W = 2 gamma, of two that meet at a speed that is enough; others stay."""
+    """7.09 (W^5 R*^4 / E*^2)^(1/3), W = 2 gamma, for pairs with sufficient speed; slower ones stay
+    together."""
     work = quad(lambda d: -jkr_force(d), -STRETCH, 0, limit=200)[0]
     assert work == pytest.approx(7.09 * ((2 * GAMMA) ** 5 / E_STAR**2) ** (1 / 3), rel=1e-3)
     least = (2 * work) ** 0.5

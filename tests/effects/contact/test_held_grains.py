@@ -1,4 +1,4 @@
-"""Grains that hit one that is fixed, or are cemented to it: it is like a wall, however light it is."""
+"""Grains that hit a fixed grain, or are cemented to it: it acts like a wall, even if it is light."""
 
 import numpy as np
 import pytest
@@ -9,21 +9,21 @@ from tisim.effects import Force, Granular, Hooke, ParallelBond, RestitutionDampi
 
 R, X = 0.01, np.array([1.0, 0.0, 0.0])
 STIFFNESS, MASS = 1e4, 1e-2
-"""Of contacts, N/m; of a grain that moves, kg."""
+"""Contact stiffness, N/m; mass of a moving grain, kg."""
 GAP = 0.5 * R
-"""m, of surfaces that are cemented."""
+"""m, gap between cemented surfaces."""
 RATIO, YOUNG = 0.2, 1e6
-"""Of damping; Pa."""
+"""Damping ratio; Pa."""
 
 
 class MayBeFixed(Force):
-    """None, for particles some of which may be fixed."""
+    """No force; declares that some particles may be fixed."""
 
     fields = ("fixed",)
 
 
 def against_one_that_is_fixed(gap, velocity, spin, dt, steps):
-    """A grain beside one that is fixed and is half as heavy, with surfaces ``gap`` (m) from each other."""
+    """A grain beside a fixed one of half its mass, with a gap of ``gap`` (m) between their surfaces."""
     effects = (
         Granular(normal=Hooke(), damping=RestitutionDamping()),
         ParallelBond(young=YOUNG, gap=GAP, damping_ratio=RATIO, tensile_strength=1e9, shear_strength=1e9),
@@ -37,8 +37,8 @@ def against_one_that_is_fixed(gap, velocity, spin, dt, steps):
 
 
 @pytest.mark.slow
-def test_what_is_fixed_is_like_a_wall():
-    """An impact has its restitution, and a bond that is stretched and twisted its damping ratio."""
+def test_fixed_grains_act_like_walls():
+    """An impact has the given restitution, and a stretched and twisted bond the given damping ratio."""
     step = np.pi * np.sqrt(MASS / STIFFNESS) / 400
     area, second = np.pi * R**2, np.pi * R**4 / 4
     stretched, twisted = YOUNG / (2 * R) * area, YOUNG / (2 * R) / 2.5 * 2 * second

@@ -1,4 +1,4 @@
-"""Hertz and Mindlin against a NumPy twin, and what the law says of one contact that is led along a path."""
+"""Hertz and Mindlin against a NumPy reference, and the forces of one contact along a given path."""
 
 import numpy as np
 import pytest
@@ -20,13 +20,13 @@ G_STAR = USUAL["young"] / (4 * (2 - USUAL["poisson"]) * (1 + USUAL["poisson"]))
 DT = 1e-5
 """s, of a step along a path."""
 GRIP, PRESSED, EASED, SLID = 1e6, 0.02, 0.005, 1e-3
-"""A friction without end; overlaps and a way, m."""
+"""Infinite friction; overlaps and a displacement, m."""
 
 
 @in_taichi_thread
 @ti.kernel
 def _along(law: ti.template(), normal: ti.types.ndarray(), path: ti.types.ndarray(), out: ti.types.ndarray()):
-    """Forces along a path of overlap and slip, of R* = 1 m and m* = 1 kg."""
+    """Forces along a path of overlap and slip, with R* = 1 m and m* = 1 kg."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         at_wall = ti.Vector([1.0, 3.5, 2.5, 2.5])
@@ -45,8 +45,8 @@ def _along(law: ti.template(), normal: ti.types.ndarray(), path: ti.types.ndarra
 
 
 def along(normal, overlap, moved, **law):
-    """Force and what is remembered of it, at each point of a path of one contact; ``moved`` is how far its
-    surfaces have moved past each other since the point before, m."""
+    """Force and contact history at each point of a path of one contact. ``moved`` : tangential displacement
+    of its surfaces since the point before, m."""
     one = grains([[0, 0, 0]], [[0, 0, 0]], law=law)
     simulation = compiled(one, WORLDS, CAPACITY)
     simulation.load([one])
@@ -57,7 +57,7 @@ def along(normal, overlap, moved, **law):
 
 
 @pytest.mark.long
-def test_one_step_and_some_hundred_are_those_of_the_twin(rng):
+def test_steps_equal_the_twin(rng):
     """Unlike grains that overlap, spin and slide, in a cell; many stick, many slide."""
     made = [heap(rng, friction=0.1 + 0.2 * k, restitution=0.3 + 0.2 * k) for k in range(4)]
     for steps in (1, 300):
@@ -70,16 +70,17 @@ def test_one_step_and_some_hundred_are_those_of_the_twin(rng):
             assert np.abs(known.v - result.start["velocity"]).max() > (0.03 if steps == 1 else 3)
 
 
-def test_force_and_stiffness_are_those_of_hertz_and_mindlin():
-    """At rest, 4/3 E* sqrt(R*) delta^1.5; pushed aside a little, 8 G* a more per metre."""
+def test_force_and_stiffness_of_hertz_and_mindlin():
+    """At rest, 4/3 E* sqrt(R*) delta^1.5; displaced sideways a little, 8 G* a more per metre."""
     force, elastic = along([0, 0, 1], [PRESSED, PRESSED], np.array([[0, 0, 0], [1e-6, 0, 0]]), restitution=1)
     np.testing.assert_allclose(force[0], [0, 0, -4 / 3 * E_STAR * PRESSED**1.5], rtol=1e-14)
     np.testing.assert_allclose(force[1, 0], 8 * G_STAR * PRESSED**0.5 * 1e-6, rtol=1e-14)
     np.testing.assert_array_equal(elastic[1], [force[1, 0], 0, 0])
 
 
-def test_what_is_remembered_turns_with_the_pair():
-    """Held aside, then turned by 2 rad about an axis of its own: the force has its size and turns too."""
+def test_the_contact_history_rotates_with_the_pair():
+    """Displaced sideways, then rotated by 2 rad about a transverse axis: the force keeps its magnitude and
+    rotates too."""
     turns = 400
     angle = np.linspace(0, 2, turns + 1)
     normal = np.stack([0 * angle, np.sin(angle), np.cos(angle)], axis=1)
@@ -88,13 +89,14 @@ def test_what_is_remembered_turns_with_the_pair():
     _, elastic = along(normal, np.full(turns + 1, PRESSED), moved)
     np.testing.assert_allclose(np.linalg.norm(elastic, axis=1), np.linalg.norm(elastic[0]), rtol=1e-12)
     assert np.abs((elastic * normal).sum(axis=1)).max() < 1e-12 * np.abs(elastic).max()
-    # Each turn is a projection with its size restored, which turns what lies along the axis a little.
+    # Each rotation is a projection and a rescaling, which slightly turns the component along the axis.
     ahead = np.linalg.norm(elastic[0]) * np.array([0.6, 0.8 * np.cos(2), -0.8 * np.sin(2)])
     np.testing.assert_allclose(elastic[-1], ahead, atol=0.01 * np.linalg.norm(ahead))
 
 
-def test_coulombs_limit_holds_with_the_damping_and_is_left_at_once():
-    """Slid far, the force is mu F_n; turned back, it falls from there as the spring does."""
+def test_coulombs_limit_includes_damping_and_ends_at_once():
+    """After long sliding, the force is mu F_n; when the motion reverses, it decreases at once as the spring
+    does."""
     moved = np.zeros((30, 3))
     moved[:20, 0], moved[20:, 0] = 1e-3, -1e-7
     force, _ = along([0, 0, 1], np.full(30, PRESSED), moved, restitution=1.0, friction=0.3)
@@ -104,8 +106,9 @@ def test_coulombs_limit_holds_with_the_damping_and_is_left_at_once():
     np.testing.assert_allclose(force[20:, 0], back, rtol=1e-12)
 
 
-def test_a_closed_path_yields_no_work():
-    """Pressed, sheared, unloaded, sheared back and pressed again: half (S_1 - S_0) u^2 is lost, none won."""
+def test_a_closed_path_gains_no_work():
+    """Pressed, sheared, unloaded, sheared back and pressed again: half (S_1 - S_0) u^2 is dissipated, and
+    nothing is gained."""
     n = 500
     still, down = np.zeros(n), np.linspace(PRESSED, EASED, n)
     overlap = np.concatenate([still + PRESSED, down, still + EASED, down[::-1]])
@@ -119,8 +122,9 @@ def test_a_closed_path_yields_no_work():
     np.testing.assert_allclose(elastic[-1], 0, atol=1e-9 * np.abs(elastic).max())
 
 
-def test_a_large_grain_that_many_small_ones_touch_remembers_nothing_and_each_of_them_one(rng):
-    """More of them than a grain has room for: the smaller of two remembers, and few larger ones touch it."""
+def test_the_history_is_stored_on_the_smaller_grain(rng):
+    """With more contacts than the capacity of a grain: the smaller grain stores the history, as it has few
+    larger neighbours."""
     small, size = 40, 0.05
     turn, height = np.pi * (1 + 5**0.5) * np.arange(small), 1 - 2 * (np.arange(small) + 0.5) / small
     aside = np.sqrt(1 - height**2)
@@ -140,7 +144,7 @@ def test_a_large_grain_that_many_small_ones_touch_remembers_nothing_and_each_of_
 
 
 @pytest.mark.long
-def test_momentum_and_angular_momentum_stay(rng):
+def test_momentum_and_angular_momentum_are_conserved(rng):
     """Grains of unlike sizes and masses, far from any wall, that stick and slide."""
     n = 40
     radius, place = rng.uniform(0.1, 0.3, n), rng.uniform(0, 1.2, (n, 3))
@@ -159,7 +163,7 @@ def test_momentum_and_angular_momentum_stay(rng):
 
 
 def test_a_law_of_one_material():
-    """E* and G* of two grains alike, and the c of their damping."""
+    """E* and G* of two equal grains, and the constant c of their damping."""
     (alike,) = Materials({"grain": Material(**USUAL)}, {}).touching()
     assert alike.effective_young == pytest.approx(E_STAR, rel=1e-15)
     assert alike.effective_shear == pytest.approx(G_STAR, rel=1e-15)

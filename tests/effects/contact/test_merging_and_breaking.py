@@ -1,4 +1,4 @@
-"""What grains remember of each other survives that others among them merge and break; beside NumPy."""
+"""The contact history of grains is kept when others among them merge and break; against NumPy."""
 
 import numpy as np
 import pytest
@@ -17,11 +17,11 @@ pytestmark = [
 
 GRAINS, BEFORE, AFTER, DT = 60, 100, 100, 2e-4
 PIECE = 0.15
-"""m; how far from a grain the piece is that breaks off it."""
+"""m; distance between a grain and the piece that breaks off it."""
 
 
 class MergeAndBreak(Operator):
-    """After a time one grain is taken up by another, and half of a third breaks off, once."""
+    """At a given time, once, one grain is merged into another, and half of a third breaks off."""
 
     when: float = parameter("s", "time", ge=0)
     taken: float = parameter("", "id of the grain that is taken up", ge=0)
@@ -56,7 +56,7 @@ def bed(seed, **which):
 
 
 def grow(known, i):
-    """The piece of grain i, the last grain of the twin, which remembers nothing yet."""
+    """The piece of grain i, the last grain of the reference, without any contact history."""
     for name in ("x", "v", "w", "radius", "mass", "held", "material"):
         values = getattr(known, name)
         setattr(known, name, np.concatenate([values, values[i : i + 1]]))
@@ -69,8 +69,8 @@ def grow(known, i):
 
 
 @pytest.mark.parametrize("which", [(0, 30, 59), (59, 0, 30), (30, 59, 0)])
-def test_the_others_go_on_as_they_are(which):
-    """Indices move, one that is new has a slot of one that is gone, and lists are made anew."""
+def test_other_grains_are_not_affected(which):
+    """Indices change, the new grain reuses the slot of the merged one, and lists are rebuilt."""
     taken, taker, broken = which
     made = bed(5, taken=taken, taker=taker, broken=broken)
     (result,) = simulate([made], capacity=GRAINS + 4)

@@ -1,4 +1,5 @@
-"""Walls that move, turn, shake and press: grains at them against closed forms, and the forces on them."""
+"""Walls that translate, rotate, shake and press: grains at them against closed forms, and the
+forces on them."""
 
 import numpy as np
 import pytest
@@ -28,13 +29,13 @@ G = 10.0
 
 
 def sunk(push):
-    """The overlap (m) at which a wall pushes a grain with so much (N)."""
+    """The overlap (m) at which a wall pushes a grain with the force ``push`` (N)."""
     return (3 * push / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
 
 
 def among(position, velocity, floor=NOWHERE, drum=None, lid=None, law=None, more_walls=(), **more):
-    """Grains of 1 kg among walls at rest and in motion; those not given are far away. Each is (shape,
-    motion). Others, ``more_walls``, are another structure, which takes long to compile."""
+    """Grains of 1 kg among walls at rest and in motion, each given as (shape, motion); walls that are not
+    given are far away. ``more_walls`` makes another structure, which takes long to compile."""
     law = {"young": YOUNG, "poisson": POISSON, "restitution": 0.5, "friction": 0.5, **(law or {})}
     tube = CylindricalSurface(start=(AWAY, -1, 0), end=(AWAY, 1, 0), radius=1)
     tube, turning = drum or (tube, Rotation(rate=(0, 1, 0)))
@@ -54,7 +55,7 @@ def among(position, velocity, floor=NOWHERE, drum=None, lid=None, law=None, more
 
 
 def shaken(plate=NOWHERE, shaking=STILL, band=NOWHERE, going=(0.0, 0.0, 0.0)):
-    """A plate that shakes, and a wall that goes."""
+    """A plate that shakes, and a wall that moves at constant velocity."""
     return (
         Walls(name="shaker", planes=[plate], motion=shaking),
         Walls(name="belt", planes=[band], motion=Translation(velocity=going)),
@@ -69,8 +70,8 @@ def run(scenes, **more):
 
 
 @pytest.mark.slow
-def test_a_moving_wall_is_one_at_rest_for_those_who_go_along():
-    """A grain that hits a wall which moves and slides, spinning: as in the frame of the wall."""
+def test_moving_walls_are_galilean_invariant():
+    """A spinning grain hits a wall that translates: the motion is the same as in the frame of the wall."""
     goes, velocity, spin = np.array([0.7, -0.4, 1.1]), np.array([0.3, 0.2, -1.0]), [[3.0, -5.0, 20.0]]
     place, more = [[0, 0, RADIUS + 0.05]], {"spin": spin, "steps": 20_000}
     walls = shaken(), shaken(band=Plane(), going=tuple(goes))
@@ -85,7 +86,7 @@ def test_a_moving_wall_is_one_at_rest_for_those_who_go_along():
 
 @pytest.mark.slow
 def test_a_turning_drum_drags_a_grain_with_mu_times_its_weight():
-    """While it slides: v = mu g t along the wall, and mu m g R on the drum."""
+    """While it slides: v = mu g t along the wall, and a torque of mu m g R on the drum."""
     friction, size, t = 0.3, 2.0, 0.05
     drum = CylindricalSurface(start=(0, -1, 0), end=(0, 1, 0), radius=size)
     place = [[0, 0, -size + RADIUS - sunk(G)]]
@@ -95,13 +96,13 @@ def test_a_turning_drum_drags_a_grain_with_mu_times_its_weight():
         [among(place, [[0, 0, 0]], drum=(drum, turning), law=law, duration=end) for end in (t, 3.0)]
     )
     speed, spin = slides.state["velocity"][0, 0], slides.state["spin"][0, 1]
-    # Its lowest place moves to -x with 4 m/s.
+    # The lowest point of the drum moves at 4 m/s along -x.
     assert speed == pytest.approx(-friction * G * t, rel=0.01)
     assert spin == pytest.approx(2.5 * friction * G * t / RADIUS, rel=0.01)
     assert slides.measures["drum_force_x"] == pytest.approx(friction * G, rel=0.01)
     assert slides.measures["drum_torque_y"] == pytest.approx(-friction * G * size, rel=0.01)
     assert slides.measures["drum_force_z"] == pytest.approx(-G, rel=0.01)
-    # Then it rolls in the drum, which no longer slips past it.
+    # Then the grain rolls in the drum, without slip.
     r, v, w = (rolls.state[name][0] for name in ("position", "velocity", "spin"))
     out = r / np.linalg.norm(r)
     slip = np.cross((0, 2.0, 0), size * out) - v - np.cross(w, RADIUS * out)
@@ -110,7 +111,7 @@ def test_a_turning_drum_drags_a_grain_with_mu_times_its_weight():
 
 @pytest.mark.slow
 def test_the_floor_bears_the_weight_of_a_column():
-    """Of three grains, at rest."""
+    """Three grains at rest."""
     place = [[0, 0, (2 * k + 0.99) * RADIUS] for k in range(3)]
     (result,) = run([among(place, np.zeros((3, 3)), floor=Plane(), duration=3.0)])
     assert moving(result.state) < 1e-12
@@ -121,7 +122,8 @@ def test_the_floor_bears_the_weight_of_a_column():
 
 @pytest.fixture(scope="module")
 def pressed():
-    """A grain that a servo presses on the floor with 100 N, after 0.01 m at 0.1 m/s without resistance."""
+    """A grain that a servo presses on the floor with 100 N, after it has approached by 0.01 m at 0.1 m/s
+    without load."""
     place, gap, speed = [[0, 0, RADIUS - sunk(G)]], 0.01, 0.1
     lid = Plane(point=(0, 0, 2 * RADIUS - sunk(G) + gap), normal=DOWN)
     made = among(place, [[0, 0, 0]], floor=Plane(), lid=(lid, Servo(force=100.0, limit=speed)), duration=0.6)
@@ -147,7 +149,7 @@ def test_a_servo_presses_with_the_wanted_force(pressed, tmp_path):
     assert result.measures["floor_force_z"] == pytest.approx(-100.0 - G, rel=1e-5)
     deeper = sunk(100.0) + sunk(100.0 + G) - sunk(G)
     assert result.measures["lid_travel"] == pytest.approx(gap + deeper, rel=1e-5)
-    # As series: while the lid is on its way the floor bears the weight alone, then the servo's force too.
+    # In the series the floor carries only the weight while the lid approaches, then also the servo's force.
     with frames(tmp_path / "t.h5") as recorded:
         for name, values in recorded.measures.items():
             np.testing.assert_array_equal(values, series[0][name], err_msg=name)
@@ -159,8 +161,8 @@ def test_a_servo_presses_with_the_wanted_force(pressed, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_servo_goes_on_from_a_checkpoint_to_the_same_bits(pressed, tmp_path):
-    """And beside other worlds."""
+def test_a_servo_continues_from_a_checkpoint_bit_for_bit(pressed, tmp_path):
+    """Also beside other worlds."""
     made, *_ = pressed
     others = among([[0, 0, 1]], [[0, 0, 0]], floor=Plane(), duration=0.3)
     simulation = compiled(made, WORLDS, CAPACITY)
@@ -195,9 +197,9 @@ def test_the_same_bits_on_both_schedules(pressed):
 
 
 @pytest.mark.slow
-def test_a_grain_goes_along_with_a_plate_that_shakes_gently():
-    """With half of g: the plate bears m (g + a), and the grain has its velocity, but for the overlap, which
-    changes with the force."""
+def test_a_grain_follows_a_gently_shaking_plate():
+    """With an acceleration amplitude of g/2: the plate carries m (g + a), and the grain has the plate's
+    velocity, corrected for the overlap, which changes with the force."""
     frequency = 5.0
     omega = 2 * np.pi * frequency
     size = 0.5 * G / omega**2
@@ -217,8 +219,9 @@ def test_a_grain_goes_along_with_a_plate_that_shakes_gently():
 
 @pytest.mark.slow
 def test_a_wall_as_fast_as_sound_throws_grains_ahead():
-    """As fast as sound in a chain pressed by a thousandth of a radius: four grains at rest fly off in order,
-    none slower than the wall, and none faster than twice that but for what the chain focuses."""
+    """At the sound speed of a chain with an overlap of a thousandth of a radius: four grains at rest fly off
+    in order. None is slower than the wall; none is faster than twice its speed, except for focusing in the
+    chain."""
     contact = 2 * E_STAR * (0.5 * RADIUS * 1e-3 * RADIUS) ** 0.5
     fast = 2 * RADIUS * contact**0.5
     place = [[2.001 * RADIUS * (k + 1), 0, 0] for k in range(4)]
@@ -239,12 +242,12 @@ def test_a_wall_as_fast_as_sound_throws_grains_ahead():
     np.testing.assert_array_equal(result.state["velocity"][:, 1:], 0)
 
 
-def test_what_a_servo_adds_up_is_a_number_however_many_grains_resist():
-    """Four million grains at the most that is counted of each, as of a tiny wanted force."""
+def test_the_sum_of_a_servo_does_not_overflow():
+    """Four million grains, each at the largest value that is counted, as for a tiny target force."""
     assert 2**22 * QUANTA * MOST_RESISTANCE < 2**63
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     for message, wrong in {
         "servo.direction must be a direction; received (0.0, 0.0, 0.0)": {"direction": (0, 0, 0)},
         "servo.force must be greater than 0.0; received 0": {"force": 0},

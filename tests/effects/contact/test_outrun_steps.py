@@ -1,4 +1,4 @@
-"""Steps in which grains outrun a contact: the world stops, and says how long the step may be."""
+"""Steps in which grains outrun a contact: the world stops, and the message states the longest step."""
 
 import re
 
@@ -14,7 +14,7 @@ from tisim.effects import PrescribedMotion, Translation
 from tisim.geometry import Disc
 
 RADIUS, STEP = 0.45e-3, 3.55756e-7
-"""m, s: a step that follows the springs of grains of this radius, of 10 MPa and 2500 kg/m^3."""
+"""m, s: a step that resolves the springs of grains of this radius, of 10 MPa and 2500 kg/m^3."""
 LAW = {"young": 1e7, "poisson": 0.25, "restitution": 0.5, "friction": 0.5}
 MASS = 2500 * 4 / 3 * np.pi * RADIUS**3
 BOUND = re.compile(r"the step is (\S+) s, and the force is finite up to (\S+) s")
@@ -28,13 +28,14 @@ def thrown(height, velocity, **more):
 
 
 def fates(scenes):
-    """What has become of scenes that share the structure of granular grains."""
+    """Results of scenes that share the structure of granular grains."""
     return simulate(scenes, worlds=granular.WORLDS, capacity=granular.CAPACITY)
 
 
-def test_a_grain_that_meets_a_wall_hundreds_of_radii_a_step_is_stopped():
-    """It gained 19 times its energy, as a force at a lever of hundreds of radii turned it; one that comes as
-    fast in steps that are short enough keeps it, and one that slides as fast on the floor is no matter."""
+def test_a_grain_that_outruns_a_wall_contact_is_stopped():
+    """Without the check the energy grew by a factor of 19, because the force acted with a lever arm of
+    hundreds of radii. A grain of equal speed in sufficiently short steps keeps its energy, and fast sliding
+    on the floor is allowed."""
     angles = (0.3, 0.8, 1.3)
     fast = [thrown(1e-3, 1e6 * np.array([np.sin(a), 0, -np.cos(a)]), steps=400) for a in angles]
     slow = [thrown(1e-3, np.array([np.sin(a), 0, -np.cos(a)]), steps=4000) for a in angles]
@@ -52,8 +53,8 @@ def test_a_grain_that_meets_a_wall_hundreds_of_radii_a_step_is_stopped():
 
 
 @pytest.mark.parametrize(("part", "goes"), [(1.9, True), (2.1, False)])
-def test_how_far_a_grain_may_come_nearer_a_wall_in_a_step(part, goes):
-    """By its diameter, whatever the springs."""
+def test_largest_approach_to_a_wall_in_a_step(part, goes):
+    """A grain may approach by its diameter, for any springs."""
     soft = {**LAW, "young": 1e-3}
     one = grains(
         [[0, 0, RADIUS * (1 + part / 2)]], [(0, 0, -part * RADIUS / STEP)], planes=[FLOOR], radius=RADIUS,
@@ -63,8 +64,9 @@ def test_how_far_a_grain_may_come_nearer_a_wall_in_a_step(part, goes):
     assert result.status.ok == goes, result.status.reason
 
 
-def test_two_that_pass_each_other_in_a_step_are_not_unseen():
-    """They were, with the status ok; two that fly side by side as fast are no matter."""
+def test_grains_that_pass_each_other_in_a_step_are_detected():
+    """Earlier, they passed without an error. Two grains that move side by side at the same speed
+    are allowed."""
     place = [[0, 0, 0], [21 * RADIUS, 0, 0]]
     meeting = grains(place, [[5 * RADIUS / STEP, 0, 0], [-5 * RADIUS / STEP, 0, 0]], radius=RADIUS, mass=MASS,
                      law=LAW, dt=STEP, steps=9)  # fmt: skip
@@ -79,9 +81,9 @@ def test_two_that_pass_each_other_in_a_step_are_not_unseen():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sheet", ["disc", "triangles"])
-def test_a_grain_does_not_go_through_a_sheet_unseen(sheet):
-    """Nothing is behind a disc or a triangle that would feel it later: neither one that is past it in a step
-    nor one that is pressed through it, which the sheet then pushed out on the other side."""
+def test_a_grain_that_passes_a_sheet_is_detected(sheet):
+    """Behind a disc or a triangle nothing acts on a grain later. The check finds a grain that passes it in
+    one step, and one that is pressed through it, which the sheet would push out on the other side."""
     above = (0.0, 0.0, 0.35) if sheet == "disc" else (0.1, 0.2, surfaces.SHEET + 0.35)
     shapes = {"discs": (Disc(radius=5.0),)} if sheet == "disc" else {}
     dt = 1e-4
@@ -98,11 +100,11 @@ def test_a_grain_does_not_go_through_a_sheet_unseen(sheet):
     assert bounced.state["velocity"][0, 2] == pytest.approx(0.02 * surfaces.RADIUS / dt, rel=1e-2)
 
 
-def test_the_longest_step_that_is_named_is_that_of_the_stiffest_spring():
-    """Sliding's, by the lever of the middle of the overlap."""
+def test_the_stated_longest_step_is_of_the_stiffest_spring():
+    """The sliding mode is the stiffest, with the lever arm to the middle of the overlap."""
     depth = 0.2
     stiffness = 2 * LAW["young"] / (1 - LAW["poisson"] ** 2) * np.sqrt(RADIUS * depth * RADIUS)
-    # As a wall is of the same material, E* = E / 2 (1 - nu^2).
+    # Because the wall has the same material, E* = E / 2 (1 - nu^2).
     stiffness *= 0.5
     shear = 4 * (1 - LAW["poisson"]) / (2 * (2 - LAW["poisson"])) * stiffness
     slides = 1 + 2.5 * (1 - depth / 2) ** 2
@@ -117,8 +119,8 @@ def test_the_longest_step_that_is_named_is_that_of_the_stiffest_spring():
 
 
 @pytest.mark.long
-def test_two_bodies_that_are_both_held_have_no_longest_step():
-    """Nothing moves by their contact, and its force is that of the overlap at any step."""
+def test_held_bodies_have_no_longest_step():
+    """Their contact moves nothing, and its force depends on the overlap alone, for any step."""
     speed, gap, duration = 1e-4, 2e-6, 0.05
     scenes = [
         scene(

@@ -1,5 +1,5 @@
-"""Walls at periodic faces of a box: felt where they go on from face to face, refused where they would have to
-be felt through one."""
+"""Walls at periodic faces of a box: accepted if they continue from face to face, refused if they would have
+to act through a face."""
 
 import numpy as np
 import pytest
@@ -91,7 +91,7 @@ FELT = {
 
 
 def scene(duration=1e-6, **walls):
-    """Return a grain that lies in a floor at 0.02 m by OVERLAP, in the middle."""
+    """Return a grain that overlaps a floor at 0.02 m by OVERLAP, in the middle."""
     return tisim.Scene(
         particles=tisim.Particles(
             position=[(0.05, 0.05, 0.02 + RADIUS - OVERLAP)], velocity=[(0, 0, 0)], radius=RADIUS,
@@ -106,13 +106,13 @@ def scene(duration=1e-6, **walls):
 
 
 def start(made):
-    """Look at the start of a scene as a run does, without compiling it."""
+    """Check the start of a scene as a run does, without compiling it."""
     for effect in made.acting():
         effect.check_start(made.start(), made)
 
 
-def test_a_mesh_that_does_not_tell_its_distances_is_refused_beside_a_duct(monkeypatch):
-    """One of very many triangles is not taken for one that is the same at both faces."""
+def test_a_mesh_without_distances_is_refused_beside_a_duct(monkeypatch):
+    """A mesh of very many triangles is not accepted as equal at both faces."""
     monkeypatch.setattr("tisim.geometry.triangles.MOST_DISTANCES", 1)
     both = FELT["a duct of two pieces that reach beyond"] | {"surface": STAIR}
     with pytest.raises(tisim.InputError, match="it does not act through them"):
@@ -120,19 +120,19 @@ def test_a_mesh_that_does_not_tell_its_distances_is_refused_beside_a_duct(monkey
 
 
 @pytest.mark.parametrize("radius", [1e-5, 1e-4])
-def test_a_duct_of_pieces_is_taken_for_small_grains_too(radius):
+def test_a_duct_of_pieces_is_accepted_for_small_grains(radius):
     made = scene(**FELT["a duct of two pieces that reach beyond"])
     start(made.replace({"particles.radius": radius}))
 
 
 @pytest.mark.long
-def test_a_run_looks():
+def test_a_run_checks_its_walls():
     with pytest.raises(tisim.InputError, match="it does not act through them"):
         tisim.run(scene(**REFUSED["a plane across"]))
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_would_have_to_be_felt_through_a_face_is_refused(name):
+def test_walls_that_act_through_a_face_are_refused(name):
     with pytest.raises(
         tisim.InputError, match=r"^walls\.\w+ must be farther than the largest radius, 0.005 m"
     ):
@@ -140,7 +140,7 @@ def test_what_would_have_to_be_felt_through_a_face_is_refused(name):
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_without_periodic_faces_it_is_taken(name):
+def test_without_periodic_faces_walls_are_accepted(name):
     open_box = tisim.Box(low=(0, 0, 0), high=(SIDE,) * 3, periodic=(False, False, False))
     changed = scene(**REFUSED[name]).model_copy(update={"domain": open_box})
     start(changed)
@@ -150,7 +150,7 @@ def test_without_periodic_faces_it_is_taken(name):
 @pytest.mark.parametrize(
     "name", ["a plane", *(pytest.param(name, marks=pytest.mark.slow) for name in FELT if name != "a plane")]
 )
-def test_what_goes_on_from_face_to_face_is_felt(name):
+def test_walls_that_continue_across_faces_act(name):
     (result,) = tisim.run([scene(**FELT[name])])
     force = 4 / 3 * 1e7 / (2 * (1 - 0.25**2)) * np.sqrt(RADIUS) * OVERLAP**1.5
     assert result.measures["walls_force_z"] == pytest.approx(-force, rel=1e-3)
@@ -196,7 +196,7 @@ MOVED = {
 
 
 @pytest.mark.parametrize("name", MOVED)
-def test_a_wall_that_comes_to_a_face_as_it_moves_is_refused(name):
+def test_walls_that_move_to_a_face_are_refused(name):
     walls, motion, duration, taken = MOVED[name]
     made = scene(**walls, motion=motion, duration=duration)
     if taken:
@@ -216,8 +216,9 @@ SHAPES = [
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.kind())
-def test_a_shape_reaches_as_far_as_it_says(shape):
-    """No farther, and so far: its distance from places on its extent is nowhere negative, and 0 somewhere."""
+def test_extents_of_shapes_are_tight(shape):
+    """No farther, and not less: its distance from points outside its extent is positive, and close to 0
+    somewhere on its boundary."""
     low, high = shape.extent()
     draw = np.random.default_rng(1)
     for axis in range(3):

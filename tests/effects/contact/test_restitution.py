@@ -1,4 +1,4 @@
-"""Damping by restitution where there is none, and beside the polynomial by which others have it."""
+"""Damping for zero restitution, and against the polynomial used by other codes."""
 
 from dataclasses import replace
 
@@ -14,8 +14,9 @@ from tisim.materials.materials import Materials
 
 
 @pytest.mark.slow
-def test_beside_hookes_spring_grains_without_restitution_stay_together():
-    """At e = 0, of one of the two materials alone too: v t exp(-t sqrt(k / m*)), and no way back."""
+def test_zero_restitution_with_hookes_spring():
+    """With e = 0, even in only one of two materials: the overlap is v t exp(-t sqrt(k / m*)), without
+    rebound."""
     rate, v = (NEUTRAL["hooke"]["stiffness"] / 0.5) ** 0.5, 1.0
     made = grains("hooke", [[0, 0, 0], [2, 0, 0]], [[v / 2, 0, 0], [-v / 2, 0, 0]], material=[0, 1],
                   first={"restitution": 0.0}, dt=1e-3 / rate, steps=40_000)  # fmt: skip
@@ -30,13 +31,13 @@ def test_beside_hookes_spring_grains_without_restitution_stay_together():
         assert approach == pytest.approx(v * (1 - turns) * np.exp(-turns), abs=2e-3 * v)
     simulation.run()
     (result,) = simulation.results()
-    # What the rounding of places is to such a spring.
+    # The rounding of positions, times the rate of this spring.
     assert np.abs(result.state["velocity"]).max() < 20 * rate * roundoff()
 
 
 def test_tsujis_polynomial_is_a_fit_of_the_damping_by_restitution():
-    """alpha(e) sqrt(m 4/3 E* a), with m = 2 m* that of one of two equal grains: the damping of an e that is
-    the same to 0.002 from 0.05 on, and 0.014 at 0."""
+    """alpha(e) sqrt(m 4/3 E* a), with m = 2 m* for one of two equal grains, is the damping of a restitution
+    that differs from e by at most 0.002 from e = 0.05 on, and by 0.014 at 0."""
     alpha = np.polynomial.Polynomial([1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218])
     e = np.append(0.0, np.linspace(0.05, 1, 20))
     (alike,) = Materials({"grain": Material(restitution=0.5)}, {}).touching()

@@ -1,4 +1,4 @@
-"""A ball that blocks a round outlet of a mesh lies there, whatever the number of facets."""
+"""A ball that blocks a round outlet of a mesh rests there, for any number of facets."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def outlet(number, radius, slope):
 
 
 def lodged(number, radius=0.8, slope=1.2, friction=0.0, aside=(2e-7, 3e-7), sunk=0.0, steps=12_000, **more):
-    """A ball let go in the outlet, at first somewhat off its axis."""
+    """A ball released in the outlet, slightly off its axis."""
     rim = radius * np.cos(np.pi / number)
     height = np.sqrt(1 - rim**2) * RADIUS
     law = {"young": YOUNG, "poisson": POISSON, "restitution": 0.3, "friction": friction}
@@ -46,8 +46,8 @@ RINGS = [(6, 0.0), (8, 0.0), (8, 0.5), (16, 0.5), (32, 0.0), (32, 0.5), (64, 0.0
     ("number", "friction"), [*QUICK, *(pytest.param(*ring, marks=pytest.mark.slow) for ring in RINGS)]
 )
 def test_a_ball_rests_in_a_ring_of_any_number_of_facets(number, friction):
-    """Its weight is on the wall, nothing pushes it aside, and it comes to rest; a world of more than six
-    contacts was ended."""
+    """The wall carries its weight, the lateral force is zero, and it comes to rest. Earlier, a world with
+    more than six contacts was stopped."""
     result = tisim.run(lodged(number, friction=friction))
     assert result.status.ok, result.status.reason
     force = np.array([result.measures[f"walls_force_{axis}"] for axis in "xyz"])
@@ -61,8 +61,9 @@ def test_a_ball_rests_in_a_ring_of_any_number_of_facets(number, friction):
 @pytest.mark.parametrize(
     "number", [7, 12, *(pytest.param(number, marks=pytest.mark.slow) for number in (6, 8))]
 )
-def test_contacts_apart_push_each_by_its_own(number):
-    """The force is the sum of those of Hertz, also where there are more contacts than a ball remembers."""
+def test_separate_contacts_act_independently(number):
+    """The force is the sum of Hertz's forces, even if the contacts exceed the capacity for contact
+    history."""
     sunk, aside = 1e-4, np.array([2e-7, -1e-7])
     result = tisim.run(lodged(number, sunk=sunk, aside=tuple(aside), steps=1, dt=1e-12))
     place = np.array([*aside, (np.sqrt(1 - (0.8 * np.cos(np.pi / number)) ** 2) - sunk) * RADIUS])
@@ -81,7 +82,7 @@ def test_contacts_apart_push_each_by_its_own(number):
 
 @pytest.mark.slow
 def test_a_ring_of_more_facets_is_not_stiffer():
-    """From some number on the force does not grow with that of facets."""
+    """Above some number of facets the force does not grow with their number."""
     scenes = [lodged(number, sunk=1e-4, aside=(0.0, 0.0), steps=1, dt=1e-12) for number in (16, 32, 64, 128)]
     forces = [tisim.run(made).measures["walls_force_z"] for made in scenes]
     assert max(forces) / min(forces) == pytest.approx(1, abs=0.2)
@@ -100,8 +101,9 @@ def test_a_ball_in_a_ring_is_the_same_alone_and_among_others():
 @pytest.mark.parametrize(
     "radius", [0.45, *(pytest.param(radius, marks=pytest.mark.slow) for radius in (0.3, 0.8))]
 )
-def test_nothing_pushes_a_ball_in_the_middle_aside(radius):
-    """Nor far aside near it: of 64 facets it would be chance which ones count."""
+def test_a_ball_in_the_middle_has_no_lateral_force(radius):
+    """Nor strongly off its position near the middle: with 64 facets, the choice of contacts would be
+    arbitrary."""
     given = {"radius": radius, "slope": 0.05, "sunk": 1e-4, "steps": 1, "dt": 1e-12}
     for x in (0.0, 1e-12, -1e-12):
         result = tisim.run(lodged(64, aside=(x, 0.0), **given))

@@ -1,4 +1,4 @@
-"""Surfaces with two sides, rims, edges and seams: what grains feel of them, against closed forms."""
+"""Two-sided surfaces, rims, edges and seams: forces on grains against closed forms."""
 
 import numpy as np
 import pytest
@@ -64,8 +64,8 @@ BLOCKS = {
 }
 
 
-def test_a_scene_with_all_shapes_goes_to_a_file_and_back():
-    """Triangles too, which are arrays; other triangles are another scene."""
+def test_a_scene_with_all_shapes_survives_a_file():
+    """Including triangles, which are arrays; other triangles make another scene."""
     made = beside((0, 0, 0), (0, 0, 0), {})
     again = Scene.from_dict(made.to_dict())
     assert again.effects == made.effects
@@ -78,8 +78,8 @@ def test_a_scene_with_all_shapes_goes_to_a_file_and_back():
 
 
 @pytest.mark.slow
-def test_a_ball_within_bounces_for_ever():
-    """Along planes, curved faces, and in their corners; there it may touch three at once."""
+def test_a_ball_inside_a_shape_bounces_for_ever():
+    """Along planes, curved faces, and in their corners, in which it may touch three at once."""
     rng = np.random.default_rng(1)
     scenes = [
         beside(tuple(0.1 * unit(rng)), tuple(4 * unit(rng)), shapes, steps=60_000)
@@ -95,7 +95,8 @@ def test_a_ball_within_bounces_for_ever():
 
 @pytest.mark.slow
 def test_a_ball_that_grazes_edges_gains_nothing():
-    """A third of the shots hit an edge, a rim, or a tip; elastic ones keep their energy, others lose some."""
+    """A third of the shots hit an edge, a rim, or a tip; elastic grains keep their energy, others
+    lose some."""
     rng = np.random.default_rng(3)
     shots, hits = [], 0
     for k in range(4 * WORLDS):
@@ -119,7 +120,8 @@ def test_a_ball_that_grazes_edges_gains_nothing():
 
 @pytest.mark.slow
 def test_a_sphere_rolls_over_seams_as_on_a_plane():
-    """Over seams and vertices of a sheet of triangles: with its speed, and the same as on a plane."""
+    """Over seams and vertices of a sheet of triangles: at constant speed, and with the same motion as on a
+    plane."""
     sunk = (3 * 10 / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
     lever = RADIUS - sunk / 2
     law, gravity = {"friction": 0.5, "restitution": 0.5}, (0.0, 0.0, -10.0)
@@ -135,15 +137,15 @@ def test_a_sphere_rolls_over_seams_as_on_a_plane():
         np.testing.assert_allclose(rolls.state[name], rolled.state[name], rtol=0, atol=1e-7)
         np.testing.assert_allclose(slides.state[name], slid.state[name], rtol=0, atol=1e-7)
     np.testing.assert_allclose(rolls.state["position"][:, :2], rolled.state["position"][:, :2], atol=1e-8)
-    # The weight is on the sheet, wherever it lies.
+    # The sheet carries the weight everywhere.
     for result in (rolls, slides):
         assert result.measures["walls_force_z"] == pytest.approx(-10.0, rel=1e-6)
 
 
 @pytest.mark.slow
 def test_a_sphere_that_rolls_downhill_over_seams_keeps_its_grip():
-    """The sheet aslant: friction of 2/7 of the pull turns it, of a spring that goes along from triangle to
-    triangle; without it the sphere would slip."""
+    """On a tilted sheet: friction of 2/7 of the pull makes it roll. The tangential spring passes from
+    triangle to triangle; otherwise the sphere would slip."""
     sunk = (3 * 10 / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
     more = {"law": {"friction": 0.5, "restitution": 1.0}, "gravity": (2.0, 0.5, -10.0), "steps": 40_000}
     sheet, plane = run(
@@ -160,8 +162,8 @@ def test_a_sphere_that_rolls_downhill_over_seams_keeps_its_grip():
 
 
 @pytest.mark.slow
-def test_a_grain_on_a_seam_is_held_once():
-    """Exactly over a vertex, where up to six triangles meet, and over an edge."""
+def test_a_grain_on_a_seam_has_one_contact():
+    """Exactly over a vertex, in which up to six triangles meet, and over an edge."""
     sunk = (3 * 10 / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
     corners = [(2.0, 2.0), (0.0, 2.0), (-2.0, 0.5)]
     places = [(x, y, SHEET + RADIUS - sunk) for x, y in corners]
@@ -172,7 +174,8 @@ def test_a_grain_on_a_seam_is_held_once():
 
 @pytest.mark.slow
 def test_faces_of_a_box_are_planes():
-    """In a corner with all three of them, sliding and spinning: as of planes, with what they remember."""
+    """In a corner with all three of them, sliding and spinning: as with planes, including the contact
+    history."""
     planes = tuple(geometry.Plane(point=(0, 0, 0), normal=tuple(axis)) for axis in np.eye(3))
     law = {"friction": 0.4, "restitution": 0.3}
     more = {"law": law, "gravity": (-3.0, -2.0, -9.0), "steps": 60_000, "spin": (30.0, -20.0, 10.0)}
@@ -187,7 +190,8 @@ def test_faces_of_a_box_are_planes():
 
 @pytest.mark.slow
 def test_a_grain_lies_in_a_groove():
-    """Each side of a groove of 90 degrees holds 1 / sqrt 2 of the weight; a sharp ridge holds all of it."""
+    """Each side of a groove of 90 degrees carries 1 / sqrt 2 of the weight; a sharp ridge carries
+    all of it."""
     half, whole = ((3 * push / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3) for push in (10 / 2**0.5, 10))
     sides = tuple(geometry.Disc(centre=(x, 0, 1), normal=(-x, 0, 1), radius=2**0.5) for x in (-1, 1))
     places = [(0, 0.2, 2**0.5 * (RADIUS - half)), (0.3, 4, SHEET + 1 + RADIUS - whole)]
@@ -200,5 +204,5 @@ def test_a_grain_lies_in_a_groove():
         assert result.state["walls_touched"][0] == touched
         np.testing.assert_allclose(result.state["position"][0], place, rtol=0, atol=1e-9)
         assert result.measures["walls_force_z"] == pytest.approx(-10, rel=1e-6)
-        # About the origin.
+        # The torque about the origin.
         assert result.measures["walls_torque_x"] == pytest.approx(-10 * place[1], rel=1e-6)

@@ -1,4 +1,4 @@
-"""Springs of contacts turn with the bodies that touch: closed forms of held grains, bodies that stick."""
+"""Contact springs rotate with the touching bodies: closed forms of held grains, bodies that stick."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ pytestmark = pytest.mark.slow
 R, YOUNG, POISSON, PRESSED = 1e-3, 1e7, 0.25, 2e-5
 """m, Pa, -, m."""
 APART = 3e-8
-"""m; of the axes of two that turn as one."""
+"""m; distance of the axes of two bodies that rotate as one."""
 RATE = 2 * np.pi
 """rad/s."""
 E_STAR = YOUNG / 2 / (1 - POISSON**2)
@@ -53,16 +53,16 @@ ROLLING = {
 SURFACE = {"young": YOUNG, "poisson": POISSON, "friction": 1e3, "restitution": 1.0, "rolling_friction": 0.3,
            "rolling_stiffness": 50.0, "rolling_damping": 0.0}  # fmt: skip
 LOOKS = (0.1, 0.25, 0.6, 1.0, 2.0)
-"""Turns."""
+"""Times of comparison, in turns."""
 
 
 def stiffness(radius):
-    """Hertz's, at R* (m)."""
+    """Hertz's stiffness at R* (m)."""
     return 2 * E_STAR * np.sqrt(radius * PRESSED)
 
 
 def held(law, groups, place, walls=(), dt=5e-4):
-    """Grains that are held, each by a motion of its own."""
+    """Grains with prescribed motions, one motion for each."""
     motions = [PrescribedMotion(name=f"g{k}", group=k + 1, motion=one) for k, one in enumerate(groups)]
     return scene(
         place, np.zeros((len(place), 3)), (law, *motions, *walls), radius=R, mass=1.0, dt=dt, duration=3.0,
@@ -83,7 +83,7 @@ def seen(made, times):
 
 
 def across(state, n):
-    """The tangential force on the first grain, whose contact faces n, N."""
+    """The tangential force on the first grain, whose contact has the normal n, N."""
     force = state["force"][0]
     return force - (force @ n) * n
 
@@ -93,9 +93,9 @@ AXES = {"normal": (0.0, 0.0, 1.0), "across": (0.6, 0.8, 0.0), "askew": (2 / 3, -
 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("name", SPRINGS)
-def test_a_pair_that_turns_as_one_has_the_force_of_its_displacement(name, axis):
-    """About axes that are c apart: S_t (c - R c) across the normal, with the rotation R of the bodies, which
-    is none after whole turns, whichever way the normal goes round."""
+def test_a_pair_rotating_as_one_has_the_exact_force(name, axis):
+    """About axes that are displaced by c: the force is S_t (c - R c) perpendicular to the normal, where R is
+    the rotation of the bodies. It is zero after whole turns, for any motion of the normal."""
     law, ratio = SPRINGS[name]
     way, c = np.array(AXES[axis]), APART * np.array([1.0, 0.5, -0.7])
     place = np.array([[0, 0, 0], [0, 0, 2 * R - PRESSED]])
@@ -111,7 +111,7 @@ def test_a_pair_that_turns_as_one_has_the_force_of_its_displacement(name, axis):
 
 
 def test_projected_springs_do_not_turn_about_the_normal():
-    """As in LAMMPS: 2 pi S_t c after one turn, 4 pi after two."""
+    """As in LAMMPS: 2 pi S_t c after one turn, 4 pi S_t c after two."""
     place, c = np.array([[0, 0, 0], [0, 0, 2 * R - PRESSED]]), np.array([APART, 0, 0])
     motions = [Rotation(rate=(0, 0, RATE), centre=tuple(at)) for at in (0 * c, c)]
     law = Granular(normal=HertzMaterial(), tangential=MindlinForce(), frame="projected")
@@ -124,8 +124,8 @@ def test_projected_springs_do_not_turn_about_the_normal():
 
 @pytest.mark.parametrize("wall", ["plane", "disc"])
 @pytest.mark.parametrize("name", SPRINGS)
-def test_a_grain_that_turns_with_a_wall_has_the_force_of_its_displacement(name, wall):
-    """About its normal, on a table that turns about an axis beside the grain's."""
+def test_a_grain_rotating_with_a_wall_keeps_its_force(name, wall):
+    """About its normal, on a table that rotates about an axis beside the grain's."""
     law, ratio = SPRINGS[name]
     c = APART * np.array([1.0, 0.5, 0.0])
     shapes = {"planes": [Plane()]} if wall == "plane" else {"discs": [Disc(radius=1.0)]}
@@ -143,8 +143,8 @@ def test_a_grain_that_turns_with_a_wall_has_the_force_of_its_displacement(name, 
         )
 
 
-def test_a_grain_that_turns_with_a_drum_has_no_force():
-    """Round the axis of a drum, with it: its normal goes round, and not a force comes of that."""
+def test_a_grain_rotating_with_a_drum_has_no_force():
+    """Around the axis of a drum, together with it: the normal rotates, and this causes no force."""
     drum = Walls(cylinders=[CylindricalSurface(start=(0, 0, -0.1), end=(0, 0, 0.1), radius=5 * R)],
                  motion=Rotation(rate=(0, 0, RATE)))  # fmt: skip
     place = np.array([[4 * R + PRESSED, 0, 0]])
@@ -158,8 +158,8 @@ def test_a_grain_that_turns_with_a_drum_has_no_force():
 @pytest.mark.parametrize("where", ["pair", "wall"])
 @pytest.mark.parametrize("name", ROLLING)
 def test_a_rolling_spring_turns_with_both_bodies(name, where):
-    """Of two that spin about axes that are askew by d: dM/dt = R*^2 k dw + W x M, W their mean spin about the
-    normal, which is none after whole turns."""
+    """Two bodies spin about axes that are tilted by d: dM/dt = R*^2 k dw + W x M, where W is their mean spin
+    about the normal. M is zero after whole turns."""
     law, k = ROLLING[name]
     radius, d = (R / 2, 1e-4) if where == "pair" else (R, 1e-4)
     if name == "rolling_epsd" and where == "wall":
@@ -168,7 +168,7 @@ def test_a_rolling_spring_turns_with_both_bodies(name, where):
     place, walls = np.array([[0, 0, 0], [0, 0, 2 * R - PRESSED]]), []
     motions, sign = [Rotation(rate=(0, 0, RATE)), other], 1
     if where == "wall":
-        # Seen by the grain the table is the other.
+        # In the frame of the grain the table is the other body.
         walls = [Walls(planes=[Plane()], motion=Rotation(rate=(0, 0, RATE)))]
         place, motions, sign = np.array([[0, 0, R - PRESSED]]), [other.model_copy(
             update={"centre": (0, 0, R - PRESSED)})], -1  # fmt: skip
@@ -182,9 +182,10 @@ def test_a_rolling_spring_turns_with_both_bodies(name, where):
 
 @pytest.mark.parametrize("where", ["pair", "wall"])
 def test_the_mean_of_both_spins_turns_a_spring(where):
-    """A grain spins about the normal while a wall does not, and slides past at v: dT/dt = S_t v + w/2 n x T,
-    which comes back after two turns of the grain. Where another grain slides past the normal leans, and the
-    surfaces of the one that spins go aside by w/2 v t: its force is S_t v t, straight on."""
+    """A grain spins about the normal and a wall without spin slides past at v: dT/dt = S_t v + w/2 n x T,
+    which is zero again after two turns of the grain. If another grain slides past instead, the normal tilts,
+    and the surface of the spinning grain is displaced sideways by w/2 v t: the force is S_t v t, in a
+    constant direction."""
     v = 1e-8
     place, walls, radius = np.array([[0, 0, R - PRESSED]]), [Walls(planes=[Plane()])], R
     spinning = Rotation(rate=(0, 0, RATE), centre=(0, 0, R - PRESSED))
@@ -208,8 +209,8 @@ def test_the_mean_of_both_spins_turns_a_spring(where):
 
 
 def tripod(steps, rate, out, turns):
-    """A tripod that stands on a table which turns, and sticks to it; where it is on the table after each
-    turn, m."""
+    """Positions, relative to the table, of a tripod that stands on a rotating table and sticks to it, after
+    each turn, m."""
     radius, young, gravity = 5e-3, 1e6, 9.81
     angles = np.array([0, 1, 2]) * 2 * np.pi / 3
     feet = 1.02 * radius * 2 / np.sqrt(3) * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
@@ -236,16 +237,17 @@ def tripod(steps, rate, out, turns):
     return np.array(places)
 
 
-def test_a_body_that_sticks_to_a_turntable_stays_where_it_is():
-    """At 0.31 of Coulomb's limit, a tripod that cannot roll: to 1e-4 of 2 pi T / S_t = 61 um a turn, by which
-    it would creep if the springs did not turn with it; and in steps of any size."""
+def test_a_body_that_sticks_to_a_turntable_does_not_creep():
+    """At 0.31 of Coulomb's limit, a tripod that cannot roll moves by less than 1e-4 of 2 pi T / S_t = 61 um a
+    turn, in steps of any size. It would creep by that distance if the springs did not rotate with it."""
     for dt in (2e-5, 1e-5):
         moved = np.diff(tripod(dt, 2 * np.pi / 0.6, 0.028, 4)[1:], axis=0)
         assert np.abs(moved[:, :2]).max() < 6e-9
 
 
-def test_what_carries_a_spring_keeps_its_length_and_goes_back():
-    """NumPy's integral of dT/dt = W x T along a path of the normal with a spin about it, and its reverse."""
+def test_rotating_a_spring_keeps_its_length():
+    """Against a SciPy integral of dT/dt = W x T along a path of the normal with a spin about it; length is
+    preserved."""
 
     def normal(t):
         n = np.array([np.cos(3 * t) * np.sin(1 + t), np.sin(3 * t) * np.sin(1 + t), np.cos(1 + t)])
@@ -271,7 +273,7 @@ def test_what_carries_a_spring_keeps_its_length_and_goes_back():
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
 
 
-def test_projected_springs_are_those_of_the_twin(rng):
+def test_projected_springs_equal_the_twin(rng):
     """Grains that stick, slide and spin in a cell."""
     made = heap(rng)
     law, *others = made.effects
@@ -288,8 +290,8 @@ def test_projected_springs_are_those_of_the_twin(rng):
 
 
 def test_an_elastic_pair_keeps_its_energy():
-    """Two that a liquid holds, without loss, swing in all their springs and turn like a top: for 1e5 steps
-    the energy of motion, springs and liquid stays within a bound that goes with dt^2."""
+    """Two grains joined by a liquid, without dissipation, oscillate in all their springs and rotate like a
+    top. For 1e5 steps the error of the total energy stays bounded and is proportional to dt^2."""
     stiff, shear, rolls, twists, tension, dts = 1e4, 0.4, 2e3, 500.0, 50.0, (4e-4, 2e-4, 1e-4)
     pull, spin = 2 * np.pi * tension, np.array([4.0, 0, 1.0])
     place = np.array([[-1, 0, 0], [1, 0, 0]]) * (1 - pull / stiff / 2)

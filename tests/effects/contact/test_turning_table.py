@@ -1,4 +1,5 @@
-"""Grains on a table that turns about its normal, with a liquid: against their twin and closed forms."""
+"""Grains on a table that rotates about its normal, with a liquid: against their reference and
+closed forms."""
 
 import numpy as np
 import pytest
@@ -84,7 +85,7 @@ def bridge(gap, radius, tension):
 
 
 class WetGrains(Grains):
-    """Grains that a plane also holds by a liquid, once they have touched it."""
+    """Grains that are also held to a plane by a liquid, after they have touched it."""
 
     tension, wet = 0.0, False
 
@@ -109,7 +110,7 @@ def twin(made, rate=RATE, tension=0.0):
 
 @pytest.fixture(scope="module")
 def thrown():
-    """Grains that slide, spin and hop on the table, and some that all but go along; wet and dry."""
+    """Grains that slide, spin and hop on the table, and some that almost rotate with it; wet and dry."""
     rng = np.random.default_rng(8)
     radius = RADIUS * np.linspace(0.8, 1.0, 6)
     height = radius * rng.uniform(0.995, 1.02, 6)
@@ -121,8 +122,8 @@ def thrown():
     return [on_table(place, velocity, spin, liquid=tension, **more) for tension in (0.0, 5.0)]
 
 
-def test_a_turning_table_and_its_liquid_are_those_of_the_twin(thrown):
-    """Slip, rolling and twisting are those of the spin relative to the table."""
+def test_a_turning_table_with_liquid_equals_the_twin(thrown):
+    """Slip, rolling and twisting depend on the spin relative to the table."""
     states = ended(thrown)
     for made, state, tension in zip(thrown, states, (0.0, 5.0), strict=True):
         grains = twin(made, tension=tension)
@@ -134,8 +135,8 @@ def test_a_turning_table_and_its_liquid_are_those_of_the_twin(thrown):
     assert np.abs(wet - dry).max() > 1e-4
 
 
-def test_a_disc_is_that_table_too(thrown):
-    """Its contacts are found and remembered in another way."""
+def test_a_disc_acts_as_the_table(thrown):
+    """Its contacts are found and stored in another way."""
     discs = [
         made.model_copy(
             update={
@@ -153,8 +154,8 @@ def test_a_disc_is_that_table_too(thrown):
             close(at_disc[name], at_table[name], 1e-9)
 
 
-def test_a_grain_on_the_axis_comes_to_turn_with_the_table():
-    """By its resistance to twisting alone; one whose centre goes along feels no resistance to rolling."""
+def test_a_grain_on_the_axis_is_spun_up_by_the_table():
+    """By twisting resistance alone. A grain whose centre moves with the table has no rolling resistance."""
     sunk = (3 * G / (4 * SURFACE["young"] / (2 * (1 - 0.09)) * RADIUS**0.5)) ** (2 / 3)
     place = np.array([[*CENTRE[:2], RADIUS - sunk]])
     still, along = (on_table(place, [[0, 0, 0]], [spin], steps=10_000) for spin in ((0.0, 0.0, 0.0), RATE))
@@ -165,8 +166,8 @@ def test_a_grain_on_the_axis_comes_to_turn_with_the_table():
 
 
 def test_a_bridge_holds_a_grain_to_a_wall_until_it_ruptures():
-    """Of a heavy grain that parts slowly from a plane and from a disc: 4 pi R gamma cos(theta) at contact,
-    and at each gap what Willett has; nothing before they have touched."""
+    """A heavy grain separates slowly from a plane and from a disc: 4 pi R gamma cos(theta) at contact, and
+    Willett's force at each gap; no force before they have touched."""
     heavy, v, walls = {"mass": 1e9, "gravity": 0.0, "dt": 1e-3, "duration": 2.0, "liquid": 0.5}, 0.01, []
     for shapes in ({}, {"table": NO_TABLE, "coin": COIN}):
         for start in (-1e-9, 0.3 * RUPTURE):

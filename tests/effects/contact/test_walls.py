@@ -12,24 +12,24 @@ G_STAR = USUAL["young"] / (4 * (2 - USUAL["poisson"]) * (1 + USUAL["poisson"]))
 
 
 def sunk(push):
-    """The overlap (m) at which a wall pushes a grain of 1 m with so much (N)."""
+    """The overlap (m) at which a wall pushes a grain of 1 m radius with the force ``push`` (N)."""
     return float(hertz_overlap(push, 1.0, E_STAR))
 
 
 def lying(velocity, gravity, planes=(FLOOR,), spin=(0, 0, 0), **more):
-    """A grain of 1 kg that lies on the floor as its weight has it."""
+    """A grain of 1 kg that lies on the floor, with the overlap of its weight."""
     return grains([[0, 0, 1 - sunk(-gravity[2])]], [velocity], [spin], planes, gravity, **more)
 
 
 def speeds(result):
-    """Velocity along x, and the spin that rolls that way."""
+    """Velocity along x, and the spin for rolling in that direction."""
     return result.state["velocity"][0, 0], result.state["spin"][0, 1]
 
 
 @pytest.mark.long
-def test_a_sliding_sphere_comes_to_roll():
-    """It slows down by mu g, and rolls from v / (mu g (1 + 5 L^2 / (2 R^2))) on, at 5/7 v where the lever L
-    is R; with the overlap of its weight L is a little less."""
+def test_a_sliding_sphere_starts_to_roll():
+    """It slows down by mu g, and rolls from the time v / (mu g (1 + 5 L^2 / (2 R^2))) on. Its speed is then
+    5/7 v for a lever arm L = R; the overlap of its weight makes L slightly smaller."""
     speed, friction, g = 1.0, 0.3, 10.0
     lever = 1 - sunk(g) / 2
     end = speed / (friction * g * (1 + 2.5 * lever**2))
@@ -43,7 +43,7 @@ def test_a_sliding_sphere_comes_to_roll():
     simulation.run()
     (rolls,) = simulation.results()
     (v, spin), t = speeds(before), before.time
-    # The spring of the start, which has yet to be drawn, is a thousandth of a step of sliding.
+    # The tolerance is a thousandth of a step of sliding, because the spring is unstretched at the start.
     assert v == pytest.approx(speed - friction * g * t, abs=2e-4)
     assert spin == pytest.approx(2.5 * friction * g * lever * t, abs=5e-4)
     v, spin = speeds(rolls)
@@ -53,8 +53,9 @@ def test_a_sliding_sphere_comes_to_roll():
     assert rolls.state["position"][0, 2] == pytest.approx(1 - sunk(g), abs=1e-9)
 
 
-def test_a_sphere_on_a_slope_rolls_where_it_is_flat_and_slides_where_it_is_steep():
-    """Down with 5/7 g sin while tan is below 7/2 mu, as for a lever of R; with g (sin - mu cos) beyond."""
+def test_a_sphere_rolls_on_gentle_and_slides_on_steep_slopes():
+    """While tan is below 7/2 mu (for a lever arm R), the acceleration is 5/7 g sin; beyond, it is g (sin - mu
+    cos)."""
     g, friction, t = 10.0, 0.2, 0.4
     for tangent in (0.1, 0.4, 0.65, 0.75, 2.0):
         sine, cosine = tangent / np.hypot(1, tangent), 1 / np.hypot(1, tangent)
@@ -72,12 +73,12 @@ def test_a_sphere_on_a_slope_rolls_where_it_is_flat_and_slides_where_it_is_steep
 
 PRESSED = 0.01
 PUSH = 4 / 3 * E_STAR * PRESSED**1.5
-"""m, N; of each of two walls that have a grain between them."""
+"""m, N, for each of two walls with a grain between them."""
 SLOT = [((0.0, 0.0, -1 + PRESSED), (0.0, 0.0, 1.0)), ((0.0, 0.0, 1 - PRESSED), (0.0, 0.0, -1.0))]
 
 
 def test_a_grain_between_two_walls_hangs_by_mindlins_springs():
-    """It falls and comes back, as on two springs of 8 G* sqrt(R delta) each, and does not turn."""
+    """It falls and comes back, as on two springs of 8 G* sqrt(R delta) each, and does not rotate."""
     stiffness = 2 * 8 * G_STAR * PRESSED**0.5
     period, weight, steps = 2 * np.pi / stiffness**0.5, 0.3 * 2 * PUSH / 4, 400
     made = grains([[0, 0, 0]], [[0, 0, 0]], planes=SLOT, gravity=(-weight, 0, 0),
@@ -94,7 +95,8 @@ def test_a_grain_between_two_walls_hangs_by_mindlins_springs():
 
 
 def test_a_grain_between_two_walls_stays_below_coulombs_limit_and_slides_above_it():
-    """Twice mu times the push of a wall: below it comes to rest, above it falls with what is left."""
+    """The limit is twice mu times the push of a wall: below, it comes to rest; above, it falls with the
+    excess force."""
     friction = 0.3
     limit, stiffness = 2 * friction * PUSH, 2 * 8 * G_STAR * PRESSED**0.5
     for part in (0.4, 0.95, 1.05, 2.0):
@@ -104,16 +106,17 @@ def test_a_grain_between_two_walls_stays_below_coulombs_limit_and_slides_above_i
         fallen, v = result.state["position"][0, 0], result.state["velocity"][0, 0]
         if part < 1:
             assert abs(v) < 1e-9 * limit
-            # At once under its whole weight, it slides a little if that is near the limit.
+            # At first it feels its whole weight at once, so it slides a little if that is near the limit.
             hangs = -part * limit / stiffness
             assert fallen == pytest.approx(hangs, rel=1e-6) if part < 0.5 else -0.1 < fallen < hangs
         else:
-            # The springs take some time to be drawn.
+            # Stretching the springs takes some time.
             assert v == pytest.approx((1 - part) * limit * result.time, abs=limit / stiffness**0.5)
 
 
-def test_a_wall_is_a_plane_wherever_its_point_is_and_however_long_its_normal():
-    """Tilted, and given by another point and a longer normal: the same motion to rounding."""
+def test_walls_do_not_depend_on_point_and_normal_length():
+    """A plane that is tilted, and one given by another point and a longer normal: the same motion to
+    rounding."""
     normal = np.array([1.0, 2.0, 2.0]) / 3
     along = np.array([2.0, -2.0, 1.0]) / 3
     there = np.array([3.0, -1.0, 5.0])
@@ -128,8 +131,8 @@ def test_a_wall_is_a_plane_wherever_its_point_is_and_however_long_its_normal():
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
 
 
-def test_a_grain_in_a_corner_feels_each_wall_as_if_alone():
-    """The sum of what the walls do, each with a memory of its own."""
+def test_in_a_corner_forces_of_walls_add_up():
+    """The force is the sum over the walls; each contact has its own history."""
     planes = [((0.0, 0.0, 0.0), tuple(axis)) for axis in np.eye(3)]
     place, velocity, spin = [[0.97, 0.98, 0.99]], [[0.3, -0.2, 0.1]], [[1.0, 2.0, 3.0]]
 

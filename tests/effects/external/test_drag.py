@@ -1,4 +1,4 @@
-"""Drag against its NumPy twin, in all branches of each law; and its derivative by velocity."""
+"""Drag against its NumPy reference, in all branches of each law; and its derivative by velocity."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tisim.steppers import ErrorControl, Trapezoid
 
 
 class Shear(Source):
-    """v_f = v_0 + G r, for the drags."""
+    """v_f = v_0 + G r, for the drag laws."""
 
     quantity = "flow_velocity"
     mean: Vector = parameter("m/s", "mean")
@@ -31,7 +31,7 @@ class Shear(Source):
 
 
 REYNOLDS = np.array([1e-3, 0.5, 1.5, 50.0, 399.0, 401.0, 1e5, 2.9e5, 3.1e5, 1e6, 2.1e6, 1e9])
-"""Two or more in each of Chow's five pieces."""
+"""Two or more in each of Chow's five intervals."""
 
 
 def chow_coefficient(re):
@@ -60,7 +60,7 @@ def drag_twin(law, state, flow=0.0):
 
 
 def drags(rng, kind):
-    """One of each world."""
+    """One law for a world."""
     options = {
         "density": rng.uniform(1, 2),
         "viscosity": rng.uniform(0.01, 0.02),
@@ -70,7 +70,8 @@ def drags(rng, kind):
 
 
 def at_reynolds(rng, law, n=12):
-    """Particles at rest, in the fluid's frame or not, whose Re are REYNOLDS; each radius its own."""
+    """Particles at rest, in the fluid's frame or not, with Reynolds numbers REYNOLDS; each has its own
+    radius."""
     setup = cloud(rng, (law,), n=n)
     start = setup.particles.arrays(setup.domain, 0)
     speed = REYNOLDS * law.viscosity / (2 * start["radius"] * law.density)
@@ -100,7 +101,7 @@ def test_drag_in_a_fluid_at_rest(kind, rng):
     ],
 )
 def test_drag_in_a_flow(kind, rng):
-    """Relative to the flow at the place of each particle."""
+    """Relative to the flow at the position of each particle."""
     scenes = [
         cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)
     ]
@@ -122,7 +123,7 @@ def test_chow_meets_stokes_at_small_reynolds_numbers(rng):
 
 @pytest.mark.parametrize("kind", [ConstantDrag, ChowDrag, SchillerNaumannDrag, StokesDrag])
 def test_nothing_drags_at_rest(kind, rng):
-    """No force, and no NaN; the derivative is that of Stokes or zero."""
+    """No force, and no NaN; the derivative is Stokes's or zero."""
     law = drags(rng, kind)
     setup = scene(np.zeros((1, 3)), np.zeros((1, 3)), (law,), radius=0.3)
     np.testing.assert_array_equal(loads([setup])[0]["force"], 0)
@@ -143,7 +144,8 @@ def test_velocity_jacobians_are_the_derivatives(kind, rng):
 
 @pytest.mark.parametrize("kind", COEFFICIENTS)
 def test_velocity_jacobian_in_each_piece_of_a_law(kind, rng):
-    """Steps that are small for the slowest particles of a range, and not all rounding for the fastest."""
+    """Steps small enough for the slowest particles of an interval, and large enough against rounding for the
+    fastest."""
     scenes = [at_reynolds(rng, drags(rng, kind)) for _ in range(WORLDS)]
     for which, step in ((slice(0, 3), 1e-7), (slice(3, 8), 1e-4), (slice(8, 12), 1.0)):
         for claimed, difference in zip(*jacobians(scenes, step), strict=True):
@@ -151,8 +153,8 @@ def test_velocity_jacobian_in_each_piece_of_a_law(kind, rng):
                 close(a, b, 2e-6)
 
 
-def test_schiller_and_naumann_jump_by_as_much_as_they_say():
-    """From 0.4383 to 0.44 at a Reynolds number of 1000; and for small ones they meet Stokes."""
+def test_schiller_and_naumann_have_their_known_jump():
+    """From 0.4383 to 0.44 at a Reynolds number of 1000; at small Reynolds numbers they agree with Stokes."""
     assert schiller_naumann_coefficient(1000.0) == pytest.approx(0.4383, abs=5e-5)
     law, radius = SchillerNaumannDrag(density=2.0, viscosity=0.01), 0.1
     reynolds = np.array([1000.0 * (1 - 1e-9), 1000.0 * (1 + 1e-9), 1e-8])
@@ -166,9 +168,9 @@ def test_schiller_and_naumann_jump_by_as_much_as_they_say():
 
 @pytest.mark.slow
 def test_a_sphere_falls_at_the_terminal_velocity_of_schiller_and_naumann():
-    """Where weight is drag: m g = 1/2 rho_f C_D(Re) v^2 pi R^2, at Reynolds numbers from 2 to 3000.
+    """Weight equals drag: m g = 1/2 rho_f C_D(Re) v^2 pi R^2, at Reynolds numbers from 2 to 3000.
 
-    Masses are made to fall at these; whoever has the coefficient wrong falls at another speed.
+    Masses are chosen for these numbers; with a wrong coefficient a sphere falls at another speed.
     """
     law, radius, reynolds = SchillerNaumannDrag(density=1000.0, viscosity=1e-3), 1e-3, [2.0, 80.0, 900.0, 3e3]
     speed = np.array(reynolds) * law.viscosity / (2 * radius * law.density)
@@ -201,7 +203,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

@@ -1,4 +1,4 @@
-"""The tether to where a particle began, and gravity, against their NumPy twins."""
+"""The tether to the initial position, and gravity, against their NumPy references."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ def stiffnesses(rng):
     return [tuple(float(k) for k in rng.uniform(0, 5, 3)) for _ in range(WORLDS)]
 
 
-def test_a_tether_draws_back_to_where_each_began(rng):
-    """The anchor is a copy of the start, to the bit, and stays where it is."""
+def test_a_tether_pulls_to_the_initial_position(rng):
+    """The anchor is a copy of the initial position, bit for bit, and is constant."""
     scenes = [cloud(rng, (Tether(stiffness=k),), dt=0.1, steps=3) for k in stiffnesses(rng)]
     for one, result in zip(scenes, simulate(scenes, worlds=WORLDS, capacity=16), strict=True):
         np.testing.assert_array_equal(result.state["anchor"], result.start["position"])
@@ -46,6 +46,6 @@ def test_only_a_tether_needs_an_anchor():
         assert not effect.offers("velocity_jacobian")
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError, match=r"^tether.stiffness.2 must be given; received nothing$"):
         Tether(stiffness=(1, 2))

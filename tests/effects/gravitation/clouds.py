@@ -1,4 +1,4 @@
-"""Clouds of particles that attract each other, the forces on them, and those over all pairs in NumPy."""
+"""Clouds of particles that attract each other, the forces on them, and sums over all pairs in NumPy."""
 
 import numpy as np
 from scipy.constants import G
@@ -11,7 +11,7 @@ CAPACITY = 1200
 
 
 def ball(rng, n):
-    """Places in a uniform ball of radius 1 m."""
+    """Positions in a uniform ball of radius 1 m."""
     direction = rng.normal(size=(n, 3))
     return direction / np.linalg.norm(direction, axis=1)[:, None] * rng.uniform(0, 1, n)[:, None] ** (1 / 3)
 
@@ -40,14 +40,14 @@ def pair_forces(setup, softening=0.0):
 
 
 def relative_error(loads, exact):
-    """Root mean square and the largest of the errors, each over the root mean square of the exact force."""
+    """Root mean square error and largest error, each over the root mean square of the exact force."""
     size = np.sqrt((exact**2).sum(axis=1).mean())
     errors = np.array([np.linalg.norm(load - exact, axis=1) for load in loads]) / size
     return np.sqrt((errors**2).mean(axis=1)), errors.max(axis=1)
 
 
 def forces():
-    """Those of one ball, as a list."""
+    """Forces in one ball, as a list."""
     rng = np.random.Generator(np.random.Philox(7))
     place = ball(rng, 700)
     setup = scene(place, 0 * place, (TreeGravity(opening_angle=0.6),), mass=rng.uniform(1, 2, 700))

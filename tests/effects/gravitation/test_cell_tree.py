@@ -11,7 +11,7 @@ from tisim.effects import TreeGravity
 from tisim.effects.gravitation.cell_tree import FAN, LEAF
 
 NUMBERS = (CAPACITY, 700, 17, 1)
-"""Of particles in the worlds: one has two blocks of the sort, some have one leaf."""
+"""Numbers of particles in the worlds: one has two blocks of the sort, some have one leaf."""
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def trees():
     rng = np.random.Generator(np.random.Philox(3))
     scenes = []
     for n in NUMBERS:
-        # Many in the same cells of the curve: they stay in the order of their numbers.
+        # Many particles share cells of the curve; they stay in the order of their indices.
         place = np.concatenate([ball(rng, n - n // 3), 1e-7 * ball(rng, n // 3)])
         place = place[rng.permutation(n)]
         scenes.append(scene(place, 0 * place, (TreeGravity(),), mass=rng.uniform(1, 2, n)))
@@ -30,7 +30,7 @@ def trees():
 
 
 def numbers(column):
-    """What a field holds."""
+    """The values of a field."""
     return in_taichi_thread(column.to_numpy)()
 
 

@@ -1,4 +1,4 @@
-"""Gravity over all pairs: its NumPy twin, Newton's shells, Kepler's orbits, and what is conserved."""
+"""Gravity over all pairs: its NumPy reference, Newton's shells, Kepler's orbits, and conservation."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from tisim.effects import SelfGravity, SoftenedSelfGravity
 from tisim.steppers import Collocation, StageControl
 
 CAPACITY = 64
-"""Of all scenes, so that each law is compiled once."""
+"""Capacity of all scenes, so that each law is compiled once."""
 
 
 def twin(law, state):
@@ -25,8 +25,8 @@ def twin(law, state):
 
 
 @pytest.mark.parametrize("kind", [SelfGravity, pytest.param(SoftenedSelfGravity, marks=pytest.mark.slow)])
-def test_forces_are_those_of_the_twin_and_add_up_to_nothing(kind, rng):
-    """Action and reaction, and no torque of all of them; and sum r.F is the energy (Clausius's virial)."""
+def test_forces_equal_the_twin_and_sum_to_zero(kind, rng):
+    """Forces and torques sum to zero; and sum r.F is the energy (Clausius's virial)."""
     options = [{"softening_length": float(rng.uniform(0.1, 1))} for _ in range(WORLDS)]
     scenes = [random_cloud(rng, (kind(**one if kind is SoftenedSelfGravity else {}),)) for one in options]
     for one, state in zip(scenes, loads(scenes, capacity=CAPACITY), strict=True):
@@ -54,8 +54,8 @@ def test_the_softened_force_is_the_gradient_of_the_softened_energy(rng):
 
 
 @pytest.mark.slow
-def test_two_in_one_place_pull_each_other_only_without_softening():
-    """Then the force is not finite, and the world stops and says so."""
+def test_coincident_particles_attract_only_without_softening():
+    """Without softening the force is not finite, and the world stops with a message."""
     law = SoftenedSelfGravity(softening_length=0.5)
     setup = scene(np.zeros((2, 3)), np.zeros((2, 3)), (law,), mass=1e9)
     assert (loads([setup], capacity=CAPACITY)[0]["force"] == 0).all()
@@ -80,16 +80,17 @@ def test_the_nearest_image_acts_in_a_periodic_box():
 
 
 def shell(radius):
-    """The corners of an icosahedron: they stand for a uniform shell up to the fifth power of r/R."""
+    """The corners of an icosahedron: they represent a uniform shell up to the fifth power of r/R."""
     a, b = 1.0, (1 + 5**0.5) / 2
     corners = [(0, s * a, t * b) for s in (1, -1) for t in (1, -1)]
     every = np.array([np.roll(corner, k) for corner in corners for k in range(3)])
     return radius * every / np.linalg.norm(every[0])
 
 
-def test_a_uniform_sphere_pulls_as_newton_found():
-    """Shells of one mass and of radii 1, 2, 4, ...: at r = 1.4 and so on only those within pull, as if from
-    the centre; what the corners leave of theirs is below 7 (r/R)^6 of it."""
+def test_newtons_shell_theorem():
+    """Shells of equal mass with radii 1, 10, 100, ...: between two of them only the inner shells attract, as
+    if from the centre. The corners of the outer ones leave a rest below 7 (r/R)^6 of the field of one shell.
+    """
     radii, mass = 10.0 ** np.arange(4), 1e9
     places = np.concatenate([shell(r) for r in radii])
     n = len(places)
@@ -112,7 +113,7 @@ def test_a_uniform_sphere_pulls_as_newton_found():
 
 
 def orbit(eccentricity, periods, control):
-    """Two bodies of unlike masses from the nearest point of their orbit, of semi-major axis 1 m."""
+    """Two bodies of unlike masses from periapsis, with semi-major axis 1 m."""
     mass = np.array([3e9, 1e9])
     total = mass.sum()
     period = 2 * np.pi / np.sqrt(G * total)
@@ -131,8 +132,8 @@ def orbit(eccentricity, periods, control):
 
 @pytest.mark.slow
 def test_kepler():
-    """After whole periods 2 pi sqrt(a^3 / (G M)) both are where they began; half of one later the distance is
-    a (1 + e). Energy is -G m_1 m_2 / (2 a), and it and the angular momentum stay."""
+    """After whole periods 2 pi sqrt(a^3 / (G M)) both are at their initial positions; half a period later the
+    distance is a (1 + e). The energy is -G m_1 m_2 / (2 a). Energy and angular momentum are conserved."""
     control, e = StageControl(error=1e-10, per="run"), 0.6
     for periods, distance in ((5.0, 1 - e), (5.5, 1 + e)):
         (result,) = simulate([orbit(e, periods, control)], capacity=2)
@@ -151,9 +152,9 @@ def test_kepler():
 
 
 @pytest.mark.slow
-def test_momenta_of_a_cloud_stay_to_rounding_and_its_energy_to_that_of_the_step(rng):
-    """Twenty bodies with softening through half a collapse, by Verlet: forces along the line of two, equal
-    and opposite."""
+def test_momenta_are_conserved_to_rounding_and_energy_to_the_step(rng):
+    """Twenty bodies with softening through half a collapse, by Verlet: forces are central, equal and
+    opposite."""
     n = 20
     position = rng.normal(size=(n, 3))
     setup = scene(
@@ -182,7 +183,7 @@ def test_momenta_of_a_cloud_stay_to_rounding_and_its_energy_to_that_of_the_step(
     assert energy[1] == pytest.approx(energy[0], rel=2e-3)
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         SoftenedSelfGravity(softening_length=0)
     assert str(fault.value) == "softened_self_gravity.softening_length must be greater than 0.0; received 0"

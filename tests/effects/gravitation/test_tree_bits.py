@@ -1,4 +1,4 @@
-"""Gravity by a tree has the same bits on all schedules and threads, and in any company."""
+"""Gravity by a tree has the same bits on all schedules and thread counts, alone and in a batch."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from tisim.effects import TreeGravity
 
 
 @pytest.mark.slow
-def test_the_same_bits_on_all_schedules_and_in_any_company(rng):
-    """A world by one thread, by a team, by launches; alone, in a batch, and where there is room for more."""
+def test_the_same_bits_on_all_schedules_and_in_batches(rng):
+    """A world by one thread, by a team, by launches; alone, in a batch, and with a larger capacity."""
     places = [ball(rng, n) for n in (1500, 40, 3, 777)]
     scenes = [
         scene(r, 0.01 * r, (TreeGravity(opening_angle=0.6),), mass=1e7 / len(r), dt=0.1, steps=5)
@@ -26,7 +26,7 @@ def test_the_same_bits_on_all_schedules_and_in_any_company(rng):
 
 @pytest.mark.slow
 def test_other_threads_and_precision(single, in_one_thread, rng):
-    """One thread: the same bits. Single precision: its own rounding only."""
+    """On one thread: the same bits. In single precision: rounding of that precision only."""
     here = forces()
     assert in_one_thread("effects.gravitation.clouds", "forces") == here
     there, here = np.array(single("effects.gravitation.clouds", "forces")), np.array(here)

@@ -1,4 +1,4 @@
-"""Gravity by a tree of cells: beside the sum over all pairs, its bound, what is conserved, hard cases."""
+"""Gravity by a tree of cells: against the sum over all pairs, its error bound, conservation, hard cases."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,9 @@ from tisim.steppers import Collocation, StageControl
 
 
 @pytest.mark.parametrize("softening", [0.0, 0.2])
-def test_with_all_cells_opened_it_is_the_sum_over_pairs(softening, rng):
-    """Of unlike masses in a ball, on a line, in a plane, and in clumps far from each other; of any number."""
+def test_with_all_cells_opened_it_sums_all_pairs(softening, rng):
+    """Unlike masses in a ball, on a line, in a plane, and in distant clumps; for various numbers of
+    particles."""
     places = [
         *(ball(rng, n) for n in (1, 2, 16, 17, 129)),
         ball(rng, 100) * [1, 0, 0],
@@ -36,8 +37,8 @@ def test_with_all_cells_opened_it_is_the_sum_over_pairs(softening, rng):
 
 
 def test_the_error_falls_as_the_third_power_of_the_opening_angle(rng):
-    """Worlds of one ball, each with its own theta: root mean square below 0.012 theta^3, the largest below
-    0.2 theta^3, of the mean force; and with softening no worse."""
+    """Worlds with the same ball and different theta: relative to the mean force, the root mean square error
+    is below 0.012 theta^3 and the largest below 0.2 theta^3; softening does not increase them."""
     place, mass = ball(rng, 1200), rng.uniform(1, 2, 1200)
     for softening in (0.0, 0.05):
         scenes = [
@@ -53,7 +54,7 @@ def test_the_error_falls_as_the_third_power_of_the_opening_angle(rng):
 
 
 def test_a_far_cell_is_within_the_bound_of_salmon_and_warren(rng):
-    """A leaf of 16 with one of them far out, and a particle just so far from it that it counts as one."""
+    """A leaf of 16 with an outlier, and a particle just far enough away for the leaf to act as one cell."""
     scenes = []
     for a in THETAS:
         leaf, mass = 0.3 * ball(rng, 16), rng.uniform(0.5, 1, 16)
@@ -61,7 +62,7 @@ def test_a_far_cell_is_within_the_bound_of_salmon_and_warren(rng):
         centre = mass @ leaf / mass.sum()
         b = np.linalg.norm(leaf - centre, axis=1).max()
         probe = centre - 1.001 * b / a / 3**0.5
-        # Where the curve begins, so that they are a leaf of their own.
+        # They come first on the curve, so that they form a leaf of their own.
         assert (probe < leaf).all()
         place = np.concatenate([leaf, probe - 1e-9 * rng.uniform(0, 1, (16, 3))])
         law = TreeGravity(opening_angle=float(a))
@@ -75,8 +76,8 @@ def test_a_far_cell_is_within_the_bound_of_salmon_and_warren(rng):
         assert (error > 1e-3 * bound).all()
 
 
-def test_one_that_is_far_away_takes_no_accuracy_from_the_others(rng):
-    """All others are then in a few of the 2^48 cells of the curve's cube, and still in order."""
+def test_a_distant_particle_does_not_reduce_accuracy(rng):
+    """The others then share a few of the 2^48 cells of the curve's cube, and are still sorted correctly."""
     near = ball(rng, 400)
     place = np.concatenate([near, [[1e3, 2e3, -1e3]]])
     setup = scene(place, 0 * place, (TreeGravity(opening_angle=0.5),), mass=1.0)
@@ -97,8 +98,8 @@ def test_momentum_is_conserved_to_the_error_of_the_forces(rng):
 
 
 @pytest.mark.slow
-def test_iterations_of_a_step_see_it_as_they_see_all_pairs():
-    """Two bodies are in one leaf: orbits by collocation, whose trial states ask for sums, are the same."""
+def test_iterated_steps_agree_with_all_pairs():
+    """Two bodies share a leaf: orbits by collocation, whose trial states need new sums, are the same."""
     mass = np.array([3e9, 1e9])
     end = []
     for law in (TreeGravity(), SelfGravity()):
@@ -117,7 +118,7 @@ def test_iterations_of_a_step_see_it_as_they_see_all_pairs():
 
 
 @pytest.mark.slow
-def test_two_in_one_place_stop_the_world():
+def test_coincident_particles_stop_the_world():
     setup = scene([[1, 2, 3], [1, 2, 3], [0, 0, 0]], np.zeros((3, 3)), (TreeGravity(),), mass=1.0)
     (result,) = simulate([setup], capacity=16)
     assert not result.status.ok
@@ -132,7 +133,7 @@ def test_a_periodic_box_with_images_is_refused():
     assert "particles do not see images of each other, with effects.tree_gravity" in str(fault.value)
 
 
-def test_a_study_of_cost_tries_it_in_place_of_all_pairs():
+def test_a_cost_study_tries_tree_gravity():
     tried = SelfGravity().approximations(1.0)
     assert [law.opening_angle for law in tried] == list(OPENING_ANGLES)
     soft = SoftenedSelfGravity(softening_length=0.3).approximations(1.0)
@@ -142,7 +143,7 @@ def test_a_study_of_cost_tries_it_in_place_of_all_pairs():
     assert turned.turned(TreeGravity(), -3.0).opening_angle == pytest.approx(0.05)
 
 
-def test_its_memory_is_told():
+def test_the_memory_of_the_tree_is_reported():
     setup = scene(np.zeros((1, 3)), np.zeros((1, 3)), (TreeGravity(),), mass=1.0)
     simulation = compiled(setup, worlds=len(THETAS), capacity=CAPACITY)
     (buffer,) = [one for one in simulation.assembly.buffers if one.what == "long-range sum"]
@@ -151,6 +152,6 @@ def test_its_memory_is_told():
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])
-def test_what_is_wrong_is_named(angle):
+def test_invalid_values_are_refused(angle):
     with pytest.raises(InputError, match=r"tree_gravity\.opening_angle must be (greater|less) than"):
         TreeGravity(opening_angle=angle)

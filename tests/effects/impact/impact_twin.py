@@ -1,4 +1,4 @@
-"""The impact of two grains, written independently from Z04's equations, and random impacts to try it on."""
+"""The impact of two grains, written independently from Z04's equations, and random impacts for tests."""
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,7 +25,7 @@ COMBINATIONS = {
 
 
 def draw(rng):
-    """One random oblique impact, as plain numbers: unequal grains, any direction, some hard and some soft."""
+    """One random oblique impact, as plain numbers: unequal grains, any direction, hard or soft."""
     radii = 1e-3 * 4.0 ** rng.uniform(0, 1, 2)
     density = 10.0 ** rng.uniform(3, 4, 2)
     normal = rng.normal(size=3)
@@ -52,7 +52,7 @@ def draw(rng):
 
 
 def effects(pair, kinds):
-    """The effects of a pair, those of ``kinds`` among them."""
+    """The effects of a pair, with the laws in ``kinds``."""
     factories = {
         Friction: lambda: Friction(coefficient=pair["friction"]),
         Heating: lambda: Heating(heat_capacity=HEAT_CAPACITY),
@@ -83,7 +83,8 @@ def as_scene(pair, kinds):
 
 
 def twin(pair, kinds):
-    """The impact by Z04's equations in e itself, the coupled e-T problem by bracketing; no fixed point."""
+    """The impact by Z04's equations in e itself; the coupled e-T problem is solved by bracketing, not by
+    iteration."""
     m, b, v, t = pair["mass"], pair["radius"], pair["velocity"], pair["temperature"]
     r = pair["position"] + DT * v
     n = (r[1] - r[0]) / np.linalg.norm(r[1] - r[0])
@@ -105,7 +106,7 @@ def twin(pair, kinds):
             pull = min(pair["friction"] * force * time, np.linalg.norm(slip) / (1 / m).sum())
             after_t -= np.outer(np.array([1, -1]) * pull / m, slip / np.linalg.norm(slip))
         after = np.outer(after_n, n) + after_t
-        # In the frame of the pair's centre of mass (see impact.py on the paper's split).
+        # In the centre-of-mass frame of the pair (see impact.py on the paper's split).
         centre = (m @ v) / m.sum()
         loss = 0.5 * m * (((v - centre) ** 2).sum(axis=1) - ((after - centre) ** 2).sum(axis=1))
         area = (pair["a0"] + (pair["af"] - pair["a0"]) * (1 - e)) * np.pi * least**2
@@ -116,11 +117,11 @@ def twin(pair, kinds):
         return after, hot, force, area, hard.min(), work, heat
 
     def excess(e):
-        """Below zero where (3.1) asks for more restitution than e."""
+        """Negative if (3.1) requires a larger restitution than e."""
         _, _, force, area, hard, _, _ = outcome(e)
         return e - (1 - force / (2 * area * hard))
 
-    # The root nearest to bonding, where the paper's iteration starts.
+    # The root nearest to bonding, which is also where the paper's iteration starts.
     e = 0.0
     if excess(0.0) < 0:
         grid = 1 - np.geomspace(1, 1e-6, 300)

@@ -1,4 +1,4 @@
-"""Two grains that bond become one sphere of all they had."""
+"""Two grains that bond merge into one sphere and conserve all quantities."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def pair(rng):
 
 @pytest.mark.long
 def test_two_bonded_grains_become_one_sphere(rng):
-    """Mass, momentum, volume, energy and centre of mass are those of the two; one particle is left."""
+    """Mass, momentum, volume, energy and centre of mass equal the sums over both; one particle is left."""
     for result in run([pair(rng) for _ in range(60)]):
         start, one = result.start, result.state
         assert len(one["mass"]) == result.work["merges"] == result.work["bonds"] == 1
@@ -45,8 +45,8 @@ def test_two_bonded_grains_become_one_sphere(rng):
 
 
 @pytest.mark.long
-def test_bonded_grains_stay_two_where_nothing_merges_them():
-    """Without the effect a bond is counted, the two move on together, and both remain."""
+def test_bonded_grains_stay_separate_without_merging():
+    """Without the effect a bond is counted, both grains move on together, and both remain."""
     (result,) = simulate([head_on(5.0, (Impact(hardness=SOFT),), mass=[1.0, 3.0])], worlds=300, capacity=2)
     assert result.work["bonds"] == 1
     np.testing.assert_allclose(result.state["velocity"], [[-2.5, 0, 0]] * 2, rtol=1e-15)

@@ -1,11 +1,11 @@
 """The engine against an independent program of the same model, benchmarks/agglomeration_numba.py.
 
-How long the two can agree particle by particle: an impact multiplies the rounding error, and a step that is
-cut to end where two surfaces meet finds them touching or not as rounding has it. Measured over 16 worlds of
-60 grains of Z04's best design: the same events in all worlds over the first 75 steps and more (all but a few
-merges), the largest difference growing from 1e-14 after 20 steps to 1e-13 after 40 and 2e-10 after 80; one
-world passes 1e-9 at step 75, four more by step 103, the other eleven never. With steps of 1e-6 s throughout
-it is 3e-15 after 200 steps.
+The two can agree particle by particle for a limited time only. Each impact amplifies the rounding error, and
+if a step is shortened to end when two surfaces meet, rounding decides whether they touch. Measured over 16
+worlds of 60 grains of Z04's best design: all worlds have the same events for at least the first 75 steps
+(nearly all of them merges). The largest difference grows from 1e-14 after 20 steps to 1e-13 after 40 and
+2e-10 after 80; one world passes 1e-9 at step 75, four more by step 103, the other eleven never. With steps of
+1e-6 s throughout it is 3e-15 after 200 steps.
 """
 
 import sys
@@ -21,7 +21,7 @@ from tisim.cases.agglomeration.scene import BEST, DURATION, scene
 from tisim.steppers import ApproachTime, Verlet
 
 numba = pytest.importorskip("numba")
-# Small parallel loops get slow where tbb is installed and numba prefers it.
+# Small parallel loops get slow if tbb is installed and numba prefers it.
 numba.config.THREADING_LAYER_PRIORITY = ["omp", "workqueue", "tbb"]
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 peer = pytest.importorskip("agglomeration_numba")
@@ -39,7 +39,7 @@ def simulation(the_runtime):
 
 
 def prepare(design, grains, **changes):
-    """Scenes from 16 starts, and the same for the other program."""
+    """Scenes from 16 random starts (seeds), and the same starts for the other program."""
     scenes = [scene(design, seed, grains).model_copy(update=changes) for seed in range(WORLDS)]
     starts = [s.particles.arrays(s.domain, s.seed) for s in scenes]
     laws = [{**design, "grain_mass": start["mass"][0]} for start in starts]
@@ -49,7 +49,7 @@ def prepare(design, grains, **changes):
 def apart(result, final):
     """Largest difference of any quantity, relative to its largest value; grains in order of x.
 
-    Which of two merging grains of one size keeps its place is up to rounding, so places do not tell.
+    Rounding decides which of two merging grains of equal size keeps its index, so indices are not compared.
     """
     a, b = np.argsort(final["position"][:, 0]), np.argsort(result.state["position"][:, 0])
     return max(np.abs(x[a] - result.state[name][b]).max() / np.abs(x).max() for name, x in final.items())
@@ -86,7 +86,7 @@ def test_every_step_has_the_same_events_and_particles(simulation, hardness, even
 
 @pytest.mark.slow
 def test_cost_of_a_design_is_the_same(simulation):
-    """Mean Pi over 16 starts of 200 grains, whole runs, where events may part as rounding has it."""
+    """Mean Pi over 16 starts of 200 grains, whole runs, in which rounding may change the events."""
     scenes, starts, laws = prepare(BEST, 200)
     simulation.load(scenes)
     simulation.run()

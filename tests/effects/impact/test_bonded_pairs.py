@@ -1,4 +1,4 @@
-"""A pair at rest relative to each other is in contact, not colliding: one impact, however it moves."""
+"""A bonded pair at relative rest is in contact, not colliding: one impact, for any motion of the pair."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,12 @@ from tisim.operators import Fragmentation
 PAIRS = 24
 ALPHA, AREA = 10.0, 0.3
 SIDE = 0.2
-"""J/m^2, the heat of the reaction; contact area of a touch that is elastic, over that of a bond; m."""
+"""J/m^2, heat of reaction; contact area of an elastic touch over the area of a bond; m."""
 
 
 def pairs(rng, boost=0.0, gravity=0.0, breaks=False, across=False):
-    """Pairs that bond in the first step, at 1 to 100 m/s and any angle, and then stay in contact for 200."""
+    """Pairs that bond in the first step, at 1 to 100 m/s and any angle, and then stay in contact for 200
+    steps."""
     laws = (
         Impact(hardness=1e-3, initial_area=AREA),
         Friction(coefficient=0.1),
@@ -90,7 +91,7 @@ def test_a_bonded_pair_collides_once(load):
 
 
 def summaries():
-    """Impacts, and heat over that of one impact, of every load. Shape (loads, pairs, 2)."""
+    """Impacts, and heat over the heat of one impact, for every load. Shape (loads, pairs, 2)."""
     return [
         [
             [
@@ -104,7 +105,7 @@ def summaries():
 
 
 @pytest.mark.slow
-def test_nor_does_it_in_single_precision(single):
+def test_a_bonded_pair_collides_once_in_single_precision(single):
     counts = np.array(single("effects.impact.test_bonded_pairs", "summaries"))
     assert (counts[..., 0] == 1).all()
     np.testing.assert_allclose(counts[..., 1], 1, rtol=1e-5)

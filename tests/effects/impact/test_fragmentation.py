@@ -1,4 +1,4 @@
-"""What breaks: from which speed, into how many pieces, and what the pieces keep."""
+"""Fragmentation: its threshold speed, the number of pieces, and conservation."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def break_speed(gamma, radius=2 * RADIUS, e=0.0, pieces=8):
 
 @pytest.mark.slow
 def test_speed_that_halves_the_radius_closed_form():
-    """Z04 (5.4): eight pieces need v = sqrt(6 gamma / (rho b0 (1 - e^2))), to 1e-10 of it."""
+    """Z04 (5.4): eight pieces need v = sqrt(6 gamma / (rho b0 (1 - e^2))), to a relative error of 1e-10."""
     gamma, hardness = 30.0, 4e5
     critical = np.sqrt(3 * hardness / (2 * DENSITY))
     v = brentq(lambda v: v - break_speed(gamma, e=max(1 - v / critical, 0)), 1e-3, 0.999 * critical)
@@ -41,8 +41,9 @@ def test_speed_that_halves_the_radius_closed_form():
 
 @pytest.mark.long
 @pytest.mark.parametrize("pieces", [2, 3, 5, 8])
-def test_default_threshold_lets_two_pieces_happen(pieces):
-    """With b/b0 = 2^(-1/3) a grain breaks from dK for two pieces on, into as many as dK pays for."""
+def test_the_default_threshold_allows_two_pieces(pieces):
+    """With b/b0 = 2^(-1/3) a grain breaks as soon as dK suffices for two pieces, into the largest number that
+    dK allows."""
     gamma = 30.0
     v = break_speed(gamma, pieces=pieces)
     fewer, enough = run([hit(v * (1 + off), laws(SOFT, gamma), radius=2 * RADIUS) for off in (-1e-9, 1e-9)])
@@ -71,7 +72,7 @@ def test_largest_grain_that_sticks_closed_form():
 
 @pytest.mark.long
 def test_pieces_keep_mass_momentum_energy_and_centre(rng):
-    """n equal pieces in place of one: same mass, momentum, kinetic energy, volume, centre; no overlap."""
+    """n equal pieces replace one grain: same mass, momentum, kinetic energy, volume, centre; no overlap."""
     scenes = []
     for _ in range(30):
         radii = RADIUS * rng.uniform(1.5, 2.5, 2)
@@ -104,7 +105,7 @@ def test_pieces_keep_mass_momentum_energy_and_centre(rng):
             atol=1e-15 * size,
         )
         assert energy(end) == pytest.approx(energy(start), rel=2e-14)
-        # None lighter than a grain.
+        # No piece is lighter than a grain.
         assert end["mass"].min() >= GRAIN * (1 - 1e-6)
         assert len(np.unique(end["id"])) == len(end["id"])
         # Pieces of one grain share its velocity, and lie about its centre without overlap.
@@ -120,7 +121,7 @@ def test_pieces_keep_mass_momentum_energy_and_centre(rng):
             np.testing.assert_allclose(place.mean(axis=0), moved, rtol=0, atol=1e-16)
             gaps = np.linalg.norm(place[:, None] - place, axis=2) + np.eye(n)
             assert gaps.min() >= 2 * end["radius"][mine[0]] * (1 - 1e-12)
-            # The book of surface energy, shared equally among the pieces.
+            # The recorded surface energy is shared equally among the pieces.
             surface = 4 * np.pi * (n * end["radius"][mine[0]] ** 2 - start["radius"][who] ** 2)
             spent = result.scene.effects[6].surface_energy * surface
             assert end["fracture_energy"][mine].sum() == pytest.approx(spent, rel=1e-12, abs=1e-18)
@@ -128,13 +129,14 @@ def test_pieces_keep_mass_momentum_energy_and_centre(rng):
 
 
 def pieces_of(end, start, who):
-    """Into how many pieces grain ``who`` broke: the first piece keeps its id."""
+    """The number of pieces of grain ``who``: the first piece keeps its id."""
     return round(float(start["mass"][who] / end["mass"][end["id"] == who][0]))
 
 
 @pytest.mark.long
 def test_no_piece_is_lighter_than_an_original_grain():
-    """However violent: an agglomerate of 3.7 grains gives three pieces, a single grain none."""
+    """For any impact energy: an agglomerate of 3.7 grains gives three pieces, and a single grain does not
+    break."""
     radius = RADIUS * 3.7 ** (1 / 3)
     big, single = run([hit(1e4, laws(SOFT, 1.0), radius=r) for r in (radius, RADIUS)])
     assert len(big.state["mass"]) == 6
@@ -142,8 +144,8 @@ def test_no_piece_is_lighter_than_an_original_grain():
     assert len(single.state["mass"]) == 1
 
 
-def test_smallest_piece_is_the_lightest_grain_of_the_start_whatever_its_density():
-    """Two grains of eight beside one of one: each gives eight pieces, however dense all of them are."""
+def test_the_smallest_piece_is_the_lightest_initial_grain():
+    """Two agglomerates of eight grains beside a single grain: each breaks into eight, for any density."""
     light = scene(
         [[-2 * RADIUS, 0, 0], [2 * RADIUS, 0, 0], [0, 1, 0]], [[1e3, 0, 0], [-1e3, 0, 0], [0, 0, 0]],
         laws(SOFT, 1.0, grain_mass=None), radius=[2 * RADIUS, 2 * RADIUS, RADIUS], dt=1e-15,
@@ -156,8 +158,8 @@ def test_smallest_piece_is_the_lightest_grain_of_the_start_whatever_its_density(
     assert heavy.capacity() == 9
 
 
-def test_agglomerate_of_grains_breaks_into_all_of_them():
-    """Rounding of the summed masses costs no piece: 7 merged grains give 7."""
+def test_an_agglomerate_breaks_into_all_its_grains():
+    """Rounding of the summed masses costs no piece: 7 merged grains give 7 pieces."""
     radius = RADIUS * 7 ** (1 / 3)
     mass = sum([GRAIN] * 7) * (1 - 1e-15)
     (result,) = run([hit(1e3, laws(SOFT, 1.0), radius=radius, mass=mass)])
@@ -166,8 +168,8 @@ def test_agglomerate_of_grains_breaks_into_all_of_them():
 
 @pytest.mark.slow
 def test_grains_of_several_blocks_of_memory_break_at_once(rng, monkeypatch):
-    """Six pairs of 2 to 7 grains each, in any order among ten that nothing hits: each grain has its pieces,
-    about its own pair's centre."""
+    """Six pairs of 2 to 7 grains each, in random order among ten grains that are not hit: the pieces of each
+    grain lie about the centre of their own pair."""
     monkeypatch.setattr(prefix_sum, "LEAST_BLOCK", {"cpu": 4})
     contents = np.concatenate([np.repeat(np.arange(2, 8), 2), np.ones(10, int)])
     radius = RADIUS * np.cbrt(contents)

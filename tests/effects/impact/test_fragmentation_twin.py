@@ -1,8 +1,8 @@
-"""Breaking grains step by step against a plain program of Z04's equations, written apart from the package.
+"""Breaking grains step by step against a separate plain program of Z04's equations.
 
-Heavy agglomerates fly at each other and break, and their pieces strike further ones. The program goes through
-the pairs one after another, earliest first. Nothing bonds here, and grains do not soften, so that every
-restitution is a formula and places in the arrays do not change.
+Heavy agglomerates collide and break, and their pieces hit further ones. The program resolves pairs one after
+another, earliest first. Nothing bonds and grains do not soften, so that every restitution is a formula and
+indices do not change.
 """
 
 import numpy as np
@@ -18,7 +18,8 @@ HARDNESS, GAMMA, THRESHOLD = 6e6, 2.0, 0.7
 
 
 class Twin:
-    """Grains as arrays: places r, velocities v, masses m, radii b, temperatures T, energy of new surface."""
+    """Grains as arrays: positions r, velocities v, masses m, radii b, temperatures T, energy of new
+    surface."""
 
     def __init__(self, start):
         self.r, self.v, self.m, self.b, self.T = (
@@ -28,7 +29,7 @@ class Twin:
         self.fractures = 0
 
     def state(self):
-        """As the package names it."""
+        """State under the names of the package."""
         return {
             "position": self.r, "velocity": self.v, "mass": self.m, "radius": self.b,
             "temperature": self.T, "fracture_energy": self.surface,
@@ -44,7 +45,7 @@ class Twin:
             self.split(i, self.pieces[i])
 
     def due(self, i, j):
-        """Time since the surfaces met; negative for a pair that is apart or parting."""
+        """Time since the surfaces met; negative for a pair that is apart or separating."""
         d = self.r[j] - self.r[i]
         distance = np.linalg.norm(d)
         approach = (self.v[i] - self.v[j]) @ d / distance
@@ -52,7 +53,7 @@ class Twin:
         return overlap / approach if overlap >= 0 and approach > 0 else -1.0
 
     def order(self):
-        """Pairs in contact, the one that met first at the head; of equal ones, that of the later grains."""
+        """Pairs in contact, the earliest contact first; of equal ones, the pair with larger indices."""
         d = self.r[None] - self.r[:, None]
         near = np.linalg.norm(d, axis=2) <= (self.b[None] + self.b[:, None]) * (1 + 1e-9)
         pairs = [(int(i), int(j)) for i, j in np.argwhere(near) if i < j and self.due(i, j) >= 0]
@@ -86,7 +87,7 @@ class Twin:
             self.fractures += 1
 
     def split(self, i, n):
-        """n equal pieces, a cubic block of touching spheres filled along x, y, z, about the old centre."""
+        """n equal pieces: a cubic block of touching spheres filled along x, y, z, about the old centre."""
         edge = next(k for k in range(1, 99) if k**3 >= n)
         sites = np.indices((edge, edge, edge)).reshape(3, -1)[::-1].T[:n]
         b = self.b[i] / n ** (1 / 3)
@@ -102,7 +103,7 @@ class Twin:
 
 
 def swarm(rng):
-    """Agglomerates on a jittered grid that fly towards its middle."""
+    """Agglomerates on a jittered grid that move towards its middle."""
     grid = np.stack(np.meshgrid(*[np.arange(-1.0, 2.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
     grid = grid[rng.permutation(27)[:14]]
     place = 5 * RADIUS * grid + 0.3 * RADIUS * rng.uniform(-1, 1, grid.shape)
@@ -120,7 +121,8 @@ def swarm(rng):
 
 @pytest.mark.long
 def test_every_step_has_the_same_pieces_as_the_twin(rng):
-    """Numbers, places, velocities, masses, heat and energy of new surface; they part by 2e-14 (measured)."""
+    """Numbers, positions, velocities, masses, heat and energy of new surface; differences are 2e-14
+    (measured)."""
     if runtime.current().precision != "f64":
         pytest.skip("a comparison of f64 programs")
     scenes = [swarm(rng) for _ in range(WORLDS)]

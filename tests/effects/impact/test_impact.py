@@ -1,4 +1,4 @@
-"""Impact of two grains against an independent twin, and what must be conserved in it."""
+"""Impact of two grains against an independent reference, and conservation."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def impacts(request):
 
 
 @pytest.mark.long
-def test_impact_is_its_twin(impacts):
+def test_impact_equals_its_twin(impacts):
     kinds, pairs, results = impacts
     bond_outcomes = set()
     for pair, result in zip(pairs, results, strict=True):
@@ -80,7 +80,7 @@ def test_friction_slows_slip_and_never_reverses_it(impacts):
 
 
 def test_restitution_leaves_the_approach_times_e(impacts):
-    """Separation speed over approach speed lies in 0..1, and is 0 exactly for those that bond."""
+    """Separation speed over approach speed is between 0 and 1, and exactly 0 for pairs that bond."""
     _, pairs, results = impacts
     for pair, result in zip(pairs, results, strict=True):
         apart = pair["position"] + DT * pair["velocity"]
@@ -94,7 +94,7 @@ def test_restitution_leaves_the_approach_times_e(impacts):
 
 
 def test_impact_looks_the_same_from_a_moving_frame(impacts):
-    """Galilean invariance: 1000 m/s added to all velocities changes nothing but the velocities."""
+    """Galilean invariance: adding 1000 m/s to all velocities changes only the velocities."""
     kinds, pairs, results = impacts
     boost = np.array([1000.0, -1000.0, 1000.0])
     moving = simulate(

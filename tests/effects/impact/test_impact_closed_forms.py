@@ -1,4 +1,4 @@
-"""Impact of two equal grains against the closed forms of Z04, and when there is none."""
+"""Impact of two equal grains against the closed forms of Z04, and pairs without an impact."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,8 @@ def test_restitution_for_any_contact_areas_closed_form():
 
 
 def test_adhesion_speed_closed_form():
-    """Z04 (4.15): equal grains bond from v = sqrt(3 a_f H beta / (2 rho)) on, to 1e-10 of it."""
+    """Z04 (4.15): equal grains bond from v = sqrt(3 a_f H beta / (2 rho)) on, to a relative error
+    of 1e-10."""
     hardness, density, beta, af = 2e5, 3000.0, 0.8, 0.7
     critical = np.sqrt(3 * af * hardness * beta / (2 * density))
     law = (Impact(hardness=hardness, deformation_length=beta, final_area=af),)
@@ -93,8 +94,8 @@ def test_harder_or_lighter_or_slower_never_bonds_more(rng):
     assert e[-1] == pytest.approx(0, abs=1e-14)
 
 
-def test_pairs_that_separate_or_do_not_touch_are_left_alone():
-    """An impact needs an overlap and an approach, both."""
+def test_pairs_that_separate_or_do_not_touch_are_unchanged():
+    """An impact needs both an overlap and an approach."""
     apart, parting = simulate(
         [
             scene([[0, 0, 0], [2.1e-3, 0, 0]], [[1, 0, 0], [0, 0, 0]], (Impact(hardness=1e5),)),

@@ -1,4 +1,4 @@
-"""Grains that forces press together are in contact, not colliding: one impact, whatever the step."""
+"""Grains that are pressed together by forces are in contact, not colliding: one impact, for any step."""
 
 import numpy as np
 import pytest
@@ -11,13 +11,13 @@ from tisim.steppers import ApproachTime, Collocation, IterationControl, StageCon
 
 RADIUS, MASS, DURATION = 1e-3, 1e-5, 1e-4
 ALPHA, FRICTION = 10.0, 0.1
-"""m, kg, s; heat of the reaction, J/m^2; coefficient of friction."""
+"""m, kg, s; heat of reaction, J/m^2; coefficient of friction."""
 ONCE = 2 * ALPHA * np.pi * RADIUS**2
-"""Heat of the reaction of one impact that bonds, J."""
+"""Heat of reaction of one bonding impact, J."""
 
 
 def row(number=2, steps=100, gap=-1e-9, speed=1.0, slip=0.0, pull=1e-6, hardness=1e-3, stepper=None):
-    """Grains in a row that attract each other by ``pull`` over distance, ``gap`` diameters apart."""
+    """Grains in a row with gaps of ``gap`` diameters, which attract each other by ``pull`` over distance."""
     x = (np.arange(number) - (number - 1) / 2) * 2 * RADIUS * (1 + gap)
     zero = np.zeros(number)
     return scene(
@@ -47,12 +47,12 @@ def run_rows(rows):
 
 
 def heat(result):
-    """Heat of the reaction, over that of one impact."""
+    """Heat of reaction, over the heat of one impact."""
     return result.state["reaction_heat"].sum() / ONCE
 
 
 def total(state, pull=1e-6):
-    """Energy of a pair, with that of the attraction, J."""
+    """Energy of a pair, including the attraction, J."""
     apart = np.linalg.norm(state["position"][1] - state["position"][0])
     return energy(state) + pull * np.log(apart / (2 * RADIUS))
 
@@ -69,7 +69,7 @@ def test_a_pressed_pair_collides_once_whatever_the_step():
         assert np.ptp(result.state["velocity"], axis=0).max() <= 1e-15
 
 
-def test_its_energy_is_kept_and_its_heat_that_of_the_impact():
+def test_a_pressed_pair_keeps_the_energy_of_its_impact():
     for result in run_rows([row(steps=steps) for steps in (100, 1000)]):
         kinetic = MASS
         assert total(result.state) == pytest.approx(total(result.start), abs=1e-7 * kinetic)
@@ -118,7 +118,7 @@ STEPPERS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stepper", STEPPERS)
-def test_so_it_is_with_other_steppers(stepper):
+def test_a_pressed_pair_collides_once_with_other_steppers(stepper):
     for result in run_rows([row(stepper=STEPPERS[stepper](DURATION / steps)) for steps in (100, 1000)]):
         assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
         assert result.work["contacts"] >= 90
@@ -127,7 +127,7 @@ def test_so_it_is_with_other_steppers(stepper):
 
 def cluster(steps, domain=None, low=-np.inf, side=np.inf):
     """A disturbed cube of 27 hard grains, nearly touching, that attract each other; in a box from ``low`` on
-    where there is one."""
+    if it is given."""
     disturbance = np.random.default_rng(0).normal(size=(27, 3))
     sites = np.stack(np.meshgrid(*3 * [np.arange(-1.0, 2.0)]), axis=-1).reshape(-1, 3)
     position = RADIUS * (2.2 * sites + 0.02 * disturbance)
@@ -144,7 +144,7 @@ def cluster(steps, domain=None, low=-np.inf, side=np.inf):
 
 
 @pytest.mark.long
-def test_a_cluster_does_not_sink_into_itself_and_the_less_so_the_shorter_the_steps():
+def test_overlaps_of_a_cluster_shrink_with_the_step():
     deepest = []
     for steps in (500, 2000):
         (result,) = simulate([cluster(steps)], capacity=32)
@@ -159,7 +159,7 @@ def test_a_cluster_does_not_sink_into_itself_and_the_less_so_the_shorter_the_ste
 
 
 @pytest.mark.slow
-def test_grains_put_apart_across_a_face_stay_in_the_box():
+def test_grains_separated_across_a_face_stay_in_the_box():
     side, low = 16 * RADIUS, np.array([0.0, -8 * RADIUS, -8 * RADIUS])
     box = Box(low=low, high=low + side)
     (result,) = simulate([cluster(500, box, low, side)], capacity=32)

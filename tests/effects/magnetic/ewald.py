@@ -46,7 +46,7 @@ class EwaldSum:
         return tuple(MU_0 / (4 * math.pi) * np.where(self.near, one, 0.0) for one in (b, c, d))
 
     def field(self):
-        """At each particle, T."""
+        """Field at each particle, T."""
         b, c, _ = self.factors_of_pairs()
         along = np.einsum("ijk,jk->ij", self.n, self.m)
         cube = self.distance**3
@@ -57,11 +57,11 @@ class EwaldSum:
         return near + waves + own - MU_0 / self.volume * self.factors * self.m.sum(axis=0)
 
     def energy(self):
-        """J."""
+        """Energy, J."""
         return -0.5 * (self.m * self.field()).sum()
 
     def force(self):
-        """On each particle, N."""
+        """Force on each particle, N."""
         _, c, d = self.factors_of_pairs()
         along = np.einsum("ijk,jk->ij", self.n, self.m)
         own = np.einsum("ijk,ik->ij", self.n, self.m)
@@ -74,7 +74,8 @@ class EwaldSum:
 
 
 def ball_of_images(side, position, moment, radius):
-    """Field (T) and force (N) of dipoles with all images of a cubic box in cells within a radius (sides)."""
+    """Field (T) and force (N) of dipoles with all images of a cubic box in cells within a radius
+    (in sides)."""
     field, force = np.zeros_like(position), np.zeros_like(position)
     most = int(radius)
     for shift in np.ndindex((2 * most + 1,) * 3):

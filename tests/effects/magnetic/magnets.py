@@ -1,4 +1,4 @@
-"""What tests of magnetic effects share: a field, moments and the field of dipoles, in NumPy."""
+"""Shared by tests of magnetic effects: a field, moments and the field of dipoles, in NumPy."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ K_B = 1.380649e-23
 
 
 class Quadrupole(Source):
-    """B = C + S (y, x, z^2), whose gradient is not symmetric once sheared by the scale of each component."""
+    """B = C + S (y, x, z^2). If the components of S differ, its gradient is not symmetric."""
 
     quantity = "magnetic_flux_density"
     constant: Vector = parameter("T", "constant")
@@ -31,21 +31,22 @@ class Quadrupole(Source):
 
 
 def flux_density(effects, r):
-    """B of a Quadrupole, first of the effects, and a uniform MagneticField, second; at r, (n, 3)."""
+    """B of a Quadrupole, the first of the effects, and of a uniform MagneticField, the second; at
+    r, (n, 3)."""
     field, uniform = effects[:2]
     b = np.array(field.constant) + np.array(uniform.constant)
     return b + np.array(field.scale) * np.stack([r[:, 1], r[:, 0], r[:, 2] ** 2], axis=1)
 
 
 def gradient(effects, r):
-    """[a, b] the derivative of component a of the same along axis b; (n, 3, 3)."""
+    """[a, b] the derivative of component a of that field along axis b; (n, 3, 3)."""
     a, zero = effects[0].scale, 0.0 * r[:, 0]
     rows = [[zero, a[0] + zero, zero], [a[1] + zero, zero, zero], [zero, zero, 2 * a[2] * r[:, 2]]]
     return np.array(rows).transpose(2, 0, 1)
 
 
 def dipole_field(r, side=None):
-    """[i, j] the matrix that gives the field (T) at i of a moment at j; of nearest images in a box."""
+    """[i, j] the matrix that gives the field (T) at i of a moment at j; for nearest images in a box."""
     d = r[None] - r[:, None]
     if side is not None:
         d -= side * np.round(d / side)

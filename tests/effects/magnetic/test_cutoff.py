@@ -1,4 +1,4 @@
-"""Cut-offs of what dipoles do to each other: plain and shifted, of forces, torques and mutual moments."""
+"""Cut-offs of dipole interactions, plain and shifted: forces, torques and mutual moments."""
 
 import numpy as np
 import pytest
@@ -22,24 +22,24 @@ from tisim.sources import MagneticField
 
 EWALD = {"cutoff": 3.0, "waves": (15, 15, 15)}
 NUMBERS = ({"cutoff": 6.0}, {"cutoff": 2.0, "gap": 2.0}, {"cutoff": 3.0, "gap": 1.0})
-"""Of cut-offs: over the mean radius, by a gap between surfaces, and both."""
+"""Cut-offs: in mean radii, as a gap between surfaces, and both."""
 
 
 def parts(law, r, radius):
-    """[i, j] the part f of what dipoles do to each other."""
+    """Matrix [i, j] of the factor f of the dipole interaction."""
     distance = np.linalg.norm(r[None] - r[:, None], axis=2)
     x = distance / (law.cutoff * (radius[:, None] + radius) / 2 + law.gap)
     return (x <= 1) * (1 - 4 * x**3 + 3 * x**4 if law.shifted else 1.0)
 
 
 def energy(law, r, m, radius):
-    """Of dipoles, each pair once, J."""
+    """Energy of the dipoles, each pair once, J."""
     field = np.einsum("ij,ijab,jb->ia", parts(law, r, radius), dipole_field(r), m)
     return -0.5 * (m * field).sum()
 
 
 def magnets(rng, law, n=9, size=2.0):
-    """Permanent magnets at random, some beyond each other's cut-off."""
+    """Random permanent magnets, some of them beyond each other's cut-off."""
     return scene(
         size * rng.normal(size=(n, 3)),
         np.zeros((n, 3)),
@@ -51,7 +51,7 @@ def magnets(rng, law, n=9, size=2.0):
 
 
 def steps(n, h):
-    """Each of n vectors changed along each axis, by h and by -h."""
+    """Displacements of one of n vectors along one axis by h."""
     for i, a in np.ndindex(n, 3):
         change = np.zeros((n, 3))
         change[i, a] = h
@@ -61,8 +61,8 @@ def steps(n, h):
 @pytest.mark.long
 @pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_forces_and_torques_are_minus_the_gradient_of_the_energy(rng, shifted):
-    """By central differences of positions and of turns; of a plain cut-off within it and beyond it. All of
-    them balance."""
+    """By central differences of positions and of rotations; for a plain cut-off, within it and beyond it.
+    Forces and torques sum to zero."""
     scenes = [magnets(rng, TruncatedDipoleDipole(**NUMBERS[k % 3], shifted=shifted)) for k in range(WORLDS)]
     for one, state in zip(scenes, loads(scenes), strict=True):
         law, h = one.effects[1], 1e-5
@@ -103,7 +103,7 @@ def total_energy(law, state):
 
 
 def at_the_cutoff(law, state):
-    """The energy that dipoles have where two, which now fly freely, were just within the cut-off; J."""
+    """The energy of the dipoles when the pair, which now moves freely, was just within the cut-off; J."""
     apart, speed = (state[name][1] - state[name][0] for name in ("position", "velocity"))
     roots = np.roots([speed @ speed, -2 * apart @ speed, apart @ apart - law.cutoff**2])
     ago = roots.min() * (1 + 1e-9)
@@ -114,7 +114,8 @@ def at_the_cutoff(law, state):
 @pytest.mark.slow
 @pytest.mark.parametrize("shifted", [True, False])
 def test_energy_is_conserved_through_a_shifted_cutoff_and_jumps_at_a_plain_one(shifted):
-    """A shifted one keeps it to the order of Verlet; a plain one loses what the pair has at the cut-off."""
+    """With a shifted cut-off energy is conserved to the order of Verlet; a plain one removes the pair energy
+    at the cut-off."""
     law, gains = TruncatedDipoleDipole(cutoff=3.6, shifted=shifted), []
     for dt in (1e-3, 5e-4):
         (result,) = simulate([parting(law, dt)], capacity=4)
@@ -127,12 +128,12 @@ def test_energy_is_conserved_through_a_shifted_cutoff_and_jumps_at_a_plain_one(s
     else:
         left = at_the_cutoff(law, end)
         assert abs(left) > 1e-3
-        # To what a step is long: the force ends with the step after it.
+        # The agreement is limited by the step length: the force ends with the step after the crossing.
         assert gains[1] == pytest.approx(-left, rel=5e-3)
 
 
 def induced(rng, law, dipoles, n=8, size=3.0, scale=0.3):
-    """Soft spheres at random, none within another, in an uneven field."""
+    """Random soft spheres, none within another, in a non-uniform field."""
     place = [size * rng.normal(size=3)]
     while len(place) < n:
         new = size * rng.normal(size=3)
@@ -162,8 +163,8 @@ def solved(one, r, radius):
 
 @pytest.mark.long
 @pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_mutual_moments_up_to_a_cutoff_are_those_of_a_linear_solve(rng, shifted):
-    """And with the same cut-off in the forces, these are the gradient of the energy -1/2 sum m.B_0."""
+def test_mutual_moments_with_a_cutoff_equal_a_linear_solve(rng, shifted):
+    """If the forces have the same cut-off, they are the gradient of the energy -1/2 sum m.B_0."""
     scenes = []
     for k in range(WORLDS):
         cut = {**NUMBERS[k % 3], "shifted": shifted}
@@ -199,7 +200,7 @@ def test_mutual_moments_of_many_are_found_with_the_pair_list(rng):
     close(state["moment"], solved(setup, state["position"], state["radius"])[0], 1e-10)
 
 
-def test_where_there_is_no_cutoff_all_pairs_count():
+def test_without_a_cutoff_all_pairs_count():
     assert not MutualInducedMoment(susceptibility=1.0).short_ranged
     assert MutualInducedMoment(susceptibility=1.0, cutoff=2.5).short_ranged
     law = MutualInducedMoment(susceptibility=1.0, cutoff=6.0)
@@ -240,8 +241,8 @@ DISAGREE = {
 
 
 @pytest.mark.parametrize("message", DISAGREE)
-def test_moments_follow_the_fields_of_the_same_sum_as_forces(message):
-    """In either order; with other forces, and moments that are not mutual, nothing need agree."""
+def test_moments_and_forces_must_use_the_same_sum(message):
+    """In either order. Other forces, and moments that are not mutual, may have different settings."""
     box = Box(low=(0, 0, 0), high=(8.0,) * 3)
     for laws in (DISAGREE[message], DISAGREE[message][::-1]):
         with pytest.raises(InputError) as fault:
@@ -262,7 +263,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         MutualInducedMoment(susceptibility=1.0, **WRONG[message])
     assert str(fault.value) == message

@@ -1,4 +1,5 @@
-"""Forces between dipoles against NumPy: twins, the gradient of their energy, closed forms of induced ones."""
+"""Forces between dipoles against NumPy references, the gradient of their energy, and closed forms for induced
+ones."""
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ SIDE = 3.0
 
 
 def magnets(rng, law, n=12, spread=SIDE, sizes=(0.05, 0.2)):
-    """Moments in any direction, in a periodic box."""
+    """Moments in random directions, in a periodic box."""
     return scene(
         rng.uniform(0, spread, (n, 3)),
         np.zeros((n, 3)),
@@ -42,7 +43,7 @@ def separations(r):
 
 
 def pair_forces(state):
-    """[i, j] the force on i by j: L21 (4.6), written with its sign."""
+    """[i, j] the force of j on i: L21 (4.6), with its sign."""
     n, d = separations(state["position"])
     m = state["moment"]
     i, j = np.einsum("ic,ijc->ij", m, n), np.einsum("jc,ijc->ij", m, n)
@@ -56,7 +57,7 @@ def energy(r, m):
     return -0.5 * (m * field).sum()
 
 
-def test_forces_are_those_of_the_twin_and_add_up_to_nothing(rng):
+def test_forces_equal_the_twin_and_sum_to_zero(rng):
     """Nearest images in a periodic box."""
     scenes = [magnets(rng, DipoleDipole()) for _ in range(WORLDS)]
     states = loads(scenes)
@@ -79,8 +80,8 @@ def test_the_force_is_the_gradient_of_the_energy(rng):
     close(state["force"], expected, 1e-8)
 
 
-def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
-    """sum r x F + sum m x B = 0, with all of them in less than half the box, so that no image acts."""
+def test_torques_on_moments_balance_torques_of_forces(rng):
+    """sum r x F + sum m x B = 0, with all particles in less than half of the box, so that no image acts."""
     (state,) = loads([magnets(rng, DipoleDipole(), spread=0.49 * SIDE)])
     r, m = state["position"], state["moment"]
     turning = np.cross(m, np.einsum("ijab,jb->ia", dipole_field(r), m))
@@ -90,7 +91,7 @@ def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
 
 @pytest.mark.slow
 def test_near_pairs_only(rng):
-    """Up to so many radii; also over the pair list, where sizes are unlike."""
+    """Up to a number of radii; also over the pair list, with unlike sizes."""
     few = [magnets(rng, TruncatedDipoleDipole(cutoff=float(rng.uniform(4, 7)))) for _ in range(WORLDS - 1)]
     scenes = [*few, magnets(rng, TruncatedDipoleDipole(cutoff=4.0), n=400, sizes=(0.02, 0.1))]
     for one, state in zip(scenes, loads(scenes, capacity=400), strict=True):
@@ -102,7 +103,7 @@ def test_near_pairs_only(rng):
 
 @pytest.mark.long
 def test_a_box_in_which_a_law_reaches_beyond_half_a_side_is_refused(rng):
-    """There the second image of a particle would act as well."""
+    """Otherwise the second image of a particle would act too."""
     wide, narrow = (magnets(rng, TruncatedDipoleDipole(cutoff=c), sizes=(0.2, 0.2)) for c in (7.4, 7.6))
     loads([wide], capacity=400)
     told = "box must be at least 3.04 m wide where .* the range over which truncated_dipole_dipole acts"
@@ -111,7 +112,7 @@ def test_a_box_in_which_a_law_reaches_beyond_half_a_side_is_refused(rng):
 
 
 def test_head_to_tail_attracts_and_side_by_side_repels():
-    """F = 6 mu_0 m^2 / (4 pi d^4) together, half of it apart; B16 6.2.4."""
+    """F = 6 mu_0 m^2 / (4 pi d^4) in attraction, half of it in repulsion; B16 6.2.4."""
     unit = 3 * MU_0 / (4 * np.pi) * 4.0 / 0.5**4
     for moment, expected in (((2, 0, 0), 2 * unit), ((0, 2, 0), -unit)):
         setup = scene(
@@ -127,7 +128,7 @@ def test_head_to_tail_attracts_and_side_by_side_repels():
 
 
 def induced(place, b, law=None, radius=1.0, domain=None, **more):
-    """Spheres in a uniform field, or an uneven one; with all forces."""
+    """Spheres in a uniform or a non-uniform field, with all forces."""
     field = Quadrupole(constant=(0, 0, 0), scale=more.pop("scale", (0, 0, 0)))
     effects = (
         field,
@@ -152,8 +153,9 @@ def solved(one, r, radius):
 
 
 def test_two_touching_spheres():
-    """mu_r -> infinity: attraction in line is 16/9 of that of fixed moments, repulsion side by side 64/81
-    (L21 section 4.2); in general moments are 1/(1 - 2a) and 1/(1 + a) times as large as alone."""
+    """For mu_r -> infinity the attraction in line is 16/9 of the attraction of fixed moments, the repulsion
+    side by side is 64/81 of it (L21 section 4.2). In general the moments are 1/(1 - 2a) and 1/(1 + a) times
+    those of isolated spheres."""
     pair = np.array([[0, 0, 0], [0, 0, 2.0]])
     alone = 4 * np.pi / MU_0
     unit = 3 * MU_0 / (4 * np.pi) * alone**2 / 2**4
@@ -175,11 +177,11 @@ def test_two_touching_spheres():
         np.testing.assert_allclose(state["moment"], [expected, expected], rtol=1e-11, atol=1e-14)
 
 
-def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_their_energy(rng):
-    """A chain of three, bent, and clouds of five; in an uneven field, of which no force is left out.
+def test_induced_moments_and_forces_follow_from_their_energy(rng):
+    """A bent chain of three, and clouds of five; in a non-uniform field, with all its forces.
 
-    The energy of linear spheres is -1/2 sum m.B_0. Its gradient is the whole force: of the field on the
-    moments and of the moments on each other, though none of the two is it alone.
+    The energy of linear spheres is -1/2 sum m.B_0. Its gradient is the whole force: the force of the field on
+    the moments plus the forces of the moments on each other. Neither of the two is a gradient of it alone.
     """
     chain = np.array([[0, 0, 0], [1.9, 0.7, 0], [3.5, 1.9, 0.3]])
     places = [chain, *(3 * np.mgrid[:5, :1, :1].reshape(3, -1).T + rng.normal(size=(5, 3)) for _ in range(3))]
@@ -202,8 +204,8 @@ def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_
 
 @pytest.mark.long
 def test_langevin_moments_in_each_others_field(rng):
-    """Each has the moment that the field at its place gives it, that of the others included; where the field
-    is weak it is not that of the sources alone."""
+    """Each moment follows from the local field, which includes the field of the other moments. In weak fields
+    this differs clearly from the field of the sources alone."""
     unit = K_B * 300.0
     scenes = []
     for strength in (0.1, 1.0, 30.0):
@@ -223,8 +225,9 @@ def test_langevin_moments_in_each_others_field(rng):
     assert ratios[0] > 0.3 > 0.05 > ratios[2] > 0
 
 
-def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
-    """Coarsest first: each alone in the field of the sources, then one sweep a step; and cut-offs."""
+def test_mutual_laws_offer_approximations_to_a_cost_study():
+    """The coarsest approximation first: each moment in the field of the sources alone; then one sweep a step;
+    and cut-offs."""
     law = MutualLangevinMoment(temperature=300.0, sweeps=50)
     alone, once = law.approximations(1.0)
     assert alone == LangevinMoment(temperature=300.0)
@@ -238,9 +241,9 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
     nearer = TruncatedDipoleDipole(cutoff=2.0, gap=8e-6).approximations(1.0)
     assert [(one.cutoff, one.gap) for one in nearer] == [(2.0, 4e-6), (2.0, 5.6e-6)]
     assert [one.cutoff for one in TruncatedDipoleDipole().approximations(1.0)] == [16.0, 21.6]
-    # Rounded to contact, without a gap, it would be no law.
+    # Rounded to contact, without a gap, it would not be a valid law.
     assert TruncatedDipoleDipole(cutoff=2.004).approximations(1.0) == ()
-    # Rounded up it would be no nearer, and two that are rounded to one are one.
+    # Rounded up, the cut-off would be no shorter. Two that are rounded to one value are listed once.
     assert TruncatedDipoleDipole(cutoff=2.008).approximations(1.0) == ()
     small = TruncatedDipoleDipole(cutoff=2.008, gap=1e-9).approximations(1.0)
     assert [(one.cutoff, one.gap) for one in small] == [(2.0, 5e-10), (2.008, 7e-10)]
@@ -249,12 +252,12 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
     assert several.sweeps == 100
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     setup = scene([[0, 0, 0]], [[0, 0, 0]], (DipoleDipole(),))
     assert fields_beside_the_core(setup) == {"moment", "force"}
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         TruncatedDipoleDipole(cutoff=2)
     rule = "greater than 2, or 2 beside a gap"

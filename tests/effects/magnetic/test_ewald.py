@@ -1,5 +1,5 @@
-"""Ewald sums of dipoles: forces, torques and moments in periodic boxes, beside sums in NumPy and over images,
-and what is known of lattices."""
+"""Ewald sums of dipoles: forces, torques and moments in periodic boxes, against sums in NumPy and over
+images, and against known energies of lattices."""
 
 import math
 
@@ -32,7 +32,7 @@ def box(sides=SIDES, periodic=(True, True, True)):
 
 
 def magnets(rng, law, domain, n=16, radius=0.1, **more):
-    """Permanent magnets at random."""
+    """Random permanent magnets."""
     low, high = domain.bounds()
     return scene(
         rng.uniform(low, high, (n, 3)),
@@ -47,14 +47,14 @@ def magnets(rng, law, domain, n=16, radius=0.1, **more):
 
 
 def dipoles(rng, n=16):
-    """Places in a box of SIDES, and moments."""
+    """Positions in a box of SIDES, and moments."""
     low, high = box().bounds()
     return rng.uniform(low, high, (n, 3)), 1e3 * rng.normal(size=(n, 3))
 
 
 @pytest.mark.parametrize("periodic", [(True, True, True), (True, True, False)])
-def test_sums_do_not_depend_on_how_they_are_split_and_forces_are_gradients_of_the_energy(periodic, rng):
-    """In NumPy, by central differences of positions and moments; also of a box that is open along z."""
+def test_sums_are_independent_of_splitting_and_conservative(periodic, rng):
+    """In NumPy, by central differences of positions and moments; also for a box that is open along z."""
     (r, m), domain, h = dipoles(rng), box(periodic=periodic), 1e-5
 
     def law(accuracy, cutoff):
@@ -75,8 +75,8 @@ def test_sums_do_not_depend_on_how_they_are_split_and_forces_are_gradients_of_th
         assert (down - up) / (2e3 * h) == pytest.approx(exact.field()[i, a], rel=1e-6)
 
 
-def test_with_a_third_of_demagnetisation_they_are_sums_over_a_ball_of_images(rng):
-    """Whose error falls as the third power of its radius."""
+def test_factors_of_one_third_give_a_ball_of_images(rng):
+    """The error of that sum falls as the third power of the ball's radius."""
     r, m = dipoles(rng, 8)
     domain = box((4.0, 4.0, 4.0))
     law = EwaldDipoleDipole(**ewald_settings(domain, 8, 1e-10), demagnetising_factors=(1 / 3,) * 3)
@@ -87,7 +87,8 @@ def test_with_a_third_of_demagnetisation_they_are_sums_over_a_ball_of_images(rng
 
 
 def test_a_slab_is_a_layer_without_images_above_and_below(rng):
-    """Of few dipoles: by a sum over a disc of images, whose rest is that of a layer of dipoles beyond."""
+    """For few dipoles: by a sum over a disc of images. The rest is approximated by a continuous layer of
+    dipoles beyond the disc."""
     domain = box((4.0, 4.0, 3.0), periodic=(True, True, False))
     r, m = dipoles(rng, 6)
     r[:, 2] = rng.uniform(0.5, 3.5, 6)
@@ -103,7 +104,8 @@ def test_a_slab_is_a_layer_without_images_above_and_below(rng):
         along = np.einsum("ijk,jk->ij", d, m)
         field += MU_0 / (4 * math.pi) * np.einsum("ij,ijk->ik", 3 * along / distance**5, d)
         field -= MU_0 / (4 * math.pi) * distance**-3.0 @ m
-    # Beyond the disc: of M / area in a plane, 1/2 mu_0 M / (2 R) along it, -mu_0 M / (2 R) across it.
+    # Field of the layer beyond radius R, with moment M / area: 1/2 mu_0 M / (2 R) in its plane, -mu_0 M / (2
+    # R) across.
     beyond = MU_0 / (4 * 16.0 * 4.0 * most) * np.array([1.0, 1.0, -2.0]) * m.sum(axis=0)
     close(exact.field(), field + beyond, 5e-6)
 
@@ -118,7 +120,7 @@ def test_a_slab_is_a_layer_without_images_above_and_below(rng):
     ],
 )
 def test_forces_and_torques_are_those_in_numpy(periodic, rng):
-    """In boxes, and with settings, of their own in each world."""
+    """With boxes and settings that differ between worlds."""
     scenes = []
     for k in range(4):
         law = EwaldDipoleDipole(
@@ -137,8 +139,9 @@ def test_forces_and_torques_are_those_in_numpy(periodic, rng):
 
 
 @pytest.mark.slow
-def test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name(rng):
-    """There the gap to the next layer would be less than is made sure of. Along the layer it may go on."""
+def test_a_magnet_that_leaves_its_layer_stops_the_world(rng):
+    """There the gap to the next layer would become smaller than guaranteed. Along the layer a magnet may move
+    on."""
     law = EwaldDipoleDipole(cutoff=1.6, accuracy=1e-2, waves=(*WAVES[:2], 24), slab_factor=2.0)
     domain = box(periodic=(True, True, False))
     scenes = []
@@ -155,14 +158,14 @@ def test_a_magnet_that_leaves_a_layer_across_it_stops_the_world_by_name(rng):
 
 
 def cubes(n, side):
-    """Places of a simple cubic lattice, and the moments of parallel dipoles along z."""
+    """Positions on a simple cubic lattice, and the moments of parallel dipoles along z."""
     return side / n * (np.argwhere(np.ones((n, n, n))) + 0.25), np.tile([0, 0, 1.0], (n**3, 1))
 
 
-def test_lattices_have_the_energies_that_are_known():
-    """Parallel dipoles on a simple cubic lattice feel mu_0 M/3. In its ground state rows along z point up and
-    down by turns: -2.676 mu_0 m^2 / (4 pi a^3) of each (J. M. Luttinger, L. Tisza, Phys. Rev. 70 (1946)
-    954)."""
+def test_lattices_have_their_known_energies():
+    """Parallel dipoles on a simple cubic lattice have the field mu_0 M/3. In its ground state rows along z
+    alternate up and down, with -2.676 mu_0 m^2 / (4 pi a^3) per dipole (J. M. Luttinger, L. Tisza, Phys. Rev.
+    70 (1946) 954)."""
     r, m = cubes(4, 4.0)
     domain = Box(low=(0, 0, 0), high=(4.0, 4.0, 4.0))
     law = EwaldDipoleDipole(**ewald_settings(domain, 64, 1e-11, cutoff=1.95))
@@ -174,8 +177,8 @@ def test_lattices_have_the_energies_that_are_known():
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6])
-def test_the_error_of_forces_is_that_which_is_asked_for(accuracy, rng):
-    """Of moments of one magnitude at random; the estimate is itself good to some 15 %."""
+def test_the_error_of_forces_is_as_requested(accuracy, rng):
+    """Random moments of one magnitude; the estimate of the error is accurate to about 15 %."""
     domain, n = box((6.0, 6.0, 6.0)), 200
     low, high = domain.bounds()
     r, m = rng.uniform(low, high, (n, 3)), rng.normal(size=(n, 3))
@@ -219,9 +222,9 @@ def solved(one, r, radius):
 
 
 @pytest.mark.slow
-def test_mutual_moments_are_those_of_a_linear_solve_and_of_clausius_and_mossotti(rng):
-    """At random, with forces that are gradients of the energy -1/2 sum m.B_0 to the accuracy of the sum; and
-    on lattices, within the sample and with its poles."""
+def test_mutual_moments_follow_clausius_and_mossotti(rng):
+    """At random positions, with forces that are gradients of the energy -1/2 sum m.B_0 to the accuracy of the
+    sum; and on lattices, within the sample and with its poles."""
     low, high = box().bounds()
     scenes = []
     for _ in range(2):
@@ -258,8 +261,9 @@ def test_mutual_moments_are_those_of_a_linear_solve_and_of_clausius_and_mossotti
         close(state["moment"], np.tile([0, 0, gain * 0.3 / (1 - part)], (8, 1)), 3e-4)
 
 
-def test_settings_are_those_that_cost_least_and_suit_the_box():
-    """The cut-off goes as N^(-1/6) in one box, and wave vectors along an axis as its inverse."""
+def test_settings_minimise_cost_and_suit_the_box():
+    """The cut-off scales as N^(-1/6) in one box, and the number of wave vectors along an axis as
+    its inverse."""
     domain = box((60.0, 60.0, 60.0))
     few, many = (ewald_settings(domain, n, 1e-4) for n in (8000, 512000))
     assert few["cutoff"] / many["cutoff"] == pytest.approx(2.0)
@@ -298,7 +302,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message, rng):
+def test_invalid_values_are_refused(message, rng):
     options, shape = WRONG[message]
     with pytest.raises(InputError) as fault:
         magnets(rng, EwaldDipoleDipole(**options), box(**shape))

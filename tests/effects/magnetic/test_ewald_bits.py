@@ -1,4 +1,4 @@
-"""Ewald sums have the same bits on all schedules and threads, and in any company."""
+"""Ewald sums have the same bits on all schedules and thread counts, alone and in a batch."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ SEED = 7
 
 
 def grains(n, seed=SEED):
-    """Soft spheres at random, which may overlap, in a field."""
+    """Random soft spheres, which may overlap, in a field."""
     rng = np.random.Generator(np.random.Philox(seed))
     low, high = box().bounds()
     return induced(rng.uniform(low, high, (n, 3)), 0.1, box(), scale=(0.1, 0.1, 0.1))
 
 
 def moments_and_forces():
-    """Those of many at the start, as a list."""
+    """Moments and forces of many particles at the start, as a list."""
     simulation = compiled(grains(150), capacity=150)
     simulation.load([grains(150)])
     simulation.first.advance(1)
@@ -28,8 +28,8 @@ def moments_and_forces():
 
 
 @pytest.mark.slow
-def test_the_same_bits_on_all_schedules_and_in_any_company():
-    """A world by one thread, by a team, by launches; alone, in a batch, and where there is room for more."""
+def test_the_same_bits_on_all_schedules_and_in_batches():
+    """A world by one thread, by a team, by launches; alone, in a batch, and with a larger capacity."""
     scenes = [grains(n) for n in (150, 40, 3, 77)]
     together = simulate(scenes, worlds=4, capacity=150, schedule="world")
     for schedule, capacity in (("world", 200), ("team", 150), ("particle", 150)):
@@ -41,7 +41,7 @@ def test_the_same_bits_on_all_schedules_and_in_any_company():
 
 @pytest.mark.slow
 def test_other_threads_and_precision(single, in_one_thread):
-    """One thread: the same bits. Single precision: its own rounding only."""
+    """On one thread: the same bits. In single precision: rounding of that precision only."""
     here = moments_and_forces()
     assert in_one_thread("effects.magnetic.test_ewald_bits", "moments_and_forces") == here
     there = single("effects.magnetic.test_ewald_bits", "moments_and_forces")

@@ -1,4 +1,4 @@
-"""Moments that saturate in the field of all images: those of Langevin, and of Froehlich and Kennelly."""
+"""Saturating moments in the field of all images: Langevin, and Froehlich and Kennelly."""
 
 import math
 
@@ -17,9 +17,9 @@ from tisim.sources import MagneticField
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["langevin", "froehlich"])
-def test_moments_that_saturate_are_those_of_the_field_of_all_images(kind, rng):
-    """Each is that which the law makes of the field where it is: of the sources, and of the Ewald sum of what
-    the others have come to, which matters, and of which the samples have poles."""
+def test_saturating_moments_follow_the_field_of_all_images(kind, rng):
+    """Each moment follows from the law and the local field, which is the field of the sources plus the Ewald
+    sum of the other moments. This sum is not negligible, and the samples have poles."""
     place = 1.1 * np.argwhere(np.ones((3, 4, 4)))[:40] + rng.uniform(-0.05, 0.05, (40, 3)) + (-0.8, 0.3, 0.7)
     settings = {"cutoff": 1.45, "waves": WAVES, "accuracy": 1e-3, "demagnetising_factors": (0.1, 0.2, 0.3)}
     field, scenes = np.array([0.1, 0.0, 0.3]), []
@@ -47,7 +47,7 @@ def test_moments_that_saturate_are_those_of_the_field_of_all_images(kind, rng):
         else:
             volume = math.pi / 6
             expected = volume * np.array([magnetisation(law.susceptibility, law.saturation, a) for a in size])
-            # Far from what weak fields make of them.
+            # Far from the linear response in weak fields.
             assert expected.max() < 0.9 * volume * 3 / MU_0 * 50 / 53 * size.max()
         close(m, (expected / size)[:, None] * b, 1e-10)
         assert np.linalg.norm(others, axis=1).max() > 0.02 * strength * np.linalg.norm(field)

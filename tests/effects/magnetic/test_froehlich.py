@@ -1,4 +1,4 @@
-"""Magnetisation that saturates as Froehlich and Kennelly have it, alone and mutual, against 60 digits."""
+"""Saturating magnetisation by Froehlich and Kennelly, alone and mutual, against 60 digits."""
 
 from decimal import Decimal, getcontext
 
@@ -26,7 +26,7 @@ NUMBERS = {"susceptibility": 999.0, "saturation": 1.671e6}
 
 
 def magnetisation(chi, saturation, flux):
-    """M of a sphere (A/m): the smaller root of M (M_s + chi H) = chi H M_s with H = B/mu_0 - M/3, by its
+    """M of a sphere (A/m): the smaller root of M (M_s + chi H) = chi H M_s with H = B/mu_0 - M/3, by the
     textbook formula, with 60 digits."""
     getcontext().prec = 60
     chi, m_s, h = Decimal(float(chi)), Decimal(float(saturation)), Decimal(float(flux)) / Decimal(MU_0)
@@ -37,7 +37,7 @@ def magnetisation(chi, saturation, flux):
 CHI = (1e-3, 0.5, 3.0, 50.0, 1e3, 1e6, 1e12, 1e-9)
 
 
-def test_moments_are_those_of_the_root_and_the_field_pulls_them(rng):
+def test_saturating_moments_and_their_forces(rng):
     scenes = [made_of(rng, FroehlichMoment(susceptibility=chi, saturation=1e6)) for chi in CHI]
     for one, state in zip(scenes, loads(scenes), strict=True):
         b, law = flux_density(one.effects, state["position"]), one.effects[2]
@@ -64,8 +64,8 @@ def at(fields, law):
     ]
 
 
-def test_weak_fields_are_those_of_a_linear_sphere_and_strong_ones_saturate():
-    """chi H / M_s from 1e-12 to 1e6 and beyond; chi of 1e3, and nearly without end."""
+def test_weak_fields_are_linear_and_strong_ones_saturate():
+    """chi H / M_s from 1e-12 to 1e6 and beyond; chi of 1e3, and almost infinite."""
     for chi in (999.0, 1e9):
         law = FroehlichMoment(susceptibility=chi, saturation=NUMBERS["saturation"])
         gain, unit = 3 * chi / (3 + chi), MU_0 * NUMBERS["saturation"]
@@ -87,8 +87,9 @@ def mutual(rng, b, law):
 
 
 @pytest.mark.long
-def test_saturation_gives_moments_an_end_where_linear_ones_have_none():
-    """Two that overlap until 2 a = 2 exceeds 1, in a weak field: each saturates the other."""
+def test_saturating_moments_are_finite_if_linear_ones_diverge():
+    """Two spheres in a weak field overlap until 2 a = 2 exceeds 1, so linear moments diverge: here each
+    saturates the other."""
     law = MutualFroehlichMoment(**NUMBERS, tolerance=1e-14, sweeps=1000)
     setup = mutual(np.random.default_rng(0), (0, 0, 1e-6), law)
     start = setup.particles.model_copy(
@@ -102,8 +103,8 @@ def test_saturation_gives_moments_an_end_where_linear_ones_have_none():
     assert m.min() > 0.9 * 4 / 3 * np.pi * NUMBERS["saturation"]
 
 
-def test_mutual_moments_are_those_of_the_field_where_each_is(rng):
-    """Against a root found by SciPy; from weak fields, where they are linear, to saturation."""
+def test_mutual_moments_follow_the_local_field(rng):
+    """Against a root found by SciPy; from weak fields, in which moments are linear, to saturation."""
     fields = np.geomspace(1e-3, 50.0, WORLDS)
     law = MutualFroehlichMoment(**NUMBERS, tolerance=1e-14, sweeps=1000)
     scenes = [mutual(rng, b * np.array([0.6, 0.0, 0.8]), law) for b in fields]
@@ -127,7 +128,7 @@ def test_mutual_moments_are_those_of_the_field_where_each_is(rng):
 
 
 def test_the_named_materials_make_moments():
-    """Iron as Ginder, Davis and Elie take it: mu_0 M_s = 2.1 T, mu_r = 1000; magnetite of 480 kA/m."""
+    """Iron as in Ginder, Davis and Elie: mu_0 M_s = 2.1 T, mu_r = 1000; magnetite with 480 kA/m."""
     law = FroehlichMoment(**CARBONYL_IRON.parameters())
     assert law.susceptibility == 999.0
     assert MU_0 * law.saturation == pytest.approx(2.1, rel=1e-9)

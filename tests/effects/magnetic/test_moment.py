@@ -1,4 +1,4 @@
-"""Magnetic moments along the field, and the pull of a field on them, against NumPy and closed forms."""
+"""Magnetic moments along the field, and the force of a field on them, against NumPy and closed forms."""
 
 from decimal import Decimal, getcontext
 
@@ -33,7 +33,7 @@ def made_of(rng, law, **quantities):
 
 
 def check(scenes, size):
-    """Moments of ``size`` along B, and the force of the gradient on them."""
+    """Moments of ``size`` along B, and the force of the field gradient on them."""
     for one, state in zip(scenes, loads(scenes), strict=True):
         b = flux_density(one.effects, state["position"])
         strength = np.linalg.norm(b, axis=1)
@@ -43,7 +43,7 @@ def check(scenes, size):
 
 
 def test_langevin_moments_of_many_domains(rng):
-    """x from 1e-2 to 1e2, for each particle its own domains."""
+    """x from 1e-2 to 1e2; each particle has its own domains."""
     scenes = []
     for _ in range(WORLDS):
         law = LangevinMoment(temperature=float(rng.uniform(100, 500)))
@@ -57,7 +57,7 @@ def test_langevin_moments_of_many_domains(rng):
     check(scenes, size)
 
 
-def test_induced_moments_are_those_of_magnetised_spheres(rng):
+def test_induced_moments_of_magnetised_spheres(rng):
     """V M with M = chi H and H = H_0 - M/3 inside; from a superconductor to iron."""
     scenes = [
         made_of(rng, InducedMoment(susceptibility=chi)) for chi in (-1, -1e-5, 0, 1e-3, 0.5, 3, 1e3, 1e6)
@@ -86,8 +86,9 @@ STEPPERS = [
 
 @pytest.mark.parametrize("stepper", STEPPERS)
 def test_every_stepper_solves_moments_before_forces(stepper):
-    """In B = (y, x, 0), T, a moment of k B is pulled by k r in the plane: r = r_0 cosh wt + v_0/w sinh wt,
-    w^2 = k/m. At the end the moment is that of the place; with Boris' stepper, of half a step before."""
+    """In B = (y, x, 0), T, the force on a moment k B is k r in the plane: r = r_0 cosh wt + v_0/w sinh wt,
+    w^2 = k/m. The final moment belongs to the final position; with Boris' stepper, to the position half a
+    step before."""
     k = 4 * np.pi / MU_0 * 0.4 * 1e-7
     effects = (
         Quadrupole(constant=(0, 0, 0), scale=(1, 1, 0)),
@@ -105,7 +106,7 @@ def test_every_stepper_solves_moments_before_forces(stepper):
     np.testing.assert_allclose(result.state["moment"], k * last[:, [1, 0, 2]], rtol=0, atol=1e-5 * k)
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     field = MagneticField(constant=(0, 0, 1))
     fixed = {"moment", "saturation_moment"}
     for law, more in (
@@ -131,7 +132,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message

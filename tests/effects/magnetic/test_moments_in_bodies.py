@@ -1,4 +1,4 @@
-"""Permanent moments are fixed in the body that they are part of: a clump, or a group that is moved."""
+"""Permanent moments are fixed in their body: a clump, or a group with prescribed motion."""
 
 from itertools import pairwise
 
@@ -26,15 +26,15 @@ CENTRES = np.array([(0, 0, 0), (1.4e-3, 0, 0), (0.3e-3, 1.2e-3, 0)])
 """m."""
 BODY = Clump(centres=CENTRES, radii=[1e-3, 0.8e-3, 0.6e-3], density=4000.0)
 MOMENT = 1e-4 * np.array([1, 0.3, -0.2])
-"""A m^2; of each of its three spheres."""
+"""A m^2, for each of the three spheres of the clump."""
 FIELD = np.array([0, 0.05, 0.1])
 """T."""
 GROUP_RATE = np.array([3.0, -20.0, 11.0])
-"""rad/s, of a magnet that is moved."""
+"""rad/s, of the magnet with prescribed motion."""
 
 
 def magnets(field, spin, dt, duration):
-    """A clump of three magnets, and one that goes round, far away."""
+    """A clump of three magnets, and a distant one on a circle."""
     far = Particles(position=[(5.0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, density=4000.0,
                     quantities={"group": [1], "moment": [MOMENT]})  # fmt: skip
     return Scene(
@@ -63,13 +63,14 @@ def ended(scenes):
 
 
 def in_body(state):
-    """Moments of the clump as the body has them."""
+    """Moments of the clump in the body frame."""
     turn = Turn.from_quat(np.roll(state["clump_orientation"][0], -1))
     return turn.inv().apply(state["moment"][:3])
 
 
 def energy(state):
-    """Of the motion of the clump, of its magnets in the field, and in those of each other, J."""
+    """Energy of the motion of the clump, of its magnets in the field, and of the magnets in each other's
+    field, J."""
     turn = Turn.from_quat(np.roll(state["clump_orientation"][0], -1))
     momentum = state["clump_angular_momentum"][0]
     spin = turn.apply(turn.inv().apply(momentum) / state["clump_inertia"][0])
@@ -80,9 +81,10 @@ def energy(state):
     return moving - (m @ FIELD).sum() - (m * others).sum() / 2
 
 
-def test_a_moment_is_fixed_in_a_body_that_nothing_turns():
-    """It tumbles, and what its magnets do to each other adds up to nothing: for 100 turns, in steps of up to
-    an eighth of a radian, in the body to rounding; one that is moved turns with its group."""
+def test_a_moment_is_fixed_in_a_torque_free_body():
+    """The clump tumbles, and the forces of its magnets on each other sum to zero: for 100 turns, in steps of
+    up to an eighth of a radian, the moment is constant in the body frame to rounding. The moment of a driven
+    magnet rotates with its group."""
     spin = np.array([50.0, -30.0, 20.0])
     turn = 2 * np.pi / np.linalg.norm(spin)
     for steps, result in zip((50, 200), ended([magnets((0, 0, 0), spin, turn / n, 100 * turn) for n in
@@ -96,7 +98,7 @@ def test_a_moment_is_fixed_in_a_body_that_nothing_turns():
 
 
 def test_a_clump_of_magnets_that_swings_keeps_its_energy_to_second_order():
-    """Motion, field and each other: the error is bounded, and goes as the square of the step."""
+    """Kinetic, field and mutual energy: the error is bounded, and proportional to the square of the step."""
     spin, period = np.array([5.0, -3.0, 2.0]), 3.9e-3
     strength = 3 * np.linalg.norm(MOMENT) * np.linalg.norm(FIELD)
     divisions, errors = (100, 200, 400), []
@@ -108,7 +110,7 @@ def test_a_clump_of_magnets_that_swings_keeps_its_energy_to_second_order():
 
 
 def test_a_clump_of_magnets_swings_to_second_order():
-    """Places of moments after some swings, from one step to half of it and a quarter."""
+    """Positions of moments after some swings, with one step, half of it and a quarter."""
     spin, period = np.array([5.0, -3.0, 2.0]), 3.9e-3
     made = [magnets(FIELD, spin, period / n, 2 * period) for n in (100, 200, 400, 800)]
     ends = [by_id(one)["moment"][:3] for one in ended(made)]

@@ -1,4 +1,4 @@
-"""Permanent magnets, which turn: torques against NumPy, closed forms of needles, conserved quantities."""
+"""Permanent magnets, which rotate: torques against NumPy, closed forms of needles, conserved quantities."""
 
 import numpy as np
 import pytest
@@ -32,12 +32,13 @@ def magnets(place, moment, effects, **more):
 
 
 def felt(*field):
-    """All that permanent moments feel, in some field."""
+    """Effects for all forces and torques on permanent moments, in some field."""
     return (*field, Magnetophoresis(), DipoleDipole())
 
 
-def test_torques_are_those_of_the_fields_and_balance(rng):
-    """T = m x B of the sources and of all others (L21 4.9); of the dipoles alone, sum r x F + T = 0."""
+def test_torques_follow_the_fields_and_balance(rng):
+    """T = m x B, where B is the field of the sources and of all other moments (L21 4.9). For dipoles without
+    a source, sum r x F + T = 0."""
     scenes = []
     for k in range(WORLDS):
         strength = 1e-4 * (k % 2)
@@ -56,21 +57,21 @@ def test_torques_are_those_of_the_fields_and_balance(rng):
 
 
 def needle(angle, moment=2.0, flux=3.0, **more):
-    """A magnet in a uniform field along z, from rest, turned by an angle (rad)."""
+    """A magnet in a uniform field along z, at rest, tilted by an angle (rad)."""
     start = moment * np.array([[np.sin(angle), 0, np.cos(angle)]])
     return magnets([[0, 0, 0]], start, felt(MagneticField(constant=(0, 0, flux))), **more)
 
 
 def test_a_compass_needle_swings_as_a_pendulum():
-    """I theta'' = -m B sin theta, I = 2/5 m R^2: for small angles with the frequency sqrt(m B / I), for any
-    with the period 4 K(sin^2 theta_0/2) / that."""
+    """I theta'' = -m B sin theta, I = 2/5 m R^2. For small angles the frequency is sqrt(m B / I); for any
+    angle the period is 4 K(sin^2 theta_0/2) over that frequency."""
     radius, mass = 0.7, 5.0
     frequency = np.sqrt(2.0 * 3.0 / (0.4 * mass * radius**2))
     for angle in (1e-4, 1.0, 3.0):
         period = 4 * ellipk(np.sin(angle / 2) ** 2) / frequency
         setup = needle(angle, radius=radius, mass=mass, stepper=fixed(period / 4096), duration=period / 4)
         state = simulate([setup], capacity=4)[0].state
-        # A quarter of a period later it is at 0, as fast as its energy says.
+        # After a quarter of a period the angle is 0, and energy conservation gives the angular speed.
         swung = np.arctan2(state["moment"][0, 0], state["moment"][0, 2])
         assert abs(swung) < 3e-6 * angle
         assert state["spin"][0, 1] == pytest.approx(-2 * frequency * np.sin(angle / 2), rel=3e-6)
@@ -78,8 +79,8 @@ def test_a_compass_needle_swings_as_a_pendulum():
 
 
 def test_a_moment_turns_with_its_particle_and_keeps_its_magnitude(rng):
-    """Without a field: by spin times time about the spin, in however large steps; its length stays, but for
-    what 20 000 of them round."""
+    """Without a field a moment rotates about the spin by the spin times the time, in steps of any size. Its
+    length stays constant to the rounding of 20 000 rotations."""
     moment, spin = rng.normal(size=(6, 3)), 3e3 * rng.normal(size=(6, 3))
     spin[0] = 0.0
     setup = magnets(
@@ -99,11 +100,11 @@ def test_a_moment_turns_with_its_particle_and_keeps_its_magnitude(rng):
 
 
 STIFF = 8.0 * 2.0**9
-"""N m^9, of a repulsion by 1/d^9."""
+"""N m^9, strength of a repulsion by 1/d^9."""
 
 
 def swinging(steps):
-    """Two magnets that swing about each other, held apart by a steep repulsion; for 2 s."""
+    """Two magnets that swing about each other, kept apart by a steep repulsion; for 2 s."""
     push = NearField(alpha1=0.0, alpha2=STIFF, beta2=9)
     return magnets(
         [[0, 0, 0], [2.0, 0.3, 0.1]],
@@ -117,7 +118,8 @@ def swinging(steps):
 
 
 def energy(state):
-    """Kinetic, of spins, of two dipoles and of the repulsion of ``swinging``, J."""
+    """Kinetic and spin energy, and the energies of the two dipoles and of the repulsion in
+    ``swinging``, J."""
     r, m = state["position"], state["moment"]
     motion = 0.5 * (state["velocity"] ** 2).sum() + 0.2 * (state["spin"] ** 2).sum()
     field = np.einsum("ijab,jb->ia", dipole_field(r), m)
@@ -125,12 +127,12 @@ def energy(state):
 
 
 def angular_momentum(state):
-    """kg m^2/s, of bodies of 1 kg and 1 m."""
+    """Angular momentum, kg m^2/s, of bodies of 1 kg and 1 m."""
     return np.cross(state["position"], state["velocity"]).sum(axis=0) + 0.4 * state["spin"].sum(axis=0)
 
 
 def test_two_free_magnets_conserve_energy_and_angular_momentum():
-    """Energy to the order of Verlet, in the step; momentum and angular momentum to rounding."""
+    """Energy to the order of Verlet in the step; momentum and angular momentum to rounding."""
     errors = []
     for steps in (1000, 2000):
         result = simulate([swinging(steps)], capacity=8)[0]
@@ -153,7 +155,7 @@ STEPPERS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STEPPERS)
 def test_a_needle_swings_under_every_stepper_that_turns(name):
-    """A quarter of a period, to the first order in the step that operators at its end have."""
+    """A quarter of a period, to first order in the step, because operators act at the end of a step."""
     stepper, frequency = STEPPERS[name], np.sqrt(2.0 * 3.0 / 0.4)
     setup = needle(0.01, stepper=stepper, velocity=[[0.1, 0, 0]], duration=np.pi / 2 / frequency)
     (result,) = simulate([setup], capacity=4)
@@ -166,7 +168,7 @@ def test_a_needle_swings_under_every_stepper_that_turns(name):
 
 @pytest.mark.slow
 def test_a_clump_of_magnets_swings_as_one():
-    """Two magnets in one rigid body: I theta'' = -(m_1 + m_2) B theta, I that of the body across its axis."""
+    """Two magnets in one rigid body: I theta'' = -(m_1 + m_2) B theta. I is taken about a transverse axis."""
     clump = Clump(centres=[(0, 0, -1.0), (0, 0, 1.0)], radii=[1.0, 1.0], density=1.0)
     moments = np.array([[0, 0, 3.0], [0, 0, 5.0]])
     inertia = clump.body.moments.max()
@@ -196,7 +198,8 @@ def test_a_clump_of_magnets_swings_as_one():
 
 
 def dragged():
-    """Lengths and directions of moments after 20 000 turns, and the swing of a needle; in any precision."""
+    """Lengths and directions of moments after 20 000 rotations, and the swing of a needle; in any
+    precision."""
     spin = [[3e3, -2e3, 1e3], [1.0, 0.5, -2.0]]
     setup = magnets(
         [[0, 0, 0], [50.0, 0, 0]],
@@ -215,7 +218,7 @@ def dragged():
 
 @pytest.mark.slow
 def test_single_precision_keeps_magnitudes_and_swings_as_double(single):
-    """Lengths by what 20 000 turns round, each on its own, and not all in one direction."""
+    """Lengths to the rounding of 20 000 rotations, whose errors do not all have one sign."""
     rough, fine = single("effects.magnetic.test_permanent_moment", "dragged"), dragged()
     np.testing.assert_allclose(fine[0], 1.0, rtol=0, atol=1e-11)
     np.testing.assert_allclose(rough[0], 1.0, rtol=0, atol=3e-5)
@@ -223,7 +226,8 @@ def test_single_precision_keeps_magnitudes_and_swings_as_double(single):
 
 
 def test_directions_are_drawn_evenly_by_the_seed():
-    """M V, the same for the same seed; the first of many are those of few."""
+    """Moments are M V, and equal for the same seed; the first particles do not depend on the number of
+    particles."""
     rng = np.random.default_rng(1)
     place, radius = 100 * rng.normal(size=(2000, 3)), rng.uniform(0.5, 1.0, 2000)
     law = PermanentMoment(magnetisation=1190.0)
@@ -238,12 +242,12 @@ def test_directions_are_drawn_evenly_by_the_seed():
     assert np.abs(moments(7, 6) - many[:7]).min() > 0
     direction = many / np.linalg.norm(many, axis=1, keepdims=True)
     for axis in range(3):
-        # The projection of an even direction on any axis is uniform (Archimedes).
+        # The projection of a uniformly distributed direction on any axis is uniform (Archimedes).
         assert stats.kstest(direction[:, axis], "uniform", args=(-1, 2)).pvalue > 1e-3
 
 
-def test_only_what_is_needed_is_allocated():
-    """Torques are a matter of permanent moments alone: soft ones cost no spin."""
+def test_only_needed_fields_are_allocated():
+    """Only permanent moments have torques; with soft moments no spin is allocated."""
     field = MagneticField(constant=(0, 0, 1))
     hard = needle(0.1)
     assert fields_beside_the_core(hard) == {"moment", "spin", "force", "torque"}
@@ -251,7 +255,7 @@ def test_only_what_is_needed_is_allocated():
     assert fields_beside_the_core(scene([[0, 0, 0]], [[0, 0, 0]], soft)) == {"moment", "force"}
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         magnets([[0, 0, 0]], [[0, 0, 1.0]], (MagneticField(), InducedMoment(susceptibility=1.0)))
     assert "induced_moment" in str(fault.value)

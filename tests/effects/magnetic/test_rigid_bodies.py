@@ -1,4 +1,4 @@
-"""Dipoles within a group or a clump act on each other as any others do, though contacts there do not."""
+"""Dipoles in one group or clump interact as usual, although contacts within it do not."""
 
 import numpy as np
 import pytest
@@ -24,16 +24,17 @@ from tisim.sources import MagneticField
 FIELD = np.array([0.1, 0.0, 1.0])
 """T."""
 PULL = 1e6
-"""N; of each contact, as much as dipoles do."""
+"""N; force of each contact, about as large as the dipole forces."""
 GAIN = 4 * np.pi / MU_0 * 50 / 53
-"""A m^2 / T, of a sphere of 1 m by itself."""
+"""A m^2 / T, of an isolated sphere of 1 m."""
 GROUP, FREE = (2, 3), 4
-"""Two that touch in a column along z, and one that touches the upper of them; 0 and 1 are a clump."""
+"""The held pair that touches in a column along z, and the free grain that touches its upper one; 0 and 1 are
+a clump."""
 SIDE = 12.0
 
 
 def bodies(*laws, domain=None):
-    """A clump of two, askew, and a column of three of which two are held."""
+    """A tilted clump of two, and a column of three of which two are held."""
     turn = np.roll(Rotation.from_euler("xy", [0.5, 0.3]).as_quat(), 1)
     column = np.array([[6.0, 3.0, 3.0], [6.0, 3.0, 5.0], [6.0, 3.0, 6.99]])
     spheres = Particles(
@@ -57,7 +58,7 @@ def bodies(*laws, domain=None):
 
 
 def bridges(r):
-    """Of contacts: the one that is not within a body."""
+    """Contact forces: from the only contact that is not within a body."""
     pull = np.zeros((5, 3))
     pull[3] = PULL * (r[4] - r[3]) / np.linalg.norm(r[4] - r[3])
     pull[4] = -pull[3]
@@ -65,7 +66,7 @@ def bridges(r):
 
 
 def force_of(r, m, i, others):
-    """Of dipoles on the one of number i, N."""
+    """Dipole force on particle i, N."""
     force = np.zeros(3)
     for j in others:
         d = np.linalg.norm(r[j] - r[i])
@@ -77,20 +78,20 @@ def force_of(r, m, i, others):
 
 @pytest.mark.slow
 def test_a_cut_off_beyond_all_is_a_sum_over_all_pairs():
-    """Moments are those of a linear solve, forces those of all dipoles and of the contacts between bodies;
-    pairs within a body remember nothing."""
+    """Moments equal a linear solve, and forces the sum over all dipoles plus the contacts between bodies.
+    Pairs within a body store no history."""
     moments = MutualInducedMoment(susceptibility=50.0, tolerance=1e-14, cutoff=50.0)
     (state,) = loads([bodies(moments, TruncatedDipoleDipole(cutoff=50.0))])
     r, influence = state["position"], dipole_field(state["position"])
     matrix = np.eye(15) - GAIN * influence.transpose(0, 2, 1, 3).reshape(15, 15)
     m = np.linalg.solve(matrix, GAIN * np.tile(FIELD, 5)).reshape(5, 3)
     close(state["moment"], m, 1e-12)
-    # The lower of two that are held is magnetised by the upper one.
+    # The upper of the two held grains magnetises the lower one.
     assert np.linalg.norm(m[2]) > 1.3 * GAIN * np.linalg.norm(FIELD)
     close(state["force"], bridges(r) + [force_of(r, m, i, set(range(5)) - {i}) for i in range(5)], 1e-11)
     remembered = {tuple(sorted((i, j))) for i in range(5) for j in state["bridge_partners"][i] if j >= 0}
     assert remembered == {(3, 4)}
-    # Forces within the clump turn it into the field: soft moments feel no torque by themselves.
+    # Forces within the clump turn it into the field: soft moments exert no torque by themselves.
     within = r[0] - r[1]
     force_within = state["force"][0] - force_of(r, m, 0, range(2, 5))
     own = influence[0, 1] @ m[1]
@@ -100,7 +101,7 @@ def test_a_cut_off_beyond_all_is_a_sum_over_all_pairs():
 
 @pytest.mark.slow
 def test_ewald_sums_do_not_depend_on_their_cut_off():
-    """Of which some pairs are near and some are not."""
+    """With different cut-offs, different pairs are in the near part of the sum."""
     domain = Box(low=(0, 0, 0), high=(SIDE,) * 3)
     settings = [ewald_settings(domain, 5, 1e-8, cutoff=cutoff) for cutoff in (1.5, 3.5, 5.0)]
     waves = settings[0]["waves"]

@@ -1,5 +1,5 @@
-"""One sweep a step, as L21 has it: three touching spheres, in an L, after each of the first sweeps; and two
-whose moments come to have no end."""
+"""One sweep a step, as in L21: three touching spheres in an L after each of the first sweeps; and two spheres
+whose moments diverge."""
 
 import numpy as np
 import pytest
@@ -21,12 +21,12 @@ ERRORS = [
     [-1.014, -1.082, -0.590],
     [-0.278, -0.286, 0.026],
 ]
-"""Of the force on each, percent of that in the end, after 0, 1, ... sweeps from the moments that each has by
-itself, for mu_r without end; computed with NumPy in plain loops."""
+"""Error of the force on each sphere, in percent of the final force, after 0, 1, ... sweeps from the moments
+of isolated spheres, for infinite mu_r; computed with NumPy in plain loops."""
 
 
 def force(m, place=L):
-    """On each of the three, over 3 mu_0 / (4 pi)."""
+    """Force on each of the three spheres, over 3 mu_0 / (4 pi)."""
     total = np.zeros((3, 3))
     for i, j in np.argwhere(~np.eye(3, dtype=bool)):
         d = place[j] - place[i]
@@ -36,17 +36,17 @@ def force(m, place=L):
     return total
 
 
-def test_each_sweep_takes_moments_as_far_as_in_numpy():
-    """A sweep a step, from nothing: after k + 1 of them the error is that of k sweeps of moments along the
-    field. L21 prints -23.6, -22.9 and 17.0 %, then -0.66, -0.49 and 1.0 %, which these are not: each sweep
-    leaves 0.27 to 0.31 of the error, not 0.03."""
+def test_each_sweep_equals_numpy():
+    """One sweep a step, from zero moments: after k + 1 sweeps the error is that after k sweeps from isolated
+    moments along the field. L21 prints -23.6, -22.9 and 17.0 %, then -0.66, -0.49 and 1.0 %, which differ
+    from these: each sweep leaves 0.27 to 0.31 of the error, not 0.03."""
     law = MutualInducedMoment(susceptibility=1e12, sweeps=0, largest_change=2.0)
     simulation = compiled(induced(L, (0, 0, 1.0), law), capacity=4)
     simulation.load([induced(L, (0, 0, 1.0), law, steps=8, dt=1e-9)])
     gain, field, along = 4 * np.pi / MU_0, dipole_field(L), np.array([0, 0, 1.0])
     matrix = np.eye(9) - gain * field.transpose(0, 2, 1, 3).reshape(9, 9)
     final = np.linalg.solve(matrix, gain * np.tile(along, 3)).reshape(3, 3)
-    # The sweep at the start has made these.
+    # The sweep at the start gives the isolated moments.
     moments = [gain * np.tile(along, (3, 1))]
     for _ in range(4):
         simulation.run(steps=1)
@@ -63,7 +63,7 @@ def test_each_sweep_takes_moments_as_far_as_in_numpy():
 
 
 def pair(distance, steps=8, closing=0.0, **options):
-    """Two spheres of 1 m and mu_r without end, in line with the field, so heavy that nothing draws them."""
+    """Two spheres of 1 m with infinite mu_r, in line with the field, too heavy to be moved by it."""
     place = np.array([[0, 0, 0], [0, 0, distance]])
     law = MutualInducedMoment(susceptibility=1e12, sweeps=0, **options)
     setup = induced(place, (0, 0, 1.0), law, steps=steps, dt=1e-3)
@@ -79,14 +79,14 @@ def run(setup):
     return result
 
 
-def test_one_sweep_a_step_does_while_moments_have_an_end_and_the_world_stops_where_they_have_none():
-    """Moments are 1 / (1 - L) of those alone, L = 2 R^3 / d^3, which is 1 at 1.26 R. From nothing sweeps go
-    on to the tolerance; then one a step is enough."""
+def test_one_sweep_a_step_suffices_unless_moments_diverge():
+    """Moments are 1 / (1 - L) times those of isolated spheres, with L = 2 R^3 / d^3, which is 1 at d = 1.26
+    R. From zero moments sweeps continue to the tolerance; afterwards one a step is enough."""
     alone = 4 * np.pi / MU_0
     result = run(pair(1.27))
     assert result.status.ok, result.status.reason
     close(by_id(result)["moment"], [[0, 0, alone / (1 - 2 / 1.27**3)]] * 2, 1e-9)
-    # Mixed, two suffice for one unknown; a third sees it, and one in each of 8 steps.
+    # With mixing, two sweeps suffice for one unknown; a third confirms it, and each of the 8 steps takes one.
     assert 10 < result.work["mutual_sweeps"] < 13
     result = run(pair(1.25))
     assert (
@@ -95,25 +95,26 @@ def test_one_sweep_a_step_does_while_moments_have_an_end_and_the_world_stops_whe
     assert result.measures["sweep_factor"] == pytest.approx(2 / 1.25**3, rel=1e-6)
 
 
-def test_two_that_are_pressed_into_each_other_stop_where_their_moments_lose_their_end():
-    """They near each other by 2e-4 R a step, from 1.35 R on."""
+def test_approaching_spheres_stop_when_their_moments_diverge():
+    """They approach by 2e-4 R a step, from 1.35 R on."""
     result = run(pair(1.35, steps=1000, closing=0.1))
     assert "does not converge" in result.status.reason
     low, high = by_id(result)["position"][:, 2]
     assert high - low == pytest.approx(2 ** (1 / 3), abs=5e-3)
-    # Unguarded, moments grow until the two fly apart; the guard of explicit steps stops that.
+    # Without this limit, moments grow until the two fly apart; then the guard of explicit steps stops the
+    # world.
     result = run(pair(1.35, steps=1000, closing=0.1, largest_change=1e300))
     assert "critical time step" in result.status.reason
 
 
 COLLOIDS, RADIUS, MASS, FIELD = 2e-6 * L, 1e-6, 8e-15, (0.003, 0, 0.01)
-"""Places (m), radius (m), mass (kg) and the field (T) of three that can be magnetised without end."""
+"""Positions (m), radius (m), mass (kg) and the field (T) of three spheres of infinite permeability."""
 TIME = 1.8e-5
-"""s, in which they go up to half a radius, and none touch."""
+"""s, in which they move by up to half a radius, and none touch."""
 
 
 def colloids():
-    """Their places after TIME, from rest, with moments by a linear solve at each moment; m."""
+    """Their positions after TIME, from rest, with moments by a linear solve at each instant; m."""
     gain, alone = 4 * np.pi / MU_0 * RADIUS**3, 4 * np.pi / MU_0 * RADIUS**3 * np.tile(FIELD, 3)
 
     def rates(_t, y):
@@ -142,7 +143,7 @@ STEPPERS = [
 @pytest.mark.long
 @pytest.mark.parametrize(("stepper", "most"), STEPPERS)
 def test_every_stepper_takes_moments_by_sweeps(stepper, most):
-    """What a stepper keeps of its own sweeps is not what those of moments come to, relative to these."""
+    """A stepper's own sweeps must not change the convergence of the sweeps for moments."""
     law = MutualInducedMoment(susceptibility=1e12, tolerance=1e-12)
     setup = induced(COLLOIDS, FIELD, law, radius=RADIUS, stepper=stepper, duration=TIME)
     heavy = setup.particles.model_copy(update={"mass": MASS})

@@ -10,7 +10,7 @@ from tisim.effects import Mie
 
 
 def crowd(rng, law, n=12, spread=1.0):
-    """Grains of unlike sizes on a shaken lattice, some of them pressed into each other."""
+    """Grains of unlike sizes on a disturbed lattice, some of them overlapping."""
     sites = (
         np.argwhere(np.ones((8, 8, 8)))[rng.permutation(512)[:n]]
         if n > 27
@@ -32,7 +32,7 @@ def potential(law, d, sigma):
 
 
 def twin(law, state):
-    """Its derivative, by a central difference of fourth order, within the cut-off."""
+    """The derivative of the potential, by a central difference of fourth order, within the cut-off."""
     n, d = pairs(state)
     sigma, h = state["radius"][:, None] + state["radius"], 1e-4 * d
     at = [potential(law, d + k * h, sigma) for k in (-2, -1, 1, 2)]
@@ -51,7 +51,7 @@ def check(scenes):
 
 
 def test_hard_spheres_of_b16_and_wells(rng):
-    """30 and 15: repulsion alone, or attraction up to a cut-off, in one batch."""
+    """Exponents 30 and 15: repulsion alone, or attraction up to a cut-off, in one batch."""
     check([crowd(rng, Mie(epsilon=float(rng.uniform(1, 2)))) for _ in range(4)])
     check([crowd(rng, Mie(epsilon=1.0, cutoff=cut)) for cut in (1.02, 1.3, 2.5)])
 
@@ -64,7 +64,7 @@ def test_other_powers(n, m, rng):
 
 @pytest.mark.slow
 def test_over_the_pair_list(rng):
-    """More than are looked through one by one."""
+    """With enough particles for the pair list to be used."""
     many = crowd(rng, Mie(epsilon=1.0, cutoff=1.8), n=400)
     (state,) = loads([many], capacity=400)
     close(state["force"], twin(many.effects[0], state), 1e-8)
@@ -72,7 +72,8 @@ def test_over_the_pair_list(rng):
 
 
 def test_repulsion_ends_smoothly_at_the_bottom_of_the_well():
-    """Two at distances around sigma 2^(1/15), of B16 (6.19): depth eps there, no force, and none beyond."""
+    """Two particles at distances around sigma 2^(1/15), from B16 (6.19): energy -eps and no force there; no
+    force beyond."""
     bottom, sigma = 2 ** (1 / 15), 0.2
 
     def force(law, distance):
@@ -89,7 +90,7 @@ def test_repulsion_ends_smoothly_at_the_bottom_of_the_well():
     assert force(well, sigma * bottom * 1.01) < -0.1 * steep
 
 
-def test_it_needs_nothing_and_goes_to_files_and_back():
+def test_mie_needs_no_fields_and_survives_files():
     setup = scene([[0, 0, 0]], [[0, 0, 0]], (Mie(epsilon=1e-19),))
     assert fields_beside_the_core(setup) == {"force"}
     again = Scene.from_dict(setup.to_dict())
@@ -106,7 +107,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         Mie(**{"epsilon": 1.0, **WRONG[message]})
     assert str(fault.value) == message

@@ -1,4 +1,5 @@
-"""The near field against its NumPy twin: every strength, whole and other exponents, near pairs only."""
+"""The near field against its NumPy reference: every strength, integer and other exponents, near
+pairs only."""
 
 from itertools import product
 
@@ -93,7 +94,7 @@ def test_exponents(exponents, rng):
 
 @pytest.mark.slow
 def test_near_pairs_only(rng):
-    """Also over the pair list, which a world of more particles than it looks through one by one has."""
+    """Also over the pair list, which worlds with many particles use."""
     scenes = [
         cloud(rng, TruncatedNearField(**coefficients(rng), cutoff=rng.uniform(0.4, 0.8)))
         for _ in range(WORLDS)
@@ -108,7 +109,7 @@ def test_near_pairs_only(rng):
 
 @pytest.mark.long
 def test_alpha1_attracts_and_alpha2_repels():
-    """Two particles side by side; between unlike signs each does the opposite."""
+    """Two particles side by side; between unlike signs each force is reversed."""
 
     def on_the_left(**options):
         setup = scene([[0, 0, 0], [0.5, 0, 0]], np.zeros((2, 3)), (NearField(**options),), quantities=signs)
@@ -122,7 +123,7 @@ def test_alpha1_attracts_and_alpha2_repels():
     np.testing.assert_allclose(on_the_left(alpha2=3.0, signed=True), [12, 0, 0])
 
 
-def test_of_charges_it_is_coulombs_law():
+def test_between_charges_it_is_coulombs_law():
     law = NearField(alpha2=COULOMB, strength="charge")
     scenes = [
         scene([[0, 0, 0], [0, 0.3, 0.4]], np.zeros((2, 3)), (law,), quantities={"charge": charge})
@@ -133,7 +134,7 @@ def test_of_charges_it_is_coulombs_law():
     assert like["force"][0, 1] < 0 < unlike["force"][0, 1]
 
 
-def test_it_is_in_balance_at_alpha2_over_alpha1():
+def test_equilibrium_at_alpha2_over_alpha1():
     """beta = (1, 2): no force at d = alpha2 / alpha1, and the stiffness of Z13 (33) there."""
     law, h = NearField(alpha1=2.0, alpha2=1.0), 1e-6
     scenes = [scene([[0, 0, 0], [0.5 + x, 0, 0]], np.zeros((2, 3)), (law,)) for x in (0.0, h, -h)]
@@ -149,7 +150,7 @@ def test_the_nearest_image_acts_in_a_periodic_box():
     np.testing.assert_allclose(loads([setup])[0]["force"], [[-5, 0, 0], [5, 0, 0]], rtol=1e-12)
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     for strength, signed in product(["plain", "mass", "charge"], [False, True]):
         law = NearField(strength=strength, signed=signed)
         setup = scene([[0, 0, 0]], [[0, 0, 0]], (law,))
@@ -167,7 +168,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         NearField(**WRONG[message])
     assert str(fault.value) == message

@@ -1,4 +1,4 @@
-"""The virial against that of the same laws in NumPy: over all pairs and listed ones, of contacts in shear."""
+"""The virial against the same laws in NumPy: over all pairs and listed ones, and for contacts in shear."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from tisim.effects import (
 
 
 class Held(Effect):
-    """Some particles may be fixed."""
+    """Declares that some particles may be fixed."""
 
     fields = ("fixed",)
 
@@ -31,7 +31,7 @@ MIE = Mie(epsilon=0.5, n=12, m=6, cutoff=2.5)
 
 
 def dipoles(state):
-    """Force on each by each other, N, (n, n, 3)."""
+    """Force on each particle by each other one, N, (n, n, 3)."""
     n, d = pairs(state)
     a, b = state["moment"][:, None], state["moment"][None]
     along_a, along_b, both = ((x * y).sum(axis=2, keepdims=True) for x, y in ((a, n), (b, n), (a, b)))
@@ -40,7 +40,7 @@ def dipoles(state):
 
 
 def mie(state):
-    """Force on each by each other, N, (n, n, 3): a derivative by differences."""
+    """Force on each particle by each other one, N, (n, n, 3), by finite differences."""
     n, d = pairs(state)
     sigma, h = state["radius"][:, None] + state["radius"], 1e-4 * d
     at = [test_mie.potential(MIE, d + k * h, sigma) for k in (-2, -1, 1, 2)]
@@ -49,7 +49,7 @@ def mie(state):
 
 
 def magnets(rng, n=40):
-    """Magnets with cores, some of which are fixed; moments so large that both laws count."""
+    """Magnets with cores, some of them fixed; moments are large enough for both laws to matter."""
     place = 0.25 * (np.argwhere(np.ones((4,) * 3))[rng.permutation(64)[:n]] + rng.uniform(-0.1, 0.1, (n, 3)))
     quantities = {"moment": 100 * rng.normal(size=(n, 3)), "fixed": np.arange(n) % 4 == 0}
     effects = (Held(), DipoleDipole(), MIE, Gravity(acceleration=(1, 2, 3)), Virial())
@@ -59,7 +59,7 @@ def magnets(rng, n=40):
 
 
 @pytest.mark.long
-def test_each_particle_has_half_of_its_pairs_over_all_and_listed_ones(rng):
+def test_each_particle_has_half_of_the_virial_of_its_pairs(rng):
     scenes = [magnets(rng) for _ in range(2)]
     for state in loads(scenes, capacity=64):
         gap = state["position"][:, None] - state["position"][None]
@@ -70,7 +70,7 @@ def test_each_particle_has_half_of_its_pairs_over_all_and_listed_ones(rng):
 
 
 @pytest.mark.long
-def test_measures_are_sums_of_those_of_particles(rng):
+def test_measures_are_sums_over_particles(rng):
     (result,) = run(magnets(rng))
     expected = result.state["virial"].sum(axis=0)
     close([result.measures[f"virial_{a}{b}"] for a in "xyz" for b in "xyz"], expected)
@@ -85,7 +85,7 @@ def run(*scenes):
 
 @pytest.mark.slow
 def test_contacts_in_shear_have_the_virial_of_their_twin(rng):
-    """Forces that remember, between images that slide past each other."""
+    """Forces with history, between images that slide past each other."""
     made = crowd(rng)
     made = made.model_copy(update={"effects": (*made.effects, Virial())})
     (result,) = run(made)
@@ -103,6 +103,6 @@ def test_contacts_in_shear_have_the_virial_of_their_twin(rng):
         ((TreeGravity(softening_length=0.1), MIE), "without tree_gravity"),
     ],
 )
-def test_it_goes_with_forces_between_particles_alone(effects, text):
+def test_the_virial_requires_pair_forces_alone(effects, text):
     with pytest.raises(InputError, match=text):
         scene([[0, 0, 0]], [[0, 0, 0]], (*effects, Virial()))
