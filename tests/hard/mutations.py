@@ -224,7 +224,7 @@ SUMS = {
     ),
     "exports_of_two_sorts_of_laws": (
         "tisim/pairs/listed_pairs.py", "self.exported.read(w, m) + term", "term",
-        "tests/pairs/test_short_ranged.py::test_contacts_within_a_far_cut_off_are_those_of_the_twin",
+        "tests/pairs/test_short_ranged.py::test_contacts_within_a_far_cut_off_equal_the_twin",
     ),
     "shifted_cut_off": (
         f"{MAGNETIC}/dipole_pairs.py", "slope = 12.0 * x", "slope = 11.9 * x",

@@ -210,7 +210,7 @@ def test_constraints_of_a_problem_hold():
         campaign.tell(campaign.ask()[0], 1.0)
 
 
-def test_what_cannot_be_is_refused(tmp_path):
+def test_impossible_values_are_refused(tmp_path):
     campaign = AskTell(GENES)
     (first, *_) = campaign.ask()
     for designs, values, errors, message in (

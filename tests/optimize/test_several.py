@@ -198,7 +198,7 @@ def test_cache_holds_all_objectives(path):
     assert verify(path).ok
 
 
-def test_what_cannot_be_is_refused(path):
+def test_impossible_values_are_refused(path):
     with pytest.raises(
         InputError,
         match="for several objectives: gaussian-process, genetic, nsga2, random; received 'zohdi'",

@@ -99,7 +99,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         ConstrictionFlow(**{**SHAPE, **WRONG[message]})
     assert str(fault.value) == message

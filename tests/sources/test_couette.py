@@ -67,7 +67,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     right = {"first": 0.0, "second": 1.0, "first_velocity": (0, 0, 0), "second_velocity": (1, 0, 0)}
     with pytest.raises(InputError) as fault:
         CouetteFlow(**{**right, **WRONG[message]})

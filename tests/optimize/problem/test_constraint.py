@@ -80,7 +80,7 @@ def test_a_rule_is_told_in_words():
         ),
     ],
 )
-def test_what_cannot_be_is_refused(make, message):
+def test_impossible_values_are_refused(make, message):
     with pytest.raises(InputError, match=f"^{message}"):
         make()
 

@@ -217,7 +217,7 @@ DESIGN = GENOME.decode(np.full(7, 0.5))
         (lambda: Genome(("x",)), r"gene must be a Gene, Choice, FixedGene or DependentGene; received 'x'"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_refused(make, message):
+def test_impossible_values_are_refused(make, message):
     with pytest.raises(InputError, match=f"^{message}"):
         make()
 

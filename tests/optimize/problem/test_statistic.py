@@ -173,7 +173,7 @@ def test_the_same_runs_serve_every_statistic(tmp_path):
     assert counts[1] == 0
 
 
-def test_what_cannot_be_is_refused():
+def test_impossible_values_are_refused():
     for make, words in (
         (lambda: Quantile(1.0), "share of a quantile must be between 0 and 1; received 1"),
         (lambda: WorstOf(1), "starts of WorstOf must be a whole number above 1; received 1"),

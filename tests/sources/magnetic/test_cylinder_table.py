@@ -53,7 +53,7 @@ def test_what_tisim_cost_tries():
     assert magnet(0.1).approximations(1.0) == ()
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         magnet(0.5, 4)
     text = "magnetic_cylinders.cylinders.0.length must be at least the radius, 1 m, with table_digits"

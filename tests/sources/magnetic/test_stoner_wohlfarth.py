@@ -97,7 +97,7 @@ def test_without_a_field():
         (((0, 0, 1), 1, 1, 0, (0, 0, 1)), "saturation magnetisation must be greater than 0; received 0"),
     ],
 )
-def test_what_is_wrong_is_named(arguments, message):
+def test_invalid_values_are_refused(arguments, message):
     with pytest.raises(InputError) as fault:
         magnetisation(*arguments)
     assert str(fault.value) == message
