@@ -1,4 +1,4 @@
-"""Functions of a problem that are at fault end a search with a line that says so, and where."""
+"""A faulty function of a problem ends the search with a line that names the error and its place."""
 
 import numpy as np
 import pytest
@@ -93,7 +93,7 @@ def test_a_search_of_which_some_designs_are_refused_goes_on(tmp_path):
 
 
 def test_an_objective_that_reads_a_file_must_declare_it(tmp_path):
-    """Or its values would be reused when the file has changed."""
+    """Otherwise its values would be reused after the file has changed."""
     target = tmp_path / "target.csv"
     target.write_text("0.25")
 
