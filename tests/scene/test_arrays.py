@@ -1,4 +1,4 @@
-"""Starts of arrays: the same scene as of lists, in less time; digests are those that they always were."""
+"""Starts given as arrays equal starts given as lists, take less time, and keep the existing digests."""
 
 import json
 import pickle
@@ -17,7 +17,7 @@ def text(value):
 
 @pytest.mark.parametrize("columns", [(), (3,)])
 def test_text_of_arrays_is_that_of_their_lists(rng, columns):
-    """Of numbers of all sizes, bit patterns at random and those near where the notation changes."""
+    """Numbers of all sizes, random bit patterns, and numbers near the change of notation."""
     size = (ROWS_PER_PIECE + 5, *columns)
     bits = rng.integers(0, 2**64, size, dtype=np.uint64).view(np.float64)
     edges = [
@@ -81,12 +81,12 @@ DIGESTS = {
     one: "4b907cc869046cdaeba1d9ec15d1ac9212be36a0bd935e74b20bc68eac21f701",
     magnitudes: "06a89ba40c956a8fd261f81054f1c79868b453e134a9d100b8e0f2c423e71f5b",
 }
-"""Written when a start was of tuples; caches of searches are found by them."""
+"""Recorded when starts consisted of tuples; search caches use these digests as keys."""
 
 
 @pytest.mark.parametrize("make", DIGESTS, ids=lambda make: make.__name__)
 def test_digests_are_those_of_before(monkeypatch, make):
-    """Those of physics version 2, when they were taken."""
+    """The digests were taken with physics version 2."""
     monkeypatch.setattr("tisim.scene.scene.PHYSICS_VERSION", 2)
     scene = Scene(name=make.__name__, particles=make(), duration=1.0, seed=3)
     assert scene.digest() == DIGESTS[make]
@@ -176,7 +176,7 @@ def test_neither_making_nor_digesting_takes_lists_of_all(rng):
 
 
 def test_lists_of_arrays_are_plain_data():
-    """A list of vectors, as NumPy makes them: a scene can be changed, written and told from others."""
+    """A list of NumPy vectors: such a scene can be changed, written and compared."""
     moment = np.array([0.0, 1.0, 2.0])
     quantities = {"moment": [moment, 2 * moment], "charge": [np.float64(1), np.int8(2)]}
     listed = {"moment": [[0.0, 1.0, 2.0], [0.0, 2.0, 4.0]], "charge": [1.0, 2]}

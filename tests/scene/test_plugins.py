@@ -1,4 +1,4 @@
-"""Effects of the user's own, from a file or an installed package: found by name, and part of the digest."""
+"""User-defined effects, from a file or an installed package, are found by name and included in the digest."""
 
 import pytest
 

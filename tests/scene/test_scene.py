@@ -1,4 +1,5 @@
-"""Scenes as plain data: TOML and back, changes by dotted key, and a digest of all that decides a result."""
+"""Scenes as plain data: TOML and back, changes by dotted key, and a digest of everything that affects
+results."""
 
 import subprocess
 import sys
@@ -76,7 +77,7 @@ def other(key, value):
 
 
 def test_digest_changes_with_every_number_in_the_scene():
-    """Each leaf of the data, changed alone, changes the digest; and nothing else does."""
+    """Changing any single leaf of the data changes the digest, and nothing else does."""
     base = flow(grains=3)
     digests = {base.digest()}
     changed = 0
@@ -92,7 +93,7 @@ def test_digest_changes_with_every_number_in_the_scene():
 
 
 def test_a_skin_is_part_of_the_scene_and_not_of_its_digest(tmp_path):
-    """Results do not depend on it, so what is stored of them need not be made anew."""
+    """Results do not depend on the skin, so stored results stay valid."""
     base, file = flow(grains=3), tmp_path / "scene.toml"
     wide = base.replace({"skin": 0.125})
     file.write_text(wide.to_toml(), encoding="utf-8")
@@ -249,7 +250,7 @@ def test_equal_structures_share_a_batch_and_others_do_not():
 
 
 def test_a_scene_is_a_value():
-    """Frozen, its arrays included; what it was made from can change without changing it."""
+    """It is frozen, including its arrays; later changes of its source data do not affect it."""
     place = np.zeros((2, 3))
     particles = Particles(position=place, velocity=place, radius=1.0, mass=1.0)
     place += 1
@@ -259,7 +260,7 @@ def test_a_scene_is_a_value():
 
 
 def test_a_missing_effect_is_named_as_it_is_listed():
-    """Also where no other has been imported yet: in a process of its own."""
+    """In a process of its own, because no other effect may have been imported yet."""
     code = (
         "import tisim; from tisim.effects import Walls; from tisim.geometry import Plane\n"
         "particles = tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, density=1.0)\n"

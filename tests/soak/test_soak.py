@@ -1,4 +1,4 @@
-"""The kill matrix in small; tests/soak.sh is the whole of it."""
+"""A small version of the kill matrix; tests/soak.sh runs all of it."""
 
 import os
 import subprocess

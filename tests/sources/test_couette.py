@@ -1,4 +1,4 @@
-"""The flow between two sliding walls against its closed form, and a grain that is dragged along in it."""
+"""The flow between two sliding walls compared with its closed form, and a grain dragged by it."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from tisim.steppers import ErrorControl, Trapezoid
 
 N = np.array([1.0, -2.0, 2.0])
 LOW, HIGH = np.array([2.0, 2.0, 1.0]), np.array([-4.0, 0.0, 2.0])
-"""m/s; both along walls of this normal."""
+"""Velocities (m/s), perpendicular to the given wall normal."""
 FLOW = CouetteFlow(
     normal=tuple(N), first=-0.5, second=1.5, first_velocity=tuple(LOW), second_velocity=tuple(HIGH)
 )
@@ -43,7 +43,7 @@ def test_the_fluid_is_still_until_the_walls_begin_to_move():
 
 @pytest.mark.slow
 def test_a_grain_in_it_moves_with_its_layer():
-    """From rest, v = v_f (1 - exp(-t/tau)): the flow along the wall does not carry it to another layer."""
+    """From rest, v = v_f (1 - exp(-t/tau)): the flow along the wall keeps the grain in its layer."""
     flow = CouetteFlow(first=-1.0, second=3.0, first_velocity=(-1, 0, 0), second_velocity=(7, 4, 0))
     tau = 2.0 / (6 * np.pi * 0.5 * 0.1)
     setup = scene(

@@ -1,4 +1,4 @@
-"""What cannot be done in as many steps as can be counted is refused."""
+"""Runs with more steps than can be counted are refused."""
 
 import pytest
 
@@ -39,7 +39,7 @@ def moving(stepper, duration):
     ],
 )
 def test_more_steps_than_can_be_counted_are_refused(stepper, duration, steps):
-    """With the duration and the number of steps; also where steps may grow, but not fast enough."""
+    """The message gives the duration and the number of steps, also if steps may grow, but too slowly."""
     with pytest.raises(InputError, match=r"duration must be reached in at most 9.01e\+15 steps") as refused:
         moving(stepper, duration)
     number = str(refused.value).split("takes at least ")[1].split(" of ")[0]
@@ -48,7 +48,7 @@ def test_more_steps_than_can_be_counted_are_refused(stepper, duration, steps):
 
 
 def test_colloids_by_themselves_number_their_intervals_with_32_bits():
-    """More of them would have the noise of the first again."""
+    """With more intervals the noise would repeat."""
     assert straight("brownian", False, 1.0, 2.0**32).duration == 2.0**32
     with pytest.raises(
         InputError, match=r"at most 4.29e\+09 steps, but takes at least 4.3e\+09 of drift_limit"
@@ -61,7 +61,7 @@ def test_colloids_by_themselves_number_their_intervals_with_32_bits():
     "control", [FixedStep, ApproachTime, IterationControl, ErrorControl, StageControl, DriftLimit]
 )
 def test_no_step_is_shorter_than_any_time_that_numbers_can_square(control):
-    """1e-300 s of any limit of a step."""
+    """1e-300 s is refused for every limit of a step."""
     for name in {"dt", "first", "longest", "shortest"} & set(control.model_fields):
         needed = {"longest": 1.0} if control is DriftLimit else {}
         with pytest.raises(InputError, match=f"{name} must be at least {SHORTEST_STEP}; received 1e-300"):
@@ -76,7 +76,7 @@ def test_it_is_said_of_files_too():
 
 @pytest.mark.parametrize("control", [ErrorControl, StageControl])
 def test_a_safety_that_leaves_but_the_shortest_steps_is_refused(control):
-    """No step is so short that the error of it is 1e-300 of that asked for: rounding makes it larger."""
+    """No step has an error of 1e-300 times the requested one, because rounding is larger."""
     with pytest.raises(InputError, match=r"safety must be at least 0.01; received 1e-300"):
         control(safety=1e-300)
     assert control(safety=0.01).safety == 0.01

@@ -1,4 +1,4 @@
-"""The field from a table: as accurate as it says, for cylinders of any shape, and what it refuses."""
+"""The tabulated field has its stated accuracy for cylinders of any shape; invalid settings are refused."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def magnet(length, digits=None):
 
 
 def around(rng, length, n=1500):
-    """All about a cylinder, near its rim and far away; anywhere in it, and about its middle."""
+    """Points around the cylinder, near its rim, far away, inside, and about its centre."""
     wide = rng.uniform(-1, 1, (n, 3)) * [4, 4, length]
     rim = rng.normal(size=(n, 3)) * 10 ** rng.uniform(-4, 0, (n, 1)) + [1, 0, length / 2]
     far = rng.normal(size=(n, 3)) * 5 * length
@@ -32,8 +32,10 @@ def around(rng, length, n=1500):
 @pytest.mark.long
 @pytest.mark.parametrize("digits", [3, pytest.param(5, marks=pytest.mark.slow)])
 def test_it_is_as_accurate_as_it_says(digits, rng):
-    """Field and gradient, each relative to its own size, the gradient inside to what cancels in it; and no
-    more accurate by a factor of a thousand."""
+    """Errors of field and gradient relative to their sizes; inside, relative to the terms of the gradient.
+
+    The errors are also not more than a thousand times below the bound.
+    """
     points = np.array([around(rng, length) for length in LENGTHS])
     exact = fields([magnet(length) for length in LENGTHS], points)
     tabulated = fields([magnet(length, digits) for length in LENGTHS], points)
@@ -47,7 +49,7 @@ def test_it_is_as_accurate_as_it_says(digits, rng):
 
 
 def test_what_tisim_cost_tries():
-    """Coarser first; none for one that is a table already, or where a cylinder is too flat for one."""
+    """Coarse tables come first; tabulated or too flat cylinders have none."""
     assert [law.table_digits for law in magnet(2.0).approximations(1.0)] == [3, 4, 5]
     assert magnet(2.0, 3).approximations(1.0) == ()
     assert magnet(0.1).approximations(1.0) == ()

@@ -1,4 +1,4 @@
-"""A soft cylinder in a uniform field."""
+"""A soft magnetic cylinder in a uniform field."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_saturates_sooner_along_a_long_axis():
         return np.linalg.norm(magnetisation((0, 0, 1), 1.0, 40.0, SATURATION, field))
 
     assert size((0.0, 0.0, 0.1)) == pytest.approx(SATURATION)
-    # Across N is near 1/2, so that it takes mu_0 M_s / 2 = 0.62 T.
+    # Across the axis N is near 1/2, so saturation takes mu_0 M_s / 2 = 0.62 T.
     assert size((0.1, 0.0, 0.0)) == pytest.approx(0.1 / (mu_0 * 0.5), rel=0.05)
     assert size((0.7, 0.0, 0.0)) == pytest.approx(SATURATION)
     assert size((0.0, 0.0, 0.0)) == 0.0
