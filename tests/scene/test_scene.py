@@ -44,7 +44,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
-def test_toml_gives_the_scene_back_to_the_last_bit(make, tmp_path):
+def test_toml_keeps_the_scene_to_the_last_bit(make, tmp_path):
     before = make()
     file = tmp_path / "scene.toml"
     file.write_text(before.to_toml(), encoding="utf-8")
@@ -118,7 +118,7 @@ def test_digest_changes_with_each_quantity_and_effect():
 
 
 class TestReplace:
-    def test_changes_what_is_named_and_nothing_else(self):
+    def test_only_named_values_are_changed(self):
         after = cloud().replace({"effects.impact.hardness": 3e5, "duration": 0.25, "particles.number": 9})
         assert after.effects[0].hardness == 3e5
         assert (after.duration, after.particles.number) == (0.25, 9)
@@ -156,14 +156,14 @@ class TestReplace:
             ),
         ],
     )
-    def test_says_what_is_wrong(self, key, value, message):
+    def test_wrong_names_are_reported(self, key, value, message):
         with pytest.raises(InputError) as fault:
             cloud().replace({key: value})
         assert str(fault.value) == message
 
 
 class TestWithout:
-    def test_leaves_out_what_is_named_and_nothing_else(self):
+    def test_only_named_parts_are_left_out(self):
         assert cloud().without("cooling").effects == cloud().effects[:-1]
         assert cloud().without("cooling", "heating").effects == cloud().effects[:-2]
         assert cloud().without().digest() == cloud().digest()
@@ -178,7 +178,7 @@ class TestWithout:
             ("heating", "effects.cooling must be used together with effects.heating; received 'impact, "),
         ],
     )
-    def test_says_what_is_wrong(self, name, message):
+    def test_wrong_names_are_reported(self, name, message):
         with pytest.raises(InputError) as fault:
             cloud().without(name)
         assert str(fault.value).startswith(message)
@@ -207,7 +207,7 @@ class TestRequires:
         assert str(fault.value).startswith(message)
         assert "; received " in str(fault.value)
 
-    def test_a_contract_that_nobody_has_met_yet_is_named(self):
+    def test_an_unmet_contract_is_named(self):
         class Unmet(Operator):
             contract = True
 
@@ -259,7 +259,7 @@ def test_a_scene_is_a_value():
         cloud().duration = 2.0
 
 
-def test_a_missing_effect_is_named_as_it_is_listed():
+def test_a_missing_effect_is_named_as_in_the_list():
     """In a process of its own, because no other effect may have been imported yet."""
     code = (
         "import tisim; from tisim.effects import Walls; from tisim.geometry import Plane\n"

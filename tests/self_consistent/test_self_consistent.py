@@ -127,7 +127,7 @@ def solved(state, chi=CHI):
 
 
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
-def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
+def test_induced_dipoles_equal_a_linear_solve(schedule):
     """Dipoles and forces at the start and after 20 steps, in two worlds that need different numbers of
     sweeps."""
     scenes = [cloud(1, tolerance=1e-13), cloud(2, chi=5.0, tolerance=1e-13)]
@@ -152,7 +152,7 @@ def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
 
 
 @pytest.mark.long
-def test_what_does_not_converge_is_a_clear_failure():
+def test_divergence_is_a_clear_failure():
     """With too strong a coupling the sweeps diverge.
 
     The world stops, and the message names the effect and the growth factor. The factor equals the NumPy value
@@ -199,7 +199,7 @@ def mixed_sweeps(coupling, alone, tolerance):
 
 
 @pytest.mark.long
-def test_mixed_sweeps_are_those_of_anderson():
+def test_mixed_sweeps_follow_anderson():
     """The number of sweeps equals NumPy for the same tolerance; under strong coupling it is a third of plain
     ones."""
     setups = [cloud(seed, n=20, chi=chi, spread=1.5, tolerance=1e-10) for seed, chi in ((1, 1.0), (2, 2.0))]
@@ -217,7 +217,7 @@ def test_mixed_sweeps_are_those_of_anderson():
 
 
 @pytest.mark.slow
-def test_one_sweep_a_step_when_asked():
+def test_one_sweep_in_each_step():
     """``sweeps=0``: one sweep in each step, started from the last values.
 
     At the start the sweeps continue to convergence, unless that is disabled too.
@@ -262,7 +262,7 @@ class Potential(SelfConsistentQuantity):
 
 
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
-def test_a_number_converges_too_and_without_any_force(schedule):
+def test_a_scalar_converges_without_any_force(schedule):
     """Two particles at a distance d have phi = 1/(1 - strength/d); no effect needs forces, so there are
     none."""
     effects = (Potential(strength=0.1, tolerance=1e-14),)

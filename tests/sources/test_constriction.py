@@ -36,7 +36,7 @@ def places(z, rho, angle):
 
 
 @pytest.mark.parametrize("transition", [0.0, 0.8])
-def test_velocity_is_that_of_the_profile(transition, rng):
+def test_the_velocity_follows_the_profile(transition, rng):
     z, rho, angle = rng.uniform(-4, 4, 200), rng.uniform(0, 3, 200), rng.uniform(0, 2 * np.pi, 200)
     flow = ConstrictionFlow(**SHAPE, transition=transition)
     velocity, _ = sample((flow,), "flow_velocity", places(z, rho, angle))
@@ -70,7 +70,7 @@ def test_gradient_is_the_derivative_and_its_trace_is_not_zero_in_the_transitions
     np.testing.assert_allclose(divergence, expected, atol=1e-5)
 
 
-def test_more_flows_through_the_constriction_than_before_it():
+def test_the_flow_rate_is_larger_in_the_constriction():
     """The flow rate ratio is 3 R^2 / (R^2 + R R_c + R_c^2), as stated in its docstring."""
     flow, rho = ConstrictionFlow(**SHAPE), np.linspace(0, 2.5, 2001)
 

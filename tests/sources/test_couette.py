@@ -33,7 +33,7 @@ def test_beyond_a_wall_the_fluid_moves_with_it():
     assert (gradient == 0).all()
 
 
-def test_the_fluid_is_still_until_the_walls_begin_to_move():
+def test_the_fluid_is_at_rest_until_the_walls_move():
     late = FLOW.model_copy(update={"begin": 2.0})
     for t, part in ((1.99, 0.0), (2.0, 1.0)):
         velocity, gradient = sample((late,), "flow_velocity", [0.5 * N / 3], t)
@@ -42,7 +42,7 @@ def test_the_fluid_is_still_until_the_walls_begin_to_move():
 
 
 @pytest.mark.slow
-def test_a_grain_in_it_moves_with_its_layer():
+def test_a_grain_moves_with_its_layer():
     """From rest, v = v_f (1 - exp(-t/tau)): the flow along the wall keeps the grain in its layer."""
     flow = CouetteFlow(first=-1.0, second=3.0, first_velocity=(-1, 0, 0), second_velocity=(7, 4, 0))
     tau = 2.0 / (6 * np.pi * 0.5 * 0.1)

@@ -34,7 +34,7 @@ def within(ratios_by_scene, least=BAND[0], most=BAND[1]):
 
 
 @pytest.mark.long
-def test_the_error_at_the_end_of_a_particle_alone_is_that_asked_for():
+def test_the_final_error_of_a_single_particle_is_the_requested_one():
     """With the trapezoidal rule the ratio is within a factor of 4 for each linear motion and requested
     error."""
     ratios_by_scene = ratios(trapezoid("run"), ASKED, SINGLE)
@@ -78,7 +78,7 @@ def from_first_steps(tolerances):
 
 
 @pytest.mark.slow
-def test_steps_are_solved_whatever_the_first_one():
+def test_steps_are_solved_for_any_first_step():
     """In a very short first step a sweep changes nothing, which says nothing about longer steps.
 
     If it were taken as a contraction rate of 0, all later steps would be left unsolved, and the final error
@@ -100,7 +100,7 @@ def few_digits():
     return from_first_steps(10.0 ** -np.arange(2, 6))
 
 
-def test_what_the_estimate_says_of_the_leading_term():
+def test_the_leading_term_of_the_estimate():
     """With two stages it is the term of the trapezoidal rule: (k dt)^3/12 of the amplitude."""
     factor, power = leading(2)
     # The estimate with two stages is a/6 k dt, here divided by a.
@@ -110,7 +110,7 @@ def test_what_the_estimate_says_of_the_leading_term():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CONTROLS if "run" in name])
-def test_the_error_at_the_end_is_that_asked_for(name):
+def test_the_final_error_is_the_requested_one(name):
     """The ratio is within a factor of 20 for every decade; the chaotic motion amplifies errors by about
     50."""
     make, tolerances = CONTROLS[name]
@@ -120,7 +120,7 @@ def test_the_error_at_the_end_is_that_asked_for(name):
 
 
 @pytest.mark.slow
-def test_the_error_at_the_end_from_the_first_step_by_default():
+def test_the_final_error_with_the_default_first_step():
     """Collocation takes few steps and depends on their places, so the bound is a factor of 50 for these
     motions."""
     ratios_by_scene = ratios(
@@ -131,7 +131,7 @@ def test_the_error_at_the_end_from_the_first_step_by_default():
 
 
 @pytest.mark.slow
-def test_an_error_of_steps_says_less_of_the_end():
+def test_an_error_per_step_determines_the_final_error_less():
     """For the same motions the final error differs from the error requested for steps by factors above 100.
 
     The factor goes either way and depends on the requested error.
@@ -162,7 +162,7 @@ def test_order_is_kept(make, tolerances, expected):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [trapezoid("run"), collocation("run")])
-def test_the_size_of_a_motion_is_that_of_open_space_in_a_box(make):
+def test_the_size_of_a_motion_in_a_box_equals_open_space(make):
     """Two bodies in orbit through the faces of a periodic box take the same steps as in open space."""
     free = orbit(0.5, 1.3).scene(make(1e-4))
     results = []

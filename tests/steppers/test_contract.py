@@ -110,7 +110,7 @@ def implicit(setup: Scene, **more) -> Scene:
     return setup.model_copy(update={"stepper": Implicit(control=setup.stepper.control, **more)})
 
 
-def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
+def test_the_stepper_is_of_second_order_and_conserves_energy():
     """The trapezoidal rule conserves the energy of a linear spring exactly for any step."""
     stiffness, end = 4.0, 3.0
     steps = 2 ** np.arange(6, 11)
@@ -134,7 +134,7 @@ def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
         assert result.work["corrections"] > 3 * n
 
 
-def test_its_parameters_may_differ_per_world_and_are_written_to_files():
+def test_parameters_may_differ_per_world_and_are_written_to_files():
     setup = scene([[1.0, 0, 0]], [[0, 1.0, 0]], (Trap(stiffness=4.0),), mass=1.0, dt=0.1, steps=30)
     loose, tight = implicit(setup, tolerance=1e-4), implicit(setup, tolerance=1e-12)
     assert loose.structure() == tight.structure()
@@ -158,7 +158,7 @@ def test_lists_and_forces_in_an_iteration():
 
 
 @pytest.mark.slow
-def test_what_settles_in_an_iteration_is_an_iteration_in_an_iteration():
+def test_self_consistent_quantities_are_nested_iterations():
     """Induced dipoles are solved in every correction of every step; both schedules agree to the bit."""
     scenes = [implicit(cloud(1), tolerance=1e-13), implicit(cloud(2, chi=5.0), tolerance=1e-12)]
     results = [simulate(scenes, worlds=2, schedule=schedule) for schedule in ("world", "particle")]

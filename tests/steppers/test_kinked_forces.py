@@ -67,7 +67,7 @@ def trapezoid(per="run"):
 
 
 @pytest.mark.parametrize("name", [pytest.param("constriction", marks=pytest.mark.slow), "flow_that_begins"])
-def test_collocation_meets_the_error_asked_for_past_kinks(name):
+def test_collocation_meets_the_requested_error_past_kinks(name):
     assert ratios(name, collocation(5), 12).max() < LARGEST["run"][name]
 
 
@@ -84,7 +84,7 @@ def test_40_scenes_of_each_kind(name, stepper, per, capsys):
     assert found.max() < LARGEST[per][name]
 
 
-def test_fields_that_begin_and_fields_that_do_not_may_run_in_one_batch():
+def test_fields_with_and_without_a_start_time_run_in_one_batch():
     """Each has the error estimate that suits it, and the bits equal separate runs."""
     scenes = [
         tisim.Scene(

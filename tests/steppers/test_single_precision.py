@@ -67,7 +67,7 @@ def fast_flights():
 
 
 @pytest.mark.parametrize("function", ["flights", pytest.param("fast_flights", marks=pytest.mark.slow)])
-def test_a_slow_particle_gets_as_far_as_it_flies(single, function):
+def test_a_slow_particle_moves_the_right_distance(single, function):
     ends = single("steppers.test_single_precision", function)
     for place, steps in ends.values():
         assert steps == STEPS
@@ -75,7 +75,7 @@ def test_a_slow_particle_gets_as_far_as_it_flies(single, function):
         assert np.abs(np.array(place) - exact).max() < 2e-7
 
 
-def test_as_many_steps_are_taken_as_were_asked_for(single):
+def test_the_requested_number_of_steps_is_taken(single):
     assert single("steppers.test_single_precision", "counts") == [
         n for n in (1, 7, 2000, 100_001) for _ in "abc"
     ]
@@ -109,7 +109,7 @@ def restarts():
     return straight == simulation.results()[0].state["position"].tolist()
 
 
-def test_a_checkpoint_has_what_rounding_has_taken(single):
+def test_a_checkpoint_includes_rounding_remainders(single):
     assert single("steppers.test_single_precision", "restarts")
 
 
@@ -140,7 +140,7 @@ def refusals():
     return said
 
 
-def test_errors_that_it_cannot_reach_are_refused(single):
+def test_unreachable_errors_are_refused(single):
     said = single("steppers.test_single_precision", "refusals")
     rule = "must be at least {} in f32, which rounds positions by 1.2e-07; received {}"
     assert said == {

@@ -41,7 +41,7 @@ def row():
 
 
 @pytest.mark.slow
-def test_step_control_at_its_floor():
+def test_step_control_at_its_lower_bound():
     """The gaps are far smaller than v times the shortest step: the step stays at its lower bound, the run
     ends."""
     simulation = compiled(row(), 8, 16)
@@ -60,7 +60,7 @@ def test_step_control_at_its_floor():
 
 
 @pytest.mark.long
-def test_a_grain_alone_takes_the_longest_step():
+def test_a_single_grain_takes_the_longest_step():
     """A single grain takes steps at the upper bound, so few steps."""
     alone = scene([[0, 0, 0]], [[100.0, 0, 0]], row().effects, stepper=Verlet(), duration=0.01,
                   quantities={"temperature": 300.0})  # fmt: skip
@@ -70,7 +70,7 @@ def test_a_grain_alone_takes_the_longest_step():
 
 
 @pytest.mark.slow
-def test_a_scene_that_the_default_steps_cannot_resolve_is_refused():
+def test_a_scene_too_fast_for_the_default_steps_is_refused():
     """Two grains of 1 um, 10 um apart, approach at 5 m/s each.
 
     In 1 us, the shortest default step, they would pass each other undetected. With shorter steps they

@@ -103,7 +103,7 @@ def short(scenes):
     return simulate(scenes, worlds=WORLDS, capacity=PARTICLES, schedule="world")
 
 
-def test_a_moment_of_the_default_stepper():
+def test_a_very_short_run_with_the_default_stepper():
     """A picosecond at 1e6 m/s, with default limits."""
     (result,) = short([scene([[0.0] * 3], [[1e6, 0, 0]], stepper=Trapezoid(), duration=1e-12)])
     assert result.state["position"][0, 0] == 1e-6
@@ -119,7 +119,7 @@ def test_growth_of_steps_is_counted():
     assert IterationControl(first=1.0, longest=100.0, most=2.0).fewest(1023.0) == pytest.approx(10.23)
 
 
-def test_steps_ahead():
+def test_remaining_steps():
     """The number of steps left at the length of the last one, in the world that has most."""
     scenes = [
         scene([[0.0] * 3], [[1.0] * 3], stepper=FREE["verlet, fixed"](dt), duration=1.0)
@@ -135,7 +135,7 @@ def test_steps_ahead():
 
 
 @pytest.mark.parametrize("name", ["trapezoid, iteration", "brownian"])
-def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
+def test_frames_near_the_times_of_synchronisation(name, tmp_path):
     """Particles synchronise at multiples of the longest step, and frames are due just before and after them.
 
     Each frame shows consistent positions, none comes too early, and the end is the same to the last bit.

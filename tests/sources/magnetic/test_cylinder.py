@@ -140,7 +140,7 @@ def test_many_cylinders_in_any_direction(rng):
         assert errors_of_inclined(ratios, 12, rng).max() < 1
 
 
-def test_what_is_parallel_stays_parallel_and_files_keep_what_was_written():
+def test_parallel_vectors_stay_parallel_and_files_keep_all_digits():
     """The direction is not rounded before it is used."""
     body = Cylinder(axis=(1, 2, 3), radius=1, length=2, magnetisation=(1e5, 2e5, 3e5))
     assert body.axis == (1, 2, 3)
@@ -229,7 +229,7 @@ def test_against_an_independent_library(rng):
     assert inside > 300
 
 
-def test_where_the_library_differs_it_is_the_one_that_is_wrong(rng):
+def test_the_library_is_wrong_at_the_largest_differences(rng):
     """At the points of the largest difference, the published formulas agree with this field."""
     world, points = one(0.8), rng.normal(size=(3000, 3)) * 5
     results, expected = fields([world], points[None]), (peer(world, points), peers_gradient(world, points))
@@ -253,7 +253,7 @@ def test_a_world_is_the_same_alone_and_in_a_batch(rng):
     assert (together[0][2] != 0).all()
 
 
-def test_many_points_at_once_are_the_same_as_one_by_one(rng):
+def test_many_points_at_once_equal_single_points(rng):
     """Most points are evaluated in vectors; points near the axis, far away and at the rim are not.
 
     The results are equal to the last bit if the compiler has no choice between fused and rounded products.
@@ -266,7 +266,7 @@ def test_many_points_at_once_are_the_same_as_one_by_one(rng):
         np.testing.assert_allclose(b, a[0], rtol=0 if exact else 1e-9)
 
 
-def test_sums_and_turns(rng):
+def test_sums_and_rotations(rng):
     """The field of several cylinders is the sum of their fields, and it rotates with them."""
     many = scattered(rng, 4)
     points = rng.normal(size=(1, 300, 3)) * 4

@@ -31,7 +31,7 @@ def around(rng, length, n=1500):
 
 @pytest.mark.long
 @pytest.mark.parametrize("digits", [3, pytest.param(5, marks=pytest.mark.slow)])
-def test_it_is_as_accurate_as_it_says(digits, rng):
+def test_the_table_has_its_stated_accuracy(digits, rng):
     """Errors of field and gradient relative to their sizes; inside, relative to the terms of the gradient.
 
     The errors are also not more than a thousand times below the bound.
@@ -48,7 +48,7 @@ def test_it_is_as_accurate_as_it_says(digits, rng):
             assert 10.0 ** -(digits + 3) < errors.max() < 10.0**-digits
 
 
-def test_what_tisim_cost_tries():
+def test_approximations_for_tisim_cost():
     """Coarse tables come first; tabulated or too flat cylinders have none."""
     assert [law.table_digits for law in magnet(2.0).approximations(1.0)] == [3, 4, 5]
     assert magnet(2.0, 3).approximations(1.0) == ()
@@ -64,7 +64,7 @@ def test_invalid_values_are_refused():
         magnet(1.0, 9)
 
 
-def test_digits_that_no_table_has_are_refused(monkeypatch):
+def test_invalid_table_digits_are_refused(monkeypatch):
     monkeypatch.setattr(cylinder_table, "GRIDS", cylinder_table.GRIDS[:1])
     with pytest.raises(InputError, match=r"^table_digits must be fewer in f(32|64); received 6$"):
         cylinder_table.table(6)

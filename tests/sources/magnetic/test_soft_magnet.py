@@ -50,7 +50,7 @@ def test_energy_is_least_of_all_that_do_not_exceed_saturation(aspect, field):
     np.testing.assert_allclose(moment, least, atol=0.01 * SATURATION)
 
 
-def test_what_is_no_magnet_is_refused():
+def test_invalid_magnets_are_refused():
     with pytest.raises(InputError, match="axis of a cylinder must be a direction"):
         magnetisation((0, 0, 0), 1.0, 1.0, SATURATION, (0, 0, 1))
     with pytest.raises(InputError, match="saturation magnetisation must be greater than 0"):

@@ -22,7 +22,7 @@ def test_demagnetising_factor():
     assert demagnetising_factor(1.0, 2e4) == pytest.approx(4 / (3 * np.pi * 1e4), rel=1e-3)
 
 
-def test_it_is_the_mean_of_the_field_inside():
+def test_the_factor_is_the_mean_field_inside():
     """-H / M along the axis, averaged over the cylinder by quadrature."""
     x, weight = np.polynomial.legendre.leggauss(60)
     half = 0.7
@@ -58,7 +58,7 @@ def test_along_the_easy_axis_and_across_it():
     assert m[1] > 0.9
 
 
-def test_no_direction_is_better(rng):
+def test_the_energy_is_minimal(rng):
     """Compared with the energy of every direction, for random cylinders in random weak and strong fields."""
     psi = np.linspace(-np.pi, np.pi, 3601)
     for _ in range(200):

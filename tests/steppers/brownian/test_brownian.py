@@ -67,7 +67,7 @@ def test_sedimentation_at_stokes_velocity_and_shear_without_heat(together):
     np.testing.assert_allclose(result.state["position"], expected, rtol=0, atol=1e-17)
 
 
-def test_steps_ahead_are_intervals():
+def test_remaining_steps_count_intervals():
     """There are 300 longest steps, many of which a launch takes for a single colloid."""
     scene = colloids(np.zeros((1, 3)), steps=300)
     simulation = compiled(scene, 5, 10_000)
@@ -101,7 +101,7 @@ def test_equipartition_in_a_trap_with_the_bias_of_eulers_steps():
         check_variance(moved(result), DIFFUSIVITY / rate / (1 - a / 2) * (1 - (1 - a) ** (16 / a)), a)
 
 
-def test_noise_keeps_its_law_where_the_step_depends_on_the_state():
+def test_noise_keeps_its_law_with_state_dependent_steps():
     """In each step the displacement minus the drift is normal with variance 2 D dt.
 
     This holds for short and long steps, and successive steps are independent.
@@ -178,7 +178,7 @@ class Pinned(Force):
     [Open(), pytest.param(Box(low=(-1.1e-6,) * 3, high=(1.1e-6,) * 3), marks=pytest.mark.slow)],
     ids=["open", "box"],
 )
-def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
+def test_vectorised_particles_equal_single_ones(domain, monkeypatch):
     """Vectorised and single steps agree to the bit.
 
     The scenes contain intervals with one step for all particles, intervals with several, fixed particles, and
@@ -213,7 +213,7 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
 
 
 @both
-def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
+def test_a_checkpoint_continues_to_the_same_bits(together, tmp_path):
     place = np.random.default_rng(1).uniform(-1e-6, 1e-6, (40, 3))
     scene = colloids(place, together, trap=200.0, dt=1e-3, steps=30, drift=0.3)
     simulation = compiled(scene, 5, 600 if together else MANY)
@@ -233,7 +233,7 @@ def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("together", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_what_is_fixed_stays_and_the_others_go_on(together):
+def test_fixed_particles_stay_and_the_others_move(together):
     """In a flow along x an operator stops each particle right after the step that brings it past the
     place."""
     shear, dt, place = 10.0, 1e-3, 1.05e-6
@@ -293,7 +293,7 @@ def test_overlapping_pair_is_pushed_apart_in_short_steps():
     ],
     ids=["drag", "impact", "dissipation"],
 )
-def test_what_needs_velocities_is_refused(effects):
+def test_effects_that_need_velocities_are_refused(effects):
     rule = "must be one that does not depend on velocity in a scene stepped by brownian"
     with pytest.raises(InputError, match=rf"effects.{effects[0].kind()} {rule}"):
         colloids(np.zeros((1, 3)), extra=effects)

@@ -85,7 +85,7 @@ def test_tensors_have_no_divergence(hydrodynamics):
 
 @noises
 @tensors
-def test_velocities_that_forces_give_at_once(hydrodynamics, noise):
+def test_velocities_follow_forces_at_once(hydrodynamics, noise):
     """v_i = sum_j D_ij F_j / kT with springs to the origin and weight, for every branch of the tensor."""
     cases = [lattice(k) for k in range(4)]
     if hydrodynamics == "rotne-prager":
@@ -202,7 +202,7 @@ def cloud(n, side, seed=0):
     return np.array(centres), np.ones(n)
 
 
-def test_what_the_expansion_leaves_out():
+def test_the_error_of_the_expansion():
     """Variances are right.
 
     Covariances of two near spheres differ by less than the 5 % of D_ii of B16 6.3; in a cloud the error is
@@ -220,7 +220,7 @@ def test_what_the_expansion_leaves_out():
 
 @slow
 @noises
-def test_noise_and_drift_leave_out_what_is_fixed(noise):
+def test_noise_and_drift_exclude_fixed_particles(noise):
     """One sphere starts beyond the place and is fixed in the first step; from then on it drags no other
     sphere."""
     position, radius = crowd(3, 10)
@@ -292,7 +292,7 @@ def test_spheres_in_one_place_and_a_heap_of_them_stay_finite(noise):
 
 @slow
 @pytest.mark.parametrize("noise", ["exact", pytest.param("fast", marks=pytest.mark.slow)])
-def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_path):
+def test_the_bits_do_not_depend_on_schedule_batch_or_portions(noise, tmp_path):
     scenes = [
         make(crowd(k, 35), noise=noise, trap=300.0, drift=0.2, dt=1e-3, steps=20, seed=k) for k in range(8)
     ]
@@ -316,7 +316,7 @@ def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_p
 
 @pytest.mark.slow
 @slow
-def test_interaction_does_not_change_where_particles_are_in_equilibrium():
+def test_interaction_does_not_change_the_equilibrium():
     """Overlapping spheres in traps of their own width: each coordinate keeps the variance kT/k.
 
     Drift and noise come from the same matrix.
@@ -353,7 +353,7 @@ def test_cost_sets_exact_and_fast_noise_side_by_side():
     assert [quantity.random for quantity in usual(scene)] == [True]
 
 
-def test_matrices_for_which_there_is_no_room_are_refused():
+def test_matrices_larger_than_the_memory_are_refused():
     scene = make((np.zeros((1, 3)), np.array([RADIUS])))
     capacity = int(np.sqrt(memory() / 4) / 3) + 100
     with pytest.raises(InputError, match=r"memory for diffusion matrices must be within the \d+ GB"):

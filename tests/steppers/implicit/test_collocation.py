@@ -90,7 +90,7 @@ def test_order_of_fewer_stages(stages, steps):
 
 
 @pytest.mark.slow
-def test_the_error_asked_for_is_met_and_costs_work(runs):
+def test_the_requested_error_is_met_with_more_work(runs):
     """Over nine decades the error is near or below the requested one and decreases with it, and the work
     increases."""
     results = [runs[f"error {e}"] for e in ERRORS]
@@ -104,7 +104,7 @@ def test_the_error_asked_for_is_met_and_costs_work(runs):
 
 
 @pytest.mark.long
-def test_goes_on_from_a_checkpoint_to_the_same_bits(runs, tmp_path):
+def test_a_checkpoint_continues_to_the_same_bits(runs, tmp_path):
     """The data for the prediction of the next step are stored too, and exactly the requested steps are
     taken."""
     assert runs
@@ -143,7 +143,7 @@ def test_a_step_too_long_is_rejected(runs):
     assert final(result)[0] == pytest.approx(speed, rel=1e-6)
 
 
-def test_what_cannot_be_solved_says_when_who_and_which_force(runs):
+def test_unsolvable_steps_name_time_particle_and_force(runs):
     """It fails at the shortest step allowed, and the state of the last good step is kept."""
     failed = runs["stuck"]
     assert (
@@ -153,7 +153,7 @@ def test_what_cannot_be_solved_says_when_who_and_which_force(runs):
     assert failed.time == 0.0
 
 
-def test_rest_is_no_error(runs):
+def test_particles_at_rest_have_no_error(runs):
     """No velocity and no force would give 0/0; also no force on a moving particle."""
     for name, place in (("rest", 0.0), ("free", 1e-2)):
         assert runs[name].status.ok

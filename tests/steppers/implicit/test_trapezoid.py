@@ -62,7 +62,7 @@ def test_acceleration_finds_the_same_solution_in_fewer_iterations():
 
 
 @pytest.mark.slow
-def test_acceleration_of_grains_that_turn():
+def test_acceleration_with_rotating_grains():
     """Torques are mixed together with forces; the solution equals plain iteration."""
     plain, mixed = (
         simulate(
@@ -99,7 +99,7 @@ def test_a_step_too_long_is_rejected_not_blown_up():
 
 
 @pytest.mark.long
-def test_what_cannot_be_solved_says_when_who_and_which_force():
+def test_unsolvable_steps_name_time_particle_and_force():
     """The shortest step allowed is too long for the spring of one world; the other world continues."""
     control = IterationControl(first=1e-2, longest=1e-2, shortest=1e-2)
     stiff, soft = (oscillator(Trapezoid(control=control), stiffness=k) for k in (1e7, 1.0))
@@ -114,7 +114,7 @@ def test_what_cannot_be_solved_says_when_who_and_which_force():
 
 
 @pytest.mark.slow
-def test_what_cannot_be_solved_together_says_so_too():
+def test_unsolvable_coupled_steps_are_named_too():
     """For interacting particles too, the state of the last good step is kept."""
     setup = with_stepper(
         shells(SoftShell, np.random.default_rng(3), True),
@@ -140,7 +140,7 @@ class Late(Force):
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", [Trapezoid, pytest.param(Collocation, marks=pytest.mark.slow)])
-def test_the_force_is_that_of_the_time_at_which_the_step_fails(kind):
+def test_the_named_force_is_evaluated_at_the_failing_step(kind):
     """At the end of the last good step another force is the largest."""
     control = {Trapezoid: IterationControl(first=0.05, longest=0.05, shortest=0.01),
                Collocation: StageControl(first=0.05, longest=0.05, shortest=0.01)}[kind]  # fmt: skip
@@ -159,7 +159,7 @@ def test_the_force_is_that_of_the_time_at_which_the_step_fails(kind):
 
 
 @pytest.mark.slow
-def test_rest_is_no_error():
+def test_particles_at_rest_have_no_error():
     """No velocity and no force would give 0/0 in the error norm; also a world in which no particle moves."""
     (result,) = simulate([oscillator(Trapezoid(), duration=1e-2, stiffness=0.0)], worlds=1)
     still = scene(
@@ -200,7 +200,7 @@ def test_linear_terms_in_velocity_are_solved_exactly():
     assert np.linalg.norm(result.state["velocity"]) == pytest.approx(1.0, rel=1e-12)
 
 
-def test_the_force_of_the_last_iterate_but_one_is_good_enough():
+def test_the_force_of_the_previous_iterate_suffices():
     """A step starts with the force from which its last iterate was made.
 
     At any tolerance the error equals the error of the fully solved rule, with little more than one force
@@ -219,7 +219,7 @@ def test_the_force_of_the_last_iterate_but_one_is_good_enough():
     assert sums[1] > 2.5
 
 
-def test_only_what_is_needed_is_allocated():
+def test_only_needed_fields_are_allocated():
     """No spins without torques; for one particle no sums or iterates; without acceleration no stored
     iterates."""
     alone = Simulation(oscillator(Trapezoid()))
