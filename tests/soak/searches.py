@@ -140,7 +140,7 @@ class _Search:
         self._dog.start()
 
     def follow(self, evaluations: int | None = None) -> bool:
-        """Read until ``evaluations`` more are stored or all processes have ended; whether they were stored."""
+        """Read until ``evaluations`` more are stored or all processes have ended; whether they are."""
         remaining = evaluations
         while remaining is None or remaining > 0:
             line = self.process.stdout.readline()
