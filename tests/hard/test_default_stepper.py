@@ -203,7 +203,7 @@ class TestTheGuard:
     """A fixed step beyond the critical step stops the world, under every law."""
 
     @pytest.mark.parametrize(("factor", "ok"), [(0.44, True), (0.48, False)])
-    def test_a_spring_is_followed_up_to_nearly_half_of_the_critical_step(self, factor, ok):
+    def test_a_spring_is_accepted_up_to_nearly_half_of_the_critical_step(self, factor, ok):
         critical = 2 / (2 * np.pi * 1e3)
         result = tisim.run(tethered(stepper=Verlet(control=FixedStep(dt=factor * critical))))
         assert result.status.ok == ok, result.status.reason
@@ -213,13 +213,13 @@ class TestTheGuard:
             told = float(result.status.reason.split("critical one at most ")[1].split(" s")[0])
             assert told == pytest.approx(critical, rel=0.05)
 
-    def test_a_magnet_that_turns_in_long_steps_stops_its_world(self):
+    def test_a_rotating_magnet_in_long_steps_stops_the_world(self):
         result = tisim.run(magnet(stepper=Verlet(control=ApproachTime())))
         assert not result.status.ok
         assert "critical time step" in result.status.reason
 
     @pytest.mark.parametrize("part", [0.3, 0.5, 1.0, 3.0])
-    def test_two_bodies_in_orbit_in_long_steps_stop_their_world(self, part):
+    def test_two_orbiting_bodies_in_long_steps_stop_the_world(self, part):
         d, period = 0.01, 1e-3
         total = 4 * np.pi**2 * d**3 / (6.6743e-11 * period**2)
         v = math.sqrt(6.6743e-11 * total / d)
@@ -356,7 +356,7 @@ class TestTheChoice:
         # The duration of a Hertzian impact scales as v^-1/5.
         assert step(10.0) == pytest.approx(step(0.1) * 100**-0.2, rel=0.02)
 
-    def test_a_blast_is_known_before_it_is_placed(self):
+    def test_the_shortest_step_accounts_for_a_blast(self):
         cloud = {"number": 50, "radius": 1e-3, "density": 2000.0}
         steps = [
             tisim.Scene(
@@ -369,7 +369,7 @@ class TestTheChoice:
         ]
         assert steps[0] == pytest.approx(10 * steps[1], rel=0.02)
 
-    def test_bodies_that_only_fall_are_stepped(self):
+    def test_a_falling_clump_is_stepped(self):
         clump = tisim.Clump(centres=[(0, 0, 0), (1e-3, 0, 0)], radii=[1e-3] * 2, density=2000.0)
         scene = tisim.Scene(
             particles=tisim.Particles.of_clumps(clump, position=[(0, 0, 0)]),
@@ -379,7 +379,7 @@ class TestTheChoice:
         fallen = tisim.run(scene).check().state["position"][:, 2]
         assert fallen == pytest.approx([-5.0, -5.0], rel=1e-9)
 
-    def test_a_charge_that_is_missing_is_asked_for(self):
+    def test_a_missing_charge_is_reported(self):
         scene = tisim.Scene(
             particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=1e-3, mass=1e-6),
             effects=(laws.Lorentz(), sources.MagneticField(constant=(0, 0, 1.0))),

@@ -38,7 +38,7 @@ def decades(low, high):
     approach=decades(-200, 308),
     hardness=decades(-300, 300),
 )
-def test_any_magnitudes_are_refused_or_give_numbers(masses, radius, away, approach, hardness):
+def test_any_magnitudes_are_refused_or_give_finite_numbers(masses, radius, away, approach, hardness):
     """Two touching grains of any mass and size, at any distance from the origin, give a message or only
     finite numbers, also in the state of a failed run."""
     try:
@@ -72,7 +72,7 @@ def test_positions_that_round_together_are_refused():
 
 @pytest.mark.long
 @pytest.mark.parametrize("part", [1e-300, 1e-12, 1e-6])
-def test_two_grains_hardly_apart(part):
+def test_two_nearly_coincident_grains(part):
     """The line of centres and the impact are defined at any distance whose square is representable."""
     (result,) = run_merging([pair(part * RADIUS, 1.0)])
     assert result.status.ok
@@ -137,7 +137,7 @@ def test_impact_at_any_speed():
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=1e-13)
 
 
-def test_two_charges_in_one_place_fail_clearly():
+def test_two_coincident_charges_fail_clearly():
     """The force is 1/0: the run fails at once, names force, particle and time, and keeps the start state."""
     bad, good = run_charges(
         [

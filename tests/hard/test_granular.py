@@ -167,7 +167,7 @@ def of_size(name, size, state):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_an_impact_is_the_same_of_ten_nanometres_and_of_kilometres(name, rng):
+def test_impacts_scale_from_nanometres_to_kilometres(name, rng):
     """Impacts of spinning grains of two materials agree in units of the size, to rounding, also in single
     precision."""
     n = 16
@@ -190,7 +190,7 @@ def test_an_impact_is_the_same_of_ten_nanometres_and_of_kilometres(name, rng):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_a_light_grain_meets_a_heavy_one_as_it_meets_a_wall(name):
+def test_restitution_at_large_mass_ratios(name):
     """For mass ratios from 1e-6 to 1e6 the restitution follows the law and the momentum is conserved."""
     e = 0.5 if "restitution" in ELASTIC[name] else 1.0
     law = {"restitution": e} if e < 1 else {}

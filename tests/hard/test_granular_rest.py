@@ -49,7 +49,7 @@ def balanced(name, law, n):
     return place
 
 
-def weighed(name, law, state):
+def column_energy(name, law, state):
     """Kinetic, potential and contact energy of a column, J."""
     z = state["position"][:, 2]
     contacts = [stored(name, 1 - z[0], 1.0, law)] + [stored(name, 2 - d, 0.5, law) for d in np.diff(z)]
@@ -78,9 +78,9 @@ def test_a_tall_column_rests(name):
             place = one.start()["position"]
             np.testing.assert_allclose(state["position"], place, rtol=0, atol=1e-11 + 1e3 * roundoff())
             assert kinetic(state).sum() < 1e-18 + (1e5 * roundoff()) ** 2
-    rest = [weighed(name, law, states[0]) for law, states in zip(laws, series[:2], strict=True)]
+    rest = [column_energy(name, law, states[0]) for law, states in zip(laws, series[:2], strict=True)]
     free, damped = (
-        np.array([weighed(name, law, state) - lowest for state in states])
+        np.array([column_energy(name, law, state) - lowest for state in states])
         for law, lowest, states in zip(laws, rest, series[2:], strict=True)
     )
     rounding = 1e3 * roundoff() * rest[0]

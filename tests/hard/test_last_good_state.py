@@ -139,7 +139,7 @@ def batch(request):
 
 
 @pytest.mark.parametrize("stretch", [300, 7])
-def test_worlds_that_fail_in_one_batch_end_as_each_does_alone(batch, stretch):
+def test_worlds_that_fail_in_one_batch_end_as_they_do_alone(batch, stretch):
     """Both with one run in which all of them fail, and with several short ones."""
     simulation, scenes, alone = batch
     simulation.load(scenes)
@@ -193,7 +193,7 @@ def test_ctrl_c_during_the_rerun_leaves_the_batch_unchanged(batch, monkeypatch):
 
 
 @pytest.mark.parametrize("steps", [150, 250])
-def test_a_checkpoint_keeps_why_worlds_have_failed(batch, tmp_path, steps):
+def test_a_checkpoint_keeps_the_reasons_of_failures(batch, tmp_path, steps):
     simulation, scenes, alone = batch
     simulation.load(scenes)
     simulation.run(steps=steps)

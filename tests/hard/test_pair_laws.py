@@ -111,7 +111,7 @@ def test_energy_released_is_energy_stored(couples):
         np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-12)
 
 
-def test_surfaces_that_just_touch_do_not_push(couples):
+def test_touching_surfaces_exert_no_force(couples):
     """At the sum of the radii, which is a binary fraction, and beyond it the force is zero."""
     for name in ("touching", "beyond"):
         np.testing.assert_array_equal(couples[name].state["velocity"], 0.0)
@@ -122,7 +122,7 @@ def test_surfaces_that_just_touch_do_not_push(couples):
 
 
 @pytest.mark.slow
-def test_a_thousand_pressed_into_each_other(rng):
+def test_a_thousand_overlapping_particles(rng):
     """Random positions with a dozen overlaps each: the stored energy is released and momentum is
     conserved."""
     place = rng.uniform(0, 1, (CROWD, 3))

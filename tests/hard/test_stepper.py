@@ -169,7 +169,7 @@ def test_a_sudden_force(name):
 
 
 @pytest.mark.slow
-def test_steps_that_a_contact_has_made_short_grow_again():
+def test_steps_grow_again_after_a_contact():
     """Grains of any speed that meet in mid-step rebound with their energy, in few steps.
 
     The stepper must not keep the short steps of the contact because of an outdated contraction rate.

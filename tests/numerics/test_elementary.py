@@ -75,14 +75,14 @@ def arguments():
 
 
 @pytest.mark.parametrize("name", ONE)
-def test_a_function_is_next_to_the_true_value(name, arguments):
+def test_functions_are_accurate(name, arguments):
     x = np.array(arguments[name])
     with mpmath.workprec(1300):
         exact = [getattr(mpmath, name)(mpmath.mpf(float(v))) for v in x]
     assert ulps(values(x)[name], exact) < ULPS
 
 
-def test_a_power_is_next_to_the_true_value():
+def test_powers_are_accurate():
     rng = np.random.default_rng(2)
     x = np.concatenate(
         [abs(spread(rng, -1022, 1023)), rng.uniform(0.1, 10.0, 1500), 1 + spread(rng, -40, -2)]

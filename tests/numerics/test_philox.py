@@ -120,7 +120,7 @@ def test_the_counter_contains_every_coordinate_of_a_draw(rng):
         assert words == twin(counter, (seed & ONES, seed >> 32))
 
 
-def test_neighbouring_draws_share_nothing():
+def test_neighbouring_draws_are_independent():
     """Seeds, streams, particles, steps and draws that differ by one never give the same word."""
     where = np.array(np.meshgrid(*[range(5)] * 5, indexing="ij"), np.uint64).reshape(5, -1).T
     out = np.zeros((len(where), 4), np.uint32)

@@ -75,12 +75,12 @@ def test_each_step_solves_its_implicit_equation():
     assert max(errors_of_steps()) < 1e-13
 
 
-def test_heat_lost_is_in_the_books():
+def test_the_heat_balance_closes():
     for result in run([alone(t, 0.01, 50, LAW) for t in (0.0, 500.0, 1e5)]):
         assert energy(result.state) == pytest.approx(energy(result.start), rel=1e-13, abs=1e-13)
 
 
-def test_never_crosses_equilibrium_however_long_the_step():
+def test_cooling_never_crosses_equilibrium():
     """The explicit step of Z04 (6.21) would fall below absolute zero here."""
     law = Cooling(emissivity=1.0, surroundings=300.0)
     hot, cold = run([alone(t, 1e9, 1, law, radius=1e-8) for t in (1e5, 0.0)])

@@ -123,7 +123,7 @@ def point_of(design):
     return Genome(GENES).encode(design)
 
 
-def test_lucky_values_do_not_lead(rng):
+def test_lucky_values_do_not_mislead(rng):
     """The best design has the best posterior mean, not the luckiest value."""
     campaign = AskTell(GENES, method="gaussian-process")
     designs = [{"x": float(x), "y": 1.0} for x in np.linspace(-1, 1, 41)]

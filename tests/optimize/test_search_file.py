@@ -112,7 +112,7 @@ def test_standard_errors_follow_from_the_runs(found):
         assert row["gain std. error"] == pytest.approx(stats.sem(mine), rel=1e-9)
 
 
-def test_a_search_that_goes_on_is_read_up_to_now(tmp_path):
+def test_a_running_search_is_read_up_to_now(tmp_path):
     counts = []
 
     class Watched(FakeEvaluator):
@@ -130,7 +130,7 @@ def test_a_search_that_goes_on_is_read_up_to_now(tmp_path):
     assert counts == [(0, 0), (4, 0), *((count, k) for k, count in enumerate(starts[1:-1], start=1))]
 
 
-def test_a_file_of_several_searches_wants_a_name(tmp_path):
+def test_a_file_of_several_searches_needs_a_name(tmp_path):
     first, second = (searched(tmp_path, seed=seed) for seed in (1, 2))
     file = optimize.read(tmp_path)
     names = [outcome.name.removeprefix("searches/") for outcome in (first, second)]

@@ -138,7 +138,7 @@ def test_a_warm_start_learns_only_from_designs_in_its_range(tmp_path):
             assert max(told) <= 0.5
 
 
-def test_a_warm_start_wants_a_folder():
+def test_a_warm_start_needs_a_folder():
     with pytest.raises(InputError, match="warm_start must be given with a folder, out; received True"):
         optimize.run(problem(), warm_start=True)
 

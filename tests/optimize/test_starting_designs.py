@@ -245,7 +245,7 @@ def test_measured_designs_are_learnt_from_and_not_run(path, method):
     assert (again.evaluations, again.designs) == (0, outcome.designs)
 
 
-def test_methods_that_cannot_learn_from_them_refuse_them(path):
+def test_methods_that_cannot_learn_refuse_measured_designs(path):
     known = experiments(measured(3), fake_problem(3))
     with pytest.raises(
         InputError, match="method must be for experiments: cma-es, gaussian-process, genetic, nsga2"

@@ -257,7 +257,7 @@ def test_too_much_memory_is_refused_before_it_is_allocated(monkeypatch):
         tracemalloc.stop()
 
 
-def test_along_an_axis_that_is_not_periodic_spheres_lie_within_the_faces():
+def test_spheres_lie_inside_nonperiodic_faces():
     """Such axes may have walls; along periodic axes spheres may extend over the faces."""
     box = Box(low=(0, 0, 0), high=(1, 1, 0.5), periodic=(True, True, False))
     place = arrays(Cloud(number=300, radius=0.04, density=1.0), box)["position"]

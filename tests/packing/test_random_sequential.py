@@ -44,7 +44,7 @@ def test_the_seed_decides():
     assert np.abs(first - other).max() > 0.1
 
 
-def test_places_are_uniform():
+def test_positions_are_uniform():
     centres = np.concatenate([place(np.full(50, 1e-3), box(LOW, HIGH), seed) for seed in range(200)])
     u = (centres - LOW) / (HIGH - LOW)
     assert np.abs(u.mean(axis=0) - 0.5).max() < 4 / np.sqrt(12 * len(u))

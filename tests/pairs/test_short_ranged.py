@@ -215,7 +215,7 @@ def test_the_contact_history_is_bounded_and_cleared():
     assert all(radius[i] <= radius[j] for i, j in partners)
 
 
-def of_chunks(setup, slots, monkeypatch):
+def run_in_chunks(setup, slots, monkeypatch):
     """Result with chunks of ``slots`` slots."""
     monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", slots)
     simulation = Simulation(setup, capacity=160, schedule="world")
@@ -235,7 +235,7 @@ def test_contacts_within_a_far_cut_off_equal_the_twin(monkeypatch):
 
     Some pairs extend over two chunks.
     """
-    result = of_chunks(grains(others=(CutOff(**SHELL),), steps=75), 64, monkeypatch)
+    result = run_in_chunks(grains(others=(CutOff(**SHELL),), steps=75), 64, monkeypatch)
     state, shell = by_id(result), tuple(SHELL.values())
     v, spin = twin(result.start, 75, 500.0, 300.0, shell)
     np.testing.assert_allclose(state["velocity"], v, rtol=0, atol=1e-9)
@@ -249,7 +249,7 @@ def test_contacts_within_a_far_cut_off_equal_the_twin(monkeypatch):
 def test_contacts_in_implicit_steps_equal_all_pairs(monkeypatch):
     """After an implicit step the history is updated separately, also if the other law sums over all pairs."""
     over_all, cut = (
-        by_id(of_chunks(grains(others=(kind(**SHELL),), stepper=TRIALS), slots, monkeypatch))
+        by_id(run_in_chunks(grains(others=(kind(**SHELL),), stepper=TRIALS), slots, monkeypatch))
         for kind, slots in ((SoftShellOfAll, 512), (CutOff, 64))
     )
     for name in ("velocity", "spin"):

@@ -135,7 +135,7 @@ def test_results_equal_an_unsorted_run_to_rounding(unsorted, usual):
 
 
 @pytest.mark.slow
-def test_grains_are_taken_out_of_a_sorted_world(simulation, unsorted, tmp_path):
+def test_grains_are_removed_from_a_sorted_world(simulation, unsorted, tmp_path):
     """Compared with an unsorted world, in a batch, and in a restarted run."""
     leaving = bed(3, exit_height=0.4)
     # Removed grains are replaced by grains from the end, so the order of ids alone does not prove the sort.

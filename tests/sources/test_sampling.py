@@ -44,7 +44,7 @@ def test_nothing_to_sample_and_points_of_another_shape():
         sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [0.0, 0, 0])
 
 
-def test_fields_of_sources_go_when_the_kernel_fails(monkeypatch):
+def test_fields_of_sources_are_freed_if_the_kernel_fails(monkeypatch):
     """This happens for a source that does not compile. A stored error must not keep the memory."""
     before = len(memory.in_use())
 

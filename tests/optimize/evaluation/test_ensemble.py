@@ -176,7 +176,7 @@ def test_finished_evaluations_are_stored_before_the_rest_runs(tmp_path):
     assert len(Cache(tmp_path / "cache.h5")) == 7
 
 
-def test_evaluator_that_forgets_a_scene_is_caught(tmp_path):
+def test_an_evaluator_that_forgets_a_scene_is_detected(tmp_path):
     class Forgetful(FakeEvaluator):
         def evaluate(self, scenes, progress):
             return (pair for pair in super().evaluate(scenes, progress) if pair[0] != 1)

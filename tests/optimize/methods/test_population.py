@@ -51,7 +51,7 @@ def settings_of(usual, method, options):
     )
 
 
-def test_the_table_is_of_the_cases_there_are():
+def test_the_table_lists_the_existing_cases():
     searches = [case.sizes["default"].search for case in catalogue.every().values() if case.problem]
     options = [search["options"] for search in searches if "options" in search]
     assert all(any(usual.get("options") == own for usual in USUAL.values()) for own in options)
@@ -59,7 +59,7 @@ def test_the_table_is_of_the_cases_there_are():
 
 @pytest.mark.parametrize("case", USUAL)
 @pytest.mark.parametrize("method", every())
-def test_every_population_is_taken_or_refused_for_a_real_reason(case, method):
+def test_every_population_is_accepted_or_refused_for_a_real_reason(case, method):
     unfit, message = REFUSED.get(method, (lambda n: False, None))
     for population in (2, 3, 12, 33) if method in SURROGATE else POPULATIONS:
         if unfit(population):

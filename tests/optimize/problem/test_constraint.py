@@ -35,7 +35,7 @@ FIRST = DesignConstraint("first", lambda design: design["x0"], "m", at_most=0.5)
         ({"at_most": 3.0}, math.nan, math.inf),
     ],
 )
-def test_a_violation_is_the_excess_in_parts_of_the_bound(bounds, value, violation):
+def test_a_violation_is_the_excess_relative_to_the_bound(bounds, value, violation):
     assert ResultConstraint("mass", len, "kg", **bounds).violation(value) == pytest.approx(violation)
 
 

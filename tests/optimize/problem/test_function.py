@@ -30,7 +30,7 @@ def test_a_method_finds_the_minimum_of_an_analytic_function():
     assert outcome.problem.name == "rosenbrock"
 
 
-def test_a_function_of_the_design_is_called_once_for_each():
+def test_a_function_is_called_once_for_each_design():
     """The budget counts calls."""
     calls = []
     problem = Problem.of_function(lambda design: len(calls.append(design) or ()) + design["x"], ONE, code="c")

@@ -77,7 +77,7 @@ def test_the_spread_of_designs_at_the_target_names_choices():
     assert lines[1] == "1.0,2,round,False,2.5,2.0,3.0"
 
 
-def test_the_bar_tells_the_best_design():
+def test_the_bar_shows_the_best_design():
     text = Display(PROBLEM, Settings(generations=3), Console(file=io.StringIO()))._design(
         PROBLEM.genome.decode([0.5] * 4)
     )

@@ -268,7 +268,7 @@ def test_a_folder_without_a_marker_continues_beside_unrelated_files(optimize, tm
     assert "notes.txt" not in (folder / MARKER).read_text().splitlines()
 
 
-def test_time_over_in_the_first_generation_says_how_to_go_on(optimize, tmp_path):
+def test_a_time_limit_in_the_first_generation_explains_how_to_continue(optimize, tmp_path):
     code, err = optimize("--budget-minutes", 1e-9)
     assert code == 1
     assert (

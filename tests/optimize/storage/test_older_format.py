@@ -112,7 +112,7 @@ def test_runs_of_one_objective(path):
 
 
 @pytest.mark.parametrize("column", ["key", "fitness", "design", "others", "crc"])
-def test_damage_costs_a_row(path, column):
+def test_damage_loses_one_row(path, column):
     old_file(path, ROWS)
     hurt(path, f"evaluations/{column}", 1)
     assert verify(path).damaged == ["row 1: its checksum does not fit"]

@@ -24,7 +24,7 @@ def in_plane(rho, z, angle=0.7):
     return [rho * np.cos(angle), rho * np.sin(angle), z]
 
 
-def hard_places(half, rng, n=3):
+def difficult_points(half, rng, n=3):
     """Difficult points for radius 1: on and beside the axis, at rho = R, at the rim, in the end planes, far
     away."""
     small = 10.0 ** rng.uniform(-12, -1, n)
@@ -55,7 +55,7 @@ def hard_places(half, rng, n=3):
 )
 def test_field_and_gradient_at_the_hard_places(halves, rng):
     """Relative errors are below 1e-12 for the field and its gradient, wherever they are finite."""
-    places = [hard_places(half, rng) for half in halves]
+    places = [difficult_points(half, rng) for half in halves]
     n = min(len(p) for p in places)
     places = np.array([p[:n] for p in places])
     b, slope = fields([one(half) for half in halves], places)
@@ -195,7 +195,7 @@ STEP = 1e-5
 """Step (m) of the differences."""
 
 
-def peers_gradient(source, points):
+def peer_gradient(source, points):
     """dB_a/dr_c from central differences of magpylib fields.
 
     They divide errors of the field by STEP. The truncation error, STEP^2/6 times the third derivative, is
@@ -217,7 +217,7 @@ def test_against_an_independent_library(rng):
     inside = 0
     for w, world in enumerate(worlds):
         expected = peer(world, points[w])
-        off = np.linalg.norm(slope[w] - peers_gradient(world, points[w]), axis=(1, 2))
+        off = np.linalg.norm(slope[w] - peer_gradient(world, points[w]), axis=(1, 2))
         for apart in relative(b[w], expected), STEP * off / np.linalg.norm(expected, axis=1):
             assert apart.max() < 1e-9
             assert np.median(apart) < 1e-12
@@ -232,7 +232,7 @@ def test_against_an_independent_library(rng):
 def test_the_library_is_wrong_at_the_largest_differences(rng):
     """At the points of the largest difference, the published formulas agree with this field."""
     world, points = one(0.8), rng.normal(size=(3000, 3)) * 5
-    results, expected = fields([world], points[None]), (peer(world, points), peers_gradient(world, points))
+    results, expected = fields([world], points[None]), (peer(world, points), peer_gradient(world, points))
     for k, (ours, theirs, least) in enumerate(zip(results, expected, (1e-13, 1e-8), strict=True)):
         worst = np.argsort(-relative(ours[0], theirs))[:3]
         true = np.array([field_and_gradient(p, 1.0, 0.8, M)[k] for p in points[worst]])
@@ -258,7 +258,7 @@ def test_many_points_at_once_equal_single_points(rng):
 
     The results are equal to the last bit if the compiler has no choice between fused and rounded products.
     """
-    points = np.concatenate([hard_places(1.0, rng), rng.normal(size=(60, 3)) * 2])
+    points = np.concatenate([difficult_points(1.0, rng), rng.normal(size=(60, 3)) * 2])
     magnets = MagneticCylinders(cylinders=[*one(1.0).cylinders, *scattered(rng, 2).cylinders])
     alone, together = fields([magnets], points[None]), sample([magnets], magnets.quantity, points)
     exact = current().device == "cpu" and current().arithmetic == "strict"

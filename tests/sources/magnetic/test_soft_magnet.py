@@ -34,7 +34,7 @@ def test_saturates_sooner_along_a_long_axis():
 
 @pytest.mark.parametrize("field", [(0.05, 0.0, 0.05), (0.3, 0.0, 0.3), (0.8, 0.0, 0.4), (4.0, 0.0, 3.0)])
 @pytest.mark.parametrize("aspect", [5 / 3, 20.0])
-def test_energy_is_least_of_all_that_do_not_exceed_saturation(aspect, field):
+def test_the_energy_is_minimal_within_saturation(aspect, field):
     n, b = demagnetising_factor(1.0, 2 * aspect), np.array(field)
     factors = np.array([(1 - n) / 2, (1 - n) / 2, n])
 

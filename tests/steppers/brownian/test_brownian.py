@@ -132,7 +132,7 @@ def test_noise_keeps_its_law_with_state_dependent_steps():
             assert abs(product.mean()) < SIGMAS * product.std() / np.sqrt(product.size)
 
 
-def test_steps_of_its_own_leave_a_particle_the_right_distribution():
+def test_individual_steps_give_the_right_distribution():
     """In a trap, with steps cut to a tenth or less in steep regions; the bias is below 1 %."""
     rate = 100.0
     width = np.sqrt(DIFFUSIVITY / rate)

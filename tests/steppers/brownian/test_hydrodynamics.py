@@ -104,7 +104,7 @@ def test_velocities_follow_forces_at_once(hydrodynamics, noise):
         np.testing.assert_allclose(result.state["velocity"], expected, rtol=0, atol=1e-12 * size)
 
 
-def test_spheres_in_one_place_and_a_pair_that_sediments():
+def test_concentric_spheres_and_a_sedimenting_pair():
     """Concentric spheres drag each other by the mobility of the larger one.
 
     For a sedimenting pair the factor is 1 + 3a/(2r) - (a/r)^3 along and 1 + 3a/(4r) + (a/r)^3/2 across the
@@ -277,7 +277,7 @@ def test_oseen_tensor_of_near_spheres_is_refused(noise):
 
 
 @noises
-def test_spheres_in_one_place_and_a_heap_of_them_stay_finite(noise):
+def test_concentric_spheres_and_a_heap_stay_finite(noise):
     """The Rotne-Prager matrix is singular there, but not worse: two equal concentric spheres stay
     together."""
     position, radius = crowd(2, 30, side=1.0, sizes=1.0)
@@ -335,7 +335,7 @@ def test_interaction_does_not_change_the_equilibrium():
     assert (places**2).mean() == pytest.approx(1.0, abs=0.02 + SIGMAS * np.sqrt(2 / places.size))
 
 
-def test_cost_sets_exact_and_fast_noise_side_by_side():
+def test_cost_compares_exact_and_fast_noise():
     """Both noises are listed, each with its step length, but no stepper for inertial particles.
 
     The costs are compared at equal errors of a statistic.
