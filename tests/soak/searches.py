@@ -103,7 +103,7 @@ def shoot(search: _Search, kind: Kind, rng: random.Random) -> bool:
 
     Some of the kills come early: while Python starts, files are read, and kernels are compiled.
     """
-    # Python itself starts with a traceback on Ctrl-C.
+    # Ctrl-C during the start of Python gives a traceback of its own.
     if kind.number != signal.SIGINT and rng.random() < 0.2:
         time.sleep(rng.uniform(0.0, 3.0))
     elif not search.follow(rng.randint(1, 40)):
@@ -129,7 +129,7 @@ class _Search:
         self._errors.parent.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, str(WORKER), "tisim", *SEARCH, "--executor", executor, "--out"]
         paths = os.pathsep.join(filter(None, sys.path))
-        # Kernels of other processes on this machine must not be affected.
+        # A separate kernel cache, so that kills do not affect other processes on this machine.
         kernels = {LOCKS[BACKEND][0]: str(self._errors.parents[1] / "kernels")}
         with self._errors.open("w") as errors:
             self.process = subprocess.Popen(
