@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 G = 10.0
-"""m/s^2."""
+"""Gravity, m/s^2."""
 
 
 def looks(scenes, number):

@@ -13,11 +13,11 @@ from tisim.operators import Compacted
 from tisim.packing import RandomInBox
 
 SIDE, HEIGHT, PRESSURE, GRAINS, RADIUS = 0.05, 0.18, 5000.0, 400, 4e-3
-"""m, m, Pa, number, m."""
+"""Side (m), height (m), pressure (Pa), number of grains, radius (m)."""
 LOW, HIGH = (0.0, 0.0, 0.01), (SIDE, SIDE, 0.04)
 """Corners of the observed region, m."""
 INTERVAL = 5e-3
-"""s."""
+"""Interval of the checks, s."""
 
 
 def bed(fraction):

@@ -26,7 +26,7 @@ from tisim.state.fields import Field
 pytestmark = pytest.mark.long
 
 STIFFNESS, DAMPING, DT, G = 2e4, 60.0, 4e-4, 9.81
-"""N/m, N s/m, s, m/s^2."""
+"""Stiffness (N/m), damping (N s/m), step (s), gravity (m/s^2)."""
 NEVER = 1e3
 """A start time (s) after the end of every run."""
 

@@ -9,7 +9,7 @@ from tisim.effects import Gravity
 from tisim.operators import PeakHeight
 
 G, DT = 10.0, 1e-3
-"""m/s^2, s."""
+"""Gravity (m/s^2) and step (s)."""
 UP = np.array([[0.0, 0.0, 2.0], [1.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
 """Velocities of three throws (m/s): two rise and come down, and one only falls."""
 

@@ -266,7 +266,7 @@ def test_files_of_others_are_refused(tmp_path):
 
 
 def test_files_of_designs_are_read(tmp_path):
-    """Files of another campaign are read too; after a change of the method their knowledge remains."""
+    """A campaign reads the file of another one with another method, and a new object continues from there."""
     file = tmp_path / "c.csv"
     first = going_on(AskTell(GENES, seed=1, file=file), 3)
     second = AskTell(GENES, method="gaussian-process", file=tmp_path / "d.csv")

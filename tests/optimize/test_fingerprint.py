@@ -171,7 +171,7 @@ def test_incomparable_objects_are_refused():
     lock = threading.Lock()
     with pytest.raises(InputError, match=r"^objective R must use only values that can be compared; "):
         fingerprint(of_closure(lock), "objective R")
-    # Objects of a scene count by their class, as a scene has its own digest.
+    # In the fingerprint of a scene, which has its own digest, an object counts by its class.
     assert fingerprint(of_closure(lock)) == fingerprint(of_closure(threading.Lock()))
 
 

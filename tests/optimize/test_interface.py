@@ -78,7 +78,7 @@ def test_a_search_in_a_folder_can_be_continued(drift, tmp_path, capsys):
 
 @pytest.mark.long
 def test_a_search_may_run_in_a_thread_of_its_own(drift):
-    """Python cannot handle Ctrl-C there."""
+    """Python cannot handle Ctrl-C in such a thread."""
     with ThreadPoolExecutor(1) as pool:
         again = pool.submit(optimize.run, problem("default", ""), seed=4, **SMALL).result()
     assert again.designs == drift.designs

@@ -97,7 +97,7 @@ def test_a_crossing_of_a_sheared_face_causes_no_jump():
 
 @pytest.mark.parametrize(("speeds", "scale"), [((0.0, 1e-3, 1.0), "log"), ((0.0, 0.9, 1.0), "linear")])
 def test_energies_that_span_decades_are_on_a_logarithmic_axis(speeds, scale):
-    """This includes a start at rest; frames at the sides have an even number of pixels."""
+    """This includes a start at rest; markers at the edges of the plot are not clipped."""
 
     class Seen(list):
         times = np.arange(3.0)

@@ -45,7 +45,7 @@ def test_nothing_to_sample_and_points_of_another_shape():
 
 
 def test_fields_of_sources_are_freed_if_the_kernel_fails(monkeypatch):
-    """This happens for a source that does not compile. A stored error must not keep the memory."""
+    """As for a source that does not compile. A stored error must not keep the memory."""
     before = len(memory.in_use())
 
     def broken(self, time, places, out):

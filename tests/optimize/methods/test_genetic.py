@@ -59,7 +59,7 @@ def two_costs(x):
     return np.sum((x - 0.3) ** 2), np.sum((x - 0.7) ** 2)
 
 
-def test_designs_near_the_best_are_the_trust_regions():
+def test_half_of_each_generation_is_in_the_trust_region():
     """Without noise: half of each generation lies in the trust region, and the rest away from its centre."""
     one = method()
     one.tell(told(one.ask(), valley), [])
