@@ -1,7 +1,7 @@
 """Random small scenes that name no stepper, of every family, each with an exact reference.
 
-A family is a function of a generator of random numbers. It returns a scene, and a function that returns how
-far a result is from the reference, over the size of the motion or the energy at hand. Sizes, masses, forces
+A family is a function of a random number generator. It returns a scene and a function that returns the error
+of a result against the reference, relative to the size of the motion or to the energy. Sizes, masses, forces
 and times are drawn over decades.
 """
 
@@ -24,18 +24,18 @@ def family(function):
 
 
 def decades(draw, low, high):
-    """Return a number whose logarithm is even between those of two numbers."""
+    """Return a random number between two bounds, uniform in its logarithm."""
     return float(np.exp(draw.uniform(np.log(low), np.log(high))))
 
 
 def direction(draw):
-    """Return a unit vector."""
+    """Return a random unit vector."""
     v = draw.normal(size=3)
     return v / np.linalg.norm(v)
 
 
 def particles(position, velocity, radius, mass, **quantities):
-    """Return particles given one by one."""
+    """Return particles with the given arrays of quantities."""
     return tisim.Particles(
         position=np.atleast_2d(position),
         velocity=np.atleast_2d(velocity),
@@ -57,7 +57,7 @@ def kinetic(state, turning=True):
 def by_path(acceleration, start, duration, **tolerances):
     """Return the error of a result against an integration to 1e-11, over the largest distance from the start.
 
-    acceleration : of (t, r, v), arrays of shape (n, 3).
+    acceleration : function of (t, r, v), which are arrays of shape (n, 3).
     """
     r, v = start["position"], start["velocity"]
     n = len(r)
@@ -122,7 +122,7 @@ def lorentz(draw):
 
 @family
 def driven_charge(draw):
-    """A charge in a field that oscillates, and may begin later."""
+    """A charge in an oscillating field, which may be switched on later."""
     omega, specific = decades(draw, 1e-1, 1e6), decades(draw, 1e-3, 1e3)
     amplitude, phase = direction(draw), draw.uniform(0, 6, 3)
     periods = draw.uniform(0.3, 8)
@@ -141,7 +141,7 @@ def driven_charge(draw):
     )
 
     def at(t):
-        """Place after a time t from when the field begins, at rest then."""
+        """Position a time t after the field is switched on, for a charge then at rest."""
         a, b = omega * begin + phase, omega * (begin + t) + phase
         return specific * amplitude / omega**2 * (omega * t * np.cos(a) - np.sin(b) + np.sin(a))
 
@@ -176,7 +176,7 @@ def stokes_drag(draw):
 
 @family
 def quadratic_drag(draw):
-    """Drag by Reynolds number, with the jumps of the laws of Schiller and Naumann and of Chow on the way."""
+    """Quadratic drag by Reynolds number; the path crosses the jumps of the Schiller-Naumann and Chow laws."""
     law = laws.SchillerNaumannDrag
     radius, rho = decades(draw, 1e-4, 1e-1), decades(draw, 1.0, 1e3)
     mass = decades(draw, 1e2, 1e4) * 4 / 3 * np.pi * radius**3
@@ -203,7 +203,7 @@ def quadratic_drag(draw):
 
 @family
 def self_gravity(draw):
-    """Two bodies in orbits of all eccentricities up to 0.9, and a light third one far out."""
+    """Two bodies in orbits of eccentricity up to 0.9, and a light third body far out."""
     size, total = decades(draw, 1e-2, 1e6), decades(draw, 1e-3, 1e20)
     ratio, e = draw.uniform(0.05, 0.5), draw.uniform(0, 0.9)
     m = total * np.array([ratio, 1 - ratio])
@@ -226,7 +226,7 @@ def self_gravity(draw):
 
 @family
 def near_field(draw):
-    """Like charges that fly apart, and particles that swing in the well of two powers."""
+    """Like charges that fly apart, and particles that oscillate in the well of two power laws."""
     n, size, mass = 4, decades(draw, 1e-6, 1e1), decades(draw, 1e-12, 1.0)
     r = size * (np.indices((2, 2, 1)).reshape(3, -1).T + 0.2 * draw.uniform(-1, 1, (n, 3)))
     strength = decades(draw, 1e-12, 1e3)
@@ -252,7 +252,7 @@ def near_field(draw):
 
 @family
 def mie(draw):
-    """Two that meet, head on or off centre, and part again."""
+    """Two particles with a Mie potential collide, head-on or off centre, and part again."""
     radius, mass = decades(draw, 1e-9, 1e-2), decades(draw, 1e-20, 1e-3)
     sigma, well = 2 * radius, decades(draw, 0.1, 30.0)
     speed = decades(draw, 1e-3, 1e2)
@@ -280,7 +280,7 @@ def mie(draw):
 
 @family
 def permanent_magnet(draw):
-    """A magnet swings in a uniform field: its energy stays."""
+    """A magnet swings in a uniform field; its energy is conserved."""
     radius, rho = decades(draw, 1e-7, 1e-1), decades(draw, 1e3, 8e3)
     magnetisation, b = decades(draw, 1e3, 1e6), decades(draw, 1e-5, 5.0) * direction(draw)
     mass, volume = rho * 4 / 3 * np.pi * radius**3, 4 / 3 * np.pi * radius**3
@@ -302,7 +302,7 @@ def permanent_magnet(draw):
 
 
 def grains_of(draw, number=2):
-    """Return radius (m), density (kg/m^3), mass (kg) and a material of soft to hard grains."""
+    """Return radius (m), density (kg/m^3), mass (kg) and material of grains, from soft to hard."""
     radius, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
     young = decades(draw, 1e6, 1e11)
     return radius, rho, rho * 4 / 3 * np.pi * radius**3, young
@@ -310,9 +310,9 @@ def grains_of(draw, number=2):
 
 @family
 def elastic_grains(draw):
-    """Two elastic grains of Hertz's law hit off centre, without friction: the energy stays."""
+    """Two elastic Hertzian grains collide off centre without friction; the energy is conserved."""
     radius, rho, mass, young = grains_of(draw)
-    # Up to overlaps of some hundredths of a radius.
+    # Overlaps reach a few hundredths of a radius.
     speed = decades(draw, 1e-4, 3e-2) * np.sqrt(young / rho)
     r = np.array([[-1.1 * radius, 0, 0], [1.1 * radius, draw.uniform(0, 1.5) * radius, 0]])
     v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
@@ -327,12 +327,15 @@ def elastic_grains(draw):
 
 @family
 def adhesive_grains(draw):
-    """Two elastic grains that adhere, as DMT or JKR, hit head on and part: of DMT the energy stays, of JKR
-    the work is lost that it takes to part them beyond the touch."""
+    """Two elastic, adhesive grains (DMT or JKR) collide head-on and part.
+
+    With DMT the energy is conserved. With JKR the pair loses the work of separating the surfaces beyond the
+    point of first touch.
+    """
     radius, _, mass, _ = grains_of(draw)
     young, energy = decades(draw, 1e6, 1e8), decades(draw, 1e-4, 3e-2) * radius / 1e-4
     reduced, mean, soft = mass / 2, radius / 2, 0.5 * young / (1 - 0.25**2)
-    # JKR's curve between the touch and its end, by the circle of contact.
+    # The JKR curve from zero overlap to separation, parametrised by the contact radius.
     ratio = np.pi * energy / soft
     circle = np.geomspace((mean**2 * ratio / 4) ** (1 / 3), (4 * mean**2 * ratio) ** (1 / 3), 20_001)
     gap = 2 * np.sqrt(ratio * circle) - circle**2 / mean
@@ -344,7 +347,7 @@ def adhesive_grains(draw):
     before = max(adhesion * decades(draw, 0.1, 1e3), 1.3 * lost)
     speed = np.sqrt(2 * before / reduced)
     law = laws.Granular(normal=laws.JKR()) if jkr else laws.Granular(cohesion=laws.DMT())
-    # Long enough for what is left of the speed, and for some swings.
+    # Long enough for the remaining speed after the impact, and for some oscillations.
     slowest = speed * np.sqrt(1 - lost / before)
     scene = tisim.Scene(
         particles=particles(
@@ -364,7 +367,7 @@ def adhesive_grains(draw):
 
 @family
 def damped_grains(draw):
-    """Two damped grains hit each other head on: their restitution is that of the material."""
+    """Two damped grains collide head-on; the restitution must equal the restitution of the material."""
     radius, rho, mass, young = grains_of(draw)
     speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
     restitution = draw.uniform(0.3, 0.95)
@@ -385,7 +388,7 @@ def damped_grains(draw):
 
 @family
 def grain_on_floor(draw):
-    """An elastic grain bounces on a floor under gravity: the energy stays."""
+    """An elastic grain bounces on a floor under gravity; the energy is conserved."""
     radius, rho, mass, young = grains_of(draw)
     g = 9.81
     height = min(decades(draw, 0.1, 20) * radius, 1e-4 * young / (rho * g))
@@ -399,7 +402,7 @@ def grain_on_floor(draw):
 
     def energy(state):
         above = float((state["position"][:, 2] - radius).sum())
-        # Soft grains may still lie on the floor, and store energy there.
+        # Soft grains may still be in contact with the floor and store energy there.
         pressed = 8 / 15 * young / (2 * (1 - 0.25**2)) * np.sqrt(radius) * max(0.0, -above) ** 2.5
         return kinetic(state) + mass * g * above + pressed
 
@@ -408,7 +411,10 @@ def grain_on_floor(draw):
 
 def bonded(draw, velocities):
     """Return a scene of a free bonded pair, its stiffness along the bond (N/m) and its velocities (m/s, shape
-    (2, 3)), which ``velocities`` makes of random numbers between -1 and 1."""
+    (2, 3)).
+
+    velocities : function that turns random numbers between -1 and 1 into the velocities.
+    """
     radius, rho, mass, young = grains_of(draw)
     speed = decades(draw, 1e-6, 1e-4) * np.sqrt(young / rho)
     r, v = [[-radius, 0, 0], [radius, 0, 0]], velocities(speed * draw.uniform(-1, 1, (2, 3)))
@@ -423,11 +429,11 @@ def bonded(draw, velocities):
 
 @family
 def bonded_pair(draw):
-    """A free bonded pair swings along and across its bond: its energy, at rest in the bond, stays bounded."""
+    """A free bonded pair oscillates along and across its bond; its energy stays bounded."""
     scene, _, v = bonded(draw, lambda drawn: drawn)
 
     def error(result):
-        # No more than the energy of the start, and the centre of mass where it must be.
+        # The energy must not exceed its initial value, and the centre of mass must follow a straight line.
         more = kinetic(result.state) / kinetic(result.start) - 1
         centre = result.state["position"].mean(axis=0) - v.mean(axis=0) * result.time
         path = np.linalg.norm(v.mean(axis=0)) * result.time
@@ -438,7 +444,8 @@ def bonded_pair(draw):
 
 @family
 def bond_along_itself(draw):
-    """A free bonded pair swings along its bond as a spring: the energy, with that of the bond, stays."""
+    """A free bonded pair oscillates along its bond as a spring; the energy, including the bond, is
+    conserved."""
 
     def along(drawn):
         return np.column_stack([drawn[:, 0], drawn[[0, 0], 1:]])
@@ -455,7 +462,7 @@ def bond_along_itself(draw):
 
 @family
 def zohdi_contact(draw):
-    """Two soft spheres of Z16 hit each other: the energy stays."""
+    """Two soft spheres of Z16 collide; the energy is conserved."""
     radius, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
     mass, young = rho * 4 / 3 * np.pi * radius**3, decades(draw, 1e5, 1e10)
     speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
@@ -467,7 +474,7 @@ def zohdi_contact(draw):
 
 @family
 def impact(draw):
-    """Two hard spheres collide off centre, without friction or loss: where they are afterwards."""
+    """Two hard spheres collide off centre, without friction or loss; their final positions are compared."""
     radius, speed = decades(draw, 1e-7, 1e2), decades(draw, 1e-6, 1e3)
     mass = decades(draw, 1e-15, 1e3) * draw.uniform(0.5, 1, 2)
     offset, gap = draw.uniform(0, 1.2) * radius, draw.uniform(1.5, 4)
@@ -490,7 +497,7 @@ def impact(draw):
 
 @family
 def free_clump(draw):
-    """A rigid body of unlike spheres turns freely: energy and angular momentum stay."""
+    """A rigid body of unequal spheres rotates freely; energy and angular momentum are conserved."""
     size, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     centres = size * (0.6 * corners + 0.3 * draw.uniform(-1, 1, (4, 3)))
@@ -513,10 +520,10 @@ def free_clump(draw):
 
 @family
 def charged_grains(draw):
-    """Two elastic grains of like or unlike charge meet, by Coulomb's and Hertz's laws: the energy stays."""
+    """Two elastic grains with like or unlike charges meet (Coulomb and Hertz); the energy is conserved."""
     radius, rho, mass, young = grains_of(draw)
     speed = decades(draw, 1e-3, 1e-2) * np.sqrt(young / rho)
-    # From next to nothing up to half of the energy of motion, at contact.
+    # The Coulomb energy at contact ranges from nearly zero to half of the kinetic energy.
     charge = draw.choice([-1, 1]) * decades(draw, 1e-2, 0.5) * 0.25 * mass * speed**2 * 2 * radius
     r = np.array([[-1.5 * radius, 0, 0], [1.5 * radius, draw.uniform(0, 1.0) * radius, 0]])
     v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
@@ -539,7 +546,7 @@ def charged_grains(draw):
 
 @family
 def grains_in_magnetic_field(draw):
-    """Charged elastic grains go round in a magnetic field and hit a floor: their kinetic energy stays."""
+    """Charged elastic grains gyrate in a magnetic field and hit a floor; the kinetic energy is conserved."""
     radius, rho, mass, young = grains_of(draw)
     speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
     orbit = radius * decades(draw, 1, 20)
@@ -565,7 +572,7 @@ def grains_in_magnetic_field(draw):
 
 
 def dipole_force(a, b, d):
-    """Return the force (N) on the dipole a by b, which is at d (m) from it."""
+    """Return the force (N) on dipole a from dipole b, which is at the displacement d (m) from a."""
     size = np.linalg.norm(d)
     n = d / size
     factor = -3 * mu_0 / (4 * np.pi * size**4)
@@ -574,7 +581,7 @@ def dipole_force(a, b, d):
 
 @family
 def dipoles(draw):
-    """Two dipoles of fixed moments pass each other."""
+    """Two dipoles with fixed moments pass each other."""
     radius, mass = decades(draw, 1e-7, 1e-2), decades(draw, 1e-15, 1e-3)
     moment = decades(draw, 1e-15, 1e-3) * direction(draw)
     r = radius * np.array([[-3, 0, 0], [3, 4 + draw.uniform(0, 2), 0]])
@@ -601,7 +608,7 @@ def dipoles(draw):
 
 @family
 def moment_past_magnet(draw):
-    """A saturated grain is drawn past a magnetised ball, whose field outside is that of a dipole."""
+    """A saturated grain is attracted past a magnetised ball, whose external field is a dipole field."""
     size, mass = decades(draw, 1e-5, 1e-1), decades(draw, 1e-15, 1e-3)
     magnetisation = 1e5 * direction(draw)
     ball = 4 / 3 * np.pi * size**3 * magnetisation
@@ -634,7 +641,7 @@ def moment_past_magnet(draw):
 
 @family
 def drag_in_constriction(draw):
-    """A sphere is dragged along the axis of a constriction, whose flow has four kinks on the way."""
+    """A sphere is dragged along the axis of a constriction; the flow has four kinks along the path."""
     radius, mu = 5e-3, 1e-2 * decades(draw, 0.1, 10)
     mass = 500.0 * 4 / 3 * np.pi * radius**3
     rate, speed = 6 * np.pi * mu * radius / mass, draw.uniform(0.5, 2)
@@ -661,7 +668,7 @@ def drag_in_constriction(draw):
 
 @family
 def drag_in_couette(draw):
-    """A sphere crosses a shear flow that begins later."""
+    """A sphere crosses a shear flow that starts later."""
     radius, mu = decades(draw, 1e-5, 1e-2), decades(draw, 1e-4, 1e0)
     mass = 1e3 * 4 / 3 * np.pi * radius**3
     rate = 6 * np.pi * mu * radius / mass

@@ -1,4 +1,4 @@
-"""Grains under all laws of contact of Z16 in one structure, and what these say of a pair, by quadrature."""
+"""Grains under all Z16 contact laws in one scene structure, and pair quantities by quadrature."""
 
 import numpy as np
 from scipy.integrate import quad
@@ -20,11 +20,11 @@ from tisim.effects import (
 
 WORLDS, CAPACITY = 6, 12
 K, R, SPRING = 1e6, 1.0, 1e5
-"""Stiffness (N/m^2) and radius (m) of all grains here, and of what holds them (N/m)."""
+"""Stiffness (N/m^2) and radius (m) of all grains here, and the stiffness of the anchor springs (N/m)."""
 
 
 class Held(Force):
-    """A spring to the place where it is slack, for the first ``number`` particles; a pull for the others."""
+    """A spring to its anchor for each of the first ``number`` particles; a constant pull for the others."""
 
     fields = Tether.fields
     number: float = parameter("", "number", 0.0, ge=0)
@@ -39,7 +39,7 @@ class Held(Force):
 
 
 def grains(position, velocity, dt, steps, mass=1.0, temperature=300.0, **laws):
-    """Grains of R; without ``laws`` there is nothing but contact. Bonds have an exponent of 1."""
+    """A scene of grains of radius R; without ``laws`` only the contact acts. Bonds have an exponent of 1."""
     friction, bond = laws.get("friction", (0, 0, 0)), laws.get("bond", (0, 0, 0.99))
     position = np.asarray(position, float)
     effects = (
@@ -61,7 +61,8 @@ def grains(position, velocity, dt, steps, mass=1.0, temperature=300.0, **laws):
 
 
 def watched(scenes, looks=1):
-    """Results, and the states of each world at the start and after each of so many equal parts of its run."""
+    """The results, and the states of each world at the start and after each of ``looks`` equal parts of its
+    run."""
     simulation = compiled(scenes[0], WORLDS, CAPACITY)
     simulation.load(scenes)
     steps = max(round(m.duration / m.stepper.control.dt) for m in scenes)
@@ -81,27 +82,27 @@ def run(scenes):
 
 
 def area(d):
-    """Of contact, Z16 (B.5). m^2."""
+    """Contact area, Z16 (B.5), m^2."""
     return np.pi * max(R**2 - d**2 / 4, 0.0) * (d < 2 * R)
 
 
 def push(d):
-    """Z16 (7.3). N."""
+    """Contact force, Z16 (7.3), N."""
     return K * (1 - d / (2 * R)) ** 2 * area(d)
 
 
 def stored_energy(d):
-    """Energy of contact, J."""
+    """Energy stored in the contact, J."""
     return quad(push, d, 2 * R)[0] if d < 2 * R else 0.0
 
 
 def kinetic(state):
-    """With spin, J."""
+    """Kinetic energy with rotation, J."""
     turning = 0.4 * state["mass"] * state["radius"] ** 2 * (state["spin"] ** 2).sum(axis=1)
     return 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1) + turning).sum()
 
 
 def angular_momentum(state):
-    """About the origin, kg m^2/s."""
+    """Total angular momentum about the origin, kg m^2/s."""
     orbit = np.cross(state["position"], state["mass"][:, None] * state["velocity"])
     return (orbit + 0.4 * (state["mass"] * state["radius"] ** 2)[:, None] * state["spin"]).sum(axis=0)

@@ -1,7 +1,7 @@
-"""Grains under each granular law at a plane, at a disc and at a piston: one structure for each law.
+"""Grains under each granular law at a plane, a disc and a piston: one scene structure for each law.
 
-The laws have all parts between them. That of Hertz and Mindlin acts beside liquid bridges and bonds, which do
-nothing unless a liquid or a cement is given.
+Together the laws use every part of the contact models. The Hertz-Mindlin law acts beside liquid bridges and
+bonds, which have no effect unless a liquid or a cement is given.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ ELASTIC = {
     **compositions.NEUTRAL,
     "mindlin": {"young": 1e6, "poisson": 0.3, "restitution": 1.0, "friction": 0.0},
 }
-"""Materials that press alone, SI."""
+"""Materials with elastic repulsion only, SI units."""
 LOSSY = {
     **compositions.TWO,
     "mindlin": (
@@ -29,17 +29,17 @@ LOSSY = {
         {"young": 1e6, "poisson": 0.4, "restitution": 0.9, "friction": 0.1},
     ),
 }
-"""Two materials of each law in which every part does something."""
+"""Two materials for each law in which every part of the law acts."""
 DRY = {"surface_tension": 0.0, "volume": 1e-12}
 LOOSE = {"young": 1e3, "gap": -FAR, "tensile_strength": 1.0, "shear_strength": 1.0}
 
 
 def grains(name, position, velocity, spin=None, **more):
-    """Grains given one by one under a law, 1 kg each and 1 m in radius unless said.
+    """A scene of grains under a law; each has 1 kg and a radius of 1 m unless given.
 
-    first, second : what their two materials have other than those that press alone. planes, disc, piston :
-    walls, far away unless given; a piston is a plane and its velocity (m/s). liquid, cement : what bridges
-    and bonds have under the law of Hertz and Mindlin.
+    first, second : properties of the two materials that differ from ``ELASTIC``. planes, disc, piston :
+    walls, far away unless given; a piston is a plane and its velocity (m/s). liquid, cement : parameters of
+    the bridges and bonds of the Hertz-Mindlin law.
     """
     position = np.asarray(position, float)
     spin = np.zeros_like(position) if spin is None else spin
@@ -69,13 +69,13 @@ def lossy(name):
     """Two materials that lose energy in every way that the law has."""
     soft, hard = LOSSY[name]
     if name == "hooke":
-        # Where 2 pi k_c R* is above the stiffness nothing holds grains apart.
+        # If 2 pi k_c R* exceeds the stiffness, cohesion exceeds the repulsion at every overlap.
         soft, hard = ({**one, "cohesion_energy_density": 500.0} for one in (soft, hard))
     return soft, hard
 
 
 def push(name, overlap, radius, law):
-    """The elastic and cohesive force (N) at an overlap (m) of some R* (m)."""
+    """The elastic and cohesive force (N) at an overlap (m) for an effective radius R* (m)."""
     if name == "hooke":
         return (law["stiffness"] - 2 * np.pi * radius * law["cohesion_energy_density"]) * overlap
     e_star, energy = law["young"] / (2 * (1 - law["poisson"] ** 2)), law.get("surface_energy", 0.0)
@@ -85,8 +85,10 @@ def push(name, overlap, radius, law):
 
 
 def stored(name, overlap, radius, law):
-    """What an overlap (m) of some R* (m) holds of energy, J: the integral of the elastic and cohesive
-    force from where contact ends."""
+    """Energy (J) stored at an overlap (m) for an effective radius R* (m).
+
+    It is the integral of the elastic and cohesive force from the overlap at which the contact ends.
+    """
     if name == "hooke":
         return (law["stiffness"] - 2 * np.pi * radius * law["cohesion_energy_density"]) * overlap**2 / 2
     e_star, energy = law["young"] / (2 * (1 - law["poisson"] ** 2)), law.get("surface_energy", 0.0)
@@ -97,14 +99,14 @@ def stored(name, overlap, radius, law):
 
 
 def loaded(scenes):
-    """The simulation that scenes of one law share, with these in it."""
+    """The compiled simulation of one law with these scenes loaded."""
     simulation = compiled(scenes[0], WORLDS, CAPACITY)
     simulation.load(scenes)
     return simulation
 
 
 def ends(scenes):
-    """States of scenes of one law at their ends, by id; each goes well."""
+    """Final states of scenes of one law, sorted by id; every run must succeed."""
     simulation = loaded(scenes)
     simulation.run()
     results = simulation.results()
@@ -114,14 +116,14 @@ def ends(scenes):
 
 
 def kinetic(state):
-    """Energy of motion and of spin of each grain, J."""
+    """Kinetic energy of each grain, with rotation, J."""
     inertia = 0.4 * state["mass"] * state["radius"] ** 2
     moving = state["mass"] * (state["velocity"] ** 2).sum(axis=1)
     return 0.5 * (moving + inertia * (state["spin"] ** 2).sum(axis=1))
 
 
 def momenta(state):
-    """Momentum of all grains, and their angular momentum about the origin; shape (6,)."""
+    """Total momentum, and total angular momentum about the origin; shape (6,)."""
     momentum = state["mass"][:, None] * state["velocity"]
     inertia = 0.4 * (state["mass"] * state["radius"] ** 2)[:, None]
     turning = np.cross(state["position"], momentum) + inertia * state["spin"]

@@ -1,4 +1,4 @@
-"""What is broken in each law of contact and motion of a wall, and the test that must see it."""
+"""A mutation of each contact law and each wall motion, and the test that must detect it."""
 
 LAW = "tisim/effects/contact/granular"
 PARTS = "tests/effects/contact/test_granular_parts.py::test_"
@@ -71,7 +71,8 @@ PARTS_OF_LAWS = {
         f"{PARTS}cohesion_pulls_while_surfaces_touch",
     ),
 }  # fmt: skip
-"""By part of a composed law: a file, what is in it once, what it becomes, and a test that must fail then."""
+"""For each part of a composed law: a file, a text that occurs in it once, its replacement, and the test that
+must then fail."""
 CONTACT = "tisim/effects/contact"
 TWIN = "tests/effects/contact/test_contact.py::test_contact_equals_its_numpy_twin"
 SOFT_GRAINS = {
@@ -91,7 +92,7 @@ SOFT_GRAINS = {
         f"{CONTACT}/bond.py", "if e >= self.threshold(w)", "if e >= 0.9 * self.threshold(w)", f"{TWIN}[bond]",
     ),
 }  # fmt: skip
-"""The same of the laws of Z16."""
+"""Mutations of the laws of Z16."""
 BONDS = "tests/effects/contact/test_bonds.py::test_"
 BONDED = {
     "capillary_bridge": (
@@ -103,7 +104,7 @@ BONDED = {
         f"{BONDS}a_bond_breaks_at_its_strength_and_stays_broken",
     ),
 }  # fmt: skip
-"""The same of what holds grains together."""
+"""Mutations of liquid bridges and bonds."""
 MOTION = "tisim/effects/walls"
 MOVING = "tests/effects/contact/test_moving_walls.py::test_"
 WALLS = {
@@ -129,9 +130,9 @@ WALLS = {
         f"{MOVING}moving_walls_are_galilean_invariant",
     ),
 }  # fmt: skip
-"""The same of walls and their motions."""
+"""Mutations of walls and their motions."""
 MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS}
-STEPS = "tests/hard/test_granular_steps.py::test_what_no_step_can_follow_stops_the_world"
+STEPS = "tests/hard/test_granular_steps.py::test_steps_beyond_the_limit_stop_the_world"
 HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
 SHARED = {
     "eased": (
@@ -204,7 +205,7 @@ SHARED = {
         f"{CONTACT}/normal.py", "0.5 * (distance + (a - b)", "0.5 * (distance - (a - b)", f"{TWIN}[friction]",
     ),
 }  # fmt: skip
-"""The same of what several laws share."""
+"""Mutations of code that several laws share."""
 MAGNETIC = "tisim/effects/magnetic"
 DIPOLES = "tests/effects/magnetic/test_"
 SUMS = {
@@ -223,7 +224,7 @@ SUMS = {
     ),
     "exports_of_two_sorts_of_laws": (
         "tisim/pairs/listed_pairs.py", "self.exported.read(w, m) + term", "term",
-        "tests/pairs/test_short_ranged.py::test_contacts_within_a_far_cut_off_are_those_of_the_twin",
+        "tests/pairs/test_short_ranged.py::test_contacts_within_a_far_cut_off_equal_the_twin",
     ),
     "shifted_cut_off": (
         f"{MAGNETIC}/dipole_pairs.py", "slope = 12.0 * x", "slope = 11.9 * x",
@@ -261,5 +262,6 @@ SUMS = {
         "tests/effects/gravitation/test_tree_gravity.py::test_with_all_cells_opened_it_sums_all_pairs[0.2]",
     ),
 }  # fmt: skip
-"""The same of sums over many: of dipoles up to a cut-off and with all images, of their virial, by a tree."""
+"""Mutations of sums over many particles: dipoles up to a cut-off and with all images, their virial, and the
+tree."""
 EVERY = {**MUTATIONS, **SHARED, **SUMS}

@@ -1,4 +1,5 @@
-"""Bad input: a message of the form "X must be Y; received Z" before anything is run, and no trace left."""
+"""Bad input gives a message of the form "X must be Y; received Z" before anything runs, and leaves no
+trace."""
 
 import numpy as np
 import pytest
@@ -243,7 +244,7 @@ def test_file_refused(tmp_path, content, message):
 
 
 def test_every_cut_of_a_scene_file_is_refused_or_read(tmp_path):
-    """At whichever byte a file ends: InputError, or a valid scene; never anything else."""
+    """A scene file cut at any byte gives an InputError or a valid scene, and nothing else."""
     whole = flow(grains=2).to_toml().encode()
     file = tmp_path / "scene.toml"
     refusals = []
@@ -258,7 +259,8 @@ def test_every_cut_of_a_scene_file_is_refused_or_read(tmp_path):
 
 
 def test_a_start_that_does_not_fit_is_refused():
-    """Too dense for random placing; a random cloud in open space; too many for the room."""
+    """Refused: random packings that are too dense, a random cloud in open space, and more particles than the
+    capacity."""
     dense = Scene(
         particles=Cloud(number=400, radius=0.1, density=1.0),
         domain=Box(low=(0, 0, 0), high=(1, 1, 1)),
@@ -289,14 +291,14 @@ def test_a_start_that_does_not_fit_is_refused():
 
 
 def test_more_than_the_machine_holds_is_refused_before_anything_runs():
-    """A smallest piece of next to nothing asks for slots without end."""
+    """A tiny smallest fragment would need practically unlimited slots."""
     scene = flow(seed=1, grains=20).replace({"effects.fragmentation.grain_mass": 1e-20})
     with pytest.raises(InputError, match=r"memory for 1 x \d+ particles must be within the \d+ GB"):
         Simulation(scene)
 
 
 def test_more_numbers_than_a_field_can_have_are_refused_like_too_much_memory(monkeypatch):
-    """What has been begun is given back: the next simulation is made, and runs."""
+    """The memory allocated before the refusal is freed: the next simulation can be made and runs."""
     one = scene([[0.0, 0, 0]], [[1.0, 0, 0]])
     monkeypatch.setattr(memory, "MOST_ENTRIES", 50)
     rule = r"^numbers for 1 x 64 particles must be at most 50 in each field(, with .* use)?; received \d+"

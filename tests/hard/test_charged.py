@@ -1,8 +1,9 @@
-"""Charged particles where it is hardest: rotation for long and in long steps, drift, release, reversed time.
+"""Extreme cases of charged particles: long rotation, long steps, drift, release, and time reversal.
 
-In uniform fields the steppers have closed forms of their own. Boris' and the trapezoidal rule are Lobatto's
-collocation of two stages, and a rotation by w dt = z is turned by the diagonal Pade approximant of exp(iz) of
-degree s - 1: by its phase, with the speed kept. All of them keep v + w b x r, and so the radius.
+In uniform fields the steppers have closed forms. Boris' method and the trapezoidal rule are Lobatto
+collocation with two stages. With s stages a step of w dt = z rotates the velocity by the phase of the
+diagonal Pade approximant of exp(iz) of degree s - 1 and keeps the speed. All of these methods conserve v + w
+b x r, and therefore the radius.
 """
 
 from math import factorial
@@ -18,10 +19,10 @@ from tisim.steppers import Boris, Collocation, ErrorControl, FixedStep, StageCon
 
 WORLDS = 8
 W, DRIFT = 3.0, 0.75
-"""1/s and m/s: of 3 C and 2 kg in 2 T and 1.5 V/m."""
+"""Gyration frequency (1/s) and drift speed (m/s) for 3 C and 2 kg in 2 T and 1.5 V/m."""
 DEGREES = {"boris": 1, "trapezoid": 1, "collocation": 4}
 ROTATIONS = {
-    # w dt, steps: ten thousand periods; steps far longer than a period; an end between two steps.
+    # w dt and number of steps: ten thousand periods; steps far longer than a period; an end within a step.
     "boris": [(0.3, 209_440), (20.0, 10_000), (2e3, 10_000), (0.3, 10.37), (0.3, 0.37)],
     "trapezoid": [(0.3, 209_440), (20.0, 10_000), (2e3, 10_000), (0.3, 10.37), (0.3, 0.37)],
     "collocation": [(2.0, 31_416), (1.0, 10.37), (1.0, 0.37)],
@@ -31,7 +32,7 @@ ELECTRON = {"charge": 1.602e-19, "mass": 9.109e-31}
 
 
 def equal_steps(name, dt):
-    """Steps of one length, solved to the last digits."""
+    """A stepper with steps of one length, solved to the last digits."""
     limits = {"first": dt, "longest": dt, "shortest": dt}
     return {
         "boris": lambda: Boris(control=FixedStep(dt=dt)),
@@ -43,7 +44,7 @@ def equal_steps(name, dt):
 
 
 def charges(position, velocity, stepper, duration, charge=3.0, mass=2.0, flux=2.0, field=0.0, **more):
-    """Charges that feel each other, in B along z and E along x."""
+    """Interacting charges in B along z and E along x."""
     effects = (
         Lorentz(),
         ElectricField(constant=(field, 0, 0)),
@@ -70,7 +71,7 @@ def run(scenes):
 
 
 def angle(z, degree):
-    """By which a step of w dt = z turns, rad: twice the phase of the numerator of the Pade approximant."""
+    """Rotation (rad) in a step of w dt = z: twice the phase of the numerator of the Pade approximant."""
     k = degree
     terms = [
         factorial(2 * k - j)
@@ -83,13 +84,16 @@ def angle(z, degree):
 
 
 def plane(vector):
-    """x + i y."""
+    """The complex number x + i y."""
     return vector[..., 0] + 1j * vector[..., 1]
 
 
 @pytest.fixture(scope="module", params=NAMES)
 def rotations(request):
-    """One charge in B, and one in E and B, from rest, for the same steps; with what they were asked for."""
+    """One charge in B, and one in E and B that starts at rest, with the same steps.
+
+    Returns the name of the stepper and the results by electric field.
+    """
     name = request.param
     scenes = []
     for z, steps in ROTATIONS[name]:
@@ -106,7 +110,8 @@ def rotations(request):
 
 @pytest.mark.long
 def test_rotation_for_ten_thousand_periods_and_in_long_steps(rotations):
-    """Speed and radius to 1e-9, the phase that of the method; time ends where it was asked to."""
+    """Speed and radius are right to 1e-9, the phase equals the phase of the method, and the run ends at the
+    duration asked for."""
     name, kinds = rotations
     for (z, steps), result in zip(ROTATIONS[name], kinds[0.0], strict=True):
         v, r = result.state["velocity"][0], result.state["position"][0]
@@ -126,7 +131,7 @@ def test_rotation_for_ten_thousand_periods_and_in_long_steps(rotations):
 
 @pytest.mark.long
 def test_drift_across_both_fields(rotations):
-    """The mean velocity is E/B within the width of a circle over the path; gyration does not heat."""
+    """The mean velocity is E/B within the circle's width over the time; gyration does not heat."""
     name, kinds = rotations
     assert kinds[1.5]
     for (z, _), result in zip(ROTATIONS[name], kinds[1.5], strict=False):
@@ -135,13 +140,13 @@ def test_drift_across_both_fields(rotations):
         wide = max(1.0, z) * DRIFT / W
         assert abs(mean + 1j * DRIFT) <= 2 * wide / result.time
         assert 2 * wide / result.time < 1e-3 * DRIFT
-        # v = -i E/B + what turns, whose size is E/B as it starts from rest.
+        # v = -i E/B plus a rotating part of magnitude E/B, because the charge starts at rest.
         assert abs(v + 1j * DRIFT) == pytest.approx(DRIFT, rel=1e-9)
 
 
 @pytest.mark.slow
-def test_sweeps_that_cannot_follow_the_rotation_say_so():
-    """Five stages of w dt = 20: not a wrong number but a failure, which keeps the start."""
+def test_sweeps_that_do_not_converge_fail_clearly():
+    """Five stages at w dt = 20 give a failure that keeps the start state, not a wrong number."""
     setup = charges([[0, 0, 0]], [[0.6, -0.8, 0.5]], equal_steps("collocation", 20.0 / W), 100.0)
     (result,) = simulate([setup], worlds=WORLDS, capacity=2)
     assert "cannot be solved even at the shortest step, by effects.lorentz" in result.status.reason
@@ -151,7 +156,8 @@ def test_sweeps_that_cannot_follow_the_rotation_say_so():
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_reversed_time_returns_to_the_start(name):
-    """Two like charges that B holds together: a thousand steps there; back with velocities and B reversed."""
+    """Two like charges confined by B return to the start after a thousand steps forwards and a thousand with
+    velocities and B reversed."""
     charge = np.sqrt(4.0 / K_E)
     place, speed = np.array([[1.0, 0, 0], [-1, 0, 0]]), np.array([[0, 0.7, 0.1], [0, -0.7, 0.2]])
     flux, more = 3.0 / charge, {"charge": charge, "mass": 1.0}
@@ -182,8 +188,10 @@ ADAPTIVE = {
     ("name", "bound"), [("trapezoid", 1e-3), pytest.param("collocation", 1e-8, marks=pytest.mark.slow)]
 )
 def test_like_charges_from_a_nanometre(name, bound):
-    """Two electrons released at rest: k q^2/d comes out as kinetic energy, through six decades of distance,
-    also where the first step is a million times too long for the start."""
+    """Two electrons released at rest convert k q^2/d into kinetic energy, through six decades of distance.
+
+    This also holds if the first step is a million times too long for the start.
+    """
     q, m, gap = ELECTRON["charge"], ELECTRON["mass"], 1e-9
     energy = K_E * q * q / gap
     swiftest = np.sqrt(energy / m)

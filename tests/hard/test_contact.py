@@ -1,4 +1,4 @@
-"""Contact of Z16 where it is hardest: fast, grazing, at rest for long, sliding, spinning, hot, cold."""
+"""Extreme cases of the Z16 contact: fast, grazing, long at rest, sliding, spinning, hot and cold."""
 
 import numpy as np
 import pytest
@@ -22,8 +22,11 @@ from tests.hard.grains import (
 
 @pytest.mark.slow
 def test_head_on_beyond_the_speed_of_waves():
-    """1e3 times sqrt(K R/m), the speed of waves: spheres go through each other, as the law has it, and keep
-    their energy; with dissipation they lose c (closing speed) times the volume both have crossed."""
+    """At 1e3 times the wave speed sqrt(K R/m) the spheres pass through each other, as the law implies.
+
+    Without dissipation they keep their energy. With dissipation they lose c (closing speed) times the volume
+    that both have crossed.
+    """
     v = 1e3 * np.sqrt(K * R)
     dt = R / v / 500
     place, speed = [[-1.5 * R, 0, 0], [1.5 * R, 0, 0]], [[v, 0, 0], [-v, 0, 0]]
@@ -37,8 +40,8 @@ def test_head_on_beyond_the_speed_of_waves():
 
 @pytest.mark.long
 def test_grazing():
-    """Past each other with 1e-3 radii of overlap: turned by the impulse along the straight path; with none,
-    not at all."""
+    """Spheres that pass with an overlap of 1e-3 radii are deflected by the impulse along the straight path;
+    without overlap they are not deflected."""
     v, deep, reach = 100.0, 1e-3 * R, 1.0
     scenes = []
     for offset in (2 * R - deep, 2 * R):
@@ -53,7 +56,7 @@ def test_grazing():
 
 
 def column(n=10, g=10.0):
-    """Places of n grains that rest on each other under gravity, from the held one up, and its anchor's."""
+    """Positions of n grains at rest on each other under gravity, from the anchored one up, and its anchor."""
     gaps = [brentq(lambda d, load=g * (n - k): push(d) - load, R, 2 * R, xtol=1e-16) for k in range(1, n)]
     place = np.zeros((n, 3))
     place[1:, 2] = np.cumsum(gaps)
@@ -64,8 +67,11 @@ def column(n=10, g=10.0):
 
 @pytest.mark.long
 def test_a_tall_column_rests():
-    """Ten grains, 300 times the period of the softest contact: what starts in balance stays, without creep or
-    heat, undamped too; what starts off balance keeps its energy, and with dissipation comes to rest."""
+    """Ten grains for 300 times the period of the softest contact.
+
+    A column that starts in balance stays at rest, without creep or heat, also undamped. A column that starts
+    off balance conserves its energy, and comes to rest with dissipation.
+    """
     place, anchor = column()
     more = {"anchor": anchor, "gravity": 10.0, "held": 1}
     off = place.copy()
@@ -98,13 +104,16 @@ def test_a_tall_column_rests():
 
 
 def test_friction_just_below_and_just_above_its_angle():
-    """A grain pressed between two that are held, and pulled sideways by 0.99 and by 1.01 of what static
-    friction can hold: it creeps, at the speed at which Z16's regularised stick, K_f A dt u, carries the load
-    (7.13); or it slips, and gains speed by what dynamic friction leaves over."""
+    """A grain pressed between two fixed ones is pulled sideways by 0.99 and by 1.01 of the static friction
+    limit.
+
+    Below the limit it creeps at the speed at which the regularised stick of Z16, K_f A dt u, carries the load
+    (7.13). Above the limit it slips and accelerates by the pull minus the dynamic friction.
+    """
     d, dt, steps = 1.9 * R, 1e-5, 1000
     normal, k_f, mu_s, mu_d = push(d), 5e9, 0.5, 0.3
     hold, grip = 2 * mu_s * normal, 2 * k_f * area(d) * dt
-    # Two of such mass stay where they are and do not turn.
+    # Two grains of such mass stay where they are and do not rotate.
     place, masses, more = (
         [[0, 0, -d], [0, 0, d], [0, 0, 0]],
         [1e12, 1e12, 1.0],
@@ -130,12 +139,15 @@ def spinning(position, spin, velocity=0.0, **more):
 
 BONDED = {"bond": (1e5, 0.0, 0.05)}
 DEEP = 1.8 * R
-"""Distance at which bond and contact balance: K E^2 = K_nb E at E = 0.1."""
+"""Overlap at which bond and contact balance: K E^2 = K_nb E at E = 0.1."""
 
 
 def test_a_spinning_pair_never_gains_energy():
-    """Bonded grains that rub, roll and twist: with spin and what contact and bond store, energy never rises
-    from one look to the next, and angular momentum is that of the start."""
+    """Bonded grains that rub, roll and twist.
+
+    The energy, with rotation and with the energy stored in contact and bond, does not rise between samples,
+    and the angular momentum is conserved.
+    """
     place = [[-DEEP / 2, 0.1, 0], [DEEP / 2, 0.1, 0]]
     scenes = [
         spinning(place, spin, friction=(1e6, 0.5, 0.3), **BONDED)
@@ -160,8 +172,11 @@ def test_a_spinning_pair_never_gains_energy():
 
 
 def test_a_bonded_pair_under_torsion():
-    """Spins along the line of centres meet no resistance, as twisting is no slip, which Z16's grip acts on.
-    Spins across it, both alike, decay into a rigid rotation of the pair with the same angular momentum."""
+    """Twisting meets no resistance; bending decays into a rigid rotation.
+
+    Spins along the line of centres cause no slip, on which the grip of Z16 acts. Equal spins across it decay
+    into a rigid rotation of the pair with the same angular momentum.
+    """
     place = [[-DEEP / 2, 0, 0], [DEEP / 2, 0, 0]]
     grip = {"bond": (1e5, 1e6, 0.05)}
     scenes = [
@@ -184,7 +199,8 @@ def test_a_bonded_pair_under_torsion():
 
 
 def test_softening_from_absolute_zero_to_a_thousand_times_hotter():
-    """exp(-a (T/T* - 1)) at a = 1e3: cold grains are beyond numbers, said clearly; hot ones do not push."""
+    """At a = 1e3 the factor exp(-a (T/T* - 1)) overflows for cold grains, and the message says so; hot grains
+    do not repel each other."""
     place, still = [[0, 0, 0], [1.8 * R, 0, 0]], np.zeros((2, 3))
     scenes = [grains(place, still, 1e-6, 10, sensitivity=1e3, temperature=t) for t in (0.0, 300.0, 3e5)]
     (cold, warm, hot), _ = watched(scenes)

@@ -1,9 +1,9 @@
-"""A scene that names no stepper is as accurate as it says, or is refused: none is wrong with status ok.
+"""A scene that names no stepper reaches its stated accuracy or is refused; none is wrong with status ok.
 
     python -m pytest -n 0 -m slow -s tests/hard/test_default_stepper.py
 
-prints the errors of 100 random scenes of each family (tests/hard/default_scenes.py), and the work beside that
-of the coarsest settings of any stepper that keep all scenes of the family within the same accuracy.
+prints the errors of 100 random scenes of each family (tests/hard/default_scenes.py), and their work beside
+the work of the coarsest settings of any stepper that reach the same accuracy in all scenes of the family.
 """
 
 import copy
@@ -34,11 +34,12 @@ from tisim.steppers.choice import ACCURACY, ALONE, KINKED
 pytestmark = pytest.mark.long
 
 QUICK = ("tether", "lorentz", "permanent_magnet", "damped_grains", "impact", "driven_charge")
-"""These families stand for the rules in the quick tests."""
+"""The families that the quick tests use; each stands for one rule of the choice."""
 
 
 def drawn(name, number):
-    """Return scenes of a family with the functions that tell their errors, and how many were refused."""
+    """Return scenes of a family with the functions that return their errors, and the number of refused
+    scenes."""
     scenes, refused = [], 0
     for k in range(number):
         draw = np.random.Generator(np.random.Philox(key=[k, zlib.crc32(name.encode())]))
@@ -50,19 +51,19 @@ def drawn(name, number):
 
 
 def errors_of(scenes, results):
-    """Return the error of each result; infinite where it has failed."""
+    """Return the error of each result; infinity for a failed result."""
     return np.array(
         [error(r) if r.status.ok else math.inf for (_, error), r in zip(scenes, results, strict=True)]
     )
 
 
 def work_of(results):
-    """Return how often forces were summed, the mean over runs."""
+    """Return the number of force evaluations, averaged over the runs."""
     return float(np.mean([r.work.get("force_evaluations", 0) or r.work["steps"] for r in results]))
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_a_scene_without_a_stepper_is_as_accurate_as_it_says(name):
+def test_a_scene_without_a_stepper_reaches_its_accuracy(name):
     scenes, refused = drawn(name, 12)
     assert refused == 0
     errors = errors_of(scenes, tisim.run([scene for scene, _ in scenes]))
@@ -82,7 +83,7 @@ def test_100_random_scenes_of_each_family(name, capsys):
             f"largest {right.max():.1e}, {work_of(results):.0f} force evaluations"
         )
     assert right.max() <= ACCURACY
-    # What is neither refused nor right must say so; in these families nothing has to.
+    # A scene that cannot be run accurately must be refused or fail with a message; very few scenes here do.
     assert refused + failed <= 3
 
 
@@ -90,7 +91,7 @@ def test_100_random_scenes_of_each_family(name, capsys):
 @pytest.mark.parametrize("name", sorted(set(FAMILIES) - {"impact"}))
 def test_other_accuracies(name):
     scenes, _ = drawn(name, 30)
-    # A leapfrog to 1e-6 takes hundreds of times the steps.
+    # A leapfrog with an error of 1e-6 takes hundreds of times the steps.
     adaptive = isinstance(scenes[0][0].stepper, Collocation)
     for accuracy in (1e-1, 1e-3, 1e-4, 1e-6) if adaptive else (1e-1, 1e-3):
         asked = [(scene.replace({"accuracy": accuracy}), error) for scene, error in scenes]
@@ -99,16 +100,16 @@ def test_other_accuracies(name):
 
 ERRORS = (ACCURACY, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
 PARTS = (0.4, 0.28, 0.2, 0.14, 0.1, 0.07, 0.05)
-"""By hand one of these is chosen for all scenes of a family: an error that is asked for, none coarser than
-the accuracy, or the part of the critical step that a step is."""
+"""Manual settings, one for all scenes of a family: an error bound no coarser than the accuracy, or a step as
+a fraction of the critical step."""
 NOT_COMPARED = {
     "impact",  # Collisions of hard particles have no other stepper.
-    "bonded_pair",  # Its error says that energy is bounded, which the coarsest steps fulfil.
+    "bonded_pair",  # Its error only requires bounded energy, which the coarsest steps satisfy.
 }
 
 
 def by_hand(scene, error=None, part=None, kind=None):
-    """Return a scene with the stepper that somebody chooses who knows its scales."""
+    """Return a scene with the stepper that an expert who knows its scales would choose."""
     chosen = scene.choice()
     if part is not None:
         gyrates = any(effect.gyrates(scene.effects) for effect in scene.effects)
@@ -139,7 +140,7 @@ def by_hand(scene, error=None, part=None, kind=None):
 
 
 def settings(scene):
-    """Return what may be chosen by hand for scenes like one, from coarse to fine, by the kind of stepper."""
+    """Return the manual settings for scenes like this one, from coarse to fine, by the kind of stepper."""
     choice, adaptive = scene.choice(), not any(effect.leapfrog for effect in scene.effects)
     tried = {}
     if choice.critical:
@@ -152,7 +153,7 @@ def settings(scene):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(FAMILIES) - NOT_COMPARED))
-def test_what_the_choice_costs_beside_the_best_by_hand(name, capsys):
+def test_cost_of_the_choice_and_of_the_best_manual_settings(name, capsys):
     scenes, _ = drawn(name, 100)
     own = work_of(tisim.run([scene for scene, _ in scenes]))
     best, which = math.inf, "none"
@@ -199,10 +200,10 @@ def tethered(**more):
 
 
 class TestTheGuard:
-    """A named step beyond the critical step stops the world, whatever the law."""
+    """A fixed step beyond the critical step stops the world, under every law."""
 
     @pytest.mark.parametrize(("factor", "ok"), [(0.44, True), (0.48, False)])
-    def test_a_spring_is_followed_up_to_nearly_half_of_the_critical_step(self, factor, ok):
+    def test_a_spring_is_accepted_up_to_nearly_half_of_the_critical_step(self, factor, ok):
         critical = 2 / (2 * np.pi * 1e3)
         result = tisim.run(tethered(stepper=Verlet(control=FixedStep(dt=factor * critical))))
         assert result.status.ok == ok, result.status.reason
@@ -212,13 +213,13 @@ class TestTheGuard:
             told = float(result.status.reason.split("critical one at most ")[1].split(" s")[0])
             assert told == pytest.approx(critical, rel=0.05)
 
-    def test_a_magnet_that_turns_in_long_steps_stops_its_world(self):
+    def test_a_rotating_magnet_in_long_steps_stops_the_world(self):
         result = tisim.run(magnet(stepper=Verlet(control=ApproachTime())))
         assert not result.status.ok
         assert "critical time step" in result.status.reason
 
     @pytest.mark.parametrize("part", [0.3, 0.5, 1.0, 3.0])
-    def test_two_bodies_in_orbit_in_long_steps_stop_their_world(self, part):
+    def test_two_orbiting_bodies_in_long_steps_stop_the_world(self, part):
         d, period = 0.01, 1e-3
         total = 4 * np.pi**2 * d**3 / (6.6743e-11 * period**2)
         v = math.sqrt(6.6743e-11 * total / d)
@@ -236,9 +237,11 @@ class TestTheGuard:
     @pytest.mark.parametrize("angle", [0.9, 1.2, 1.6, 2.0, 2.4, 2.8, 3.5, 5.0, 10.0])
     @pytest.mark.parametrize("softening", [None, 1e-3])
     @pytest.mark.parametrize("beside", [(), (laws.Gravity(),)], ids=["alone", "gravity"])
-    def test_bodies_that_fall_together_and_are_thrown_apart_stop_their_world(self, angle, softening, beside):
-        """From rest, at a distance of 1 cm. ``angle`` is omega dt there; the energy is off by 1 to 1e48 times
-        in what such steps give."""
+    def test_a_close_encounter_in_long_steps_stops_the_world(self, angle, softening, beside):
+        """Two bodies at rest 1 cm apart, attracted to each other.
+
+        angle : omega dt at the start. Without the guard the energy is wrong by a factor of 1 to 1e48.
+        """
         d, omega = 0.01, 1e3
         gravity = laws.SoftenedSelfGravity(softening_length=softening) if softening else laws.SelfGravity()
         scene = tisim.Scene(
@@ -253,8 +256,8 @@ class TestTheGuard:
         assert "critical time step" in tisim.run(scene).status.reason
 
     @pytest.mark.parametrize(("factor", "ok"), [(0.7, True), (1.02, False)])
-    def test_beside_contacts_a_motion_that_grows_stops_its_world(self, factor, ok):
-        """Laws of contact guard their own steps, but not those of a spring beside them."""
+    def test_an_instability_beside_contacts_stops_the_world(self, factor, ok):
+        """Contact laws guard their own steps, but not the steps of a spring beside them."""
         dt = factor * 2 / (2 * np.pi * 1e3)
         scene = tisim.Scene(
             particles=tisim.Particles(
@@ -269,8 +272,8 @@ class TestTheGuard:
         assert result.status.ok == ok, result.status.reason
         assert ok or "effects.tether" in result.status.reason
 
-    def test_a_wall_that_is_drawn_away_at_once_does_not_stop_it(self):
-        """Its dashpot pulls at a grain in the first step alone, which is no motion that grows."""
+    def test_a_wall_pulled_away_does_not_stop_the_world(self):
+        """The dashpot of the wall pulls at a grain in the first step only, which is not an instability."""
         radius, mass = 1e-3, 1e-5
         scene = tisim.Scene(
             particles=tisim.Particles(
@@ -303,7 +306,7 @@ class TestTheGuard:
 
 
 class TestTheChoice:
-    def test_a_scene_that_changes_is_chosen_for_anew(self):
+    def test_a_changed_scene_gets_a_new_choice(self):
         assert tethered().replace({"duration": 1.0}).stepper.control.longest == pytest.approx(0.1)
 
     def test_a_scene_keeps_its_accuracy_and_not_its_stepper_in_a_file(self):
@@ -325,7 +328,7 @@ class TestTheChoice:
             assert errors[-1] <= accuracy
         assert errors[0] > errors[-1]
 
-    def test_what_depends_on_its_step_is_refused(self):
+    def test_effects_that_depend_on_the_step_are_refused(self):
         with pytest.raises(tisim.InputError, match=r"scene.stepper must be given, because the step length"):
             tisim.Scene(
                 particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, mass=1e-6),
@@ -350,10 +353,10 @@ class TestTheChoice:
                 duration=1.0,
             ).stepper.control.dt
 
-        # The time of an impact of Hertz's law goes as v^-1/5.
+        # The duration of a Hertzian impact scales as v^-1/5.
         assert step(10.0) == pytest.approx(step(0.1) * 100**-0.2, rel=0.02)
 
-    def test_a_blast_is_known_before_it_is_placed(self):
+    def test_the_shortest_step_accounts_for_a_blast(self):
         cloud = {"number": 50, "radius": 1e-3, "density": 2000.0}
         steps = [
             tisim.Scene(
@@ -366,7 +369,7 @@ class TestTheChoice:
         ]
         assert steps[0] == pytest.approx(10 * steps[1], rel=0.02)
 
-    def test_bodies_that_only_fall_are_stepped(self):
+    def test_a_falling_clump_is_stepped(self):
         clump = tisim.Clump(centres=[(0, 0, 0), (1e-3, 0, 0)], radii=[1e-3] * 2, density=2000.0)
         scene = tisim.Scene(
             particles=tisim.Particles.of_clumps(clump, position=[(0, 0, 0)]),
@@ -376,7 +379,7 @@ class TestTheChoice:
         fallen = tisim.run(scene).check().state["position"][:, 2]
         assert fallen == pytest.approx([-5.0, -5.0], rel=1e-9)
 
-    def test_a_charge_that_is_missing_is_asked_for(self):
+    def test_a_missing_charge_is_reported(self):
         scene = tisim.Scene(
             particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=1e-3, mass=1e-6),
             effects=(laws.Lorentz(), sources.MagneticField(constant=(0, 0, 1.0))),
@@ -385,7 +388,7 @@ class TestTheChoice:
         with pytest.raises(tisim.InputError, match="charge"):
             tisim.run(scene)
 
-    def test_particles_that_come_later_are_refused(self):
+    def test_inserted_particles_are_refused(self):
         insertion = operators.InsertionByFlux(
             number=10, flux=1.0, low=(0.0,) * 3, high=(0.1,) * 3,
             grains=[tisim.GrainClass(sizes=tisim.packing.EqualSizes(radius=1e-3), density=2000.0)],
@@ -400,7 +403,7 @@ class TestTheChoice:
                 duration=1.0,
             )
 
-    def test_a_law_of_a_user_counts_as_smooth_where_it_says_so(self):
+    def test_a_user_law_counts_as_smooth_if_it_says_so(self):
         class SaysNothing(laws.Tether):
             pass
 
@@ -416,7 +419,7 @@ class TestTheChoice:
             ACCURACY / safety for safety in (ALONE, ALONE, KINKED)
         ]
 
-    def test_a_law_that_tells_no_critical_step_is_refused_beside_grains(self):
+    def test_a_law_without_a_critical_step_is_refused_beside_grains(self):
         class WithoutCriticalStep(laws.Tether):
             def critical_step(self, start, speed, effects):
                 return None
@@ -433,7 +436,7 @@ class TestTheChoice:
 
 
 class TestFailedResults:
-    """Who uses a failed run without a look at its status is warned."""
+    """Use of a failed run without a check of its status gives a warning."""
 
     failing = staticmethod(lambda: tisim.run(tethered(stepper=Verlet(control=FixedStep(dt=1e-3)))))
 
@@ -458,7 +461,7 @@ class TestFailedResults:
         with pytest.warns(tisim.RunWarning, match="dropped"):
             del result
 
-    def test_who_prints_it_sees_that_it_has_failed(self):
+    def test_the_printed_result_shows_the_failure(self):
         result = self.failing()
         assert repr(result).startswith("Result('scene': 1 particles, ")
         assert "critical time step" in repr(result)

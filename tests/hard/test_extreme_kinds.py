@@ -1,6 +1,8 @@
-"""Every number of every effect, operator, source and stepper at the ends of what is accepted, and those of a
-particle: refused before anything runs, or run to the end, or failed in words. Never a crash, a hang, or a
-state that is not finite."""
+"""Every number of every effect, operator, source, stepper and particle at the ends of its accepted range.
+
+The scene is refused before anything runs, or runs to the end, or fails with a message. It never crashes,
+hangs, or returns a state that is not finite.
+"""
 
 from collections import Counter
 
@@ -21,7 +23,7 @@ def runs():
 
 
 def count_outcomes(runs, name, cases):
-    """How many scenes have come to what; none of them to anything but words or numbers."""
+    """Return the number of scenes for each outcome; each scene must end in a message or in finite numbers."""
     counts = Counter()
     for values in cases:
         column, word = runs(name, values)
@@ -33,7 +35,7 @@ def count_outcomes(runs, name, cases):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", extremes.scenes())
 def test_extremes_of_a_kind(runs, name):
-    """One number after another; as they are, the scene runs."""
+    """Each number is varied separately; the unchanged scene runs."""
     assert count_outcomes(runs, name, [{}]) == {RAN: 1}
     counts = count_outcomes(runs, name, extremes.one_by_one(name))
     assert counts[RAN] > 0
@@ -42,14 +44,14 @@ def test_extremes_of_a_kind(runs, name):
 
 @pytest.mark.long
 def test_extremes_of_one_kind(runs):
-    """A quick one of them."""
+    """One kind with a few values, for the quick suite."""
     name = "effects.stokes_drag"
     cases = [{("effects", "stokes_drag", "viscosity"): value} for value in (0.0, 2.3e-308, 1e155, 1.7e308)]
     assert count_outcomes(runs, name, cases) == {REFUSED: 1, RAN: 1, FAILED: 2}
 
 
 def test_every_kind_is_there():
-    """Each stepper and control of the package is in some scene; effects are taken as they are found."""
+    """Every stepper and control of the package is in some scene; effects are found automatically."""
     serialization.load(steppers)
     tables = [data["stepper"] for data in extremes.scenes().values()]
     for contract, names in (

@@ -1,4 +1,4 @@
-"""Extremes of place, size, speed and length: right, or a failure that says what and where."""
+"""Extreme positions, sizes, speeds and run lengths: the result is right, or a failure names the cause."""
 
 from fractions import Fraction
 
@@ -17,7 +17,7 @@ from tisim import InputError
 
 
 def pair(gap, approach, hardness=1e9, radius=RADIUS, **more):
-    """Two grains with centres a distance apart along a slanted line, closing in along it."""
+    """Two grains a distance apart along a slanted line of centres, approaching along it."""
     n = np.array([2.0, -3.0, 6.0]) / 7
     return scene(
         [[0, 0, 0], gap * n], [approach * n, 0 * n], merging(hardness), radius=radius, dt=1e-30, **more
@@ -25,7 +25,7 @@ def pair(gap, approach, hardness=1e9, radius=RADIUS, **more):
 
 
 def decades(low, high):
-    """Numbers of either end of a range of powers of ten, and between."""
+    """Numbers at both ends of a range of powers of ten, and between them."""
     return st.floats(low, high).map(lambda power: 10.0**power)
 
 
@@ -38,9 +38,9 @@ def decades(low, high):
     approach=decades(-200, 308),
     hardness=decades(-300, 300),
 )
-def test_any_magnitudes_are_refused_or_give_numbers(masses, radius, away, approach, hardness):
-    """Two grains that touch, of any masses and size, any distance away: a message, or only finite numbers,
-    those of a run that has failed among them."""
+def test_any_magnitudes_are_refused_or_give_finite_numbers(masses, radius, away, approach, hardness):
+    """Two touching grains of any mass and size, at any distance from the origin, give a message or only
+    finite numbers, also in the state of a failed run."""
     try:
         n = np.array([2.0, -3.0, 6.0]) / 7
         place = np.array([radius * away, 0, 0])
@@ -61,8 +61,8 @@ def test_any_magnitudes_are_refused_or_give_numbers(masses, radius, away, approa
 
 
 @pytest.mark.long
-def test_a_place_that_rounding_cannot_tell_is_refused():
-    """1 m from a place at 1e17 m, grains of a millimetre are in one point: nobody knows what they touch."""
+def test_positions_that_round_together_are_refused():
+    """Millimetre grains 1 m apart at 1e17 m round to one point, so their contacts are undefined."""
     place = np.array([1e17, 0, 0])
     setup = scene([place, place + 1e-3], np.zeros((2, 3)), merging(1e9), radius=1e-3, dt=1e-30)
     message = r"particles.position must be so near the origin that f\d\d rounds it by less than a radius"
@@ -72,8 +72,8 @@ def test_a_place_that_rounding_cannot_tell_is_refused():
 
 @pytest.mark.long
 @pytest.mark.parametrize("part", [1e-300, 1e-12, 1e-6])
-def test_two_grains_hardly_apart(part):
-    """At any distance that numbers can square there is a line of centres, and an impact."""
+def test_two_nearly_coincident_grains(part):
+    """The line of centres and the impact are defined at any distance whose square is representable."""
     (result,) = run_merging([pair(part * RADIUS, 1.0)])
     assert result.status.ok
     assert all(np.isfinite(values).all() for values in result.state.values())
@@ -87,7 +87,8 @@ def test_two_grains_hardly_apart(part):
 
 
 def test_overlap_at_the_start_releases_no_energy():
-    """Ten per cent of overlap, at rest or parting: nothing; closing: an impact that takes energy."""
+    """An overlap of 10 %: grains at rest or parting are unchanged; approaching grains collide and lose
+    energy."""
     still, parting, closing = run_merging([pair(1.8 * RADIUS, v) for v in (0.0, -1.0, 1.0)])
     for result in (still, parting):
         np.testing.assert_array_equal(result.state["velocity"], result.start["velocity"])
@@ -96,7 +97,8 @@ def test_overlap_at_the_start_releases_no_energy():
 
 
 def test_touching_exactly_at_the_sum_of_radii():
-    """Surfaces that touch and close in have met; the next number beyond, they have not."""
+    """Approaching grains whose distance is the sum of radii collide; at the next larger number they do
+    not."""
     radius = 0.25
     for gap, impacts in ((0.5, 1), (np.nextafter(0.5, 1), 0)):
         place = [[0, 0, 0], [gap, 0, 0]]
@@ -109,7 +111,7 @@ def test_touching_exactly_at_the_sum_of_radii():
 
 @pytest.mark.parametrize("hardness", [1e12, 1e-3], ids=["rebound", "bond"])
 def test_mass_and_size_ratios(hardness):
-    """Radii 1 : 1000, masses 1 : 1e9 and worse: momentum and energy to rounding of the larger."""
+    """Radii 1 : 1000, masses 1 : 1e9 and worse: momentum and energy are right to rounding of the larger."""
     for small, large, density in ((1e-6, 1e-3, DENSITY), (1e-6, 1e-3, [1.0, 1e4]), (1e-9, 1.0, DENSITY)):
         mass = np.asarray(density) * 4 / 3 * np.pi * np.array([small, large]) ** 3
         setup = pair((small + large) * (1 - 1e-12), 10.0, hardness, radius=[small, large], mass=mass)
@@ -118,13 +120,13 @@ def test_mass_and_size_ratios(hardness):
         assert result.work["merges"] == (hardness < 1)
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=1e-14)
         if hardness > 1:
-            # The light one bounces off as from a wall.
+            # The light grain rebounds as from a wall.
             velocity = by_id(result)["velocity"][0]
             np.testing.assert_allclose(velocity, -result.start["velocity"][0], rtol=1e-3)
 
 
 def test_impact_at_any_speed():
-    """From 1e-12 m/s to a thousand times the speed of sound in steel: energy is never gained."""
+    """Energy is never gained at speeds from 1e-12 m/s to a thousand times the speed of sound in steel."""
     for speed in 10.0 ** np.arange(-12, 7.5, 1.0):
         (result,) = run_merging([pair(2 * RADIUS * (1 - 1e-12), speed, hardness=1e6)])
         before, after = (
@@ -135,8 +137,8 @@ def test_impact_at_any_speed():
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=1e-13)
 
 
-def test_two_charges_in_one_place_fail_clearly():
-    """1/0: the run does not begin; it names the force, the particle and the time, and keeps the start."""
+def test_two_coincident_charges_fail_clearly():
+    """The force is 1/0: the run fails at once, names force, particle and time, and keeps the start state."""
     bad, good = run_charges(
         [
             charges(
@@ -156,7 +158,7 @@ def test_two_charges_in_one_place_fail_clearly():
 
 
 def test_like_charges_from_a_nanometre():
-    """Two like charges released from 1e-9 m: with steps short enough, the energy comes out as kinetic."""
+    """Two like charges released at 1e-9 m: with short enough steps the potential energy becomes kinetic."""
     q, gap = 1e-12, 1e-9
     potential_before = 8.9875517873681764e9 * q * q / gap
     tau = np.sqrt(gap**2 / (2 * potential_before))
@@ -173,7 +175,7 @@ def test_like_charges_from_a_nanometre():
 
 
 def test_reversed_time_returns_to_the_start():
-    """Velocity Verlet is symmetric: half way round an eccentric orbit and back, to rounding."""
+    """Velocity Verlet is symmetric: half an eccentric orbit and back returns to the start, to rounding."""
     q = np.sqrt(4.0 / 8.9875517873681764e9)
     there = charges(
         [[1, 0, 0], [-1, 0, 0]], [[0, 0.7, 0], [0, -0.7, 0]], [q, -q], {"stiffness": 0.0}, dt=0.01, steps=300
@@ -186,7 +188,7 @@ def test_reversed_time_returns_to_the_start():
 
 
 def test_time_does_not_drift_over_a_million_steps():
-    """A step of 0.1, which binary numbers cannot hold: after 1e6 of them, time is right to its last bit."""
+    """After 1e6 steps of 0.1, which is not a binary fraction, the time is right to its last bit."""
     setup = charges([[0, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 0.0}, dt=0.1, duration=1e6)
     simulation = compiled(setup, 40, 32)
     simulation.load([setup])
@@ -199,8 +201,9 @@ def test_time_does_not_drift_over_a_million_steps():
     assert abs(naive - float(exact)) > 1e-7, "plain summation would fail here"
 
 
-def test_energy_helper_counts_what_it_should():
-    """The books that other tests rely on: kinetic, heat, spent, given, each with its sign."""
+def test_the_energy_helper_counts_every_term():
+    """The energy helper used by other tests counts kinetic energy, heat, losses and work with the right
+    signs."""
     state = {
         "mass": np.array([2.0]),
         "velocity": np.array([[3.0, 0, 0]]),

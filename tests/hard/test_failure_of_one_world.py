@@ -1,4 +1,5 @@
-"""A grain turns to NaN in mid-run, in one of three worlds: it is named, and kept apart."""
+"""A grain becomes NaN during a run in one of three worlds: it is named, and the other worlds are
+unaffected."""
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from tisim.operators.base import parameter
 
 
 class Poison(Operator):
-    """At a step, makes something of one particle not finite; each flag spoils one quantity."""
+    """At a given step, makes one quantity of one particle not finite; a flag selects the quantity."""
 
     fields = ("temperature",)
     at_step: float = parameter("", "at step", 0.0)
@@ -46,7 +47,7 @@ def poisoned(quantity, when=50, seed=9):
     ("quantity", "fault"),
     [
         ("velocity", "velocity of particle 17 is not finite"),
-        # Seen in the move itself, where it is not yet known what has spoilt it.
+        # Detected in the move itself, before the cause is known.
         ("position", "a quantity is not finite, at particle 17"),
         ("temperature", "temperature of particle 17 is not finite"),
         ("overflow", "velocity of particle 17 is not finite"),

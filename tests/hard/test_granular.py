@@ -1,5 +1,5 @@
-"""Every granular law where it is hardest: grazing planes and rims, deep in each other, in one place, of
-nanometres and of kilometres, light beside heavy."""
+"""Extreme cases of every granular law: grazing planes and rims, deep overlap, coincident centres, sizes from
+nanometres to kilometres, and large mass ratios."""
 
 import numpy as np
 import pytest
@@ -12,14 +12,16 @@ from tisim.geometry import Disc
 pytestmark = pytest.mark.slow
 
 RIM = 50.0
-"""m; radius of a disc, around which grains are shot at its rim."""
+"""Radius (m) of a disc; grains are shot at its rim."""
 HIGH = 100.0
-"""m; its height."""
+"""Height of the disc, m."""
 
 
 def shots(rng, n=64):
-    """Grains of which half fly at the plane z = 0 and half at the rim of the disc, half of each grazing; they
-    spin as fast as they fly, and are 1e-3 m off what they hit."""
+    """Grains of which half fly at the plane z = 0 and half at the rim of the disc; half of each graze.
+
+    The surface speed of their spin is comparable to their velocity, and they start 1e-3 m from the surface.
+    """
     radius = rng.uniform(0.3, 1.0, n)
     graze = np.where(np.arange(n) % 2, 10 ** rng.uniform(-3, -1, n), rng.uniform(0.2, 1.5, n))
     speed, sign = 10 ** rng.uniform(0, 1, n), rng.choice([-1.0, 1.0], n)
@@ -27,7 +29,7 @@ def shots(rng, n=64):
     low = np.arange(n) < n // 2
     place[:, 1], place[:, 2] = 4.0 * np.arange(n), radius + 1e-3
     velocity[:, 0], velocity[:, 2] = sign * np.cos(graze), -np.sin(graze)
-    # At the rim, from where it is nearest: past it along a tangent of the grain.
+    # At the rim: a grain starts next to a point of the rim and flies past it along a tangent of the grain.
     side, around = rng.uniform(-np.pi / 2, np.pi / 2, n), 2 * np.pi * np.arange(n) / (n // 2)
     out = np.stack([np.cos(around), np.sin(around), 0 * around], axis=1)
     up = np.array([0.0, 0.0, 1.0])
@@ -41,7 +43,7 @@ def shots(rng, n=64):
 
 
 def gaps(state):
-    """How far each grain is from the plane and the disc, m."""
+    """Distance of each grain from the plane and the disc, m."""
     r = state["position"]
     rho, z = np.hypot(r[:, 0], r[:, 1]), r[:, 2] - HIGH
     disc = np.where(rho < RIM, np.abs(z), np.hypot(rho - RIM, z))
@@ -50,13 +52,15 @@ def gaps(state):
 
 WET = {"surface_tension": 5.0, "volume": 1e-3}
 RUPTURE = 0.1
-"""m, for this volume."""
+"""Rupture distance (m) of a liquid bridge of this volume."""
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_energy_is_not_created_at_planes_and_rims(name, rng):
-    """It is kept by what is elastic, and lost by what rubs, rolls, twists, damps and adheres, in grazing
-    impacts too; a bridge that forms at contact takes its work from what parts."""
+    """Elastic impacts conserve the energy; friction, rolling, twisting, damping and adhesion lose it.
+
+    Grazing impacts are included. A liquid bridge that forms at contact takes its work from the parting grain.
+    """
     kinds = [{"first": {}}] * 2 + [{"first": one} for one in lossy(name) * 2]
     if name == "mindlin":
         kinds += [{"liquid": WET}] * 2
@@ -71,7 +75,7 @@ def test_energy_is_not_created_at_planes_and_rims(name, rng):
         change = np.abs(state["velocity"] - start["velocity"]).max(axis=1)
         met = (gaps(state) > apart) & (change > 1e-6 * np.abs(start["velocity"]).max())
         gain = (kinetic(state) / kinetic(start) - 1)[met]
-        # The error of the step at a kink of the force, and of places at 100 m.
+        # The integration error at a kink of the force, and the rounding of positions at 100 m.
         rounding = 2e-5 + 1e5 * roundoff()
         if kind == {"first": {}}:
             assert met.sum() > 30
@@ -90,8 +94,11 @@ ADHESION = {
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_what_is_pressed_deep_gives_back_what_it_holds_and_no_more(name):
-    """Half of a radius and more, at rest: in a plane, and in each other; less than that with losses."""
+def test_deep_overlaps_release_the_stored_energy_and_no_more(name):
+    """Grains released at rest from overlaps up to 0.9 radii, in a plane and in each other.
+
+    Elastic grains convert the stored energy into kinetic energy; lossy ones end with less.
+    """
     deep = np.array([0.1, 0.6, 0.9])
     floor = [((0, 0, 0), (0, 0, 1))]
     soft, _ = lossy(name)
@@ -110,9 +117,9 @@ def test_what_is_pressed_deep_gives_back_what_it_holds_and_no_more(name):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_centres_in_one_place_are_named(name, monkeypatch):
-    """A start is refused. There is no normal where that comes in a run: the world ends where it was, whatever
-    the masses."""
+def test_coincident_centres_are_named(name, monkeypatch):
+    """Coincident centres are refused at the start. During a run they have no normal, so the world stops in
+    its last state, for any masses."""
     place, still = [[0, 0, 5], [0, 0, 5], [3, 0, 5]], np.zeros((3, 3))
     made = [grains(name, place, still, mass=mass) for mass in (1.0, [1e-20, 1e20, 1.0])]
     with pytest.raises(InputError, match="particles 0 and 1 both at"):
@@ -132,11 +139,12 @@ GROWS = {
     "twisting_stiffness": 3, "twisting_damping": 4, "surface_energy": 1, "viscous_time": 1, "damping": 2,
     "surface_tension": 1, "volume": 3,
 }  # fmt: skip
-"""Powers of the length by which properties grow where velocities and moduli stay: the motion is the same."""
+"""Exponent of the length with which each property scales, with velocities and moduli fixed, for the same
+motion."""
 
 
 def of_size(name, size, state):
-    """Couples at a length scale (m): their relative velocities, masses, radii and spins as in ``state``."""
+    """Pairs at a length scale (m), with relative velocities, masses, radii and spins from ``state``."""
     place, velocity, spin, radius = state
     laws = [
         {key: value * size ** GROWS.get(key, 0) for key, value in each.items()}
@@ -159,8 +167,9 @@ def of_size(name, size, state):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_an_impact_is_the_same_of_ten_nanometres_and_of_kilometres(name, rng):
-    """In units of the size, of two materials, with spin; to rounding, in single precision too."""
+def test_impacts_scale_from_nanometres_to_kilometres(name, rng):
+    """Impacts of spinning grains of two materials agree in units of the size, to rounding, also in single
+    precision."""
     n = 16
     radius = rng.uniform(0.5, 1.4, (n, 2))
     aside = rng.uniform(0, 0.9, n)
@@ -181,8 +190,8 @@ def test_an_impact_is_the_same_of_ten_nanometres_and_of_kilometres(name, rng):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_a_light_grain_meets_a_heavy_one_as_it_meets_a_wall(name):
-    """Of 1e-6 to 1e6 times the mass: their restitution is that of the law, and momentum stays."""
+def test_restitution_at_large_mass_ratios(name):
+    """For mass ratios from 1e-6 to 1e6 the restitution follows the law and the momentum is conserved."""
     e = 0.5 if "restitution" in ELASTIC[name] else 1.0
     law = {"restitution": e} if e < 1 else {}
     ratios = np.array([1e-6, 1e-3, 1.0, 1e3, 1e6])
@@ -203,14 +212,17 @@ def test_a_light_grain_meets_a_heavy_one_as_it_meets_a_wall(name):
         assert parting == pytest.approx(e * (1 + 1 / ratio) ** 0.5, rel=5e-3)
         start = one.start()
         scale = (start["mass"] * np.linalg.norm(start["velocity"], axis=1)).sum()
-        # That of a thousand steps of contact, 9 m off the origin.
+        # The rounding of a thousand steps in contact, 9 m from the origin.
         rounding = 9 * 1e2 * roundoff()
         np.testing.assert_allclose(momenta(state), momenta(start), rtol=0, atol=rounding * scale)
 
 
-def test_a_bond_that_swings_keeps_its_energy_and_one_that_breaks_gives_none():
-    """Bonded couples that are stretched, sheared, bent and twisted by their spins: energy with what springs
-    hold is kept, falls with damping, and never rises where bonds break."""
+def test_a_bond_conserves_energy_and_adds_none_if_it_breaks():
+    """Bonded pairs are stretched, sheared, bent and twisted by their initial spins.
+
+    The energy, with the energy of the bond springs, is conserved without damping, falls with damping, and
+    never rises if bonds break.
+    """
     n, young, kappa, wide = 16, 1e4, 2.5, 0.8
     rng = np.random.default_rng(5)
     place = np.zeros((n, 2, 3))
@@ -241,7 +253,7 @@ def test_a_bond_that_swings_keeps_its_energy_and_one_that_breaks_gives_none():
         series.append([energy(by_id(result)) for result in simulation.results()])
     kept, damped, broken = (np.array([look[w][0] for look in series]) for w in range(3))
     held = np.array([look[2][1] for look in series])
-    # That of places at 150 m, of which the stretch of a bond is a small part.
+    # The rounding of positions at 150 m, of which the stretch of a bond is a small part.
     rounding = 5e4 * roundoff()
     assert np.abs(kept / kept[0] - 1).max() < 5e-4 + rounding
     assert (np.diff(damped, axis=0) < (1e-6 + rounding) * damped[0]).all()

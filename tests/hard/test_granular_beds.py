@@ -1,4 +1,4 @@
-"""Mixtures of unlike sizes and stiffnesses, and a bed that a piston hits as fast as sound in it."""
+"""Mixtures of unequal sizes and stiffnesses, and a bed compressed by a piston at the speed of sound."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,14 @@ from tests.scenes import by_id, roundoff
 pytestmark = pytest.mark.slow
 
 LARGE, SMALL, STIFFER = 0.2, 0.01, 1e3
-"""m; radii of a mixture, and how much stiffer one of its materials is."""
+"""Radii (m) of a mixture, and the stiffness ratio of its two materials."""
 
 
 def mixture(name, rng):
-    """Small grains that fly at four large ones, and the large ones at each other; every other grain is
-    stiffer. Nothing adheres."""
+    """Small grains fly at four large ones, and the large ones at each other; every other grain is stiffer.
+
+    There is no adhesion.
+    """
     soft, _ = ({**one, "cohesion_energy_density": 0.0, "surface_energy": 0.0} for one in LOSSY[name])
     stiff = {key: soft[key] * STIFFER for key in ("stiffness", "young") if key in soft}
     laws = [{key: law[key] for key in ELASTIC[name]} for law in (soft, {**soft, **stiff})]
@@ -32,7 +34,7 @@ def mixture(name, rng):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_a_mixture_keeps_its_momentum_and_gains_no_energy(name, rng):
-    """Sizes by 20, masses by 8000 and stiffnesses by 1e3 in one."""
+    """Ratios in one scene: size 20, mass 8000, stiffness 1e3."""
     made = mixture(name, rng)
     (state,) = ends([made])
     start = made.start()
@@ -40,15 +42,18 @@ def test_a_mixture_keeps_its_momentum_and_gains_no_energy(name, rng):
     rounding = 1e-12 + 1e3 * roundoff()
     np.testing.assert_allclose(momenta(state), momenta(start), rtol=0, atol=rounding * scale)
     assert kinetic(state).sum() < 0.9 * kinetic(start).sum()
-    # Both large and small have met others.
+    # Both large and small grains have collided.
     change = np.abs(state["velocity"] - start["velocity"]).max(axis=1)
     assert (change > 1e-3).sum() > 30
     assert (change[:4] > 1e-3).all()
 
 
 def test_a_mixture_comes_to_rest_and_bears_its_weight(rng):
-    """Two large grains fall on small ones on a floor, of both materials: at the end forces balance on each,
-    floor and sides bear the weight, and energy has never been above that of the start."""
+    """Two large grains fall on small ones on a floor; both materials occur in each size.
+
+    At the end the forces on every grain balance, and floor and sides bear the weight. The energy never
+    exceeds its initial value.
+    """
     g, side = 1.0, 0.25
     spots = np.stack(np.meshgrid(*[0.03 * np.arange(8) + 0.02] * 2), axis=-1).reshape(-1, 2)[:62]
     small = np.column_stack([spots + 0.004 * rng.uniform(-1, 1, spots.shape), np.full(62, 0.0051)])
@@ -84,15 +89,15 @@ def test_a_mixture_comes_to_rest_and_bears_its_weight(rng):
 YOUNG, POISSON = 1e6, 0.3
 E_STAR = YOUNG / (2 * (1 - POISSON**2))
 PRESSED = 1e-4
-"""Overlap over the radius (m) of the bed in which sound has the speed of the piston."""
+"""Overlap divided by the radius (m) at which the speed of sound in the bed equals the piston speed."""
 SOUND = 2 * (2 * E_STAR * (0.5 * PRESSED) ** 0.5) ** 0.5
-"""m/s; of a chain of grains of 1 kg and 1 m."""
+"""Speed of sound (m/s) in a chain of grains of 1 kg and 1 m."""
 SIDE, TOP, TRAVEL = 6.0, 8.1, 1.6
-"""m."""
+"""Side of the bed, initial height of the piston and its travel, m."""
 
 
 def contacts(state, height):
-    """Overlap (m), R*, m*, and speed of approach (m/s) of all pairs, and of all grains with six walls."""
+    """Overlap (m), R*, m* and closing speed (m/s) of all pairs, and of all grains with the six walls."""
     r, v = state["position"], state["velocity"]
     i, j = np.triu_indices(len(r), 1)
     apart = r[j] - r[i]
@@ -109,9 +114,11 @@ def contacts(state, height):
     return found[:, found[0] > 0]
 
 
-def test_a_piston_as_fast_as_sound_does_the_work_that_a_bed_takes_up(rng):
-    """Energy of motion, of contacts and lost in dampers is the work of the piston, at all times; with
-    friction it takes up more than the first two; and no grain gets through a wall."""
+def test_the_work_of_a_piston_equals_the_energy_of_the_bed(rng):
+    """The work of the piston equals the kinetic, contact and damping energy at all times.
+
+    With friction the work exceeds the kinetic and contact energy. No grain passes through a wall.
+    """
     layers = np.stack(np.meshgrid(*[2.0 * np.arange(3) + 1] * 2, 2.0 * np.arange(4) + 1), axis=-1)
     place = layers.reshape(-1, 3) + 0.02 * rng.uniform(-1, 1, (36, 3))
     planes = [*cell(SIDE)[:5]]

@@ -1,4 +1,4 @@
-"""Every granular law head-on at a thousand times the speed of waves in the material."""
+"""Head-on impacts under every granular law at a thousand times the wave speed in the material."""
 
 import numpy as np
 import pytest
@@ -13,29 +13,33 @@ FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def fast(law):
-    """1e3 times the speed of waves, m/s: in a chain of Hooke's springs 2 R sqrt(k / m), in a solid
-    sqrt(E / rho), of grains of 1 m and 1 kg."""
+    """1e3 times the wave speed (m/s) for grains of 1 m and 1 kg.
+
+    The wave speed is 2 R sqrt(k / m) in a chain of Hookean springs and sqrt(E / rho) in a solid.
+    """
     return 1e3 * np.sqrt(4 * law["stiffness"] if "stiffness" in law else 4 / 3 * np.pi * law["young"])
 
 
 def long(law, speed):
-    """How long an elastic impact at a wall lasts, s."""
+    """Duration of an elastic impact at a wall, s."""
     if "stiffness" in law:
         return np.pi / law["stiffness"] ** 0.5
     return float(hertz_duration(speed, 1.0, 1.0, law["young"] / (2 * (1 - law["poisson"] ** 2))))
 
 
 def head_on(name, law, apart, dt, steps):
-    """Two that fly at each other from some distance (m) of their centres."""
+    """Two grains fly at each other; their centres start a distance (m) apart."""
     v, place = fast(law), [[-apart / 2, 0, 9], [apart / 2, 0, 9]]
     return grains(name, place, [[v, 0, 0], [-v, 0, 0]], first=law, dt=dt, steps=steps)
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_grains_that_fly_through_each_other_gain_no_energy(name):
-    """Their motion is far more than what contacts can hold, so they go through each other as the law has it:
-    elastic ones keep their energy, others lose some. In steps of a third of a radius, which see a contact a
-    few times, none gains more than twice what a contact holds at most."""
+    """The kinetic energy far exceeds the largest contact energy, so the grains pass through each other.
+
+    Elastic grains keep their energy and others lose some. With steps of a third of a radius, which sample a
+    contact only a few times, no grain gains more than twice the largest contact energy.
+    """
     made, laws = [], (ELASTIC[name], {**ELASTIC[name], **lossy(name)[0]})
     for law in laws:
         for part in (1 / 500, 0.37):
@@ -44,7 +48,7 @@ def test_grains_that_fly_through_each_other_gain_no_energy(name):
     for state, one in zip(states, made, strict=True):
         assert np.isfinite(state["velocity"]).all()
         assert state["position"][0, 0] > 1 > -1 > state["position"][1, 0]
-        # That of steps which see a contact a few times is what it holds at most.
+        # The error of steps that sample a contact only a few times is at most the largest contact energy.
         held = stored(name, 2.0, 0.5, ELASTIC[name])
         assert kinetic(state).sum() <= kinetic(one.start()).sum() * (1 + 10 * roundoff()) + 2 * held
     elastic, _, lost, _ = (
@@ -56,9 +60,11 @@ def test_grains_that_fly_through_each_other_gain_no_energy(name):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_a_wall_throws_back_what_is_as_fast(name):
-    """After hundreds of radii of overlap, at the speed at which it came, or below it by what is lost. Without
-    friction, whose dashpot no such step could follow at a lever of hundreds of radii."""
+def test_a_wall_reflects_grains_of_this_speed(name):
+    """The grain rebounds after overlaps of hundreds of radii, at its initial speed or, with losses, slower.
+
+    There is no friction: no such step can resolve its dashpot at a lever arm of hundreds of radii.
+    """
     made, laws = [], (ELASTIC[name], {**ELASTIC[name], **lossy(name)[0]})
     for law in laws:
         v = fast(law)
@@ -80,9 +86,9 @@ def test_a_wall_throws_back_what_is_as_fast(name):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_steps_that_cannot_follow_are_named(name):
-    """Two that a step of hundreds of radii brings together: the world stops, says who moves so far, and keeps
-    what it was."""
+def test_too_long_steps_are_named(name):
+    """One step of hundreds of radii brings two grains together: the world stops, names the particle that
+    moves too far, and keeps its state."""
     law = ELASTIC[name]
     v, dt = fast(law), 0.03
     made = head_on(name, law, 1.0 + 2 * v * dt, dt, 5)

@@ -1,4 +1,4 @@
-"""Each law of contact and motion of a wall is broken in a copy of the package, and a test must see it."""
+"""Each contact law and wall motion is broken in a copy of the package, and a test must detect it."""
 
 import os
 import re
@@ -18,11 +18,11 @@ from tisim.scene import plugins
 ROOT = Path(__file__).parents[2]
 ROOMS = ("tisim.effects.contact.", "tisim.effects.walls.")
 UNBROKEN = {"granular", "fixed"}
-"""The first is its parts, each of which is broken; the second does nothing."""
+"""``granular`` consists of its parts, each of which has a mutation; ``fixed`` does nothing."""
 
 
 def of_the_package(contract):
-    """Names of the laws and motions of walls in the package that are made after a contract."""
+    """Names of the contact laws and wall motions in the package that subclass a contract."""
     plugins.load_parts()
     return {kind.kind() for kind in contract.kinds() if kind.__module__.startswith(ROOMS)}
 
@@ -47,7 +47,7 @@ def copied(to):
 
 
 def outcome(root, *tests):
-    """What pytest says of tests in a copy, which run in double precision whatever this one runs in."""
+    """Run pytest on tests of a copy, in double precision regardless of the precision of this session."""
     command = [sys.executable, "-m", "pytest", "-n", "0", "-q", "-m", "slow or not slow", *tests]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("TISIM_TEST_")}
     return subprocess.run(
@@ -57,8 +57,8 @@ def outcome(root, *tests):
 
 
 @pytest.mark.slow
-def test_the_tests_pass_where_nothing_is_broken(tmp_path):
-    """Else one that fails would say nothing."""
+def test_the_tests_pass_without_mutations(tmp_path):
+    """Without this, a failing test would prove nothing about a mutation."""
     copied(tmp_path)
     done = outcome(tmp_path, *sorted({test for *_, test in EVERY.values()}))
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
@@ -66,12 +66,13 @@ def test_the_tests_pass_where_nothing_is_broken(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", EVERY)
-def test_a_test_sees_what_is_broken(part, tmp_path):
+def test_a_mutation_is_detected(part, tmp_path):
     file, old, new, test = EVERY[part]
     copied(tmp_path)
     (tmp_path / file).write_text((ROOT / file).read_text().replace(old, new))
     done = outcome(tmp_path, test)
     assert done.returncode == 1, done.stdout[-2000:] + done.stderr[-2000:]
-    # An assertion of the test itself, and no error in what was broken: where it was raised is said last.
+    # The test must fail by its own assertion, not by an error in the mutated code; pytest prints the place
+    # last.
     assert re.search(r"^E +(AssertionError|assert )", done.stdout, re.MULTILINE), done.stdout[-2000:]
     assert re.search(r"^\S+:\d+: AssertionError$", done.stdout, re.MULTILINE), done.stdout[-2000:]

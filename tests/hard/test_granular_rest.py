@@ -1,4 +1,5 @@
-"""Every granular law for long: a column at rest, friction at its threshold, spinning until all is still."""
+"""Long runs of every granular law: a column at rest, friction at its threshold, spin until everything
+rests."""
 
 import numpy as np
 import pytest
@@ -12,11 +13,12 @@ pytestmark = pytest.mark.slow
 
 FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 G = 10.0
-"""m/s^2."""
+"""Gravity, m/s^2."""
 
 
 def looks(scenes, number):
-    """States of each world at the start and after each of so many equal parts of its run, which goes well."""
+    """States of each world at the start and after each of ``number`` equal parts of its run, which must
+    succeed."""
     simulation = loaded(scenes)
     steps = max(round(one.duration / one.stepper.control.dt) for one in scenes)
     series = [[by_id(result)] for result in simulation.results()]
@@ -34,11 +36,11 @@ STRONG = {
     "dmt": {"damping": 100.0},
     "mindlin": {"restitution": 0.1},
 }
-"""Losses by which a column comes to rest within seconds."""
+"""Losses that bring a column to rest within seconds."""
 
 
 def balanced(name, law, n):
-    """Places of n grains of 1 kg that rest on each other and on the floor, by the force of the law alone."""
+    """Positions of n grains of 1 kg at rest on each other and on the floor, from the contact force alone."""
     place = np.zeros((n, 3))
     for k in range(n):
         load, radius = G * (n - k), 0.5 if k else 1.0
@@ -47,8 +49,8 @@ def balanced(name, law, n):
     return place
 
 
-def weighed(name, law, state):
-    """Energy of a column: of motion, of height, and of its contacts, J."""
+def column_energy(name, law, state):
+    """Kinetic, potential and contact energy of a column, J."""
     z = state["position"][:, 2]
     contacts = [stored(name, 1 - z[0], 1.0, law)] + [stored(name, 2 - d, 0.5, law) for d in np.diff(z)]
     return kinetic(state).sum() + G * z.sum() + sum(contacts)
@@ -56,8 +58,11 @@ def weighed(name, law, state):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_a_tall_column_rests(name):
-    """Ten grains for 200 times the period of a contact: what starts in balance stays, without creep or heat,
-    undamped and with every loss; what starts off balance keeps its energy, and with losses comes to rest."""
+    """Ten grains for 200 times the period of a contact.
+
+    A column that starts in balance stays at rest, without creep or heat, both undamped and with every loss. A
+    column that starts off balance conserves its energy, and comes to rest with losses.
+    """
     soft = {**lossy(name)[0], **STRONG[name]}
     made, still = [], np.zeros((10, 3))
     laws = [{**ELASTIC[name]}, {**ELASTIC[name], **soft}]
@@ -73,9 +78,9 @@ def test_a_tall_column_rests(name):
             place = one.start()["position"]
             np.testing.assert_allclose(state["position"], place, rtol=0, atol=1e-11 + 1e3 * roundoff())
             assert kinetic(state).sum() < 1e-18 + (1e5 * roundoff()) ** 2
-    rest = [weighed(name, law, states[0]) for law, states in zip(laws, series[:2], strict=True)]
+    rest = [column_energy(name, law, states[0]) for law, states in zip(laws, series[:2], strict=True)]
     free, damped = (
-        np.array([weighed(name, law, state) - lowest for state in states])
+        np.array([column_energy(name, law, state) - lowest for state in states])
         for law, lowest, states in zip(laws, rest, series[2:], strict=True)
     )
     rounding = 1e3 * roundoff() * rest[0]
@@ -85,7 +90,7 @@ def test_a_tall_column_rests(name):
 
 
 def lasting():
-    """What becomes of a lossy column in 100 steps."""
+    """Status of a lossy column after 100 steps."""
     law = {**ELASTIC["hooke"], **lossy("hooke")[0]}
     place = balanced("hooke", law, 10)
     more = {"planes": [FLOOR], "gravity": (0, 0, -G), "dt": 1e-4, "steps": 100_000}
@@ -95,12 +100,12 @@ def lasting():
 
 
 def test_a_column_lasts_in_single_precision(single):
-    """There what slides is next to nothing, whose square is none."""
+    """In single precision the square of a tiny slip underflows to zero."""
     assert single("hard.test_granular_rest", "lasting") == "running"
 
 
 PRESSED = 0.02
-"""m; of a grain in each of two planes, between which it is."""
+"""Overlap (m) of a grain with each of the two planes that enclose it."""
 SLOT = [FLOOR, ((0.0, 0.0, 2 - 2 * PRESSED), (0.0, 0.0, -1.0))]
 GRIPS = {
     "hooke": {"friction": 0.5, "restitution": 0.0},
@@ -108,15 +113,19 @@ GRIPS = {
     "dmt": {"friction": 0.5, "damping": 200.0, "surface_energy": 20.0},
     "mindlin": {"friction": 0.5, "restitution": 0.0},
 }
-"""Friction, damping so strong that what sticks does not swing, and adhesion where a law has it."""
+"""Friction, damping strong enough that a sticking grain does not oscillate, and adhesion if the law has
+it."""
 CREEPS = {"dmt": 2 * 0.7 * 200.0}
-"""N s/m, of both planes; laws whose friction is a dashpot."""
+"""Drag coefficient (N s/m) of both planes, for laws whose friction is a dashpot."""
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_friction_just_below_and_just_above_its_threshold(name):
-    """A grain between two planes is pulled along them by 0.99 and 1.01 of what friction can hold, 2 mu N: it
-    hangs at rest, adhesive ones too, or creeps as a dashpot has it; or gains speed by what is left over."""
+    """A grain between two planes is pulled along them by 0.99 and 1.01 of the friction limit, 2 mu N.
+
+    Below the limit it stays at rest, also with adhesion, or creeps if the friction is a dashpot. Above the
+    limit it accelerates by the excess force.
+    """
     law = {**ELASTIC[name], **GRIPS[name]}
     pulls = {"jkr": 2 * 3, "dmt": 2 * 4}.get(name, 0) * np.pi * law.get("surface_energy", 0.0)
     most = 2 * 0.5 * (push(name, PRESSED, 1.0, law) + pulls)
@@ -137,7 +146,7 @@ def test_friction_just_below_and_just_above_its_threshold(name):
         elif name in CREEPS:
             np.testing.assert_allclose(v, part * most / CREEPS[name], rtol=1e-6 + 1e3 * roundoff())
         else:
-            # What is so slow does not change the number of a place.
+            # So slow a motion is below the rounding of a position.
             stuck = roundoff() * x[1] / made[0].stepper.control.dt
             assert np.abs(v).max() < 1e-9 * most + stuck
             assert x[1] == pytest.approx(x[0], abs=1e-9)
@@ -146,7 +155,7 @@ def test_friction_just_below_and_just_above_its_threshold(name):
 
 
 def springs(name, made, memory, overlap, radius):
-    """What the springs of a contact hold (J), by what it remembers, and the tangential one's force, N."""
+    """Energy (J) in the springs of a contact, from its history, and the force of its tangential spring, N."""
     law, slots = law_of(made), LAWS[name].slots()
     part = {key: memory[begin : begin + size] for key, (begin, size) in slots.items()}
     which, at = np.zeros((1, 2), int), (np.array([overlap]), np.array([radius]))
@@ -165,8 +174,8 @@ def springs(name, made, memory, overlap, radius):
 
 
 def total(name, made, state, law, liquid):
-    """All energy of a grain on a floor, or of a pair far above it (J), and the force of its tangential
-    spring, N."""
+    """Total energy (J) of a grain on a floor, or of a pair far above it, and the force (N) of its tangential
+    spring."""
     z, n, none = state["position"][:, 2], len(state["position"]), np.zeros((2, 4))
     if n == 1:
         overlap, radius, memory = 1 - z[0], 1.0, state.get("walls_past", none)[0]
@@ -181,11 +190,12 @@ def total(name, made, state, law, liquid):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_what_spins_in_a_lasting_contact_never_gains_energy(name):
-    """On a floor, and a pair that adheres or that a liquid holds: it rolls, slides and twists until it is
-    still or goes round as a top does, and energy with what all springs hold never rises from one look to the
-    next; but a constant torque trembles about rest by a step's worth of spin. At the start dashpots alone are
-    beyond Coulomb's limit, which draws springs against them at once.
+def test_spin_in_a_lasting_contact_never_gains_energy(name):
+    """A spinning grain on a floor, and a pair held by adhesion or a liquid.
+
+    They roll, slide and twist until they rest or rotate like a top. The energy, including all springs, never
+    rises between samples, except with a constant torque, which oscillates about rest by the spin of one step.
+    At the start the dashpots alone exceed Coulomb's limit, so the springs are stretched against them at once.
     """
     law = {**ELASTIC[name], **lossy(name)[0]}
     liquid = {"surface_tension": 5.0, "volume": 1e-3} if name == "mindlin" else None
@@ -213,11 +223,13 @@ def test_what_spins_in_a_lasting_contact_never_gains_energy(name):
         assert last < 0.9 * first
 
 
-def test_a_steady_spring_in_a_pair_that_goes_round_gains_nothing():
-    """A pair that a liquid holds turns like a top, as one rigid body with a spin about its normal, by a
-    steady force T of its spring. Drawn along the normal at the end of a step, by velocities of half a step
-    ago, the spring would do a work of T^2 dt / (2 m_t) in a second, m_t = 2/7 m*; drawn along that midway, it
-    does none, and what damping takes is the same in all steps.
+def test_a_steady_spring_in_a_rotating_pair_does_no_work():
+    """A pair held by a liquid rotates like a top under a steady force T of its tangential spring.
+
+    It moves as one rigid body with a spin about its normal. If the spring were projected along the normal at
+    the end of a step, with velocities from half a step earlier, it would do the work T^2 dt / (2 m_t) per
+    second, with m_t = 2/7 m*. Projected along the normal at midstep it does no work, and the damping loss
+    does not depend on the step.
     """
     liquid = {"surface_tension": 5.0, "volume": 1e-3}
     law = {**ELASTIC["mindlin"], "restitution": 0.1, "friction": 1e3}
@@ -248,9 +260,12 @@ SETTLES = {"jkr": {"viscous_time": 1e-2}, "dmt": {"damping": 100.0}}
 
 
 @pytest.mark.parametrize("name", SETTLES)
-def test_a_pull_that_has_an_end_is_held_by_every_elastic_force(name):
-    """Two that nothing presses come to rest where a root of the force in NumPy has them, of much adhesion
-    too: of DMT at (3 pi gamma / (E* R*))^(2/3) R*, of JKR at (pi gamma / E*)^(2/3) (3 R*)^(1/3)."""
+def test_adhesive_pairs_rest_at_the_root_of_the_force(name):
+    """Two adhesive grains without load come to rest at the root of the force computed in NumPy.
+
+    This also holds for strong adhesion. The overlap is (3 pi gamma / (E* R*))^(2/3) R* for DMT and (pi gamma
+    / E*)^(2/3) (3 R*)^(1/3) for JKR.
+    """
     e_star, made, depths = 1e6 / (2 * (1 - 0.3**2)), [], []
     for energy in (20.0, 2000.0):
         law, ratio = {**ELASTIC[name], **SETTLES[name], "surface_energy": energy}, np.pi * energy / e_star

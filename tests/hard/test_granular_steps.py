@@ -1,6 +1,8 @@
-"""Steps that no spring and no dashpot of a contact can follow, in each way to move: just below the limit a
-motion stays small, and so it does in NumPy, where nothing stops it; just beyond it grows there, and the world
-stops."""
+"""Time steps beyond the stability limit of the springs and dashpots of a contact, for each mode of motion.
+
+Just below the limit a motion stays small. Just beyond it the motion grows in the NumPy reference, which has
+no guard, and tisim stops the world.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 G, TINY = 10.0, 1e-4
-"""m/s^2; m/s and rad/s, of what is nearly at rest."""
+"""Gravity (m/s^2), and the size of the initial velocities (m/s) and spins (rad/s)."""
 STICKS, ROLLS, TWISTS = {"friction": 1e3}, {"rolling_friction": 1e3}, {"twisting_friction": 1e3}
 WAYS = {
     "hooke": {
@@ -40,13 +42,16 @@ WAYS = {
     "dmt": {"slides, damped": {**STICKS, "damping": 2e4, "rolling_friction": 0.5}},
     "mindlin": {"slides": STICKS, "slides, damped": {**STICKS, "restitution": 0.3}},
 }
-"""By law and way to move, what the material has other than what presses alone."""
+"""For each law and mode of motion, the material properties in addition to the elastic repulsion."""
 PAIR = {"radius": np.array([1.0, 0.3]), "mass": np.array([1.0, 0.05])}
 
 
 def nearly_at_rest(name, way, dt, steps, **more_of_it):
-    """A grain on a floor, or a pair that adheres; it presses by what balances it, and moves a little in all
-    ways across the normal. Its overlap (m) too."""
+    """A grain on a floor, or an adhesive pair, in balance normal to the contact and with small tangential
+    motion.
+
+    Returns the scene and the overlap (m).
+    """
     law, rng = {**ELASTIC[name], **WAYS[name][way], **more_of_it}, np.random.default_rng(1)
     more = {"first": law, "dt": dt, "steps": steps}
     if "pair" in way:
@@ -63,7 +68,8 @@ def nearly_at_rest(name, way, dt, steps, **more_of_it):
 
 
 def springs(made, overlap, radius, mass):
-    """Of what presses, slides, rolls and twists: spring and dashpot; none where there is no friction."""
+    """Spring and dashpot constants of the normal, sliding, rolling and twisting modes; zero without
+    friction."""
     law, which = law_of(made), np.zeros((1, 2), int)
     soft = law.materials[0]
     circle, stiffness, *_ = law.press(which, np.array([overlap]), np.array([radius]))
@@ -83,8 +89,11 @@ def springs(made, overlap, radius, mass):
 
 
 def inverse_masses(overlap, radius, mass):
-    """How forces along the normal and across it, couples of rolling over R*, and those of twisting accelerate
-    what they act on: 1/kg, and 1/(kg m^2) of twisting."""
+    """Inverse masses of the normal, sliding and rolling modes (1/kg) and of twisting (1/(kg m^2)), R* (m) and
+    m* (kg).
+
+    The rolling force is the couple divided by R*. Sliding and rolling are coupled.
+    """
     inverse, inertia = 1 / mass, 1 / (0.4 * mass * radius**2)
     arm, effective = radius - overlap / 2, 1 / (1 / radius).sum()
     sign = np.array([1, -1])[: len(radius)]
@@ -95,8 +104,11 @@ def inverse_masses(overlap, radius, mass):
 
 
 def limit(name, way):
-    """The step (s) from which on one of them grows, and which it is: half kicks of springs K and dashpots C
-    with inverse masses B are stable where B (K dt^2 + 2 C dt) has no eigenvalue above 4."""
+    """The largest stable step (s) and the mode that grows beyond it.
+
+    Half kicks of springs K and dashpots C with inverse masses B are stable if B (K dt^2 + 2 C dt) has no
+    eigenvalue above 4.
+    """
     made, overlap = nearly_at_rest(name, way, 1.0, 1)
     start = made.start()
     inverse, radius, mass = inverse_masses(overlap, start["radius"], start["mass"])
@@ -118,8 +130,9 @@ CASES = [(name, way) for name, ways in WAYS.items() for way in ways]
 
 
 @pytest.mark.parametrize(("name", "way"), CASES)
-def test_the_limit_is_where_a_motion_grows(name, way):
-    """In NumPy, which goes on beyond it, until surfaces slip; what grows is not what presses."""
+def test_motion_grows_beyond_the_limit(name, way):
+    """The NumPy reference, which has no guard, grows beyond the limit until surfaces slip; it is not the
+    normal mode that grows."""
     dt, grows = limit(name, way)
     assert grows > 0
     for part in (0.98, 1.02):
@@ -135,8 +148,8 @@ def test_the_limit_is_where_a_motion_grows(name, way):
 
 
 @pytest.mark.parametrize("name", WAYS)
-def test_what_no_step_can_follow_stops_the_world(name):
-    """The law is named, with what may be wrong, and the last good state is kept, which is the start."""
+def test_steps_beyond_the_limit_stop_the_world(name):
+    """The message names the law and the likely causes, and the last good state, here the start, is kept."""
     tried = [(way, part) for way in WAYS[name] for part in (0.98, 1.02)]
     made = [nearly_at_rest(name, way, part * limit(name, way)[0], 400)[0] for way, part in tried]
     simulation = loaded(made)
@@ -156,8 +169,10 @@ def test_what_no_step_can_follow_stops_the_world(name):
 
 
 def half_kicks(n, dt, held):
-    """What half kicks of undamped springs, of 1 N/m, do in a step to places and speeds of a row of grains of
-    1 kg. held : stiffness of a spring from each grain to its place, N/m."""
+    """Matrix of one step with half kicks for a row of undamped grains of 1 kg and springs of 1 N/m.
+
+    It acts on positions and velocities. held : stiffness of a spring from each grain to its place, N/m.
+    """
     neighbours = np.eye(n, k=1) + np.eye(n, k=-1)
     pull, still = np.diag(neighbours.sum(axis=1) + held) - neighbours, np.zeros((n, n))
     kick = np.block([[np.eye(n), still], [-0.5 * dt * pull, np.eye(n)]])
@@ -166,12 +181,12 @@ def half_kicks(n, dt, held):
 
 
 OF_A_PAIR = np.sqrt(2.0)
-"""s, the limit of a pair of 1 kg each, of 1 N/m: S dt^2 = 4 m*."""
+"""Stability limit (s) of a pair of 1 kg each with 1 N/m: S dt^2 = 4 m*."""
 
 
 @pytest.mark.parametrize(("grains_in_row", "part"), [(2, 1.0), (3, 0.8165), (10, 0.7159), (100, 0.7071)])
 def test_rows_have_shorter_limits_the_longer_they_are(grains_in_row, part):
-    """In NumPy, from 1 / (sqrt(2) cos(pi / (2 n))) of the limit of a pair on."""
+    """In NumPy a row of n grains is unstable from 1 / (sqrt(2) cos(pi / (2 n))) times the limit of a pair."""
 
     def growth(dt):
         return np.abs(np.linalg.eigvals(half_kicks(grains_in_row, dt, 0.0))).max()
@@ -181,9 +196,12 @@ def test_rows_have_shorter_limits_the_longer_they_are(grains_in_row, part):
     assert growth(1.001 * part * OF_A_PAIR) > 1.01
 
 
-def test_energy_of_three_grains_in_a_row_grows_in_shorter_steps_than_that_of_a_pair():
-    """They are pressed together by a weak spring to the middle, so that contacts last, and move a little: as
-    half kicks in NumPy do, and beyond the limit of three, where no pair stops the world, without end."""
+def test_three_grains_in_a_row_have_a_shorter_limit_than_a_pair():
+    """Three grains pressed together by a weak central spring, so that contacts last, move a little.
+
+    They follow the half kicks in NumPy. Beyond the limit for three grains the motion grows without bound, as
+    the guard only knows the limit of a pair.
+    """
     held, k = 1e-3, 1e4
     overlap, tiny, steps = 2 * held / (1 + held), 1e-7 * np.array([1.0, -2.0, 1.0]), 20
     place = np.array([[overlap - 2, 0, 5], [0, 0, 5], [2 - overlap, 0, 5]])
@@ -205,7 +223,8 @@ def test_energy_of_three_grains_in_a_row_grows_in_shorter_steps_than_that_of_a_p
 
 
 def test_springs_without_friction_stop_nothing():
-    """What holds nothing back has no limit, however stiff."""
+    """Springs that act only through friction have no limit if the friction is zero, however stiff they
+    are."""
     idle = {"rolling_stiffness": 1e9, "twisting_stiffness": 1e9, "rolling_damping": 1e9}
     made, _ = nearly_at_rest("hooke", "slides", 0.9 * limit("hooke", "slides")[0], 400, **idle)
     simulation = loaded([made])
@@ -213,8 +232,11 @@ def test_springs_without_friction_stop_nothing():
     assert simulation.results()[0].status.ok, simulation.results()[0].status.reason
 
 
-def test_grains_that_nothing_holds_apart_stop_their_world(monkeypatch):
-    """As of grains that have grown, or that are put in: a start is refused, unless nobody asks."""
+def test_cohesion_above_the_stiffness_stops_the_world(monkeypatch):
+    """This happens to grains that have grown or been inserted.
+
+    At the start such grains are refused, so the test disables that check.
+    """
     radius, k = np.array([1.0, 3.0]), ELASTIC["hooke"]["stiffness"]
     most = k / (2 * np.pi * radius.prod() / radius.sum())
     made = [

@@ -1,4 +1,4 @@
-"""Merging and breaking at their limits: everything, for long, into the last slot and beyond it."""
+"""Limits of merging and breaking: all particles, long runs, the last free slot and beyond."""
 
 import numpy as np
 import pytest
@@ -10,13 +10,16 @@ from tisim.operators import Fragmentation
 
 
 def run(scenes):
-    """With room for 200, in the batch that test_schedules has compiled."""
+    """Run with a capacity of 200, in the batch that test_schedules has compiled."""
     return simulate(scenes, worlds=BATCH, capacity=200, schedule="world")
 
 
 @pytest.mark.slow
 def test_all_particles_merge_into_one():
-    """Everything bonds, images across the faces: one sphere of all mass, and it travels on, to rounding."""
+    """All particles bond, also across periodic faces, into one sphere of the total mass.
+
+    Its mass, radius and velocity are right to rounding.
+    """
     scene = flow(seed=5, grains=150, hardness=10.0, side=0.016, images=True, duration=0.05)
     (result,) = run([scene])
     check_sums(result)
@@ -29,8 +32,8 @@ def test_all_particles_merge_into_one():
 
 
 @pytest.mark.slow
-def test_a_long_violent_flow_keeps_its_sums_and_books():
-    """Grains merge, break and cool for thousands of steps; nothing is lost."""
+def test_balances_close_in_a_long_violent_flow():
+    """Grains merge, break and cool for thousands of steps; mass, momentum and energy balances close."""
     worlds = [
         flow(
             seed=k,
@@ -53,7 +56,7 @@ def test_a_long_violent_flow_keeps_its_sums_and_books():
 
 @pytest.mark.slow
 def test_fragments_of_one_grain_fill_every_slot():
-    """Two grains of 32 break into all 64: exactly the room there is, nothing lost."""
+    """Two grains of 32 break into 64 fragments, which is exactly the capacity; nothing is lost."""
     radius = RADIUS * 32 ** (1 / 3)
     scene = hit(1e3, laws(1.0, surface_energy=1.0), radius=radius)
     assert scene.capacity() == 64
@@ -65,15 +68,15 @@ def test_fragments_of_one_grain_fill_every_slot():
 
 
 class Optimist(Fragmentation):
-    """Thinks that less room is enough."""
+    """Underestimates the capacity it needs."""
 
     def capacity(self, masses):
         return 64
 
 
 @pytest.mark.slow
-def test_more_fragments_than_room_is_a_clear_failure():
-    """The world stops, says so, names the grain, and keeps the last good state; others of the batch go on."""
+def test_more_fragments_than_the_capacity_is_a_clear_failure():
+    """The world stops, says so, names the grain and keeps the last good state; the other world continues."""
     effects = (
         Impact(hardness=1.0),
         Heating(heat_capacity=HEAT_CAPACITY),
@@ -81,7 +84,7 @@ def test_more_fragments_than_room_is_a_clear_failure():
     )
     radius = RADIUS * 100 ** (1 / 3)
     full, fine = (hit(v, effects, radius=radius, steps=4) for v in (1e3, 1e-3))
-    # Compiled for more: the room is the scene's own.
+    # Compiled for more particles; the capacity of the scene is the limit.
     broken, whole = simulate([full, fine], worlds=2, capacity=256)
     assert not broken.status.ok
     assert "more particles than there is room for" in broken.status.reason

@@ -1,4 +1,4 @@
-"""The coupling of heat, hardness and restitution where it is strongest: it settles, and nothing overflows."""
+"""Strong coupling of heat, hardness and restitution: the iteration converges and nothing overflows."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,8 @@ from tisim.effects import DeformationWork, Friction, Heating, Impact, Reaction, 
 
 
 def flip_flop(a0=0.0, af=1.0, pressure=0.5, iterations=200):
-    """Z04's own fixed point: e_(K+1) = max(1 - I_n / (2 a(e_K) H), 0) from e = 0, at constant hardness."""
+    """Fixed-point iteration of Z04: e_(K+1) = max(1 - I_n / (2 a(e_K) H), 0) from e = 0, at constant
+    hardness."""
     e, history = 0.0, []
     for _ in range(iterations):
         e = max(1 - pressure / (a0 + (af - a0) * (1 - e)) if (1 - e) * (af - a0) + a0 > 0 else 0.0, 0.0)
@@ -19,8 +20,8 @@ def flip_flop(a0=0.0, af=1.0, pressure=0.5, iterations=200):
 
 
 @pytest.mark.slow
-def test_the_papers_own_iteration_never_settles_and_ours_does():
-    """x = 1 - e -> p / x flips between 1 and p for ever; here the pair is solved: e = 1 - sqrt(p)."""
+def test_the_iteration_of_the_paper_never_converges_and_ours_does():
+    """The iteration x = 1 - e -> p / x alternates between 1 and p for ever; tisim finds e = 1 - sqrt(p)."""
     history = flip_flop(pressure=0.5)
     assert np.ptp(history[-2:]) == pytest.approx(0.5), "bond, rebound, bond, ..."
     hardness, speed = 1e6, 0.0
@@ -31,7 +32,8 @@ def test_the_papers_own_iteration_never_settles_and_ours_does():
 
 
 def coupled(speed, iterations=200, q=3000.0, alpha=3e4, c=HEAT_CAPACITY, **more):
-    """Strong coupling of heat and hardness: near the adhesion speed hot is soft, soft is hot."""
+    """Strong coupling of heat and hardness: near the adhesion speed hot grains are soft and soft grains get
+    hot."""
     effects = (
         Impact(hardness=1e5, max_iterations=iterations, **more),
         Friction(coefficient=0.9),
@@ -45,7 +47,7 @@ def coupled(speed, iterations=200, q=3000.0, alpha=3e4, c=HEAT_CAPACITY, **more)
 
 @pytest.mark.slow
 def test_iterations_across_the_bond_threshold_converge():
-    """A fine scan of speeds through the threshold: each impact settles, within its bound of iterations."""
+    """In a fine scan of speeds through the threshold each impact converges within the iteration bound."""
     speeds = np.linspace(1.0, 40.0, 300)
     results = simulate([coupled(v) for v in speeds], worlds=300, capacity=2)
     e = []
@@ -62,7 +64,7 @@ def test_iterations_across_the_bond_threshold_converge():
 
 @pytest.mark.slow
 def test_unconverged_impacts_are_bounded_and_counted():
-    """With too few iterations allowed the run goes on, within its bound, and it is reported."""
+    """With too few iterations allowed the run continues with the bounded result and reports it."""
     results = simulate(
         [coupled(v, iterations=2, tolerance=1e-15) for v in (3.0, 5.0, 8.0)], worlds=3, capacity=2
     )
@@ -76,7 +78,8 @@ def test_unconverged_impacts_are_bounded_and_counted():
 @pytest.mark.long
 @pytest.mark.parametrize("temperature", [0.0, 1e-30, 1e-3, 1.0, 1e6, 1e9])
 def test_extreme_temperatures(temperature):
-    """exp(Q / (R T)) overflows below 0.4 K; T^4 is 1e36 at 1e9 K. Books close and all stays finite."""
+    """exp(Q / (R T)) overflows below 0.4 K and T^4 is 1e36 at 1e9 K; balances close and all numbers stay
+    finite."""
     scene = flow(seed=8, grains=60, hardness=1e5, duration=2e-4)
     data = scene.to_dict()
     data["particles"]["quantities"]["temperature"] = temperature
@@ -91,11 +94,11 @@ def test_extreme_temperatures(temperature):
 
 @pytest.mark.slow
 def test_cold_grains_are_hard_and_hot_ones_as_hard_as_h0():
-    """At 1 mK nothing bonds that would at room temperature; at 1e9 K the hardness is H_0."""
+    """At 1 mK grains that bond at room temperature do not bond; at 1e9 K the hardness is H_0."""
     q = 1000.0
     speed = 0.5 * np.sqrt(3 * 1e5 * np.exp(q / R / 300) / (2 * DENSITY))
     effects = (Impact(hardness=1e5), Heating(heat_capacity=1e12), Softening(activation_energy=q))
-    # So large a heat capacity that the impact itself does not matter.
+    # The heat capacity is so large that the impact does not change the temperature.
     e = []
     for result in simulate(
         [head_on(speed, effects, dt=1e-15, quantities={"temperature": t}) for t in (1e-3, 300.0, 1e9)],

@@ -1,4 +1,4 @@
-"""Hostile input, thousands of kinds of it: accepted, or refused in a line, within a second."""
+"""Thousands of kinds of hostile input: each is accepted or refused in one line, within a second."""
 
 import time
 import tomllib
@@ -17,25 +17,28 @@ pytestmark = pytest.mark.long
 EXAMPLES = settings(
     max_examples=200, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
 )
-"""The same examples in every run; no bound on wall time, which a loaded machine decides."""
+"""The examples are the same in every run; wall time is not bounded, because it depends on machine load."""
 FEWER = settings(EXAMPLES, max_examples=40)
 RANDOM = st.randoms(use_true_random=False)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def warm():
-    """What is mutated, with all modules imported that it needs."""
+    """The valid scenes that are mutated; also imports all modules that they need."""
     return hostile.valid()
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """A scene file to write over."""
+    """A scene file that the tests overwrite."""
     return tmp_path_factory.mktemp("hostile") / "scene.toml"
 
 
 def judge(make, file):
-    """A scene is accepted, and comes back from a file; or it is refused in words. In a second of work."""
+    """The scene is accepted and survives a round trip through a file, or is refused with a message.
+
+    Either takes less than a second of CPU time.
+    """
     began = time.thread_time()
     try:
         accepted = make()
@@ -47,7 +50,7 @@ def judge(make, file):
         check_file(accepted, file)
 
 
-def test_what_is_mutated_is_valid(warm, file):
+def test_the_unmutated_scenes_are_valid(warm, file):
     assert len(warm) > 60
     for data in warm:
         check_file(Scene.from_dict(data), file)
@@ -98,12 +101,12 @@ COMMANDS = (
     ("optimize", "agglomeration", "--executor", ("processes:0", "processes:x", "processes:" + "9" * 30)),
     ("optimize", "agglomeration", "--set", tuple(f"search.{key}" for key in SEARCH)),
 )
-"""Words of a command, and what its last word can be."""
+"""Words of a command, and values for its last word."""
 
 
 @pytest.mark.parametrize("words", COMMANDS, ids=[" ".join(words[:-1])[:40] for words in COMMANDS])
 def test_commands(words, tmp_path, monkeypatch):
-    """Whatever the words: one line on standard error, and exit code 2, if they are not accepted."""
+    """Refused commands print one line to standard error and exit with code 2, whatever the words."""
     monkeypatch.chdir(tmp_path)
     scene = tmp_path / "scene.toml"
     scene.write_text(Scene.from_dict(hostile.valid()[1]).to_toml())
@@ -132,8 +135,9 @@ def test_run_of_a_hostile_file(file, random):
         assert (code, err.strip()) == (1, ACCEPTED)
 
 
-def test_what_was_received_is_shortened():
-    """Ten million characters, a number of 100,000 digits and a list of 100,000 levels, in some 200."""
+def test_received_values_are_shortened():
+    """Ten million characters, a number of 100,000 digits and a list of 100,000 levels are shortened to about
+    200 characters."""
     for value in (
         "x" * 10**7,
         10**100_000,
@@ -150,7 +154,7 @@ def test_what_was_received_is_shortened():
 
 
 def test_odd_names_come_back_from_a_file(file):
-    """Keys that TOML wants in quotes, characters beyond 16 bits, and those that must be escaped."""
+    """Keys that TOML must quote, characters beyond 16 bits, and characters that must be escaped."""
     data = dict(hostile.valid()[1])
     for name in ("a b", "a.b", "", "größer", "😀", '"', "\\", "\n", "\x00", "\x7f", "\u2028", "#", "[x]"):
         quantities = {name: [1.0, 2.0], "temperature": 300.0}

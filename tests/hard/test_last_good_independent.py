@@ -1,5 +1,5 @@
-"""Particles that do not feel each other, with a longest step as long as the run: what is given back when one
-fails on the way, and what there is to go on from when a launch ends there."""
+"""Non-interacting particles with a longest step equal to the run: the state returned if one fails during the
+run, and the state at which the next launch continues if a launch ends within a step."""
 
 from itertools import islice
 
@@ -15,14 +15,15 @@ from tisim.sources import UniformFlow
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid, intervals
 
 SPEED = np.resize([1.0, 0.5, 0.25], 10)
-"""m/s; some particles arrive at the cliff at 0.783 s, others never. More than a tile that goes together."""
+"""Speeds (m/s): some particles reach the cliff at 0.783 s, others never. There are more than fit in one
+tile."""
 CLIFF = 0.783
 STEP = 1e-3
-"""s, of steps where nothing is in the way."""
+"""Step (s) far from the cliff."""
 
 
 class Ledge(Force):
-    """A push across, and beyond a place along x a spring that is far too stiff."""
+    """A force across the path and, beyond a position along x, a spring that is far too stiff."""
 
     place: float = parameter("m", "place")
     push: float = parameter("N", "push", 0.0)
@@ -34,7 +35,7 @@ class Ledge(Force):
 
 
 def inert(place=CLIFF, step=STEP, duration=1.0):
-    """Steps that do not grow."""
+    """Inertial particles with steps that do not grow."""
     control = IterationControl(first=step, longest=1.0, shortest=1e-2 * step, most=1.0)
     start = np.zeros((len(SPEED), 3)), np.outer(SPEED, [1.0, 0, 0])
     return scene(
@@ -43,7 +44,8 @@ def inert(place=CLIFF, step=STEP, duration=1.0):
 
 
 def drifting(place=CLIFF, step=STEP, duration=1.0):
-    """Colloids without heat that a flow carries and a force pushes across at 1 m/s, a step at a time."""
+    """Athermal colloids carried by a flow and pushed across it at 1 m/s; each step is as long as the drift
+    allows."""
     control = DriftLimit(longest=1.0, shortest=max(1e-6 * step, 1e-9), drift=step)
     return Scene(
         particles=Particles(
@@ -57,7 +59,7 @@ def drifting(place=CLIFF, step=STEP, duration=1.0):
 
 
 def velocities(setup):
-    """Velocities on the way to the cliff, m/s."""
+    """Velocities before the cliff, m/s."""
     ahead = SPEED if isinstance(setup.stepper, Trapezoid) else np.ones(len(SPEED))
     return np.outer(ahead, [1.0, 0, 0]) + np.array([0.0, setup.effects[0].push, 0.0])
 
@@ -66,22 +68,22 @@ BOTH = pytest.mark.parametrize("make", [inert, pytest.param(drifting, marks=pyte
 
 
 def in_launches(setup, monkeypatch, attempts):
-    """A simulation of which a launch has a particle make so many attempts at a step."""
+    """A simulation in which each launch makes ``attempts`` step attempts for a particle."""
     monkeypatch.setattr(intervals, "LAUNCH_ATTEMPTS", 1)
     monkeypatch.setattr(intervals, "LEAST_INTERVALS", attempts)
     return Simulation(setup, worlds=2)
 
 
 def same(actual, expected):
-    """To the bit."""
+    """Equal status, time, work and state, to the bit."""
     assert (actual.status, actual.time, actual.work) == (expected.status, expected.time, expected.work)
     for name, values in expected.state.items():
         np.testing.assert_array_equal(actual.state[name], values, err_msg=name)
 
 
 @BOTH
-def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(make, tmp_path):
-    """All particles are where they are at that time; whoever goes on from there fails at once."""
+def test_the_state_is_from_the_last_step_of_the_failing_particle(make, tmp_path):
+    """All particles are returned at that time; a run that continues from there fails at once."""
     fails, ends = make(), make(duration=CLIFF / 2)
     simulation = compiled(fails, worlds=2, capacity=len(SPEED))
     simulation.load([fails, ends])
@@ -112,8 +114,11 @@ def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(make, tmp
 @pytest.mark.long
 @BOTH
 def test_launches_that_end_within_a_step(make, monkeypatch, tmp_path):
-    """Looked at every 64 steps of a particle, and stopped and restored there: progress, the last state that
-    all particles have had in common, and the same bits at the end, fail or not."""
+    """Launches end every 64 steps of a particle, and the run is saved and restored there.
+
+    Checked are the progress, the last state common to all particles, and identical bits at the end, for a
+    failing and for a good world.
+    """
     fails, ends = make(), make(place=5.0)
     whole = compiled(fails, worlds=2, capacity=len(SPEED))
     whole.load([fails, ends])
@@ -143,8 +148,9 @@ def test_launches_that_end_within_a_step(make, monkeypatch, tmp_path):
 
 
 @BOTH
-def test_a_launch_is_of_so_many_steps(make):
-    """Of all particles together: so Ctrl-C is heard, and progress seen, within a run of one longest step."""
+def test_the_steps_of_a_launch_are_limited(make):
+    """The limit counts the steps of all particles, so Ctrl-C and progress work within a run of one longest
+    step."""
     long = make(step=1e-7, place=5.0)
     simulation = compiled(long, worlds=2, capacity=len(SPEED))
     simulation.load([long])

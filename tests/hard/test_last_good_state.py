@@ -1,4 +1,4 @@
-"""A world that fails gives back the state of its last good step, whenever anybody has looked."""
+"""A failed world returns the state of its last good step, however often the states are read."""
 
 import numpy as np
 import pytest
@@ -14,11 +14,11 @@ from tisim.operators.base import Operator
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 
 WHEN = 0.783
-"""s, when things go wrong."""
+"""Time of the failure, s."""
 
 
 class Stiffening(Force):
-    """A spring towards the middle, which after a time is stiffer, beyond all measure where asked for."""
+    """A spring towards the centre that becomes stiffer at a given time, by any factor."""
 
     when: float = parameter("s", "when", WHEN)
     stiffness: float = parameter("N/m", "stiffness", 1.0)
@@ -36,25 +36,25 @@ def one(stepper, **options):
 
 
 def not_finite():
-    """1e308 N/m are too many for a step."""
+    """A stiffness of 1e308 N/m overflows within a step."""
     return one(fixed(1e-4), later=1e308), 1e-4, "is not finite"
 
 
 def stuck():
-    """The longest step, which is the shortest too, is too long for the spring."""
+    """The longest step, which is also the shortest, is too long for the spring."""
     control = IterationControl(first=1e-3, longest=1e-3, shortest=1e-3)
     return one(Trapezoid(control=control), later=1e9), 1e-3, "cannot be solved even at the shortest step"
 
 
 def steep():
-    """A Brownian particle that a force would move too far in the shortest step."""
+    """A force would move a Brownian particle too far even in the shortest step."""
     control = DriftLimit(longest=1e-4, shortest=1e-5)
     stepper = Brownian(temperature=300.0, viscosity=1e-3, control=control)
     return one(stepper, stiffness=1e-9, later=1e9), 1e-4, "shorter than the shortest"
 
 
 def crowded():
-    """Sixty grains, all within reach of each other at once."""
+    """Sixty grains that all come within interaction range of each other at the same time."""
     place = np.random.default_rng(3).normal(size=(60, 3))
     place /= np.linalg.norm(place, axis=1)[:, None]
     radius = 1e-3
@@ -72,8 +72,8 @@ def crowded():
         pytest.param(crowded, marks=pytest.mark.slow),
     ],
 )
-def test_the_state_is_that_of_the_last_step_before_the_failure(make, monkeypatch):
-    """Also of many particles, which are looked at on the device."""
+def test_the_state_is_from_the_last_step_before_the_failure(make, monkeypatch):
+    """This includes large systems, which are checked on the device."""
     start, step, fault = make()
     simulation = compiled(start, worlds=4)
     failures = []
@@ -96,7 +96,7 @@ def test_the_state_is_that_of_the_last_step_before_the_failure(make, monkeypatch
     assert failures[0].status == failures[1].status
     for name, values in failures[0].state.items():
         np.testing.assert_array_equal(values, failures[1].state[name])
-    # A run that stops there by itself has the same state, and the next step fails.
+    # A run that stops there on its own has the same state, and its next step fails.
     simulation.load([start])
     simulation.run(steps=failures[0].work["steps"])
     (there,) = simulation.results()
@@ -109,14 +109,14 @@ def test_the_state_is_that_of_the_last_step_before_the_failure(make, monkeypatch
 
 
 def same(actual, expected):
-    """To the bit, how they ended and what they have done too."""
+    """Equal status, time, work and state, to the bit."""
     assert (actual.status, actual.time, actual.work) == (expected.status, expected.time, expected.work)
     for name, values in expected.state.items():
         np.testing.assert_array_equal(actual.state[name], values)
 
 
 def several():
-    """Worlds of 300 steps that fail in the first, the 110th and the 200th of them, and one that does not."""
+    """Worlds of 300 steps: three fail, in step 1, 110 and 200, and one does not."""
     return [
         one(fixed(1e-4), when=when, later=1e308).replace({"duration": 0.03})
         for when in (0.02, -1.0, 1.0, 0.011)
@@ -125,7 +125,7 @@ def several():
 
 @pytest.fixture(params=[None, pytest.param("particle", marks=pytest.mark.slow)])
 def batch(request):
-    """A compiled simulation, the scenes of ``several``, and what becomes of each alone."""
+    """A compiled simulation, the scenes of ``several``, and the result of each scene run alone."""
     scenes = several()
     simulation = compiled(scenes[0], worlds=4, schedule=request.param)
     alone = []
@@ -139,8 +139,8 @@ def batch(request):
 
 
 @pytest.mark.parametrize("stretch", [300, 7])
-def test_worlds_that_fail_in_one_batch_end_as_each_does_alone(batch, stretch):
-    """In one look, where all fail within the first stretch, and in several."""
+def test_worlds_that_fail_in_one_batch_end_as_they_do_alone(batch, stretch):
+    """Both with one run in which all of them fail, and with several short ones."""
     simulation, scenes, alone = batch
     simulation.load(scenes)
     while simulation.fraction() < 1:
@@ -149,8 +149,9 @@ def test_worlds_that_fail_in_one_batch_end_as_each_does_alone(batch, stretch):
         same(result, expected)
 
 
-def test_worlds_that_fail_together_are_run_once_more_together(batch, monkeypatch):
-    """The way from the start to the last failure is gone again once, however many worlds have failed."""
+def test_worlds_that_fail_together_are_rerun_together(batch, monkeypatch):
+    """The steps from the start to the last failure are repeated only once, for any number of failed
+    worlds."""
     simulation, scenes, _ = batch
     launched, advance = [], simulation.program.advance
 
@@ -169,8 +170,8 @@ def test_worlds_that_fail_together_are_run_once_more_together(batch, monkeypatch
     assert all(sum(count[1:]) <= 2 * 250 for count in counts)
 
 
-def test_ctrl_c_while_worlds_are_run_once_more_leaves_the_batch_where_it_was(batch, monkeypatch):
-    """Whoever goes on from there comes to the same end."""
+def test_ctrl_c_during_the_rerun_leaves_the_batch_unchanged(batch, monkeypatch):
+    """A run that continues afterwards reaches the same end."""
     simulation, scenes, alone = batch
     simulation.load(scenes)
     reached, advance = [], simulation.program.advance
@@ -192,7 +193,7 @@ def test_ctrl_c_while_worlds_are_run_once_more_leaves_the_batch_where_it_was(bat
 
 
 @pytest.mark.parametrize("steps", [150, 250])
-def test_a_checkpoint_keeps_why_worlds_have_failed(batch, tmp_path, steps):
+def test_a_checkpoint_keeps_the_reasons_of_failures(batch, tmp_path, steps):
     simulation, scenes, alone = batch
     simulation.load(scenes)
     simulation.run(steps=steps)
@@ -209,7 +210,7 @@ def test_a_checkpoint_keeps_why_worlds_have_failed(batch, tmp_path, steps):
 
 
 class Doubles(Operator):
-    """After five steps it puts a grain where there is one."""
+    """After five steps, inserts a grain where there already is one."""
 
     @ti.func
     def world(self, s, w):
@@ -221,8 +222,8 @@ class Doubles(Operator):
 
 
 @pytest.mark.slow
-def test_what_fails_after_events_is_taken_up_as_any_step():
-    """Forces are summed in the middle of a step then: what was kept goes on with whole steps all the same."""
+def test_a_failure_after_events_keeps_whole_steps():
+    """In that case forces are evaluated within a step; the kept state still continues with whole steps."""
     place, speed = [[0, 0, 0], [0, 0, 1.9e-3], [0, 0.1, 0]], [[0.1, 0, 0], [0, 0, 0], [0, 0, 0]]
     effects = (StickingSpring(), Gravity(acceleration=(0, 0, -9.81)), Doubles())
     setup = scene(place, speed, effects, stepper=fixed(1e-3), duration=0.02)

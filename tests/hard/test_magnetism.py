@@ -1,4 +1,4 @@
-"""Magnetic moments where it is hardest: in no field and too much, at contact and closer, near divergence."""
+"""Extreme cases of magnetic moments: zero field, saturation, contact, overlap, and near divergence."""
 
 import numpy as np
 import pytest
@@ -47,14 +47,14 @@ def _ratios(x: ti.types.ndarray(), out: ti.types.ndarray()):
 
 
 def spheres(place, **options):
-    """Of mu_r = 1e6 and 1 m, in a uniform field."""
+    """Spheres with mu_r = 1e6 and a radius of 1 m in a uniform field."""
     law = MutualInducedMoment(susceptibility=1e6 - 1, **options)
     laws = (MagneticField(constant=(0, 0, 1)), law)
     return scene(place, 0 * place, laws, radius=1.0, mass=1.0)
 
 
 def ratios(real=np.float32):
-    """L(x)/x of all arguments, and of 0."""
+    """L(x)/x for all arguments, and at 0."""
     x = np.concatenate([ARGUMENTS, [0.0]]).astype(real)
     out = np.zeros_like(x)
     _ratios(x, out)
@@ -63,7 +63,7 @@ def ratios(real=np.float32):
 
 @pytest.mark.parametrize("real", [np.float64, np.float32])
 def test_langevins_function_is_right_to_rounding(real, request):
-    """For x from 1e-30 to 1e30, in both precisions, against 60 digits; 1/3 at 0."""
+    """L(x)/x is compared to 60 digits for x from 1e-30 to 1e30 in both precisions; it is 1/3 at 0."""
     values = np.array(
         ratios(real)
         if real is np.float64
@@ -77,7 +77,7 @@ def test_langevins_function_is_right_to_rounding(real, request):
 
 @pytest.mark.slow
 def test_no_field_no_moment_and_no_force(rng):
-    """Where B = 0 no direction is preferred; next to it the moment is whole, and elsewhere."""
+    """At B = 0 no direction is preferred and the moment is zero; next to it the moment is complete."""
     place = np.array([[0, 0, 0], [1e-12, 0, 0], [0, 0, 0], [1, 0, 0]])
     field = Quadrupole(constant=(0, 0, 0), scale=(2, 2, 1))
     start = {"saturation_moment": 5.0, "domain_moment": 1e-20}
@@ -104,7 +104,7 @@ def test_no_field_no_moment_and_no_force(rng):
 
 
 def test_langevin_moments_of_weak_and_strong_fields():
-    """x from 1e-12 to 1e6: linear, m_s x / 3, and saturated, m_s (1 - 1/x); of particles of one domain."""
+    """Single-domain particles, x from 1e-12 to 1e6: linear, m_s x / 3, and saturated, m_s (1 - 1/x)."""
     law = LangevinMoment(temperature=300.0)
     scenes = []
     for b in (1e-12, 1e-6, 1e3, 1e6):
@@ -117,8 +117,11 @@ def test_langevin_moments_of_weak_and_strong_fields():
 
 
 def test_dipoles_at_contact_and_closer(rng):
-    """In one place a force has neither direction nor size: a failure that names it. At 1e-12 of a radius it
-    is as anywhere; antiparallel ones at contact are drawn together side by side and driven apart in line."""
+    """For coincident dipoles the force is undefined, and the failure names it.
+
+    At 1e-12 radii the usual law holds. Antiparallel dipoles in contact attract side by side and repel in
+    line.
+    """
     moment = rng.normal(size=3)
     place = np.array([[1.0, 1, 1], [1.0, 1, 1], [2, 2, 2]])
     law = magnets(rng, DipoleDipole(), n=3)
@@ -170,10 +173,12 @@ def solve(place, law=None):
 
 
 @pytest.mark.slow
-def test_mutual_induction_converges_or_says_that_it_cannot():
-    """mu_r = 1e6. Two that overlap until 2 a = 2 R^3/d^3 exceeds 1, where their moments would grow without
-    end; a long chain; dense lattices, whose eigenvalues below -1 relaxation takes in, or mixing. The right
-    moments, or a clear failure with what a sweep multiplies the change by."""
+def test_mutual_induction_converges_or_fails_with_a_message():
+    """Induction at mu_r = 1e6 gives the right moments, or a failure that states the growth factor of a sweep.
+
+    Cases: two spheres that overlap until 2 a = 2 R^3/d^3 exceeds 1, so that their moments would diverge; a
+    long chain; and dense lattices with eigenvalues below -1, which need relaxation or mixing to converge.
+    """
     lattice = 2.0 * np.argwhere(np.ones((5, 5, 5)))
     faces = np.argwhere(np.ones((6, 6, 6)))
     faces = np.sqrt(2) * faces[faces.sum(axis=1) % 2 == 0]
@@ -208,16 +213,19 @@ def test_mutual_induction_converges_or_says_that_it_cannot():
         np.testing.assert_array_equal(result.state["position"], place)
         if np.isfinite(factor):
             assert "does not converge: a sweep multiplies the change by" in result.status.reason
-            # Of (1 - 1e-6) of it, as mu_r is not infinite.
+            # The eigenvalue is (1 - 1e-6) times this, because mu_r is finite.
             assert result.measures["sweep_factor"] == pytest.approx(factor, rel=1e-4)
         else:
             assert "not finite" in result.status.reason
 
 
 @pytest.mark.slow
-def test_mixed_sweeps_find_moments_where_there_are_some_and_no_others(rng):
-    """Spheres of unlike sizes that lie in each other more or less, mu_r = 1e9: mixed sweeps would also
-    converge to what is no solution, beyond an eigenvalue of 1; the world stops there, and nowhere else."""
+def test_mixed_sweeps_find_moments_only_if_they_exist(rng):
+    """Overlapping spheres of unequal sizes, mu_r = 1e9.
+
+    If an eigenvalue exceeds 1, mixed sweeps would converge to a spurious solution. The world stops in these
+    cases and in no others.
+    """
     scenes, solvable = [], []
     for _ in range(120):
         n = int(rng.integers(2, 30))
@@ -254,15 +262,17 @@ def test_mixed_sweeps_find_moments_where_there_are_some_and_no_others(rng):
 
 
 def energy(state, wall, b):
-    """Kinetic, of linear dipoles in the field b, and of the repulsion between the two. J."""
+    """Energy (J): kinetic, of linear dipoles in the field b, and of the repulsion between the two."""
     gap = np.linalg.norm(state["position"][1] - state["position"][0])
     return 0.5 * (state["velocity"] ** 2).sum() - 0.5 * (state["moment"] @ b).sum() + wall(gap)
 
 
 @pytest.mark.slow
-def test_a_trial_state_in_which_nothing_converges_is_given_up():
-    """Two spheres fly at each other in a field and bounce off; a first step so long that it ends with both in
-    each other, where moments have no end, is tried again with a shorter one. Energy stays; nothing fails.
+def test_a_trial_state_without_convergence_is_repeated():
+    """Two spheres in a field fly at each other and rebound.
+
+    The first step is so long that it ends with overlapping spheres, for which the moments diverge. It is
+    repeated with a shorter step. The energy is conserved and nothing fails.
     """
     b, power = (0.0, 0, 1e-2), 30
     push = NearField(alpha2=900.0 * (power - 1) * 2.05 ** (power - 1), beta2=power)
@@ -305,7 +315,7 @@ def test_a_trial_state_in_which_nothing_converges_is_given_up():
 
 @pytest.mark.slow
 def test_a_pair_that_snaps_together_keeps_its_energy():
-    """Head to tail, from rest, onto hard spheres and off again, twenty times: Mie(30, 15) takes the blows."""
+    """A head-to-tail pair falls from rest onto hard cores (Mie(30, 15)) and rebounds, twenty times."""
     size, bottom, steps = 4e3, 2 * 2 ** (1 / 15), 300
     setup = scene(
         [[0, 0, -1.3], [0, 0, 1.3]],
@@ -341,8 +351,11 @@ def test_a_pair_that_snaps_together_keeps_its_energy():
 
 @pytest.mark.slow
 def test_permanent_moments_antiparallel_at_contact():
-    """Head to head, held together: in unstable balance nothing turns; a little off it the two turn round, and
-    energy stays."""
+    """Two magnets are held head to head.
+
+    In exact unstable balance nothing rotates. With a small offset both turn round, and the energy is
+    conserved.
+    """
     off = 1e-3
     moment = 1e3 * np.array([[0, 0, 1.0], [np.sin(off), 0, -np.cos(off)]])
     hold = NearField(alpha1=0.4, beta1=1, alpha2=0.2 * 2.0**13, beta2=13)
@@ -370,7 +383,7 @@ def test_permanent_moments_antiparallel_at_contact():
     np.testing.assert_array_equal(still.state["spin"], 0.0)
     (result,) = simulate([pair(moment)], capacity=4)
     start, end = result.start, by_id(result)
-    # By far more than it was off.
+    # By far more than the initial offset.
     assert np.linalg.norm(end["moment"] - start["moment"], axis=1).max() > 500.0
     scale = 2e-7 * 1e6 / 2.2**3
     assert abs(all_energy(end) - all_energy(start)) < 1e-3 * scale
@@ -378,8 +391,11 @@ def test_permanent_moments_antiparallel_at_contact():
 
 @pytest.mark.slow
 def test_dense_lattices_with_a_cutoff_converge():
-    """mu_r = 1e6, spheres that touch: mixed sweeps take in what plain ones cannot, relaxed or not, with a
-    cut-off too, and moments are those of a linear solve with the same pairs."""
+    """At mu_r = 1e6 and contact, mixed sweeps converge where plain ones do not.
+
+    This holds with and without relaxation and with a cut-off. The moments equal a linear solve with the same
+    pairs.
+    """
     faces = np.argwhere(np.ones((6, 6, 6)))
     faces = np.sqrt(2) * faces[faces.sum(axis=1) % 2 == 0]
     for cut in ({"cutoff": 3.0}, {"cutoff": 2.0, "gap": 1.7}, {"cutoff": 6.0, "shifted": True}):
@@ -396,7 +412,7 @@ STEEL = {"steel": Material(stiffness=1e5, restitution=0.1, friction=0.5)}
 
 
 def chain(*effects, materials=None, **more):
-    """Five grains in a row along z that just touch."""
+    """Five grains in a row along z, just in contact."""
     place = np.array([[0, 0, 2.0 * k] for k in range(5)])
     return scene(
         place,
@@ -412,11 +428,11 @@ def chain(*effects, materials=None, **more):
 
 
 ONCE = {"susceptibility": 1e3, "sweeps": 0, "cutoff": 6.0, "shifted": True}
-"""One sweep a step."""
+"""One sweep in each step."""
 
 
 def swept_once(stiffness=1e5, saturation=1.7e6, **more):
-    """The chain, of grains whose contacts have a stiffness (N/m), and which saturate at so much (A/m)."""
+    """The chain with a given contact stiffness (N/m) and saturation magnetisation (A/m)."""
     return chain(
         MagneticField(constant=(0, 0, 1e-3)),
         MutualFroehlichMoment(saturation=saturation, **ONCE, **more),
@@ -439,7 +455,7 @@ CHAINS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CHAINS)
 def test_a_chain_at_rest_holds(name):
-    """The springs of its contacts bear what the moments on one side of each pull those on the other."""
+    """Each contact spring bears the magnetic force between the moments on its two sides."""
     setup = CHAINS[name]()
     (result,) = simulate([setup], capacity=32)
     assert result.status.ok, result.status.reason
@@ -452,7 +468,7 @@ def test_a_chain_at_rest_holds(name):
         part, slope = (
             (1 - 4 * x**3 + 3 * x**4, 12 * x**3 * (x - 1)) if getattr(law, "shifted", False) else (1.0, 0.0)
         )
-        # U = -2 c m m / d^3 of a pair in line; F along n is f times -6 c m m / d^4, less d f' U / d.
+        # U = -2 c m m / d^3 for a pair in line; F along n is f times -6 c m m / d^4, minus d f' U / d.
         size = 2e-7 * m[i, 2] * m[j, 2] / d**4
         pull[i, j] = np.sign(d) * (3 * part - slope) * size if x <= 1 else 0.0
     assert np.abs(state["force"]).max() < 1e-5 * np.abs(pull).max()
@@ -464,9 +480,11 @@ def test_a_chain_at_rest_holds(name):
 
 
 @pytest.mark.slow
-def test_grains_so_soft_that_they_draw_each_other_in_stop_by_name():
-    """One sweep a step, and no saturation to speak of: unguarded, moments grow by a factor in each step,
-    until the grains fly apart."""
+def test_the_collapse_of_soft_grains_is_named():
+    """One sweep in each step and practically no saturation.
+
+    Without the guard the moments grow by a factor in each step, until the grains fly apart.
+    """
     (result,) = simulate([swept_once(stiffness=1.0, saturation=1e12)], capacity=32)
     assert "does not converge: a sweep multiplies the change by" in result.status.reason
     assert "by effects.mutual_froehlich_moment, at particle" in result.status.reason
@@ -477,8 +495,11 @@ def test_grains_so_soft_that_they_draw_each_other_in_stop_by_name():
 
 
 def colloids():
-    """Of B16's largest and smallest particles at contact: forces (N), moments. Then a dense lattice, which
-    settles to rounding though it is asked for less than single precision has."""
+    """Forces (N) and moments of B16's largest and smallest particles in contact, and moments of a dense
+    lattice.
+
+    The lattice converges to rounding although its tolerance is below single precision.
+    """
     effects = (
         MagneticField(constant=(0.3, 0, 0.4)),
         MutualLangevinMoment(temperature=298.0),
@@ -502,8 +523,8 @@ def colloids():
 
 
 @pytest.mark.slow
-def test_single_precision_holds_the_numbers_of_nanometres(single):
-    """Moments of 1e-18 A m^2, energies of 1e-19 J: nothing becomes zero or infinite on the way; as in f64."""
+def test_single_precision_suffices_for_nanometre_particles(single):
+    """Moments of 1e-18 A m^2 and energies of 1e-19 J neither underflow nor overflow and agree with f64."""
     for rough, fine in zip(single("hard.test_magnetism", "colloids"), colloids(), strict=True):
         assert np.abs(fine).max() > 0
         close(np.array(rough), np.array(fine), 2e-5)

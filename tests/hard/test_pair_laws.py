@@ -1,4 +1,5 @@
-"""Laws of pairs where it is hardest: in one place, just touching, pressed, crowded, unlike, far out."""
+"""Extreme cases of pair laws: coincident, just touching, compressed, crowded, unequal and far-away
+particles."""
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ N = np.array([2.0, -3.0, 6.0]) / 7
 
 
 def grains(position, radius, young=1e3, stiffness=1e3, **more):
-    """At rest in a box with images, pressed by both laws of contact."""
+    """Particles at rest in a periodic box, under both contact laws."""
     effects = (Contact(stiffness=stiffness), Hertz(young=young, poisson=0.25))
     n = len(position)
     more = {"velocity": np.zeros((n, 3)), "mass": np.ones(n), "dt": 1e-4, **more}
@@ -30,7 +31,7 @@ def run_grains(scenes):
 
 
 def stored_energy(d, a, b, young=1e3, stiffness=1e3):
-    """Energy of a pair at a distance d under both laws of contact (Z16 7.3, B.5, B.7), by quadrature. J."""
+    """Energy (J) of a pair at a distance d under both contact laws (Z16 7.3, B.5, B.7), by quadrature."""
 
     def push(x):
         overlap = a + b - x
@@ -48,13 +49,15 @@ def kinetic(state):
     return 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
 
 
-def test_near_field_in_one_place_and_hardly_apart():
-    """In one point the force has neither direction nor size: a failure that names law and particle and keeps
-    the start, even if the law is of no strength. At 1e-12 of a radius it is as anywhere."""
+def test_near_field_at_zero_and_tiny_distance():
+    """For coincident particles the force is undefined, even with zero strength.
+
+    The failure names law and particle and keeps the start state. At 1e-12 radii the usual law holds.
+    """
     law, place = NearField(alpha1=2.0, alpha2=1e-13), [[0, 0, 0], [1, 1, 1], [1, 1, 1]]
     scenes = [scene(place, np.zeros((3, 3)), (effect,), mass=1.0) for effect in (law, NearField())]
     close = scene([[0, 0, 0], 1e-13 * N], np.zeros((2, 3)), (law,), radius=0.1, mass=1.0, dt=1e-30)
-    # With room for so many, sums are made for a tile of particles at once.
+    # At this capacity sums run over tiles of particles.
     *bad, good = simulate([*scenes, close], worlds=3, capacity=40)
     for result in bad:
         for word in ("at t = 0 s", "effects.near_field", "particle 1", "not finite"):
@@ -76,26 +79,26 @@ PLACES = {
 
 
 def couple(d, **more):
-    """Two of radius R at a distance, one of them on a face of the box."""
+    """Two particles of radius R at a distance, one of them on a face of the box."""
     return grains(np.array([[0, 0.5, 0.5], [d, 0.5, 0.5]]), R, **more)
 
 
 @pytest.fixture(scope="module")
 def couples():
-    """All these distances, run until those that are pressed have parted."""
+    """Pairs at all these distances, run until the compressed ones have parted."""
     results = run_grains([couple(d, dt=2e-5, steps=10_000) for d in PLACES.values()])
     return dict(zip(PLACES, results, strict=True))
 
 
-def test_contact_in_one_place_is_refused():
-    """There is no line of centres."""
+def test_coincident_particles_in_contact_are_refused():
+    """Coincident centres have no line of centres."""
     with pytest.raises(InputError, match="particles 0 and 1 both at"):
         run_grains([couple(0.0)])
 
 
 @pytest.mark.long
 def test_energy_released_is_energy_stored(couples):
-    """From 10 % of overlap, and from 1e-12 radii between the centres: neither explosion nor loss."""
+    """From an overlap of 10 %, and from a distance of 1e-12 radii, the stored energy is released exactly."""
     for name in ("pressed", "hardly apart"):
         result = couples[name]
         assert result.status.ok
@@ -108,8 +111,8 @@ def test_energy_released_is_energy_stored(couples):
         np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-12)
 
 
-def test_surfaces_that_just_touch_do_not_push(couples):
-    """At the sum of the radii, a number of binary digits, the force is zero; so it is beyond."""
+def test_touching_surfaces_exert_no_force(couples):
+    """At the sum of the radii, which is a binary fraction, and beyond it the force is zero."""
     for name in ("touching", "beyond"):
         np.testing.assert_array_equal(couples[name].state["velocity"], 0.0)
         assert couples[name].status.ok
@@ -119,8 +122,9 @@ def test_surfaces_that_just_touch_do_not_push(couples):
 
 
 @pytest.mark.slow
-def test_a_thousand_pressed_into_each_other(rng):
-    """Random places, a dozen overlaps each: the energy released is what was stored, momentum stays."""
+def test_a_thousand_overlapping_particles(rng):
+    """Random positions with a dozen overlaps each: the stored energy is released and momentum is
+    conserved."""
     place = rng.uniform(0, 1, (CROWD, 3))
     radius = rng.uniform(0.05, 0.09, CROWD)
     (result,) = run_grains([grains(place, radius, mass=np.full(CROWD, 1e-2), dt=2e-5, steps=400)])
@@ -143,7 +147,7 @@ def test_a_thousand_pressed_into_each_other(rng):
 
 
 def worlds_of_lists(rng):
-    """What a cell list finds hard: name, places, radii."""
+    """Difficult cases for a cell list: name, positions, radii."""
     unlike = 2e-4 * 1e3 ** rng.uniform(0, 1, 300)
     unlike[7], unlike[8] = 0.2, 2e-4
     faces = rng.integers(0, 12, (300, 3)) / 12
@@ -156,8 +160,8 @@ def worlds_of_lists(rng):
 
 
 @pytest.mark.long
-def test_forces_over_lists_are_those_over_all_pairs(rng):
-    """As by NumPy over all pairs, none twice and none left out; and they add up to nothing."""
+def test_list_forces_equal_forces_over_all_pairs(rng):
+    """The forces equal a NumPy sum over all pairs, with no pair missing or repeated, and add up to zero."""
     scenes = [grains(place, np.broadcast_to(radius, len(place))) for _, place, radius in worlds_of_lists(rng)]
     contacts = []
     for state in loads(scenes, capacity=CROWD):
@@ -181,7 +185,7 @@ def test_forces_over_lists_are_those_over_all_pairs(rng):
 
 
 class Vanish(Operator):
-    """Removes every particle at a step."""
+    """Removes every particle at a given step."""
 
     at_step: float = parameter("", "at step", 3.0)
 
@@ -193,7 +197,7 @@ class Vanish(Operator):
 
 @pytest.mark.slow
 def test_a_world_that_loses_all_its_particles_runs_to_its_end():
-    """Nothing is left to sum over, nor to measure distances by: no hang, no NaN, time goes on."""
+    """Sums and distances over no particles neither hang nor give NaN, and time advances."""
     places = np.random.default_rng(2).uniform(0, 1, (60, 3))
     laws = Hertz(young=1.0, poisson=0.0)
     more = {"radius": 0.1, "mass": 1.0, "stepper": fixed(1e-3), "duration": 1.0, "domain": BOX}
@@ -206,7 +210,7 @@ def test_a_world_that_loses_all_its_particles_runs_to_its_end():
 
 
 def far_out():
-    """In single precision, 1e3 m out: momentum, what was exchanged, distances and forces at the start."""
+    """Single-precision runs 1e3 m from the origin: status, velocities and positions as stored."""
     rows = []
     for gap in (1e-4, 1e-3, 1e-2):
         place = np.array([1e3, -1e3, 1e3]) + np.array([[0, 0, 0], [gap, 0, 0], [0, gap, 0]])
@@ -221,8 +225,11 @@ def far_out():
 
 @pytest.mark.slow
 def test_single_precision_far_from_the_origin(single):
-    """At 1e3 m the last digit of a place is 6e-5 m. Momentum is kept to rounding all the same, and forces are
-    those of the places as they are held: near field and contact by NumPy."""
+    """At 1e3 m the spacing of single-precision positions is 6e-5 m.
+
+    Momentum is still conserved to rounding, and the forces equal near field and contact in NumPy at the
+    stored positions.
+    """
     for ok, velocity, place in single("hard.test_pair_laws", "far_out"):
         assert ok
         velocity, place = np.array(velocity), np.array(place)

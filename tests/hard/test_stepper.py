@@ -1,6 +1,6 @@
-"""Steppers where it is hardest: stiff springs, masses far apart, forces out of nothing, a fall into one.
+"""Extreme cases of steppers: stiff springs, large mass ratios, sudden forces, and a fall into a singularity.
 
-One structure of forces, of which each scene leaves out what it does not need, for each stepper.
+Each stepper has one compiled structure of forces; each scene sets the forces it does not need to zero.
 """
 
 import numpy as np
@@ -31,14 +31,14 @@ NAMES = [
 
 
 def adaptive(name, first, longest, **more):
-    """Steps as long as the error allows, from ``first`` (s)."""
+    """A stepper with error-controlled steps that start at ``first`` (s)."""
     return STEPPERS[name]({"first": first, "longest": longest, "shortest": 1e-14, **more})
 
 
 def forced(
     position, velocity, stepper, duration, tether=0.0, shell=1e-100, width=1e-100, near=(0, 0), **more
 ):
-    """Particles on springs, within elastic shells, that attract by near[0]/d and repel by near[1]/d^2."""
+    """Particles on springs within elastic shells; they attract by near[0]/d and repel by near[1]/d^2."""
     effects = (
         SoftShellOfAll(stiffness=shell, width=width),
         NearField(alpha1=near[0], alpha2=near[1]),
@@ -66,9 +66,11 @@ FACTORS = (1.0, 1e2, 1e6)
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
-def test_stiffness_beyond_what_the_steps_are_meant_for(name):
-    """Springs 1, 1e2 and 1e6 times as stiff, with the same control: the first step is up to 20 radians long.
-    After 3 1/4 periods each is in the middle, at full speed, in steps that are as many for all."""
+def test_stiffness_far_beyond_the_first_step(name):
+    """Springs 1, 1e2 and 1e6 times as stiff with the same control; the first step is up to 20 radians long.
+
+    After 3 1/4 periods each particle is at the centre at full speed, after nearly the same number of steps.
+    """
     scenes = []
     for factor in FACTORS:
         period = 2 * np.pi / np.sqrt(4.0 * factor)
@@ -86,7 +88,7 @@ def test_stiffness_beyond_what_the_steps_are_meant_for(name):
 
 
 def test_explicit_steps_too_long_for_a_spring_fail_clearly():
-    """Verlet beyond w dt = 2 grows without bound: the run is stopped, and what is kept is finite."""
+    """Verlet beyond w dt = 2 grows without bound: the run is stopped and the state kept is finite."""
     more = {"mass": 1.0, "quantities": {"anchor": np.zeros((1, 3))}}
     stable, stiff = run(
         [forced([[1.0, 0, 0]], [[0, 0, 0]], fixed(0.01), 10.0, tether=4.0 * f, **more) for f in (1.0, 1e6)]
@@ -101,14 +103,17 @@ def test_explicit_steps_too_long_for_a_spring_fail_clearly():
 
 
 def pull(x):
-    """Of two particles that attract by 2/d and repel by 1/d^2, d = x. N."""
+    """Force (N) between two particles that attract by 2/d and repel by 1/d^2, at d = x."""
     return 2.0 / x - 1.0 / x**2
 
 
 @pytest.mark.parametrize("name", [*NAMES, "verlet"])
 def test_masses_a_million_apart(name):
-    """1e-3 kg and 1e3 kg vibrate about d = 1/2, and the same with places exchanged: as the reduced mass does
-    by scipy; momentum to a billionth of what is exchanged."""
+    """1e-3 kg and 1e3 kg vibrate about d = 1/2, in both orders.
+
+    The distance follows a SciPy solution with the reduced mass. The total momentum stays below a billionth of
+    the exchanged momentum.
+    """
     light, heavy = 1e-3, 1e3
     reduced, duration = light * heavy / (light + heavy), 1.003
     stepper = fixed(2e-5) if name == "verlet" else adaptive(name, 1e-3, 1e-2)
@@ -128,7 +133,7 @@ def test_masses_a_million_apart(name):
         state = by_id(result)
         distance = state["position"][1, 0] - state["position"][0, 0]
         opening = state["velocity"][1, 0] - state["velocity"][0, 0]
-        # Of an amplitude of 0.1 m and a speed of 10 m/s.
+        # For an amplitude of 0.1 m and a speed of 10 m/s.
         assert distance == pytest.approx(exact[0], abs=2e-5)
         assert opening == pytest.approx(exact[1], abs=2e-3)
         total = (state["mass"][:, None] * state["velocity"]).sum(axis=0)
@@ -139,13 +144,15 @@ def test_masses_a_million_apart(name):
 
 
 MEETINGS = 1e-3 + 1e-4 * (1 - np.append(np.geomspace(1e-9, 1, 13), [0.3, 0.7]))
-"""Seconds: between the ends of the tenth and the eleventh step of 1e-4 s, and just before the latter."""
+"""Times (s) between the ends of the tenth and the eleventh step of 1e-4 s, and just before the latter."""
 
 
 @pytest.mark.parametrize("name", [*NAMES, "verlet"])
-def test_a_force_that_comes_out_of_nothing(name):
-    """Two shells meet at 200 m/s after a flight in the longest steps, a tenth of the shell each: they rebound
-    as a linear spring has it, v' = -v and half a period late."""
+def test_a_sudden_force(name):
+    """Two shells meet at 200 m/s after a flight in the longest steps, each a tenth of the shell.
+
+    They rebound as a linear spring does: v' = -v, half a period later.
+    """
     k, m, v, width = 2e6, 1.0, 100.0, 0.2
     contact = np.pi / np.sqrt(2 * k / m)
     assert v * np.sqrt(m / (2 * k)) < width, "the spring must stop them before their centres meet"
@@ -162,9 +169,11 @@ def test_a_force_that_comes_out_of_nothing(name):
 
 
 @pytest.mark.slow
-def test_steps_that_a_contact_has_made_short_grow_again():
-    """Grains that meet in mid-step, at any speed: they rebound, energy kept, in few steps. An old contraction
-    of the sweeps must not keep steps as short as those in which they met."""
+def test_steps_grow_again_after_a_contact():
+    """Grains of any speed that meet in mid-step rebound with their energy, in few steps.
+
+    The stepper must not keep the short steps of the contact because of an outdated contraction rate.
+    """
     radius, speeds = 1e-3, np.geomspace(0.1, 100, 10)
     scenes = [
         scene(
@@ -176,7 +185,7 @@ def test_steps_that_a_contact_has_made_short_grow_again():
             duration=12 * radius / v,
         )
         for v in speeds
-        # Two long steps past each other would not see each other at all.
+        # With two long steps the grains would pass without detecting each other.
         for longest in (0.3, 0.9)
     ]
     simulation = compiled(scenes[0], worlds=len(scenes), capacity=2)
@@ -188,12 +197,15 @@ def test_steps_that_a_contact_has_made_short_grow_again():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_fall_into_an_attraction_without_bottom(name):
-    """1/d between two that fall head-on from rest, v^2 = 2 alpha ln(d_0/d)/m_reduced: while that goes, it is
-    right; where it goes no more the run stops before numbers are wrong, names the force and keeps them."""
+def test_a_fall_into_a_singularity(name):
+    """Two particles attracted by 1/d fall head-on from rest, v^2 = 2 alpha ln(d_0/d)/m_reduced.
+
+    The result is right as long as the steps can follow. After that the run stops before numbers are wrong,
+    names the force and keeps the state.
+    """
     # They meet after d_0 sqrt(pi m_reduced / (2 alpha)).
     fall = np.sqrt(np.pi / 4)
-    # By default what is below a thousandth of a radius is not resolved; here everything is.
+    # By default distances below a thousandth of a radius are not resolved; here all are.
     stepper = adaptive(name, 1e-3, 0.1, resolution=0.0)
     scenes = [
         forced([[0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)), stepper, end * fall, near=(1, 0), mass=1.0)

@@ -1,4 +1,4 @@
-"""Materials: what two of them are to each other, names, files, and particles of several."""
+"""Materials: mixing rules, names, files, and particles of several materials."""
 
 import numpy as np
 import pytest
@@ -16,13 +16,14 @@ TWO = {"steel": STEEL, "rubber": RUBBER}
 
 
 def two(material=("rubber", "steel"), materials=TWO, **more):
-    """A grain of each."""
+    """A scene of one grain of each material."""
     place = [[0, 0, 0], [1, 0, 0]]
     return scene(place, np.zeros((2, 3)), (HERTZ_MINDLIN,), material=material, materials=materials, **more)
 
 
 def test_two_materials_are_mixed_by_their_rules_and_by_the_table():
-    """Elastic constants as Hertz and Mindlin have it; moduli that differ a thousandfold too."""
+    """The effective elastic constants are the Hertz-Mindlin ones, also for moduli that differ by a factor of
+    1000."""
     pairs = Materials(TWO, {"rubber-steel": MaterialPair(restitution=0.55)}).touching()
     same, mixed, back, other = pairs
     assert mixed.effective_young == pytest.approx(1 / ((1 - 0.09) / 2e11 + (1 - 0.49**2) / 2e8), rel=1e-14)
@@ -61,7 +62,7 @@ def test_a_part_of_a_law_may_be_given_by_its_name():
         Scene.from_dict({**data, "effects": {"granular": {"normal": "hoke"}}})
 
 
-def test_particles_know_their_material_by_name_or_number_and_only_where_there_are_several():
+def test_particles_name_or_number_their_material_if_there_are_several():
     for given in (("rubber", "steel"), (1, 0), np.array([1, 0])):
         np.testing.assert_array_equal(two(given).start()["material"], [1, 0])
     np.testing.assert_array_equal(two("rubber").start()["material"], [1, 1])
@@ -85,13 +86,13 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         WRONG[message]()
     assert str(fault.value) == message
 
 
-def test_a_file_that_is_wrong_about_a_material_is_told_which():
+def test_a_wrong_material_in_a_file_is_named():
     data = two().to_dict()
     with pytest.raises(
         InputError, match=r"^scene.materials.rubber.young must be greater than 0.0; received -1"
@@ -102,8 +103,8 @@ def test_a_file_that_is_wrong_about_a_material_is_told_which():
         Scene.from_dict({**data, "material_pairs": pairs})
 
 
-def test_what_a_table_gives_need_not_be_known_of_each():
-    """The friction of a pair, where no grain touches its like."""
+def test_pair_values_replace_those_of_single_materials():
+    """A pair friction from the table needs no friction of the single materials."""
     alone = {name: Material(young=1e7, poisson=0.3, restitution=0.5) for name in ("a", "b")}
     pairs = {f"{a}-{b}": MaterialPair(friction=0.1) for a, b in ("aa", "ab", "bb")}
     assert two(("a", "b"), alone, material_pairs=pairs)

@@ -1,4 +1,4 @@
-"""The functions for devices that lack them, beside mpmath: to two units in the last place, everywhere."""
+"""Elementary functions for devices without them, compared with mpmath to two units in the last place."""
 
 import mpmath
 import numpy as np
@@ -12,7 +12,7 @@ INF, NAN, TINY, LARGE = np.inf, np.nan, 5e-324, 1.7976931348623157e308
 ONE = {"exp": exponential.exp, "log": exponential.log, "sin": circular.sin, "cos": circular.cos}
 ULPS = 1.0
 SUBNORMAL = 2.3e-308
-"""Kernels take smaller numbers for 0."""
+"""Kernels flush smaller numbers to 0."""
 
 
 @in_taichi_thread
@@ -31,7 +31,7 @@ def evaluate(
 
 
 def values(x, y=None):
-    """The five functions of each x, by name, and x^y."""
+    """The values of the five functions at each x, by name, and of x^y."""
     x = np.array(x, float)
     results = np.empty((5, len(x)))
     evaluate(x, np.array(np.ones(len(x)) if y is None else y, float), results)
@@ -39,7 +39,7 @@ def values(x, y=None):
 
 
 def ulps(computed, exact):
-    """The largest distance from the true values, in units of their last place."""
+    """The largest deviation from the true values, in units of the last place."""
     with mpmath.workprec(200):
         units = (mpmath.mpf(float(np.spacing(abs(float(b))))) for b in exact)
         apart = (abs(mpmath.mpf(float(a)) - b) for a, b in zip(computed, exact, strict=True))
@@ -47,13 +47,13 @@ def ulps(computed, exact):
 
 
 def spread(rng, low, high, n=1500):
-    """Numbers of both signs whose exponents are even between two."""
+    """Random numbers of both signs with exponents uniform between two bounds."""
     return rng.choice([-1.0, 1.0], n) * rng.uniform(1.0, 2.0, n) * 2.0 ** rng.integers(low, high, n)
 
 
 @pytest.fixture(scope="module")
 def arguments():
-    """Of each function, numbers from all of its range, and where it is hard."""
+    """Arguments of each function from its whole range, including the difficult ones."""
     rng = np.random.default_rng(1)
     worst = 6381956970095103.0 * 2.0**797
     turns = np.arange(1, 400) * (np.pi / 2)
@@ -75,14 +75,14 @@ def arguments():
 
 
 @pytest.mark.parametrize("name", ONE)
-def test_a_function_is_next_to_the_true_value(name, arguments):
+def test_functions_are_accurate(name, arguments):
     x = np.array(arguments[name])
     with mpmath.workprec(1300):
         exact = [getattr(mpmath, name)(mpmath.mpf(float(v))) for v in x]
     assert ulps(values(x)[name], exact) < ULPS
 
 
-def test_a_power_is_next_to_the_true_value():
+def test_powers_are_accurate():
     rng = np.random.default_rng(2)
     x = np.concatenate(
         [abs(spread(rng, -1022, 1023)), rng.uniform(0.1, 10.0, 1500), 1 + spread(rng, -40, -2)]
@@ -96,7 +96,7 @@ def test_a_power_is_next_to_the_true_value():
     assert ulps(computed[within], [v for v, ok in zip(exact, within, strict=True) if ok]) < ULPS
 
 
-def test_edges_are_those_of_numpy():
+def test_special_values_equal_numpy():
     x = np.array([0.0, -0.0, 1.0, -1.0, INF, -INF, NAN, 800.0, -800.0, 1e300, -1e300, LARGE, 1e-300, -3.0])
     computed = values(x)
     for name in ONE:
@@ -108,7 +108,7 @@ def test_edges_are_those_of_numpy():
         np.testing.assert_array_equal(np.signbit(computed[name][finite]), np.signbit(expected[finite]))
 
 
-def test_edges_of_a_power_are_those_of_numpy():
+def test_special_values_of_a_power_equal_numpy():
     edges = [
         0.0,
         -0.0,

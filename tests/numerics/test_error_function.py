@@ -1,4 +1,4 @@
-"""The complementary error function beside that of SciPy."""
+"""The scaled complementary error function compared with SciPy."""
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -18,8 +18,8 @@ def _erfcx(x: ti.types.ndarray(), out: ti.types.ndarray()):
         out[k] = erfcx(x[k])
 
 
-def test_it_is_that_of_scipy_from_zero_on():
-    """To rounding; also where erfc itself is less than any number."""
+def test_it_equals_scipy_for_positive_arguments():
+    """They agree to rounding for x >= 0, including arguments at which erfc itself underflows."""
     x = np.concatenate([np.linspace(0, 30, 4001), np.logspace(-12, 8, 401)])
     x = x.astype(runtime.current().precision.replace("f", "float"))
     out = np.zeros_like(x)
@@ -27,7 +27,7 @@ def test_it_is_that_of_scipy_from_zero_on():
     np.testing.assert_allclose(out, special.erfcx(x.astype(float)), rtol=10 * roundoff())
 
 
-def test_the_coefficients_are_those_of_the_interpolation():
+def test_the_coefficients_interpolate_the_function():
     def function(u):
         t = (u + 1) / 2
         return special.erfcx(2 / t - 2) / t

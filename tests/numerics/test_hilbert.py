@@ -1,4 +1,4 @@
-"""Hilbert's curve goes through all cells, from each to a neighbour."""
+"""The Hilbert curve visits all cells, each next to the one before."""
 
 import numpy as np
 
@@ -20,8 +20,8 @@ def indices(cells):
     return out
 
 
-def test_the_curve_begins_in_a_corner_and_goes_from_cell_to_neighbour():
-    """The first 16^3 cells are the cube there; each once, and each beside the one before."""
+def test_the_curve_starts_in_a_corner_and_moves_to_neighbours():
+    """The first 16^3 positions fill a cube, visit each cell once, and move to a neighbour every time."""
     cells = np.argwhere(np.ones((16, 16, 16)))
     place = indices(cells)
     np.testing.assert_array_equal(np.sort(place), np.arange(16**3))
@@ -30,8 +30,9 @@ def test_the_curve_begins_in_a_corner_and_goes_from_cell_to_neighbour():
     assert (np.abs(np.diff(ordered, axis=0)).sum(axis=1) == 1).all()
 
 
-def test_places_far_along_the_curve_are_in_cubes_of_its_cubes(rng):
-    """All bits count: cells that share their leading bits share those of the place, and the others do not."""
+def test_the_curve_is_hierarchical(rng):
+    """All bits count: cells share leading bits of their index exactly if they share leading bits of their
+    position."""
     cells = rng.integers(0, 1 << CURVE_BITS, (2000, 3))
     place = indices(cells)
     assert place.min() >= 0

@@ -1,4 +1,4 @@
-"""Counter-based noise: Philox4x32-10 as published, and numbers of the right distribution from its bits."""
+"""Counter-based noise: Philox4x32-10 as published, and the distributions of numbers made from its bits."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def _philox(counters: ti.types.ndarray(), keys: ti.types.ndarray(), out: ti.type
 @in_taichi_thread
 @ti.kernel
 def _bits(where: ti.types.ndarray(), out: ti.types.ndarray()):
-    """where: rows of seed, stream, particle, step, draw."""
+    """where : rows of seed, stream, particle, step and draw."""
     for n in range(where.shape[0]):
         words = philox.bits(
             where[n, 0],
@@ -72,7 +72,7 @@ def numbers(words):
 
 
 def twin(counter, key):
-    """Philox4x32-10 in Python's integers, from the paper (Salmon et al. 2011, section 3.3)."""
+    """Reference implementation of Philox4x32-10 with Python integers (Salmon et al. 2011, section 3.3)."""
     c, (a, b) = [int(x) for x in counter], (int(x) for x in key)
     for _ in range(10):
         left, right = c[0] * 0xD2511F53, c[2] * 0xCD9E8D57
@@ -94,7 +94,7 @@ def twin(counter, key):
     ],
 )
 def test_known_answers_of_random123(counter, key, expected):
-    """The known-answer vectors that come with Random123 (kat_vectors, philox4x32 10)."""
+    """The known-answer vectors distributed with Random123 (kat_vectors, philox4x32 10)."""
     words = [int(text, 16) for text in expected.split()]
     assert words_of([counter], [key])[0].tolist() == words
     assert twin(counter, key) == words
@@ -106,8 +106,8 @@ def test_philox_is_its_twin_in_python_integers(rng):
     assert words_of(counters, keys).tolist() == [twin(c, k) for c, k in zip(counters, keys, strict=True)]
 
 
-def test_every_coordinate_of_a_draw_reaches_its_place_in_the_counter(rng):
-    """Seed is the 64-bit key; step (64 bits), draw, particle and stream fill the counter."""
+def test_the_counter_contains_every_coordinate_of_a_draw(rng):
+    """The seed is the 64-bit key; step (64 bits), draw, particle and stream fill the counter."""
     where = np.zeros((400, 5), np.uint64)
     where[:, 0] = rng.integers(0, 2**63, 400)
     where[:, 1:3] = rng.integers(0, 2**32, (400, 2))
@@ -120,20 +120,20 @@ def test_every_coordinate_of_a_draw_reaches_its_place_in_the_counter(rng):
         assert words == twin(counter, (seed & ONES, seed >> 32))
 
 
-def test_neighbouring_draws_share_nothing():
-    """Seeds, streams, particles, steps and draws that differ by one give words that never agree."""
+def test_neighbouring_draws_are_independent():
+    """Seeds, streams, particles, steps and draws that differ by one never give the same word."""
     where = np.array(np.meshgrid(*[range(5)] * 5, indexing="ij"), np.uint64).reshape(5, -1).T
     out = np.zeros((len(where), 4), np.uint32)
     _bits(np.ascontiguousarray(where), out)
     assert len(np.unique(out, axis=0)) == len(where)
-    # Half of all bits differ between one draw and the next.
+    # On average half of all bits differ between neighbouring draws.
     flipped = np.unpackbits((out[1:] ^ out[:-1]).view(np.uint8)).mean()
     assert flipped == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(32 * 4 * len(out)))
 
 
 @pytest.fixture(scope="module")
 def sample():
-    """200 particles at 1000 steps: rows of words as an operator would draw them."""
+    """Rows of words for 200 particles at 1000 steps, as an operator would draw them."""
     steps, particles = np.meshgrid(np.arange(1000), np.arange(200))
     where = np.zeros((steps.size, 5), np.uint64)
     where[:, 0], where[:, 1] = 7, 3
@@ -169,7 +169,8 @@ def test_normal_numbers_are_normal_and_independent(sample):
 
 
 def test_extreme_words_stay_inside_the_open_interval():
-    """Not 0, of which the logarithm is infinite, and not 1, which would lie on the far face of a box."""
+    """The number is never 0, whose logarithm is infinite, nor 1, which would be on the upper face of a
+    box."""
     uniform, normal = numbers([[0, 0, 0, 0], [ONES] * 4, [0, 0, ONES, ONES]])
     assert (uniform > 0).all()
     assert (uniform < 1).all()
@@ -177,8 +178,8 @@ def test_extreme_words_stay_inside_the_open_interval():
     assert normal.max() == pytest.approx(np.sqrt(-2 * np.log(2.0**-54)), rel=1e-12)
 
 
-def test_four_normal_numbers_are_those_of_box_and_muller():
-    """From one word a length, sqrt(-2 ln u); from another an angle in the first quadrant, and two signs."""
+def test_four_normal_numbers_follow_box_and_muller():
+    """One word gives a length, sqrt(-2 ln u); another gives an angle in the first quadrant and two signs."""
     draw = np.random.default_rng(2)
     ends = [[0] * 4, [ONES] * 4, [2, 3, 2**31, 2**30]]
     words = np.vstack([draw.integers(0, 2**32, (100_000, 4)), ends]).astype(np.uint32)

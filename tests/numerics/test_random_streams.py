@@ -1,4 +1,4 @@
-"""Every use of random numbers draws from a stream of its own."""
+"""Every use of random numbers has its own stream."""
 
 import ast
 from pathlib import Path
@@ -10,7 +10,7 @@ STREAMS = {name: value for name, value in vars(random_streams).items() if name.i
 
 
 def named(tree):
-    """The streams that an expression or a module names."""
+    """The streams named in an expression or a module."""
     return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in STREAMS}
 
 
@@ -24,7 +24,7 @@ def test_no_two_streams_are_the_same():
     assert all(0 <= stream < 2**32 for stream in STREAMS.values())
 
 
-def test_whoever_draws_names_its_stream_and_no_other_does():
+def test_streams_are_named_exactly_by_their_users():
     files = rooms.modules(Path(__file__).parents[2])
     trees = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in files.items()}
     assert all(len(named(call.args[1])) == 1 for tree in trees.values() for call in calls_of_bits(tree))

@@ -1,4 +1,4 @@
-"""Roots by estimates, against NumPy's."""
+"""Cube roots from estimates, compared with NumPy."""
 
 import numpy as np
 

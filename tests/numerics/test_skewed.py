@@ -1,4 +1,4 @@
-"""Intervals hold the mean in 93 to 97 of 100 samples, of few, skewed, equal and rare values."""
+"""Confidence intervals cover the mean in 93 to 97 % of samples: few, skewed, equal and rare values."""
 
 import math
 
@@ -22,7 +22,8 @@ KINDS_OF_NOISE = {
 @pytest.mark.parametrize("starts", [12, 16, 24])
 @pytest.mark.parametrize("noise", KINDS_OF_NOISE)
 def test_coverage(noise, starts):
-    """Of rare and discrete values it may be more; of lognormal ones, of skewness 3.7, it is somewhat less."""
+    """The coverage may be higher for rare and discrete values; it is slightly lower for lognormal ones
+    (skewness 3.7)."""
     rng = np.random.default_rng(starts)
     draw = KINDS_OF_NOISE[noise]
     seen = np.unique(draw(rng, 1)[:100])
@@ -33,10 +34,10 @@ def test_coverage(noise, starts):
     assert covered < (1.0 if "rarely" in noise or "one of ten" in noise else 0.97 + spread)
 
 
-def test_equal_values_tell_nothing_but_that_others_are_rare():
+def test_equal_values_bound_the_frequency_of_others():
     assert interval([0.3] * 12) == pytest.approx((math.nan, math.nan), nan_ok=True)
     low, high = interval([0.0] * 12, [1.0])
-    # 1/2 (1 - p)^12 = 0.025, the mid-P of twelve failures.
+    # 1/2 (1 - p)^12 = 0.025, the mid-P value of twelve failures.
     assert (low, high) == (0.0, pytest.approx(1 - 0.05 ** (1 / 12)))
     low, high = interval([0.5] * 12, [0.0, 2.0])
     rare = 1 - 0.05 ** (1 / 12)
@@ -44,7 +45,7 @@ def test_equal_values_tell_nothing_but_that_others_are_rare():
     assert all(map(math.isnan, interval([1.0])))
 
 
-def test_without_skewness_it_is_that_of_student():
+def test_without_skewness_it_equals_students_interval():
     assert interval([1.0, 2.0, 3.0]) == pytest.approx((2 - 2.4841377, 2 + 2.4841377), rel=1e-6)
 
 
@@ -60,14 +61,17 @@ SHARED = {
         lambda rng, size: rng.normal(size=size) - 20 * (rng.random(size) < 0.05), -1.0
     ),
 }  # fmt: skip
-"""Noise that several samples share, and its mean."""
+"""Noise distributions that several samples share, and their means."""
 
 
 @pytest.mark.parametrize(("starts", "designs"), [(16, 6), (4, 24)])
 @pytest.mark.parametrize("noise", SHARED)
-def test_coverage_where_samples_tell_each_other_how_skewed_noise_is(noise, starts, designs):
-    """From 0.93 to 0.98, of four values from 0.92: of means by Student's interval 0.85 of lognormal noise,
-    and 0.57 of rare values."""
+def test_coverage_with_shared_skewness(noise, starts, designs):
+    """The coverage is 0.93 to 0.98, and 0.92 or more with four values.
+
+    Student's interval covers the mean in 0.85 of the samples with lognormal noise and in 0.57 with rare
+    values.
+    """
     draw, mean = SHARED[noise]
     rng = np.random.default_rng(starts)
     held = []
@@ -83,7 +87,7 @@ def test_coverage_where_samples_tell_each_other_how_skewed_noise_is(noise, start
     assert covered < (0.98 if "captured" not in noise else 1.0) + spread
 
 
-def test_moments_are_without_bias_and_add_up():
+def test_moments_are_unbiased_and_additive():
     rng = np.random.default_rng(1)
     samples = rng.exponential(size=(20_000, 5))
     moments = [Moments.of(sample) for sample in samples]

@@ -14,10 +14,10 @@ def test_published_quantiles():
     assert half_width([0.0, 2.0], 0.5) == pytest.approx(1.0)  # t_1 = tan(pi/4)
 
 
-def test_holds_the_mean_as_often_as_it_says():
+def test_the_interval_has_its_nominal_coverage():
     runs = np.random.default_rng(5).normal(3.0, 2.0, (6, 4000))
     assert (np.abs(runs.mean(axis=0) - 3.0) < half_width(runs)).mean() == pytest.approx(0.95, abs=0.012)
 
 
-def test_one_run_says_nothing_of_the_spread():
+def test_a_single_run_has_no_interval():
     assert half_width([1.0]) == np.inf

@@ -1,4 +1,4 @@
-"""What acts at intervals does so once in each, however times are rounded."""
+"""Operators that act at intervals act exactly once in each, regardless of the rounding of times."""
 
 import pytest
 
@@ -8,11 +8,11 @@ from tisim.effects import WorldField, parameter
 from tisim.operators.at_intervals import AtIntervals
 
 DT, STEPS = 1e-6, 5003
-"""s; of no interval below is the end a multiple."""
+"""Duration (s), which is not a multiple of any interval below."""
 
 
 class Chime(AtIntervals):
-    """Counts the times that it has acted."""
+    """Counts its calls."""
 
     world_fields = (WorldField("chimes", "counter"),)
 
@@ -26,8 +26,11 @@ class Chime(AtIntervals):
 
 @pytest.fixture(scope="module")
 def chimes():
-    """How often it acts in 5003 steps, by interval: some that steps divide, one that they do not, and two
-    that are over in each step, of which there are far more than an integer of 32 bits counts."""
+    """Number of calls in 5003 steps for each interval.
+
+    Some intervals are multiples of the step, one is not, and two are so short that their number exceeds a
+    32-bit integer.
+    """
     intervals = (1e-5, 3e-6, 7e-4, 3.1415927e-6, 1e-20, 1e-30)
     scenes = [
         scene([[0, 0, 0]], [[0, 0, 0]], (Chime(interval=one),), dt=DT, steps=STEPS) for one in intervals

@@ -1,4 +1,4 @@
-"""Particles that touch a magnet stay there: against a twin in NumPy, and whatever pulls at them then."""
+"""Particles that touch a magnet are captured and stay there under any force; checked against NumPy."""
 
 import numpy as np
 import pytest
@@ -10,11 +10,11 @@ from tisim.operators import Capture
 from tisim.sources import Cylinder, MagneticCylinders, MagneticField, MagneticSpheres, Sphere
 
 DT, STEPS, RADIUS = 0.02, 60, 0.05
-"""Flights of 1.2 s at speeds of about 1 m/s, in steps shorter than a radius."""
+"""Flights last 1.2 s at speeds of about 1 m/s, with steps shorter than a radius."""
 
 
 def bodies(rng, cylinders, spheres):
-    """Magnets that attract nothing, at random."""
+    """Random magnets without magnetisation."""
     return (
         MagneticCylinders(
             cylinders=[
@@ -34,7 +34,7 @@ def bodies(rng, cylinders, spheres):
 
 
 def distance(body, r):
-    """From the surface of a body, negative inside; r is (n, 3)."""
+    """Distance from the surface of a body, negative inside; r has shape (n, 3)."""
     d = r - body.centre
     if isinstance(body, Sphere):
         return np.linalg.norm(d, axis=1) - body.radius
@@ -45,7 +45,7 @@ def distance(body, r):
 
 
 def flying(rng, magnets, n=60, **more):
-    """Particles in free flight, none of which touches at the start."""
+    """Particles in free flight, none of which touches a magnet at the start."""
     solids = [*magnets[0].cylinders, *magnets[1].spheres]
     position = rng.normal(size=(400, 3)) * 1.5
     position = position[np.all([distance(body, position) > 2 * RADIUS for body in solids], axis=0)][:n]
@@ -63,7 +63,8 @@ def flying(rng, magnets, n=60, **more):
 
 
 def twin(setup):
-    """Which magnet each particle touches first and when, -1 for none, and where it then is."""
+    """Reference implementation: the magnet that each particle touches first (-1 for none), the time, and the
+    final position."""
     solids = [*setup.effects[0].cylinders, *setup.effects[1].spheres]
     r, v = np.array(setup.particles.position), np.array(setup.particles.velocity)
     by, at = np.full(len(r), -1), np.full(len(r), -1.0)
@@ -78,7 +79,8 @@ def twin(setup):
 
 @pytest.mark.long
 def test_against_the_twin(rng):
-    """Who is caught, by which and when; on its surface; in worlds with other numbers of magnets."""
+    """Captured particles, their magnets and times agree, and they lie on the surface, in worlds with
+    different numbers of magnets."""
     worlds = [flying(rng, bodies(rng, *numbers)) for numbers in ((1, 0), (3, 2), (0, 6), (8, 5))]
     results = simulate(worlds, worlds=4, capacity=64)
     caught = 0
@@ -95,7 +97,7 @@ def test_against_the_twin(rng):
             np.testing.assert_allclose(distance(body, positions), RADIUS, rtol=1e-12)
         assert (result.state["velocity"][by >= 0] == 0).all()
         np.testing.assert_allclose(result.state["position"][by < 0], r[by < 0], atol=1e-12)
-        # Put back from where the step brought it, the shortest way.
+        # The particle moves from the end of its step to the surface by the shortest path.
         moved = np.linalg.norm(result.state["position"] - r, axis=1)
         assert (moved <= DT * np.linalg.norm(setup.particles.velocity, axis=1) + 1e-12).all()
         caught += (by >= 0).sum()
@@ -106,8 +108,9 @@ def test_against_the_twin(rng):
 
 
 @pytest.mark.slow
-def test_what_is_fixed_takes_no_force():
-    """Gravity and the magnet's pull act on the free one only; what a start fixes is no capture."""
+def test_fixed_particles_feel_no_force():
+    """Gravity and the magnetic force act on the free particle only; initially fixed particles are not counted
+    as captured."""
     magnet = MagneticCylinders(cylinders=[Cylinder(radius=0.5, length=1, magnetisation=(0, 0, 1e6))])
     setup = scene(
         [[0.0, 0, 0.56], [3, 0, 0], [0, 0, 2]],
@@ -133,7 +136,7 @@ def test_what_is_fixed_takes_no_force():
     assert (force[1] != 0).any()
 
 
-def test_it_needs_a_magnet_and_files_give_it_back():
+def test_capture_needs_a_magnet_and_is_kept_in_files():
     with pytest.raises(InputError, match=r"effects\.capture must be used together with effects\.magnetic_"):
         scene([[0, 0, 0]], [[0, 0, 0]], (Capture(),))
     setup = scene(
@@ -142,7 +145,7 @@ def test_it_needs_a_magnet_and_files_give_it_back():
     assert Scene.from_dict(setup.to_dict()).digest() == setup.digest()
 
 
-def test_what_is_fixed_is_at_rest_and_stays():
+def test_fixed_particles_start_at_rest_and_stay():
     body = MagneticCylinders(cylinders=[Cylinder(radius=1.0, length=2.0)])
     place, speed = [[3.0, 0, 0]], [[1.0, 0, 0]]
     moving = scene(place, speed, (body, Capture()), quantities={"fixed": [1]})

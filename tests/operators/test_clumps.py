@@ -1,4 +1,4 @@
-"""Rigid clumps that are put in, come to rest and leave: one scene over a soft floor, compiled once."""
+"""Rigid clumps that are inserted, come to rest and leave: one scene over a soft floor, compiled once."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ PEAR = Clump(
     density=3.0,
 )
 SIZE = float(np.cbrt(PEAR.body.mass / 3.0 * 3 / (4 * np.pi)))
-"""The radius (m) of a ball of its volume."""
+"""Radius (m) of a sphere of the same volume."""
 GRAINS = (
     GrainClass(
         sizes=UniformSizes(by="number", smallest=0.03, largest=0.05), density=RHO, clump=PEAR, share=3.0
@@ -40,7 +40,7 @@ def filling(
     begin=NEVER, fill=NEVER, fraction=0.03, interval=0.1, flux=1e5, gravity=G, bed=BED, edge=50.0,
     side=-1.0, velocity=0.0, duration=0.4, floor=DAMPING,
 ):  # fmt: skip
-    """Three clumps on the floor, and more that are put in above it."""
+    """Three clumps on the floor, and more that are inserted above it."""
     more = {"velocity": (velocity, 0.0, 0.0), "angular_velocity": (0.0, 2.0, 1.0)}
     return Scene(
         particles=Particles.of_clumps(SMALL, bed, **more) if bed else Particles.none(),
@@ -93,8 +93,9 @@ def results(outcome):
 
 
 @pytest.mark.long
-def test_clumps_are_put_in_as_they_are_drawn(results):
-    """Of the size, mass and inertia of a template scaled in NumPy; each of its spheres where the body is."""
+def test_inserted_clumps_follow_the_random_numbers(results):
+    """Size, mass and inertia equal a template scaled in NumPy, and every sphere is at its place in the
+    body."""
     state = by_id(results["pour"])
     u = np.array([uniforms(3, INSERTION + 3, k) for k in range(NUMBER)])
     number = np.array([one.number() for one in GRAINS])
@@ -122,8 +123,9 @@ def test_clumps_are_put_in_as_they_are_drawn(results):
     np.testing.assert_allclose(bodies.velocity, np.tile([0, 0, -1.0], (len(grown), 1)), atol=1e-12)
 
 
-def test_orientations_are_even(results):
-    """The angle t of a turn drawn evenly has (t - sin t) / pi below it, and its axis lies anywhere."""
+def test_orientations_are_uniform(results):
+    """For uniform random rotations the angle t has the distribution (t - sin t) / pi, and the axis is
+    uniform."""
     turns = Turn.from_quat(np.roll(clump_bodies(results["pour"].state).orientation, -1, axis=1))
     angle = turns.magnitude()
     assert kstest((angle - np.sin(angle)) / np.pi, "uniform").pvalue > 0.01
@@ -132,8 +134,8 @@ def test_orientations_are_even(results):
             assert kstest((component + 1) / 2, "uniform").pvalue > 0.01
 
 
-def test_no_clump_is_put_where_another_grain_is(simulation):
-    """Looked at after each step, before they have moved: only spheres of one clump overlap."""
+def test_inserted_clumps_overlap_no_other_grain(simulation):
+    """Checked after each step, before the new clumps have moved: only spheres of the same clump overlap."""
     simulation.load(SCENES["pour"])
     known, waited = 0, 0
     for _ in range(40):
@@ -152,8 +154,8 @@ def test_no_clump_is_put_where_another_grain_is(simulation):
     assert known > 4 * 20
 
 
-def test_clumps_of_the_start_do_not_notice_those_that_are_put_in(results):
-    """They turn and go on freely; numbers of members are of one clump each."""
+def test_insertions_do_not_affect_initial_clumps(results):
+    """The initial clumps keep rotating freely, and member numbers are unique."""
     state = by_id(results["beside"])
     assert len(state["mass"]) > 12 + 4 * 20
     alone = by_id(results["staying"])
@@ -165,8 +167,11 @@ def test_clumps_of_the_start_do_not_notice_those_that_are_put_in(results):
 
 
 def test_a_region_is_filled_up_to_a_fraction_of_clumps(outcome):
-    """Of their own volume, not that of their spheres, with those of the start that are there; nothing is
-    missing when it is time again."""
+    """The fraction counts the volume of each clump, not the sum of its spheres, and includes the initial
+    clumps.
+
+    At the next interval nothing is missing.
+    """
     result, series = outcome[0]["fill"], outcome[1]["fill"]
     bodies = clump_bodies(result.state)
     volume = bodies.mass / RHO
@@ -178,8 +183,8 @@ def test_a_region_is_filled_up_to_a_fraction_of_clumps(outcome):
     assert series["fill_number"][0] == 0 < series["fill_number"][1] == series["fill_number"][-1] > 50
 
 
-def test_what_is_put_in_while_others_leave_stays(outcome):
-    """Where numbers of members have gaps, and slots of those that have left are taken by others."""
+def test_clumps_inserted_during_an_outflow_remain(outcome):
+    """Member numbers then have gaps, and inserted clumps reuse the slots of clumps that have left."""
     (results, series), name = outcome, "both"
     result, poured, gone = results[name], series[name]["pour_number"], series[name]["outflow"]
     leaving = np.flatnonzero(np.diff(gone)) + 1
@@ -190,8 +195,8 @@ def test_what_is_put_in_while_others_leave_stays(outcome):
     assert result.measures["outflow_mass"] == pytest.approx(3 * SMALL.body.mass, rel=1e-12)
 
 
-def test_members_are_found_where_others_have_left(simulation):
-    """Those that are put in take slots whose numbers are those of other members."""
+def test_members_are_found_in_reused_slots(simulation):
+    """Inserted clumps take slots with the member numbers of other clumps."""
     simulation.load(SCENES["both"])
     simulation.run(until=0.2)
     (before,) = simulation.measures([0])
@@ -204,7 +209,7 @@ def test_members_are_found_where_others_have_left(simulation):
     assert simulation.measures([0])[0]["pour_number"] >= before["pour_number"] + 3
 
 
-def test_they_may_be_put_in_where_there_are_only_spheres(simulation):
+def test_clumps_can_be_inserted_among_spheres(simulation):
     start = Particles(position=[(0.0, 0.0, 0.04)], velocity=[(0.0, 0.0, 0.0)], radius=0.04, density=RHO)
     simulation.load(SCENES["pour"].model_copy(update={"particles": start}))
     simulation.run(until=0.002)
@@ -224,7 +229,7 @@ def test_bodies_of_other_inertia_are_another_structure():
 
 
 def test_clumps_at_rest_end_the_run(results):
-    """By the kinetic energy of the bodies, and the force on each as a whole."""
+    """The criteria use the kinetic energy of the bodies and the total force on each."""
     result = results["rest"]
     assert result.status.reason == "grains are at rest, by effects.at_rest"
     bodies, state = clump_bodies(result.state), result.state
@@ -237,14 +242,15 @@ def test_clumps_at_rest_end_the_run(results):
     force = [np.linalg.norm(state["force"][grains == k].sum(axis=0)) for k in np.unique(grains)]
     weight = G * state["mass"].sum()
     assert result.measures["unbalanced_ratio"] == pytest.approx(sum(force) / weight, rel=1e-9)
-    # The forces on single spheres are those of the floor and of the weight, and never balance.
+    # The forces on single spheres include the internal constraint forces, so they never balance.
     assert np.linalg.norm(state["force"], axis=1).sum() > 0.1 * weight
     assert result.measures["pour_number"] == NUMBER
     np.testing.assert_array_less(bodies.position[:, 2], 0.12)
 
 
 def test_a_clump_leaves_as_a_whole(outcome):
-    """When its centre of mass has got there, and others go on to the same bits as where none leaves."""
+    """It leaves when its centre of mass crosses the plane. The remaining clumps match a run without outflow
+    to the bit."""
     results, series = outcome
     leaving, staying = results["leaving"], by_id(results["staying"])
     mass = SMALL.body.mass
@@ -265,8 +271,9 @@ def test_a_clump_leaves_as_a_whole(outcome):
 
 
 @pytest.mark.parametrize("name", ["beside", "leaving"])
-def test_restarted_it_is_the_same_run(simulation, results, tmp_path, name):
-    """Also where the state is written to when clumps have come or gone, with what it is."""
+def test_a_restart_does_not_change_the_run(simulation, results, tmp_path, name):
+    """This also holds if, after clumps have come or gone, a state field is overwritten with its own
+    values."""
     simulation.load(SCENES[name])
     simulation.run(until=0.3)
     simulation.checkpoint(tmp_path / "half")
@@ -282,7 +289,7 @@ def test_restarted_it_is_the_same_run(simulation, results, tmp_path, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["particle", "team"])
-def test_on_other_schedules_it_is_the_same_run(results, schedule):
+def test_other_schedules_do_not_change_the_run(results, schedule):
     names = ("both", "beside", "fill")
     simulation = compiled(SCENES["pour"], worlds=3, capacity=12 + 8 * NUMBER, schedule=schedule)
     simulation.load([SCENES[name] for name in names])
@@ -312,6 +319,6 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("make", "message"), WRONG.values(), ids=WRONG)
-def test_what_cannot_be_is_refused(make, message):
+def test_impossible_values_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()

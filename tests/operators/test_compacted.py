@@ -1,4 +1,5 @@
-"""A servo wall compacts a bed to a wanted pressure, or until it fills a region to a wanted part."""
+"""A servo wall compacts a bed to a target pressure, or until the solids fill a target fraction of a
+region."""
 
 import numpy as np
 import pytest
@@ -12,15 +13,16 @@ from tisim.operators import Compacted
 from tisim.packing import RandomInBox
 
 SIDE, HEIGHT, PRESSURE, GRAINS, RADIUS = 0.05, 0.18, 5000.0, 400, 4e-3
-"""m, m, Pa, number, m."""
+"""Side (m), height (m), pressure (Pa), number of grains, radius (m)."""
 LOW, HIGH = (0.0, 0.0, 0.01), (SIDE, SIDE, 0.04)
-"""Corners of the region that is looked at, m."""
+"""Corners of the observed region, m."""
 INTERVAL = 5e-3
-"""s."""
+"""Interval of the checks, s."""
 
 
 def bed(fraction):
-    """Loose grains between a floor and a lid that comes down; a periodic box on all other sides."""
+    """Loose grains between a floor and a descending lid, in a box that is periodic in the other
+    directions."""
     return Scene(
         particles=Cloud(
             number=GRAINS,
@@ -47,14 +49,15 @@ def bed(fraction):
 
 
 def filled(state):
-    """The part of the region that grains fill whose centres are in it."""
+    """Solid fraction of the region, from grains whose centres are inside it."""
     inside = ((state["position"] >= LOW) & (state["position"] <= HIGH)).all(axis=1)
     return 4 / 3 * np.pi * (state["radius"][inside] ** 3).sum() / np.prod(np.subtract(HIGH, LOW))
 
 
 @pytest.mark.slow
-def test_to_a_wanted_pressure_or_a_wanted_part_of_a_region():
-    """Pressure on lid and floor, to a hundredth; the part against NumPy, at the first look that has it."""
+def test_compaction_to_a_pressure_or_a_solid_fraction():
+    """The pressure on lid and floor is right to one hundredth; the volume fraction equals NumPy at the first
+    check that reaches the target."""
     scenes = [bed(fraction) for fraction in (0.99, 0.5)]
     simulation = compiled(scenes[0], 2, GRAINS)
     simulation.load(scenes)
@@ -79,8 +82,8 @@ def test_to_a_wanted_pressure_or_a_wanted_part_of_a_region():
     assert on_the_way[1] == pytest.approx(filled(dense.start), abs=0.05)
 
 
-def test_a_region_is_looked_at_once_in_each_interval():
-    """One grain flies into the region, at a time of its own in each world, which ends at the next look."""
+def test_a_region_is_checked_once_in_each_interval():
+    """In each world one grain enters the region at a different time; the world ends at the next check."""
     dt, interval, side, speed = 1e-4, 1e-3, 2.0, 1.0
     arrivals = np.random.Generator(np.random.Philox(1)).uniform(0.0, 0.5, 64)
     look = Compacted(fraction=0.1, low=(0, 0, 0), high=(side,) * 3, interval=interval)
@@ -91,7 +94,7 @@ def test_a_region_is_looked_at_once_in_each_interval():
     results = simulate(scenes, worlds=len(scenes), capacity=4)
     ends = np.array([result.time for result in results])
     assert all(result.status.reason.startswith("grains fill the region") for result in results)
-    # By rounding, the first step of an interval may be the one after it.
+    # Rounding may shift the first step of an interval by one.
     assert np.isin(np.round(ends / dt) % 10, (0, 1)).all()
     assert ((ends >= arrivals) & (ends <= arrivals + interval + dt)).all()
     filled_part = 4 / 3 * np.pi * 0.8**3 / side**3
@@ -106,6 +109,6 @@ def test_a_region_is_looked_at_once_in_each_interval():
         ({"interval": 0.0}, "interval must be greater than 0"),
     ],
 )
-def test_what_makes_no_sense_is_refused(given, message):
+def test_invalid_settings_are_refused(given, message):
     with pytest.raises(InputError, match=message):
         Compacted(**{"fraction": 0.5, "low": LOW, "high": HIGH, "interval": INTERVAL, **given})

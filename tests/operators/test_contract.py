@@ -1,4 +1,4 @@
-"""What the core promises operators: rules 8 and 12 of tisim/effects/base."""
+"""Guarantees of the core to operators: rules 8 and 12 of tisim/effects/base."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tisim.steppers import ApproachTime, Verlet
 
 
 class Census(Operator):
-    """Counts its calls; a world has no pair events to wait for."""
+    """Counts its calls, although no pair events occur."""
 
     world_fields = (WorldField("censuses", "counter"),)
 
@@ -26,7 +26,7 @@ class Census(Operator):
 
 
 class Poison(Operator):
-    """Makes one component of one particle NaN after some steps."""
+    """Makes one component of one particle NaN after a number of steps."""
 
     axis: int = 0
 
@@ -38,7 +38,8 @@ class Poison(Operator):
 
 @pytest.mark.parametrize("wrong", [{"slots": 3}, {"integer": True}, {"components": 3, "slots": 3}])
 def test_a_field_that_could_not_be_merged_is_refused(wrong):
-    """Not when two particles merge, where the compiler would stop or a fraction be lost."""
+    """The refusal comes when the scene is made, not at a merge, where the compiler would stop or a fraction
+    would be lost."""
     with pytest.raises(TypeError, match="field tag"):
         Field("tag", "", **wrong)
 
@@ -49,7 +50,7 @@ def test_an_operator_sees_every_world_once_a_step():
 
 
 class Take(Operator):
-    """Removes a particle with what the world does."""
+    """Removes a particle in the world stage."""
 
     terms = 1
 
@@ -65,7 +66,7 @@ class Take(Operator):
 
 
 class Tally(Operator):
-    """Counts the particles that it is asked about."""
+    """Counts the particles for which it is called."""
 
     world_fields = (WorldField("tallied", "counter"),)
     terms = 1
@@ -79,7 +80,7 @@ class Tally(Operator):
         s.tallied[w] += ti.cast(self.sums.total(w)[0], ti.i64)
 
 
-def test_no_operator_is_asked_about_what_one_before_it_has_removed():
+def test_removed_particles_are_skipped_by_later_operators():
     place = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
     result = run(scene(place, np.zeros((3, 3)), (Take(), Tally()), dt=0.1, steps=1))
     assert len(result.state["mass"]) == 2 == result.work["tallied"]
@@ -91,7 +92,7 @@ def test_no_operator_is_asked_about_what_one_before_it_has_removed():
     [("world", 0, True), pytest.param("particle", 2, False, marks=pytest.mark.slow)],
 )
 def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
-    """More particles than look at all pairs; the bad one belongs to no cell."""
+    """The world has too many particles for an all-pairs search, and the bad particle belongs to no cell."""
     wanted = scene(
         rng.uniform(0, 1, (300, 3)),
         rng.normal(size=(300, 3)),
@@ -112,8 +113,8 @@ def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images,
 
 
 @pytest.mark.slow
-def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
-    """Two grains bond in the last step, one just outside the other's side of the box."""
+def test_a_merger_at_a_face_ends_inside_and_can_restart():
+    """Two grains bond in the last step across a face of the box."""
     wanted = scene(
         [[0.9993, 0.5, 0.5], [0.0011, 0.5, 0.5]],
         [[10.0, 0, 0], [-10.0, 0, 0]],
@@ -129,7 +130,7 @@ def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
 
 
 class Teleport(Operator):
-    """Every tenth step, throws the first grain of a world across the box, and out of it."""
+    """Every tenth step, moves the first grain of a world across the box and out of it."""
 
     @ti.func
     def world(self, s, w):
@@ -139,8 +140,8 @@ class Teleport(Operator):
 
 
 @pytest.mark.slow
-def test_lists_follow_what_operators_do_to_the_world(rng):
-    """A grain that is thrown about meets, wherever it lands, those who are there; and lands in the box."""
+def test_lists_follow_changes_by_operators(rng):
+    """A grain that is moved collides with the grains at its new position, which is wrapped into the box."""
     results = []
     position, velocity = rng.uniform(0.0, 1.0, (200, 3)), rng.normal(size=(200, 3))
     for kind in (SoftShell, SoftShellOfAll):
@@ -170,7 +171,8 @@ class Leave(Operator):
 
 @pytest.mark.long
 def test_step_control_sees_the_pairs_that_a_removal_leaves():
-    """Gap 0.8 m at 1 m/s: 0.5 s, the longest step, and then the 0.3 s that are left until surfaces meet."""
+    """A gap of 0.8 m at 1 m/s takes one step of 0.5 s, the longest, and one of 0.3 s until the surfaces
+    meet."""
     wanted = scene(
         [[0, 0, 0], [1, 0, 0], [0, 9, 0]], [[1, 0, 0], [0, 0, 0], [0, 0, 0]], (Leave(),),
         radius=0.1, dt=1, steps=2,

@@ -1,4 +1,4 @@
-"""Cooling: the law of Z04 (6.20), its implicit step, and its books."""
+"""Cooling: the law of Z04 (6.20), its implicit step, and the balance of heat."""
 
 import numpy as np
 import pytest
@@ -44,8 +44,8 @@ def rate(t, radius=RADIUS):
 
 @pytest.mark.long
 @pytest.mark.parametrize("temperature", [1800.0, 20.0])
-def test_cools_as_the_differential_equation_at_first_order(temperature):
-    """Against scipy's integrator; halving the step halves the error."""
+def test_cooling_converges_at_first_order(temperature):
+    """Compared with SciPy's integrator; half the step halves the error."""
     span = 5.0
     exact = solve_ivp(lambda _, t: rate(t), (0, span), [temperature], "DOP853", rtol=1e-12, atol=1e-9)
     steps = 2 ** np.arange(6, 12)
@@ -53,13 +53,14 @@ def test_cools_as_the_differential_equation_at_first_order(temperature):
     errors = np.array([abs(r.state["temperature"][0] - exact.y[0, -1]) for r in results])
     order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert order == pytest.approx(1.0, abs=0.03)
-    # What is left after Richardson's extrapolation is of second order: far smaller than the error it
+    # The remainder after Richardson extrapolation is of second order, far below the error that it removes.
     better = 2 * results[-1].state["temperature"][0] - results[-2].state["temperature"][0]
     assert abs(better - exact.y[0, -1]) < errors[-1] / 100
 
 
 def errors_of_steps():
-    """Relative errors of T' = T + dt rate(T') after one step: bracketed here, solved by Newton there."""
+    """Relative errors of T' = T + dt rate(T') after one step, with the root bracketed here and found by
+    Newton's method in tisim."""
     draw = np.random.Generator(np.random.Philox(6))
     cases = [(float(t), 10.0**dt) for t in (0.0, 1e-3, 300.0, 3e3, 1e5) for dt in draw.uniform(-9, 2, 12)]
     errors = []
@@ -74,12 +75,12 @@ def test_each_step_solves_its_implicit_equation():
     assert max(errors_of_steps()) < 1e-13
 
 
-def test_heat_lost_is_in_the_books():
+def test_the_heat_balance_closes():
     for result in run([alone(t, 0.01, 50, LAW) for t in (0.0, 500.0, 1e5)]):
         assert energy(result.state) == pytest.approx(energy(result.start), rel=1e-13, abs=1e-13)
 
 
-def test_never_crosses_equilibrium_however_long_the_step():
+def test_cooling_never_crosses_equilibrium():
     """The explicit step of Z04 (6.21) would fall below absolute zero here."""
     law = Cooling(emissivity=1.0, surroundings=300.0)
     hot, cold = run([alone(t, 1e9, 1, law, radius=1e-8) for t in (1e5, 0.0)])
@@ -89,7 +90,7 @@ def test_never_crosses_equilibrium_however_long_the_step():
 
 
 def test_surroundings_at_absolute_zero():
-    """0 K among 0 K stays there; no 0/0."""
+    """A grain at 0 K in surroundings at 0 K stays at 0 K; there is no 0/0."""
     law = Cooling(emissivity=1.0, surroundings=0.0, gas=0.0, convection=1.0)
     cold, warm = run([alone(t, 1.0, 1, law) for t in (0.0, 300.0)])
     assert cold.status.ok

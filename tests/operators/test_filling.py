@@ -1,4 +1,4 @@
-"""Insertions, outflow and coming to rest: one scene of soft grains over a floor, compiled once."""
+"""Insertion, outflow and the end at rest: one scene of soft grains over a floor, compiled once."""
 
 import numpy as np
 import pytest
@@ -26,13 +26,14 @@ from tisim.state.fields import Field
 pytestmark = pytest.mark.long
 
 STIFFNESS, DAMPING, DT, G = 2e4, 60.0, 4e-4, 9.81
-"""N/m, N s/m, s, m/s^2."""
+"""Stiffness (N/m), damping (N s/m), step (s), gravity (m/s^2)."""
 NEVER = 1e3
-"""Begins after the end of any run, s."""
+"""A start time (s) after the end of every run."""
 
 
 class StickingSpring(PairForce):
-    """Springs along and across the line of centres; that across remembers how far two have slid."""
+    """Springs along and across the line of centres; the tangential one keeps the slip of the pair as
+    history."""
 
     fields = ("radius",)
     short_ranged = True
@@ -81,7 +82,7 @@ BED = np.array([[0.3, 0.3, 0.065], [0.3, 0.428, 0.065], [0.411, 0.364, 0.065], [
 
 
 class Tagged(Force):
-    """Pulls nobody, but has grains carry three fields."""
+    """Exerts no force; its only effect is that grains carry three fields."""
 
     fields = (
         "material",
@@ -152,7 +153,7 @@ def simulation():
 
 
 def side_by_side(simulation, scenes):
-    """Results of all scenes in one batch, and what they counted on the way, both by name."""
+    """Results and time series of all scenes run in one batch, both by name."""
     simulation.load(list(scenes.values()))
     series = MeasureSeries(0.02)
     simulation.run(observers=[series])
@@ -170,7 +171,7 @@ def results(outcome):
 
 
 def uniforms(seed, stream, k):
-    """The six numbers of grain k."""
+    """The six random numbers of grain k."""
     numbers = []
     for draw in range(3):
         a, b, c, d = twin((0, draw << 16, k, stream), (seed, 0))
@@ -179,7 +180,7 @@ def uniforms(seed, stream, k):
 
 
 def drawn(seed, effect, number):
-    """Class, radius and lambda of each grain, in NumPy."""
+    """Class, radius and velocity deviates of each grain, computed in NumPy."""
     counts = np.array([one.number() for one in GRAINS])
     u = np.array([uniforms(seed, INSERTION + effect, k) for k in range(number)])
     which = (u[:, 0] * counts.sum() >= counts[0]).astype(int)
@@ -187,7 +188,7 @@ def drawn(seed, effect, number):
     return which, radius, 2 * u[:, 2:5] - 1
 
 
-def test_grains_come_by_mass_in_the_order_they_are_drawn(results):
+def test_grains_are_inserted_by_mass_in_random_number_order(results):
     result = results["pour"]
     state, mass = by_id(result), result.measures["pour_mass"]
     which, radius, _ = drawn(5, 4, FLUX_NUMBER)
@@ -198,9 +199,9 @@ def test_grains_come_by_mass_in_the_order_they_are_drawn(results):
     density = np.array([1000.0, 1200.0])[which[:n]]
     np.testing.assert_allclose(state["mass"][new], density * 4 / 3 * np.pi * radius[:n] ** 3, rtol=1e-13)
     assert mass == pytest.approx(state["mass"][new].sum(), rel=1e-13)
-    # The last one was due when those before it were less than what had come through.
+    # The last grain was inserted while the mass before it was below the mass due by the flux.
     assert mass - state["mass"][-1] < 20.0 * 0.5 <= mass + 1e-9
-    # What its class gives it, and what it has of itself.
+    # Quantities from the class of the grain, and its own quantities.
     np.testing.assert_array_equal(state["tag"][new], 7 + which[:n])
     np.testing.assert_array_equal(state["origin"][new][:, 2], 3 + which[:n])
     np.testing.assert_array_equal(state["material"], [0] * len(BED) + which[:n].tolist())
@@ -208,8 +209,8 @@ def test_grains_come_by_mass_in_the_order_they_are_drawn(results):
     assert 0 < which[:n].mean() < 1
 
 
-def test_no_grain_is_put_where_another_is(simulation):
-    """Looked at after each step, before they have moved; the region is so full that some must wait."""
+def test_inserted_grains_do_not_overlap_others(simulation):
+    """Checked after each step, before the grains have moved; the region is so full that some must wait."""
     scenes = [filling(flux=3000.0), filling(begin=NEVER, fill=0.0)]
     simulation.load(scenes)
     known, waited = [len(BED)] * 2, False
@@ -240,7 +241,7 @@ def test_no_grain_is_put_where_another_is(simulation):
 
 
 def test_a_region_is_filled_again_when_grains_have_left_it(outcome):
-    """At 0.1 s and 0.35 s, when most have fallen out of it."""
+    """Refills occur at 0.1 s and 0.35 s, after most grains have fallen out of the region."""
     result, series = outcome[0]["fill"], outcome[1]["fill"]
     steps = np.flatnonzero(np.diff(series["fill_number"]))
     np.testing.assert_allclose(series["time"][steps + 1], [0.1, 0.36], atol=0.02)
@@ -249,15 +250,15 @@ def test_a_region_is_filled_again_when_grains_have_left_it(outcome):
     assert first + second == result.measures["fill_number"] <= FRACTION_NUMBER
 
 
-def test_what_is_there_does_not_notice_what_is_put_in_elsewhere(results):
-    """The bed slides on itself, and remembers how far, while grains come in far above it.
+def test_distant_insertions_do_not_affect_a_bed(results):
+    """The bed slides and builds up contact history while grains are inserted far above it.
 
-    By less than a sixth of the error of the step: after an insertion forces are those at velocities of the
-    end of a step.
+    The difference is below one sixth of the integration error: after an insertion the forces use the
+    velocities at the end of the step.
     """
     alone, below, finer = (by_id(results[name]) for name in ("alone", "below", "finer"))
     assert len(below["mass"]) > len(alone["mass"]) == len(BED)
-    # They began with 0.05 m/s, and have come some millimetres far.
+    # The bed grains started with 0.05 m/s and have moved a few millimetres.
     for name in ("position", "velocity"):
         error = np.abs(alone[name] - finer[name]).max() / 6
         np.testing.assert_allclose(below[name][: len(BED)], alone[name], rtol=0, atol=error)
@@ -268,7 +269,7 @@ def test_what_is_there_does_not_notice_what_is_put_in_elsewhere(results):
 
 
 def test_grains_at_rest_end_the_run(outcome):
-    """When all have been put in, and not before; the two ratios are those of the state."""
+    """The run ends only after all grains are inserted; both ratios are recomputed from the state."""
     results, series = outcome
     result, before = results["rest"], series["rest"]["time"] < 3.49
     calm = (series["rest"]["kinetic_ratio"] <= 1e-4) & (series["rest"]["unbalanced_ratio"] <= 2e-2)
@@ -277,7 +278,7 @@ def test_grains_at_rest_end_the_run(outcome):
     assert result.status.ok
     assert result.status.reason == "grains are at rest, by effects.at_rest"
     assert 3.5 < result.time < 16.0
-    # A tenth of the time goes by from one look to the next; each is after a step.
+    # The interval between checks is a tenth of the given time; each check follows a step.
     assert (result.time + 1e-9) % 5e-3 < DT + 2e-9
     assert result.measures["pour_number"] == FLUX_NUMBER
     m, radius, v, f = (result.state[name] for name in ("mass", "radius", "velocity", "force"))
@@ -290,7 +291,7 @@ def test_grains_at_rest_end_the_run(outcome):
     assert results["alone"].status.reason == "reached its end"
 
 
-def test_what_leaves_is_counted(outcome):
+def test_the_outflow_is_counted(outcome):
     result, series = outcome[0]["leaving"], outcome[1]["leaving"]
     assert result.status.ok
     mass = result.start["mass"]
@@ -302,8 +303,8 @@ def test_what_leaves_is_counted(outcome):
     assert (np.diff(series["outflow"]) >= 0).all()
 
 
-def test_a_start_without_particles_is_filled_as_one_with_a_grain_elsewhere(results):
-    """To the last bit: first by flux, then by fraction too."""
+def test_an_empty_start_is_filled_like_one_with_a_distant_grain(results):
+    """They agree to the last bit, filled first by flux and then also by fraction."""
     empty, lonely = (by_id(results[name]) for name in ("empty", "lonely"))
     assert len(results["empty"].start["mass"]) == 0
     poured, filled = (results["empty"].measures[f"{name}_number"] for name in ("pour", "fill"))
@@ -317,7 +318,7 @@ def test_a_start_without_particles_is_filled_as_one_with_a_grain_elsewhere(resul
 
 
 def test_a_start_without_particles_is_recorded_drawn_and_exported(simulation, results, tmp_path):
-    """Its first frame has none; the scene comes back from its file."""
+    """The first frame has no particles, and the scene is read back from its file."""
     made = SCENES["empty"]
     simulation.load(made)
     with Recording(tmp_path / "t.h5", frames=5).observer(simulation) as recorder:
@@ -351,7 +352,7 @@ def test_a_world_that_is_empty_at_both_ends_has_a_picture():
 
 
 @pytest.mark.parametrize("name", ["pour", "rest", "empty"])
-def test_alone_and_restarted_it_is_the_same_run(simulation, results, tmp_path, name):
+def test_alone_or_restarted_the_run_is_the_same(simulation, results, tmp_path, name):
     simulation.load(SCENES[name])
     simulation.run(until=0.21)
     simulation.checkpoint(tmp_path / "half")
@@ -367,7 +368,7 @@ def test_alone_and_restarted_it_is_the_same_run(simulation, results, tmp_path, n
 
 @pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["particle", "team"])
-def test_on_other_schedules_it_is_the_same_run(results, schedule):
+def test_other_schedules_do_not_change_the_run(results, schedule):
     names = ("rest", "leaving", "empty")
     simulation = compiled(SCENES["pour"], worlds=3, capacity=80, schedule=schedule)
     simulation.load([SCENES[name] for name in names])
@@ -378,7 +379,7 @@ def test_on_other_schedules_it_is_the_same_run(results, schedule):
             np.testing.assert_array_equal(result.state[field], values, err_msg=field)
 
 
-def test_room_is_made_for_all_that_come():
+def test_the_capacity_includes_all_insertions():
     assert SCENES["pour"].capacity() == len(BED) + FLUX_NUMBER + FRACTION_NUMBER
 
 
@@ -386,13 +387,13 @@ ONE = (GrainClass(sizes=EqualSizes(radius=0.1), density=1.0),)
 
 
 def poured(*quantities):
-    """An insertion of classes of equal grains that are given these quantities."""
+    """An insertion of classes of equal grains with the given quantities."""
     grains = [GrainClass(sizes=EqualSizes(radius=0.1), density=1.0, quantities=one) for one in quantities]
     return InsertionByFlux(name="pour", flux=1.0, number=1, grains=grains, low=(0, 0, 0), high=(1, 1, 1))
 
 
 def started(*quantities):
-    """A scene with such an insertion, checked before anything is compiled."""
+    """A scene with this insertion, checked before anything is compiled."""
     effects = (Tagged(), poured(*quantities))
     made = scene([[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]], effects, materials={"sand": Material()})
     return Simulation(made)

@@ -1,4 +1,5 @@
-"""Layers of grains that join a group at a time: which do, where they go from then on, and what they bear."""
+"""Layers of grains that join groups: the grains that join, their motion from then on, and the force on
+them."""
 
 import numpy as np
 import pytest
@@ -19,15 +20,17 @@ from tisim.geometry import Plane
 from tisim.operators import JoinGroup, MeanForce
 
 G, DT, STEPS, JOINS = 9.81, 1e-3, 100, 0.0305
-"""m/s^2, s; joins at the end of the 31st step."""
+"""Gravity (m/s^2), step (s), number of steps and joining time (s); grains join at the end of the 31st
+step."""
 SPEED, RATE = (0.1, 0.0, 0.0), (0.0, 0.0, 2.0)
 PLACE = np.array([[0.0, 0, -0.2], [0.3, 0, 0.2], [0.0, 0, 0.004], [0.0, 0.2, 0.7], [0.1, 0, 0.6]])
-"""m; by then the third has fallen through 0, and the fourth is above the upper plane."""
+"""Positions (m). At the joining time the third grain has fallen below 0 and the fourth is above the upper
+plane."""
 LOWER, UPPER = Plane(point=(0, 0, 0)), Plane(point=(0, 0, 0.5), normal=(0, 0, -1))
 
 
 def falling(lower=None, group=None, **more):
-    """Grains that fall until some below and above two planes join two groups."""
+    """Grains that fall until those below one plane and above another join two groups."""
     effects = (
         PrescribedMotion(name="down", group=1, motion=lower or Translation(velocity=SPEED)),
         PrescribedMotion(name="up", group=2, motion=Rotation(rate=RATE)),
@@ -44,12 +47,12 @@ def falling(lower=None, group=None, **more):
 
 
 def fallen(t):
-    """The way of a free fall by Verlet, which is that of Galilei."""
+    """Height change in free fall, for which Verlet is exact."""
     return -G * t**2 / 2
 
 
 @pytest.mark.long
-def test_layers_join_when_it_is_time_and_go_on_from_there():
+def test_layers_join_at_the_given_time_and_follow_the_group():
     (result,) = simulate([falling()], capacity=8)
     state, t, joined = by_id(result), 31 * DT, fallen(31 * DT)
     assert result.work["joined"] == 3
@@ -59,7 +62,7 @@ def test_layers_join_when_it_is_time_and_go_on_from_there():
     expected[[0, 2, 3], 2] += joined
     expected[[0, 2]] += np.array(SPEED) * rest
     expected[1, 2] += fallen(DT * STEPS)
-    # The other was of its group from the start.
+    # The other grain belongs to this group from the start.
     for i, turned in ((3, 2.0 * rest), (4, 2.0 * DT * STEPS)):
         x, y = PLACE[i, :2]
         expected[i, :2] = (
@@ -74,13 +77,13 @@ def test_layers_join_when_it_is_time_and_go_on_from_there():
 
 
 TIMES = ((1e-3, 0.0305), (1e-6, 4e-5), (1e-7, 2e-5), (1e-8, 2e-5), (5e-9, 2e-5))
-"""Steps, and times at which grains join that are mostly a whole number of them, s."""
+"""Steps (s) and joining times (s), most of which are a whole number of steps."""
 LAYER = 130
-"""Grains that join: those of several blocks of a sum."""
+"""Number of grains that join; more than one block of a sum."""
 
 
 def settled(dt, time, step):
-    """A layer that joins, and one grain that gets behind the plane in the step after that."""
+    """A layer that joins, and one grain that crosses the plane half a step too late."""
     place = np.zeros((LAYER + 1, 3))
     place[:, 2] = -1.0
     place[LAYER // 2, 2], velocity = 1.0, np.zeros_like(place)
@@ -90,8 +93,8 @@ def settled(dt, time, step):
 
 
 @pytest.mark.long
-def test_a_group_is_joined_once_whatever_the_rounding_of_times():
-    """At the end of the first step that reaches the time; in the next nobody does."""
+def test_a_group_is_joined_once_despite_rounding_of_times():
+    """Grains join at the end of the first step that reaches the time, and none in the next step."""
     scenes, real = [], np.dtype(runtime.current().precision.replace("f", "float")).type
     for pair in TIMES:
         dt, time = (float(real(value)) for value in pair)
@@ -104,8 +107,8 @@ def test_a_group_is_joined_once_whatever_the_rounding_of_times():
 
 
 @pytest.mark.long
-def test_the_mean_force_is_that_of_the_steps_since_it_began():
-    """Of a constant force it is that; what has not begun is 0."""
+def test_the_mean_force_covers_the_steps_since_its_start():
+    """For a constant force the mean equals the force; before its start it is 0."""
     one = falling()
     late = (*one.effects[:-1], MeanForce(begin=1.0))
     kept, none = simulate([one, one.model_copy(update={"effects": late})], worlds=2, capacity=8)
@@ -115,12 +118,13 @@ def test_the_mean_force_is_that_of_the_steps_since_it_began():
 
 
 BEGINS = (0.0, 0.0305, 0.0995)
-"""s; the second within a step, the third within the last."""
+"""Start times (s); the second is within a step, the third within the last step."""
 
 
 @pytest.mark.long
-def test_the_mean_of_a_force_that_changes_is_the_integral_since_it_began():
-    """Over steps each with the force where it begins; of that in which it began, the part that is left."""
+def test_the_mean_of_a_varying_force_is_its_time_integral():
+    """Each step contributes the force at its beginning; the first step contributes only its part after the
+    start."""
     shake, omega = np.array([1.0, -2.0, 3.0]), 40.0
     scenes = [
         scene(
@@ -139,8 +143,9 @@ def test_the_mean_of_a_force_that_changes_is_the_integral_since_it_began():
 
 
 @pytest.mark.slow
-def test_laws_no_longer_act_between_two_that_have_joined():
-    """Two grains that press on each other and on a third: once they are frozen, only the third feels it."""
+def test_joined_grains_exert_no_forces_on_each_other():
+    """Two grains press on each other and on a third; once the two are frozen, only the third exerts a
+    force."""
     law = Granular(normal=HertzMaterial())
     place = RADIUS * np.array([[0.0, 0, -0.8], [1.9, 0, -0.8], [0.95, 0, 0.8]])
     effects = (

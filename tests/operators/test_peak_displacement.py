@@ -1,4 +1,4 @@
-"""The observer of a cloud's centre of gravity, and that a Result and its file give back what it keeps."""
+"""The observer of the largest displacement of the centre of mass; a Result and its file contain its value."""
 
 import h5py
 import numpy as np
@@ -11,7 +11,7 @@ from tisim.operators import PeakDisplacement
 
 
 def swinging(periods, speed):
-    """Two masses of 1 kg on springs of 1 N/m: their centre of gravity swings too."""
+    """Two masses of 1 kg on springs of 1 N/m, whose centre of mass oscillates too."""
     return scene(
         [[0.0, 0, 0], [0.1, 0, 0]], [[0.0, speed, 0], [0, speed, 0]],
         (Tether(stiffness=(1.0, 1.0, 1.0)), PeakDisplacement()),
@@ -21,7 +21,8 @@ def swinging(periods, speed):
 
 @pytest.mark.long
 def test_the_largest_displacement_is_kept_and_not_the_last(tmp_path):
-    """After half a swing it is back at the start, having been v/w away; before a quarter it is on its way."""
+    """After half a period the cloud is back at its start and the record is v/w; before a quarter it still
+    grows."""
     speeds = (0.3, 2.0)
     results = simulate([swinging(p, v) for p in (0.5, 0.125) for v in speeds], worlds=4, capacity=4)
     peaks = [result.measures["peak_displacement"] for result in results]
@@ -35,8 +36,8 @@ def test_the_largest_displacement_is_kept_and_not_the_last(tmp_path):
         assert file["measures"].attrs["peak_displacement"] == peaks[1]
 
 
-def test_masses_weigh():
-    """Only the light one of 1 kg and 3 kg moves: the centre of gravity moves a quarter as far."""
+def test_the_displacement_is_weighted_by_mass():
+    """Of masses 1 kg and 3 kg only the light one moves, so the centre of mass moves a quarter as far."""
     setup = scene(
         [[0.0, 0, 0], [1.0, 0, 0]], [[1.0, 0, 0], [0, 0, 0]],
         (Tether(stiffness=(0.0, 0.0, 0.0)), PeakDisplacement()), mass=[1.0, 3.0], dt=1e-3, steps=100,
@@ -45,8 +46,8 @@ def test_masses_weigh():
     assert result.measures["peak_displacement"] == pytest.approx(0.1 / 4, rel=1e-12)
 
 
-def test_a_displacement_that_is_no_number_stops_the_world():
-    """Of 1e297 m the square is none: the state before is given back, and the run is not said to be good."""
+def test_an_infinite_displacement_stops_the_world():
+    """The square of 1e297 m overflows: the previous state is returned and the run is reported as failed."""
     setup = scene(
         [[0.0, 0, 0], [1.0, 0, 0]], [[0.0, 1e300, 0], [0, 0, 0]],
         (Tether(stiffness=(0.0, 0.0, 0.0)), PeakDisplacement()), mass=1.0, dt=1e-3, steps=3,

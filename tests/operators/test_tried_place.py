@@ -1,4 +1,4 @@
-"""Places that an insertion tries are compared with all particles, whatever block of memory they are in."""
+"""Insertion trials are compared with all particles, in whatever block of memory they are."""
 
 import numpy as np
 import pytest
@@ -9,19 +9,19 @@ from tisim.operators import InsertionByFraction, tried_place
 from tisim.packing import EqualSizes
 
 SIDE, RADIUS, BED, ADDED = 1.0, 0.1, 30, 10
-"""m, m; grains that lie in the box, and those that are put between them."""
+"""Side of the box and radius of the grains (m), and numbers of initial and inserted grains."""
 
 
 def lattice(rng):
-    """Places of grains 0.3 m apart, of 27 in the box, in any order, and of others outside of it."""
+    """Positions of grains 0.3 m apart, in random order: 27 in the box and others outside it."""
     axis = 0.2 + 0.3 * np.arange(3)
     inside = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
     return rng.permutation(np.concatenate([inside, inside[:3] + np.array([0.0, 0.0, 9.0])]))
 
 
 @pytest.mark.long
-def test_grains_are_put_where_none_of_any_block_is(rng, monkeypatch):
-    """In a box that is full but for a few gaps, where nearly each place that is tried is taken."""
+def test_inserted_grains_overlap_no_grain_of_any_block(rng, monkeypatch):
+    """The box is full except for a few gaps, so nearly every insertion trial fails."""
     monkeypatch.setattr(tried_place, "COMPARED_TOGETHER", {"cpu": 8})
     place = lattice(rng)
     fill = InsertionByFraction(

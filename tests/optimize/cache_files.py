@@ -1,4 +1,4 @@
-"""Looking at a cache file from outside, and processes that use one."""
+"""Access to a cache file from outside, and processes that use one."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path
 
 
 def payloads(records):
-    """The records as bytes, in an order of their own."""
+    """The records as sorted bytes."""
     return sorted(record.payload() for record in records)
 
 
@@ -25,7 +25,7 @@ def lock_of(path):
 
 
 def hurt(path, dataset, row):
-    """Flip the first bit of a row in the raw data of a dataset; nothing else in the file is changed."""
+    """Flip the first bit of a row in the raw data of a dataset; nothing else in the file changes."""
     with h5py.File(path, "r") as file:
         at = file[dataset].id.get_offset() + row * file[dataset].dtype.itemsize
     content = bytearray(path.read_bytes())
@@ -34,8 +34,11 @@ def hurt(path, dataset, row):
 
 
 PIPE = 4096
-"""Bytes (pipesize) that a process may write before they are read. It names evaluations by 72 bytes each: who
-reads some is less than 60 of them behind, and a search cannot end meanwhile, however fast the machine is."""
+"""Pipe size: the number of bytes that a process can write before they are read.
+
+Each evaluation takes 72 bytes, so a reader is less than 60 evaluations behind. A search therefore cannot end
+before they are read, however fast the machine is.
+"""
 
 
 def worker(*arguments, **options):

@@ -1,4 +1,4 @@
-"""Run as a script by tests of kills: a process that writes, folds or searches until something stops it."""
+"""Script for kill tests: a process that writes, folds or searches until it is stopped."""
 
 import os
 import resource
@@ -13,7 +13,7 @@ from tisim.optimize.storage.cache import Cache
 
 
 def write(path, first):
-    """Store records for ever, naming each only when it is stored; fold often."""
+    """Store records for ever and print the number of each after it is stored; fold often."""
     cache = Cache(path)
     number = int(first)
     while True:
@@ -27,7 +27,7 @@ def write(path, first):
 
 
 def stepwise(folder):
-    """In a fresh cache each, be killed at the first, second, ... system call that changes a file."""
+    """With a fresh cache each time, be killed at the first, second, ... system call that changes a file."""
     calls = ("pwrite", "fsync", "ftruncate", "rename", "replace")
     for kill_at in range(1, 100):
         path = Path(folder) / f"{kill_at:02d}" / "cache.h5"
@@ -42,7 +42,7 @@ def stepwise(folder):
                     nonlocal remaining
                     remaining -= 1
                     if remaining == 0:
-                        if call.__name__ == "pwrite":  # half of it gets through
+                        if call.__name__ == "pwrite":  # half of the data is written
                             call(arguments[0], bytes(arguments[1][: len(arguments[1]) // 2]), arguments[2])
                         os.kill(os.getpid(), signal.SIGKILL)
                     return call(*arguments, **options)
@@ -64,7 +64,7 @@ def stepwise(folder):
 
 
 def limited(path, size):
-    """Store records, and fold, on a file system that lets no file grow beyond size bytes."""
+    """Store records and fold, with a limit on the size (bytes) of any file."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(size), int(size)))
     cache = Cache(path)
     count = 0
@@ -81,7 +81,7 @@ def limited(path, size):
 
 
 def search(path):
-    """A search that names each evaluation as soon as it counts as finished."""
+    """A search that prints the key of each evaluation when it is stored."""
     from tisim.optimize.search import search as run
     from tisim.optimize.settings import Settings
 
@@ -96,7 +96,7 @@ def search(path):
 
 
 def shared(folder, method, *seed_and_more):
-    """A search of shared_case, naming each evaluation as it is stored."""
+    """A search of shared_case that prints the key of each evaluation when it is stored."""
     from tests.optimize.shared_case import searched
 
     announce()
@@ -105,7 +105,8 @@ def shared(folder, method, *seed_and_more):
 
 
 def announce():
-    """Have each evaluation named on standard output when it is stored; who reads slowly holds it up."""
+    """Print the key of each evaluation to standard output when it is stored; a slow reader delays the
+    search."""
     put = Cache.put
 
     def put_and_say(cache, record):
@@ -117,14 +118,14 @@ def announce():
 
 
 class Asleep:
-    """A scene that a worker reads for an hour."""
+    """A scene that takes a worker an hour to unpickle."""
 
     def __reduce__(self):
         return time.sleep, (3600.0,)
 
 
 def asleep():
-    """Two worker processes that are busy, and a parent that waits for them."""
+    """Two busy worker processes, and a parent that waits for them."""
     from tisim.optimize.evaluation.executors.processes import Processes
     from tisim.optimize.evaluation.executors.worker import WorkerSettings
 
@@ -137,7 +138,7 @@ def asleep():
 
 
 def tisim(*arguments):
-    """The command, naming each evaluation."""
+    """The ``tisim`` command, which also prints the key of each evaluation."""
     from tests.optimize.drift_case import CASE
     from tisim.cases import case
     from tisim.cli.main import main

@@ -1,9 +1,9 @@
-"""What tests of the search share."""
+"""Fixtures for tests of the search."""
 
 import pytest
 
 
 @pytest.fixture
 def path(tmp_path):
-    """Where a cache file may be made."""
+    """Path for a new cache file."""
     return tmp_path / "cache.h5"

@@ -1,8 +1,8 @@
-"""How often the intervals that a search reports hold the truth, by plain functions of which it is known.
+"""Coverage of the intervals that searches report, for functions with known means.
 
-Each kind of noise is a function of two genes: a bowl and noise of that kind, whose mean is known everywhere.
-Searches with seeds 0, 1, ... report designs with 95 % intervals from fresh starts, and each is asked whether
-it has the true mean of its design.
+Each kind of noise is a function of two genes: a bowl with noise of that kind, whose mean is known everywhere.
+Searches with seeds 0, 1, ... report designs with 95 % intervals from held-out seeds. The experiment counts
+the intervals that contain the true mean of their design.
 
     PYTHONPATH=. python tests/optimize/coverage_of_searches.py [SEARCHES [KIND ...]]
 """
@@ -22,20 +22,21 @@ GENES = (Gene("x", "", 0.0, 1.0), Gene("y", "", 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Noise:
-    """value : of a run, by the cost of its design without noise (0 at best, about 1 at worst) and a
-    generator. mean : of such runs, by that cost."""
+    """value : result of a run, from the noiseless cost of its design (0 at best, about 1 at worst) and a
+    random generator. mean : expected value of such runs, from that cost.
+    """
 
     value: Callable[[float, np.random.Generator], float]
     mean: Callable[[float], float]
 
 
 def added(draw, mean):
-    """Noise that is added to the bowl, the same at all designs: draws, and their mean."""
+    """Noise added to the bowl, the same at all designs: a function that draws it, and its mean."""
     return Noise(lambda cost, rng: cost + draw(rng), lambda cost: cost + mean)
 
 
 def share(least):
-    """The probability that an outcome is 1, by the cost: the given one at the best design."""
+    """Probability of the outcome 1 as a function of the cost; it is ``least`` at the best design."""
     return lambda cost: min(least + 0.5 * cost, 1.0)
 
 
@@ -44,7 +45,7 @@ def bernoulli(least):
 
 
 def captured(least):
-    """The part of 20 that are captured."""
+    """The captured fraction of 20 particles."""
     return Noise(lambda cost, rng: rng.binomial(20, share(least)(cost)) / 20, share(least))
 
 
@@ -85,12 +86,12 @@ def bowl(x, y):
 
 
 def costs(x, y):
-    """Of two objectives: their best designs are 0.6 apart."""
+    """Costs of two objectives, whose best designs are 0.6 apart."""
     return bowl(x, y), bowl(x - 0.6, y)
 
 
 def problem(kind, several=False):
-    """A problem of one objective or two with noise of that kind."""
+    """A problem of one or two objectives with noise of this kind."""
     noise = KINDS[kind]
 
     def function(design, seed):
@@ -116,8 +117,10 @@ def searched(kind, seed, several=False, **settings):
 
 
 def held(kind, outcome, several=False):
-    """For each reported design and objective whether its interval has the truth, (designs, objectives); NaN
-    where none is given, as all runs of the search are equal."""
+    """Whether the interval contains the truth, for each reported design and objective: (designs, objectives).
+
+    The value is NaN if no interval is given because all runs of the search are equal.
+    """
     found = []
     for design in outcome.designs:
         true = truths(kind, design.genes, several)
@@ -130,9 +133,11 @@ def held(kind, outcome, several=False):
 
 
 def coverage(kind, searches, several=False, **settings):
-    """(part of the reported best that hold, part of all, its standard error, median width): designs of one
-    search are not independent, so that the error is that of the means of searches. The best of a front is
-    the compromise."""
+    """(coverage for the best design, for all designs, standard error of the latter, median width).
+
+    Designs of one search are not independent, so the error is computed from the means of searches. The best
+    design of a front is the compromise.
+    """
     first, everything, widths = [], [], []
     for seed in range(searches):
         outcome = searched(kind, seed, several, **settings)
@@ -147,8 +152,10 @@ def coverage(kind, searches, several=False, **settings):
 
 
 def stopped_at_target(kind, searches, above, **settings):
-    """(part of searches that stop at a target, part of these whose design does not meet it); the target is so
-    much above what the best design has."""
+    """(fraction of searches that stop at a target, fraction of those whose design does not meet it).
+
+    above : difference between the target and the mean of the best design.
+    """
     goal = KINDS[kind].mean(0.0) + above
     usual = {"generations": 12, "options": {"population": 20}, "target": goal, "ensemble": OWN}
     stopped, wrong = 0, 0
@@ -161,20 +168,20 @@ def stopped_at_target(kind, searches, above, **settings):
 
 
 def dominated(outcome):
-    """The number of listed designs that another one dominates by the values that are listed."""
+    """The number of listed designs that are dominated by another, by their listed values."""
     values = np.array([list(design.values.values()) for design in outcome.designs])
     no_better = np.all(values[:, None] >= values[None], axis=2)
     return int(np.sum(no_better & np.any(values[:, None] > values[None], axis=2)))
 
 
 def truly_dominated(kind, outcome):
-    """The part of the listed designs that another one dominates by the true means."""
+    """The fraction of listed designs that are dominated by another, by their true means."""
     true = np.array([truths(kind, design.genes, True) for design in outcome.designs])
     return np.mean(np.any(np.all(true[:, None] > true[None], axis=2), axis=1))
 
 
 def table(searches, kinds):
-    """Print a line for each kind of noise and way to search."""
+    """Print a line for each kind of noise and each way to search."""
     for kind in kinds:
         for way, settings in WAYS.items():
             report(kind, way, coverage(kind, searches, **settings))

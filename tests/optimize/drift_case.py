@@ -1,4 +1,4 @@
-"""A case that compiles in a moment: free grains, and how far they drift."""
+"""A case that compiles quickly: the drift distance of free grains."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def scene(design, seed):
 
 
 def distance(result):
-    """Mean distance from the middle, m."""
+    """Mean distance from the centre, m."""
     return float(np.linalg.norm(result.state["position"], axis=1).mean())
 
 

@@ -1,4 +1,4 @@
-"""Stand-ins for scenes and their evaluation that cost nothing and count everything."""
+"""Stand-ins for scenes and their evaluation, which cost nothing and count every call."""
 
 import hashlib
 import json
@@ -33,10 +33,11 @@ def bowl(design, seed, noise=0.01):
 
 
 class FakeEvaluator:
-    """function(design, seed) -> fitness, or a string: the reason of a failed run.
+    """function(design, seed) -> fitness, or a string that gives the reason of a failed run.
 
-    Yields in reverse order, to catch whoever relies on the order; interrupt_after: KeyboardInterrupt then.
-    leaves_state: runs have a last state, as scenes have and functions have not.
+    Results come in reverse order, to detect code that relies on the order.
+    interrupt_after : number of evaluations before a KeyboardInterrupt.
+    leaves_state : whether runs have a final state, as scenes do and functions do not.
     """
 
     def __init__(self, function=bowl, interrupt_after=math.inf, delay=0.0, leaves_state=True):
@@ -87,7 +88,7 @@ def fake_record(number, fitness=None, ok=True, pad=""):
 
 
 class FakeCache:
-    """Evaluations in memory only, for searches by the dozen."""
+    """Evaluations in memory only, for dozens of searches."""
 
     def __init__(self):
         self.records_by_key = {}
@@ -112,7 +113,7 @@ class FakeCache:
 
 
 def string_of(point, *costs, std=0.0, starts=1):
-    """A string of known costs; std : of each of its starts."""
+    """An individual with known costs; std : standard deviation over its starts."""
     string = Individual(point, len(costs))
     string.know(tuple(FitnessEstimate(float(c), std, float(c), float(c), starts, True) for c in costs))
     return string

@@ -1,4 +1,4 @@
-"""A noisy function of two genes whose searches, of several methods, share a folder."""
+"""A noisy function of two genes, for searches with several methods that share a folder."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from tisim.optimize.problem.problem import Problem
 
 
 def noisy(design, seed):
-    """A bowl with its least value, 0.5, at x = 0.3, y = 0.6, and noise that follows from the seed."""
+    """A bowl with its minimum, 0.5, at x = 0.3, y = 0.6, and noise determined by the seed."""
     noise = 0.01 * np.random.default_rng(seed).normal()
     return (design["x"] - 0.3) ** 2 + (design["y"] - 0.6) ** 2 + 0.5 + noise
 

@@ -1,4 +1,4 @@
-"""Ask and tell: the methods of searches for experiments that are made elsewhere."""
+"""Ask and tell: search methods for experiments that are done elsewhere."""
 
 import math
 
@@ -29,8 +29,8 @@ def going_on(campaign, generations, of=worth):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_it_asks_for_what_a_search_runs(method):
-    """Of the same method, seed and options, where designs have no noise."""
+def test_ask_gives_the_designs_of_a_search(method):
+    """The designs equal those of a search with the same method, seed and options, if there is no noise."""
     problem = fake_problem(3)
 
     def quiet(design, seed=0):
@@ -49,8 +49,8 @@ def test_it_asks_for_what_a_search_runs(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_file_is_gone_on_with(tmp_path, method):
-    """By a new object after every answer, in another order, with designs that nobody asked for."""
+def test_a_campaign_continues_from_its_file(tmp_path, method):
+    """A new object after every answer continues, in another order, with designs that were not asked for."""
 
     def step(campaign, number):
         asked = campaign.ask()
@@ -73,7 +73,7 @@ def test_a_file_is_gone_on_with(tmp_path, method):
     assert len(again.outcome.estimates) == len(whole.outcome.estimates) == 20 + 4
 
 
-def test_the_best_is_found_and_is_told_in_units():
+def test_the_best_is_found_and_given_in_units():
     campaign = going_on(AskTell(GENES, {"gain": "largest"}, seed=1), 5, lambda design: 3 - worth(design))
     assert campaign.best.values["gain"] > 2.999
     assert abs(campaign.best.genes["x"] - 0.3) < 0.03
@@ -97,7 +97,7 @@ def test_several_objectives_give_a_front(method):
         AskTell(GENES, ["a", "b"], method="zohdi")
 
 
-def test_noise_is_told_or_had_from_repeats():
+def test_noise_is_given_or_estimated_from_repeats():
     campaign = AskTell(GENES, method="gaussian-process")
     assert campaign.best is None
     design, other = {"x": 0.1, "y": 1.0}, {"x": 0.2, "y": 1.0}
@@ -123,8 +123,8 @@ def point_of(design):
     return Genome(GENES).encode(design)
 
 
-def test_lucky_values_do_not_lead(rng):
-    """The best is the best by posterior mean, and not the design of the luckiest value."""
+def test_lucky_values_do_not_mislead(rng):
+    """The best design has the best posterior mean, not the luckiest value."""
     campaign = AskTell(GENES, method="gaussian-process")
     designs = [{"x": float(x), "y": 1.0} for x in np.linspace(-1, 1, 41)]
     values = [worth(design) for design in designs]
@@ -135,7 +135,7 @@ def test_lucky_values_do_not_lead(rng):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_experiments_that_fail_are_gone_on_from(method):
+def test_failed_experiments_are_accepted(method):
     campaign = AskTell(GENES, method=method, seed=1)
     for _ in range(3):
         designs = campaign.ask()
@@ -152,7 +152,7 @@ def test_experiments_that_fail_are_gone_on_from(method):
     assert all_failed.ask() != first
 
 
-def test_designs_that_were_not_asked_for_are_learnt_from():
+def test_designs_not_asked_for_are_learnt():
     told = [{"x": float(x), "y": 1.0} for x in np.linspace(-1, 1, 12)]
     campaign = AskTell(GENES, method="gaussian-process", seed=1)
     campaign.tell(told, [worth(design) for design in told])
@@ -164,7 +164,7 @@ def test_designs_that_were_not_asked_for_are_learnt_from():
     assert first.best.genes["x"] == pytest.approx(0.3, abs=0.1)
 
 
-def test_a_design_is_known_again_after_a_spreadsheet_has_rounded_it():
+def test_a_design_rounded_by_a_spreadsheet_is_recognised():
     campaign = AskTell(GENES, seed=1)
     asked = campaign.ask()
     rounded = {name: float(f"{value:.12g}") for name, value in asked[0].items()}
@@ -187,7 +187,7 @@ def test_starting_designs_are_asked_for_first(tmp_path):
         assert not {tuple(d.items()) for d in again.ask()} & {tuple(d.items()) for d in ours}
 
 
-def test_a_method_that_has_nothing_new_asks_for_nothing():
+def test_a_method_without_new_designs_asks_for_none():
     campaign = AskTell([Choice("wall", ("smooth", "rough", "oily"))], method="random")
     designs = campaign.ask()
     assert sorted(design["wall"] for design in designs) == ["oily", "rough", "smooth"]
@@ -210,7 +210,7 @@ def test_constraints_of_a_problem_hold():
         campaign.tell(campaign.ask()[0], 1.0)
 
 
-def test_what_cannot_be_is_refused(tmp_path):
+def test_impossible_values_are_refused(tmp_path):
     campaign = AskTell(GENES)
     (first, *_) = campaign.ask()
     for designs, values, errors, message in (
@@ -265,8 +265,8 @@ def test_files_of_others_are_refused(tmp_path):
     assert len(other.outcome.estimates) + 1 == len(one.outcome.estimates)
 
 
-def test_files_of_designs_are_told(tmp_path):
-    """Those of another campaign, among them; and with another method its knowledge goes on."""
+def test_files_of_designs_are_read(tmp_path):
+    """A campaign reads the file of another one with another method, and a new object continues from there."""
     file = tmp_path / "c.csv"
     first = going_on(AskTell(GENES, seed=1, file=file), 3)
     second = AskTell(GENES, method="gaussian-process", file=tmp_path / "d.csv")

@@ -1,4 +1,4 @@
-"""Constraints of a result: the best design is one that keeps to them, on the mean over its starts."""
+"""Constraints on results: the best design satisfies them, for the mean over its starts."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ GENES = (Gene("x", "m", 0.0, 1.0), Gene("y", "m", 0.0, 1.0))
 
 
 def bowl(design, seed):
-    """Least at (0.3, 0.3); its load is x + y and noise of its own."""
+    """Least at (0.3, 0.3); its load is x + y plus noise."""
     rng = np.random.default_rng(seed)
     value = (design["x"] - 0.3) ** 2 + (design["y"] - 0.3) ** 2
     return {"value": value + 0.001 * rng.normal(), "load": design["x"] + design["y"] + 0.01 * rng.normal()}
@@ -24,7 +24,7 @@ def problem(**bounds):
 
 
 @pytest.mark.parametrize("method", ["gaussian-process", "cma-es"])
-def test_the_best_design_keeps_to_a_constraint_of_the_result(method):
+def test_the_best_design_satisfies_a_constraint_on_the_result(method):
     outcome = optimize.run(problem(at_least=1.0), method=method, max_evaluations=200, generations=100)
     best = outcome.designs[0]
     assert best.genes["x"] + best.genes["y"] == pytest.approx(1.0, abs=0.05)
@@ -32,7 +32,7 @@ def test_the_best_design_keeps_to_a_constraint_of_the_result(method):
     assert all(string.violation == 0 and string.limited[0] >= 1.0 for string in outcome.hall)
 
 
-def test_where_no_design_keeps_to_it_the_one_that_violates_it_least_is_best():
+def test_without_a_feasible_design_the_least_violation_is_best():
     outcome = optimize.run(problem(at_least=3.0), max_evaluations=80, generations=100)
     assert outcome.hall[0].violation == min(s.violation for s in outcome.hall) > 0
     assert sum(outcome.designs[0].genes.values()) > 1.8

@@ -1,8 +1,8 @@
-"""Intervals that searches report hold the truth as often as they say, of any noise, and so does a target.
+"""Reported intervals have their nominal coverage for all kinds of noise, and targets their confidence.
 
     PYTHONPATH=. python tests/optimize/coverage_of_searches.py
 
-prints the table of all kinds of noise.
+prints the table for all kinds of noise.
 """
 
 import math
@@ -19,16 +19,18 @@ FEW = {"options": {"population": 40}, "max_evaluations": 100, "ensemble": OWN}
 
 @pytest.fixture(autouse=True)
 def quick_disk(monkeypatch):
-    """Nothing of these searches is kept."""
+    """Skip fsync, as no file of these searches is kept."""
     monkeypatch.setattr("os.fsync", lambda file: None)
 
 
 @pytest.mark.parametrize(
     "kind", ["one of 20 runs is off by 20 deviations", "one of 20 runs is off, else equal"]
 )
-def test_ten_searches_report_intervals_that_hold(kind):
-    """Of 10 that hold with a chance of 0.95 less than 8 do so in one of 90 cases; where rare runs are off,
-    of intervals by a sample alone half do not hold."""
+def test_ten_searches_report_valid_intervals(kind):
+    """Of 10 intervals with a coverage of 0.95 fewer than 8 contain the truth in one of 90 cases.
+
+    With rare outliers, half of the intervals computed from the single sample would miss it.
+    """
     first, *_ = coverage(kind, 10, **FEW)
     assert first >= 0.8
 
@@ -47,12 +49,13 @@ def test_a_target_that_no_design_meets_stops_no_search():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_intervals_hold(kind):
-    """From 0.93 to 0.97 within chance; more of outcomes that are shares, rare or skewed."""
+def test_intervals_have_their_coverage(kind):
+    """The coverage is 0.93 to 0.97 within chance, and higher for rare or skewed outcomes and for
+    fractions."""
     chance = 1.96 * math.sqrt(0.05 * 0.95 / SEARCHES)
     for way, settings in {**WAYS, **WAYS_TO_FRONTS}.items():
         if "one of 20" in kind and "common" in way:
-            continue  # what has not come to a single design is known to nobody
+            continue  # an outcome that no single design has shown cannot be known
         first, everything, error, _ = coverage(kind, SEARCHES, several="front" in way, **settings)
         print(f"{kind}, {way}: best {first:.3f}, all {everything:.3f} +- {1.96 * error:.3f}")
         assert first > 0.93 - chance
@@ -64,8 +67,10 @@ def test_intervals_hold(kind):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["normal", "exponential", "lognormal"])
 def test_a_target_is_met_with_confidence(kind):
-    """Where no design meets it one search in 20 stops at most; where some do, as few of those that stop do
-    so in error."""
+    """If no design meets the target, at most one search in 20 stops at it.
+
+    If some designs do, at most one in 20 of the searches that stop is wrong.
+    """
     chance = 1.96 * math.sqrt(0.05 * 0.95 / SEARCHES)
     stopped, _ = experiment.stopped_at_target(kind, SEARCHES, -1e-9)
     assert stopped < 0.05 + chance
@@ -76,7 +81,7 @@ def test_a_target_is_met_with_confidence(kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["normal", "lognormal, a factor", "captured of 20, 0.3"])
-def test_fronts_list_nothing_that_is_dominated(kind):
+def test_fronts_list_no_dominated_design(kind):
     outcomes = [searched(kind, seed, True, ensemble=OWN) for seed in range(50)]
     assert sum(map(experiment.dominated, outcomes)) == 0
     part = np.mean([experiment.truly_dominated(kind, outcome) for outcome in outcomes])

@@ -1,4 +1,4 @@
-"""Functions of a problem that are at fault end a search with a line that says so, and where."""
+"""A faulty function of a problem ends the search with a line that names the error and its place."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def test_an_objective_that_gives_no_number_is_refused(tmp_path, name):
 
 
 @pytest.mark.parametrize("number", [np.float32(0.5), np.int64(3), np.array(0.5), 7])
-def test_any_real_number_is_one(tmp_path, number):
+def test_any_real_number_is_accepted(tmp_path, number):
     assert run(tmp_path, objective=lambda r: number).best is not None
 
 
@@ -76,14 +76,14 @@ def refused(design, seed):
     raise InputError("speed must be below 1 m/s; received 2.0")
 
 
-def test_a_search_of_which_every_design_is_refused_ends_and_says_why(tmp_path):
+def test_a_search_without_valid_designs_ends_with_the_reason(tmp_path):
     with pytest.raises(
         RunError, match=r"^the scene function refused all of the first 24 designs; .* speed must"
     ):
         run(tmp_path, scene=refused)
 
 
-def test_a_search_of_which_some_designs_are_refused_goes_on(tmp_path):
+def test_a_search_with_some_refused_designs_continues(tmp_path):
     def some(design, seed):
         return FakeScene(design, seed) if design["x0"] > 0.3 else refused(design, seed)
 
@@ -93,7 +93,7 @@ def test_a_search_of_which_some_designs_are_refused_goes_on(tmp_path):
 
 
 def test_an_objective_that_reads_a_file_must_declare_it(tmp_path):
-    """Or its values would be reused when the file has changed."""
+    """Otherwise its values would be reused after the file has changed."""
     target = tmp_path / "target.csv"
     target.write_text("0.25")
 
@@ -111,7 +111,7 @@ def test_an_objective_that_reads_a_file_must_declare_it(tmp_path):
     assert run(tmp_path, objective=miss, files=[target]).evaluations > 0
 
 
-def test_a_file_that_an_objective_writes_itself_is_its_own(tmp_path):
+def test_an_objective_may_read_files_that_it_writes(tmp_path):
     def scratch(result):
         (tmp_path / "scratch.txt").write_text(str(result.value))
         return float((tmp_path / "scratch.txt").read_text())

@@ -1,4 +1,4 @@
-"""Values of objectives are reused for the same function bound to the same things, and for no other."""
+"""Objective values are reused for the same function bound to the same data, and for no other."""
 
 import functools
 import importlib
@@ -59,7 +59,7 @@ class Weights:
 
 @dataclass
 class OfFile:
-    """What it wants is no field of it."""
+    """Its target is not a dataclass field."""
 
     name: str
 
@@ -68,7 +68,7 @@ class OfFile:
 
 
 def with_base(value):
-    """An object of a class whose base has a value and a method that uses it."""
+    """An object of a class whose base class has a value and a method that uses it."""
     base = type("Base", (), {"target": [value], "miss": lambda self, result: abs(result - self.target[0])})
     return type("Objective", (base,), {"__call__": lambda self, result: self.miss(result)})()
 
@@ -103,13 +103,13 @@ MAKERS = {
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_what_a_function_is_bound_to_counts(name):
+def test_the_bound_data_of_a_function_count(name):
     make = MAKERS[name]
     assert fingerprint(make(0.5), name) == fingerprint(make(0.5), name)
     assert fingerprint(make(0.5), name) != fingerprint(make(1.5), name)
 
 
-def test_globals_count_and_so_do_those_of_functions_that_are_called(monkeypatch):
+def test_globals_of_a_function_and_its_callees_count(monkeypatch):
     before = fingerprint(of_global, "x"), fingerprint(through_another, "x")
     assert before == (fingerprint(of_global, "x"), fingerprint(through_another, "x"))
     with monkeypatch.context() as patch:
@@ -120,8 +120,8 @@ def test_globals_count_and_so_do_those_of_functions_that_are_called(monkeypatch)
     assert fingerprint(through_another, "x") != before[1]
 
 
-def test_what_is_named_of_a_module_of_the_user_counts(tmp_path, monkeypatch):
-    """Its file, and a value that was set in it since."""
+def test_names_from_user_modules_count(tmp_path, monkeypatch):
+    """Its file counts, and a value that was set in it later."""
     monkeypatch.syspath_prepend(tmp_path)
     text = "LEVEL = 1.0\n\n\ndef miss(result):\n    return abs(result - LEVEL)\n"
     (tmp_path / "own_levels.py").write_text(text)
@@ -140,14 +140,14 @@ def test_what_is_named_of_a_module_of_the_user_counts(tmp_path, monkeypatch):
     monkeypatch.delitem(sys.modules, "own_levels")
 
 
-def test_what_was_computed_of_an_object_since_does_not_count():
+def test_cached_values_of_an_object_do_not_count():
     weights = Weights(("a",), {"a": 1.0})
     before = fingerprint(of_closure(weights), "x")
     assert weights.total == 1.0
     assert fingerprint(of_closure(weights), "x") == before
 
 
-def test_code_that_was_typed_anew_counts():
+def test_redefined_code_counts():
     """As in a notebook, where there is no file."""
     names = {}
     exec("def f(r): return r - 1", names)
@@ -158,7 +158,7 @@ def test_code_that_was_typed_anew_counts():
     assert fingerprint(names["f"], "x") != before
 
 
-def test_objects_that_hold_each_other_end():
+def test_cyclic_objects_are_handled():
     one, other = SimpleNamespace(a=1), SimpleNamespace(a=2)
     one.other, other.other = other, one
     before = fingerprint(of_closure(one), "x")
@@ -167,15 +167,15 @@ def test_objects_that_hold_each_other_end():
     assert fingerprint(of_closure(one), "x") != before
 
 
-def test_what_cannot_be_compared_is_refused():
+def test_incomparable_objects_are_refused():
     lock = threading.Lock()
     with pytest.raises(InputError, match=r"^objective R must use only values that can be compared; "):
         fingerprint(of_closure(lock), "objective R")
-    # Of a scene, which has a digest of its own, it counts by its class.
+    # In the fingerprint of a scene, which has its own digest, an object counts by its class.
     assert fingerprint(of_closure(lock)) == fingerprint(of_closure(threading.Lock()))
 
 
-def test_a_code_stands_for_what_cannot_be_compared():
+def test_an_explicit_code_replaces_the_comparison():
     """As the message recommends."""
     made = replace(problem("default", ""), objective=of_closure(threading.Lock()))
     with pytest.raises(InputError, match="Or give Problem"):
@@ -190,7 +190,7 @@ print(*(t.fingerprint(make(0.5), name) for name, make in t.MAKERS.items()))
 """
 
 
-def test_it_is_the_same_in_another_process():
+def test_fingerprints_are_equal_in_another_process():
     command = [sys.executable, "-c", SCRIPT]
     root = Path(__file__).parents[2]
     told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root).stdout.split()
@@ -209,7 +209,7 @@ def away(result, target):
 
 @pytest.mark.long
 def test_another_target_in_the_same_folder_is_another_problem(tmp_path):
-    """The second search is refused; it does not reuse the values of the first."""
+    """The second search is refused and does not reuse the values of the first."""
 
     def of(target):
         objective = functools.partial(
@@ -227,7 +227,7 @@ def test_another_target_in_the_same_folder_is_another_problem(tmp_path):
 @pytest.mark.long
 @pytest.mark.slow
 def test_another_range_of_a_gene_is_another_search(tmp_path):
-    """It is not taken for the same, and a value of the same design is."""
+    """The searches differ, but the values of equal designs are reused."""
     made = problem("default", "")
     gene, *others = made.genome.genes
     wider = replace(made, genome=optimize.Genome((replace(gene, high=2 * gene.high), *others)))

@@ -1,4 +1,4 @@
-"""Records of what designs are worth: the same to the last bit, or in the mean, or changed."""
+"""Records of fitness values: equal to the last bit, equal in the mean, or changed."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tisim.steppers import FixedStep, Verlet
 
 
 def fall(design, seed, strength=1.0):
-    """Some particles that fall from random heights."""
+    """A few particles that fall from random heights."""
     height = np.random.default_rng(seed).uniform(0.0, 1.0, 5)
     return tisim.Scene(
         particles=tisim.Particles(
@@ -38,7 +38,7 @@ def problem(scene=fall):
 
 
 class Blowing(Force):
-    """A force that is not a number."""
+    """A force that is NaN."""
 
     @ti.func
     def force(self, s, w, i, t):
@@ -53,7 +53,7 @@ def record():
     return FitnessRecord.measure(problem(), DESIGNS, starts=6)
 
 
-def test_it_is_what_the_runs_give_start_by_start(record):
+def test_a_record_contains_the_values_of_each_start(record):
     assert record.starts == 6
     for name, design in DESIGNS.items():
         results = tisim.run([fall(design, seed) for seed in range(6)])
@@ -61,7 +61,7 @@ def test_it_is_what_the_runs_give_start_by_start(record):
         assert record.values[name]["height"] == heights
 
 
-def test_a_file_of_it_gives_the_same_bits_again(record, tmp_path):
+def test_a_record_file_keeps_all_bits(record, tmp_path):
     record.save(tmp_path / "fitness.json")
     loaded_record = FitnessRecord.load(tmp_path / "fitness.json")
     assert loaded_record == record
@@ -70,14 +70,14 @@ def test_a_file_of_it_gives_the_same_bits_again(record, tmp_path):
     assert loaded_record.deviations(again) == {"slow": 0.0, "fast": 0.0}
 
 
-def test_a_change_of_the_laws_is_seen(record):
-    """Another gravity moves all heights alike, by a thousandth of the fall; the spread stays."""
+def test_a_change_of_the_laws_is_detected(record):
+    """Another gravity changes all heights by a thousandth of the fall and keeps their spread."""
     changed = record.again(problem(lambda design, seed: fall(design, seed, 1.001)))
     assert min(record.deviations(changed).values()) > 4.0
 
 
-def test_other_rounding_is_not(record):
-    """Single starts that have gone elsewhere, and a shift by rounding, keep the mean within its error."""
+def test_different_rounding_is_not_a_change(record):
+    """Single starts that differ, and a shift by rounding, keep the mean within its error."""
     draw = np.random.default_rng(5)
     values = {
         name: {
@@ -92,15 +92,15 @@ def test_other_rounding_is_not(record):
 
 
 @pytest.mark.parametrize(("recorded", "now"), [(1.0, np.nan), (1.0, np.inf), (0.0, 1.0)])
-def test_what_is_no_number_any_more_or_was_nothing_is_a_change(record, recorded, now):
-    """Also where another objective of the design has not changed."""
+def test_new_or_former_failures_are_a_change(record, recorded, now):
+    """This holds even if another objective of the design has not changed."""
     before, after = (
         replace(record, values={"slow": {"height": [1.0], "spread": [value]}}) for value in (recorded, now)
     )
     assert before.deviations(after) == {"slow": np.inf}
 
 
-def test_what_is_no_record_of_this_problem_is_refused(record, tmp_path):
+def test_records_of_other_problems_are_refused(record, tmp_path):
     path = tmp_path / "fitness.json"
     with pytest.raises(InputError, match="fitness record must be an existing file; received"):
         FitnessRecord.load(path)
@@ -128,5 +128,5 @@ def test_a_run_that_fails_names_its_design():
         FitnessRecord.measure(wild, DESIGNS, starts=1)
 
 
-def test_it_is_among_the_public_names():
+def test_the_record_is_public():
     assert optimize.FitnessRecord is FitnessRecord

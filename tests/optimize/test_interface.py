@@ -1,4 +1,4 @@
-"""What is public of optimize: a search in a few lines, and what it gives back by name and in units."""
+"""The public interface of optimize: a search in a few lines, with results by name and in units."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ SMALL = {
 
 @pytest.fixture(scope="module")
 def drift():
-    """One search of the drift of free grains, kept nowhere."""
+    """One search on the drift of free grains, without a folder."""
     return optimize.run(problem("default", ""), seed=4, **SMALL)
 
 
@@ -66,8 +66,8 @@ def test_pandas_is_optional(drift, monkeypatch):
 
 
 @pytest.mark.long
-def test_a_folder_is_gone_on_with(drift, tmp_path, capsys):
-    """The same designs as without one; again, nothing is run; nothing is printed."""
+def test_a_search_in_a_folder_can_be_continued(drift, tmp_path, capsys):
+    """The designs equal those of a search without a folder; a repetition runs and prints nothing."""
     first = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
     again = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
     assert first.designs == again.designs == drift.designs
@@ -78,14 +78,14 @@ def test_a_folder_is_gone_on_with(drift, tmp_path, capsys):
 
 @pytest.mark.long
 def test_a_search_may_run_in_a_thread_of_its_own(drift):
-    """Where Python cannot be told to handle Ctrl-C."""
+    """Python cannot handle Ctrl-C in such a thread."""
     with ThreadPoolExecutor(1) as pool:
         again = pool.submit(optimize.run, problem("default", ""), seed=4, **SMALL).result()
     assert again.designs == drift.designs
 
 
 def test_other_threads_wait_until_a_search_is_over(monkeypatch):
-    """Between its evaluations too: they would start Taichi with settings that are not its own."""
+    """They must wait between its evaluations too, because they would start Taichi with other settings."""
 
     def free():
         acquired = runtime.turn.acquire(blocking=False)
@@ -140,7 +140,7 @@ def test_another_objective_has_another_identity():
     assert replace(one, code="mine").identity == replace(one, code="mine", objective=len).identity
 
 
-def test_importing_it_loads_nothing_heavy():
+def test_the_import_loads_nothing_heavy():
     heavy = ("taichi", "quadrants", "numpy", "deap", "h5py", "pydantic", "pandas")
     code = f"import tisim.optimize, sys; print([m for m in {heavy} if m in sys.modules])"
     completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

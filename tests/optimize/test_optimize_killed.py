@@ -1,4 +1,4 @@
-"""A real search, compiled kernels and all, killed again and again: nothing is lost, nothing changes."""
+"""A real search with compiled kernels, killed repeatedly: nothing is lost and no result changes."""
 
 import random
 import subprocess
@@ -17,13 +17,14 @@ REAL = ("agglomeration", "--size", "small")
 
 
 def begin(case, folder):
-    """The search, in a process that names on its standard output what it has stored."""
+    """Start the search in a process that prints the key of each stored evaluation."""
     settings = ("--generations", "5", "--seed", "3", "--out", folder)
     return worker("tisim", "optimize", *case, *settings, stderr=subprocess.DEVNULL, pipesize=PIPE)
 
 
 def kill(search, folder, rng):
-    """SIGKILL at a random moment, mostly while evaluations are stored; the keys of those reported stored."""
+    """SIGKILL at a random moment, mostly while evaluations are stored; returns the keys reported as
+    stored."""
     reported = ""
     moment = rng.choice(["starts", "reads and compiles", "stores", "stores", "stores", "stores"])
     if moment == "reads and compiles":
@@ -39,7 +40,7 @@ def kill(search, folder, rng):
 
 
 def at_work(folder):
-    """Whether a search holds the lock of its folder, which it makes itself."""
+    """Whether a search holds the lock of its folder, which it creates itself."""
     if not (folder / lock.LOCK).exists():
         return False
     try:
@@ -50,7 +51,7 @@ def at_work(folder):
 
 
 def contents_of(folder):
-    """All that a search has found: in its file, and in what it has written of its best designs."""
+    """The results of a search: the contents of its file, and its best designs."""
     cache = Cache(folder / "search.h5")
     tables = {name: cache.table(name).columns for name in cache.tables()}
     files = [(folder / name).read_bytes() for name in ("best.csv", "best_scene.toml")]
@@ -60,7 +61,7 @@ def contents_of(folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("case", "kills"), [(QUICK, 3), (REAL, 20)])
-def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
+def test_a_killed_search_ends_as_if_undisturbed(tmp_path, case, kills):
     with begin(case, tmp_path / "whole") as search:
         search.communicate()
     assert search.returncode == 0
@@ -71,11 +72,11 @@ def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
     records_before, leftovers = {}, set()
     for number in range(kills):
         if 2 * len(records_before) > len(whole[2]):
-            break  # What is left is for the run that is not killed, however fast the machine is.
+            break  # leave the rest for the final run, however fast the machine is
         with begin(case, folder) as search:
             keys = kill(search, folder, rng)
         if not (file.exists() or keys):
-            continue  # killed before there was anything
+            continue  # killed before the file was made
         report = verify(file)
         assert report.ok, report
         leftovers |= {name for name in ("journal", "torn", "duplicates") if getattr(report, name)}

@@ -41,12 +41,12 @@ def run(path, evaluator=None, genes=4, problem=None, callbacks=None, **settings)
 
 @pytest.mark.parametrize("settings", [{}, pytest.param(DEAP, marks=pytest.mark.slow)], ids=["z04", "deap"])
 def test_beats_random_search_at_equal_evaluations(tmp_path, settings):
-    """In 10 dimensions, three seeds: the median best lies far below that of as many random points."""
+    """In 10 dimensions with three seeds the median best is far below an equal number of random points."""
     best, chance = [], []
     for seed in range(3):
         outcome = run(tmp_path / f"{seed}.h5", genes=10, seed=seed, **settings)
         requested = sum(outcome.logbook.select("starts"))
-        assert 300 < requested <= 20 * 26  # strings that are bred twice are not run twice
+        assert 300 < requested <= 20 * 26  # individuals that are bred twice are not run twice
         points = np.random.default_rng(seed).random((requested, 10))
         best.append(outcome.best.estimates[0].mean - 0.5)
         chance.append(np.sum((points - 0.3) ** 2, axis=1).min())
@@ -59,7 +59,7 @@ def test_log_of_a_search(path):
     log = outcome.logbook
     assert (outcome.stopped, outcome.interrupted) == ("generations", False)
     assert log.select("gen") == list(range(13))
-    assert log.select("designs") == [20] + [14] * 12  # parents are never estimated again
+    assert log.select("designs") == [20] + [14] * 12  # parents are never evaluated again
     best = log.select("best")
     assert all(later <= earlier for earlier, later in itertools.pairwise(best))
     assert best[-1] < best[0]
@@ -126,7 +126,7 @@ def test_wall_clock_stops_between_generations(path):
 
 def test_failures_never_win(path):
     def function(design, seed):
-        if design["x0"] < 0.35:  # the optimum lies here
+        if design["x0"] < 0.35:  # the minimum lies here
             return ("collapsed", math.nan, -math.inf)[seed % 3]
         return quiet_bowl(design, seed)
 
@@ -146,7 +146,7 @@ def test_all_failed_is_an_outcome_without_a_best(path):
     assert outcome.logbook.select("best") == [math.inf] * 6
 
 
-def test_callbacks_tell_where_the_search_is(path):
+def test_callbacks_report_the_progress_of_the_search(path):
     generations, steps = [], []
     callbacks = {"on_generation": generations.append, "on_progress": steps.append}
     outcome = run(path, callbacks=callbacks, generations=3)
@@ -166,7 +166,7 @@ def test_callbacks_tell_where_the_search_is(path):
     assert [(p.evaluations, p.hits) for p in again] == [(0, 20), (0, 34), (0, 48), (0, 62)]
 
 
-def test_file_holds_what_is_needed_to_redo_the_search(path):
+def test_the_file_contains_the_settings_of_the_search(path):
     outcome = run(path, generations=4, **DEAP)
     cache = Cache(path)
     about = cache.table(outcome.name).attrs
@@ -202,7 +202,7 @@ def test_longer_search_continues_a_shorter_one(path):
     )
 
 
-def test_file_is_of_the_search_before_anything_has_run(path):
+def test_the_file_belongs_to_the_search_before_the_first_run(path):
     outcome = run(path, FakeEvaluator(interrupt_after=0))
     assert Cache(path).table(outcome.name).attrs["stopped"] == "interrupted"
     with pytest.raises(RunError, match="in the middle"):
@@ -210,8 +210,9 @@ def test_file_is_of_the_search_before_anything_has_run(path):
     assert len(searches(Cache(path))) == 2
 
 
-def test_best_designs_are_reported_from_starts_that_have_not_been_used(path):
-    """After the search each has some starts more, by which they are chosen, and then fresh ones."""
+def test_best_designs_are_reported_from_held_out_seeds(path):
+    """After the search the candidates get further starts, by which the best are chosen, and then held-out
+    seeds."""
     settings = EnsembleSettings(min_starts=3, select=5, confirm=10)
     evaluator = FakeEvaluator(lambda design, seed: bowl(design, seed + int(1e9 * design["x0"]), noise=0.3))
     outcome = run(path, evaluator, generations=3, ensemble=settings)
@@ -232,7 +233,7 @@ def test_best_designs_are_reported_from_starts_that_have_not_been_used(path):
 
 
 @pytest.mark.parametrize("budget", [60, 200, 600])
-def test_the_budget_has_fresh_starts_in_it(tmp_path, budget):
+def test_the_budget_includes_the_held_out_seeds(tmp_path, budget):
     outcome = run(
         tmp_path / "b.h5", FakeEvaluator(bowl), generations=1000, max_evaluations=budget, ensemble={}
     )
@@ -240,8 +241,9 @@ def test_the_budget_has_fresh_starts_in_it(tmp_path, budget):
     assert all(string.confirmed for string in outcome.hall)
 
 
-def test_a_search_stops_at_a_target_only_when_it_is_met_for_sure(tmp_path):
-    """Of noise 0.3 many means of two starts are below 0.5, the least that is; none is below 0.5 truly."""
+def test_a_search_stops_at_a_target_only_with_confidence(tmp_path):
+    """With noise 0.3 many means of two starts are below 0.5, the true minimum, but no true cost is below
+    0.5."""
     evaluator = FakeEvaluator(lambda design, seed: bowl(design, seed + int(1e9 * design["x0"]), noise=0.3))
     few = {"options": {"population": 12, "parents": 4}, "ensemble": {}}
     never = run(tmp_path / "a.h5", evaluator, generations=4, target=0.49, **few)
@@ -253,16 +255,15 @@ def test_a_search_stops_at_a_target_only_when_it_is_met_for_sure(tmp_path):
     assert met.hall[0].confirmed[0].mean < 0.9
 
 
-def test_a_function_without_noise_is_found_out_and_run_once(tmp_path):
+def test_a_function_without_noise_is_run_once(tmp_path):
     outcome = run(tmp_path / "a.h5", generations=5, ensemble={})
     assert {string.estimates[0].starts for string in outcome.hall} == {1}
     assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 2
     assert outcome.designs[0].intervals["fitness"] == (outcome.designs[0].values["fitness"],) * 2
 
 
-def test_a_rare_outcome_that_has_not_come_yet_leaves_an_interval(tmp_path):
-    """Of few runs that are all equal nothing says that others would be; nor of many from two starts that all
-    designs have in common."""
+def test_equal_runs_leave_an_interval_for_rare_outcomes(tmp_path):
+    """A few equal runs do not exclude other outcomes, and neither do many runs with two common starts."""
     evaluator = FakeEvaluator(quiet_bowl, leaves_state=False)
     for runs, common in ((40, False), (200, True)):
         settings = {"max_evaluations": runs, "ensemble": {"common_starts": common}}
@@ -271,7 +272,7 @@ def test_a_rare_outcome_that_has_not_come_yet_leaves_an_interval(tmp_path):
         assert low <= value < high
 
 
-def test_unfit_operators_stop_it_before_anything_runs(path):
+def test_unfit_operators_are_refused_before_anything_runs(path):
     evaluator = FakeEvaluator()
     with pytest.raises(InputError, match="fit for real-valued strings"):
         run(path, evaluator, method="genetic", options={"mate": GeneticOperator(name="cxOrdered")})
@@ -301,7 +302,7 @@ def _full(handle, data, offset):
 
 
 def test_designs_that_fail_from_further_starts_are_not_reported(tmp_path):
-    """One start in three fails, so that no design passes the starts in which the best are chosen."""
+    """One start in three fails, so every design fails in one of the starts used to choose the best."""
 
     def function(design, seed):
         return "lost" if (seed + int(1e9 * design["x0"])) % 3 == 0 else bowl(design, seed, noise=0.01)

@@ -1,4 +1,4 @@
-"""What a search has found as data frames: from its outcome, and read back from its file."""
+"""The results of a search as data frames, from its outcome and from its file."""
 
 import sys
 
@@ -103,7 +103,7 @@ def test_a_file_is_read_back(found):
     assert list(file.objectives()["direction"]) == ["largest"]
 
 
-def test_standard_errors_are_those_of_the_runs(found):
+def test_standard_errors_follow_from_the_runs(found):
     _, folder = found
     file = optimize.read(folder)
     runs, designs = file.runs(), file.designs()
@@ -112,7 +112,7 @@ def test_standard_errors_are_those_of_the_runs(found):
         assert row["gain std. error"] == pytest.approx(stats.sem(mine), rel=1e-9)
 
 
-def test_a_search_that_goes_on_is_read_up_to_now(tmp_path):
+def test_a_running_search_is_read_up_to_now(tmp_path):
     counts = []
 
     class Watched(FakeEvaluator):
@@ -126,11 +126,11 @@ def test_a_search_that_goes_on_is_read_up_to_now(tmp_path):
     with Cache(tmp_path / SEARCH_FILE) as cache:
         outcome = search(problem, Watched(gain), cache, settings)
     starts = np.cumsum([0, *outcome.logbook.select("starts")])
-    # The first generation looks at two designs before it runs the rest.
+    # The first generation evaluates two designs before the rest.
     assert counts == [(0, 0), (4, 0), *((count, k) for k, count in enumerate(starts[1:-1], start=1))]
 
 
-def test_a_file_of_several_searches_wants_a_name(tmp_path):
+def test_a_file_of_several_searches_needs_a_name(tmp_path):
     first, second = (searched(tmp_path, seed=seed) for seed in (1, 2))
     file = optimize.read(tmp_path)
     names = [outcome.name.removeprefix("searches/") for outcome in (first, second)]
@@ -145,7 +145,7 @@ def test_a_file_of_several_searches_wants_a_name(tmp_path):
         file.runs("other")
 
 
-def test_pandas_is_wanted_for_frames_alone(found, monkeypatch):
+def test_only_data_frames_need_pandas(found, monkeypatch):
     outcome, folder = found
     monkeypatch.setitem(sys.modules, "pandas", None)
     file = optimize.read(folder)
@@ -155,7 +155,7 @@ def test_pandas_is_wanted_for_frames_alone(found, monkeypatch):
             frame()
 
 
-def test_what_is_no_file_of_a_search_is_refused(tmp_path):
+def test_other_files_than_searches_are_refused(tmp_path):
     with pytest.raises(InputError, match="cache file must be an existing file; received"):
         optimize.read(tmp_path)
     (tmp_path / SEARCH_FILE).write_text("text")

@@ -1,4 +1,4 @@
-"""Several objectives: the front is found, kept whole, and its file goes on as any other."""
+"""Several objectives: the front is found and kept whole, and its search can be resumed."""
 
 import csv
 
@@ -30,7 +30,7 @@ OBJECTIVES = (
 
 
 def zdt1(design, seed, noise=0.0):
-    """ZDT1 (Zitzler, Deb and Thiele, Evol. Comput. 8 (2000) 173-195), its first objective turned round.
+    """ZDT1 (Zitzler, Deb and Thiele, Evol. Comput. 8 (2000) 173-195), with the first objective inverted.
 
     The front is price = 1 - sqrt(-gain), where all genes but the first are 0.
     """
@@ -67,7 +67,7 @@ def test_nsga2_finds_the_front_and_spreads_along_it(outcome):
     assert np.mean([p - (1 - np.sqrt(-g)) < 0.05 for g, p in chance]) < 0.01, "not by chance"
 
 
-def test_front_is_what_nothing_dominates(outcome):
+def test_no_design_of_the_front_is_dominated(outcome):
     costs = [[estimate.mean for estimate in estimates] for estimates in outcome.estimates.values()]
     front, points = values(outcome), np.array([outcome.problem.costs(each) for each in costs])
     better = (points[:, None, 0] >= front[None, :, 0]) & (points[:, None, 1] <= front[None, :, 1])
@@ -128,8 +128,8 @@ def test_log_and_report(outcome, tmp_path):
     assert imread(paths["front.png"]).std() > 0.01
 
 
-def test_designs_of_few_starts_are_distinguished_from_those_that_are_known(outcome):
-    """The front from 9 starts, others from 3 and 9."""
+def test_designs_of_few_starts_are_distinguished_from_well_known_ones(outcome):
+    """The front from 9 starts, other designs from 3 and 9."""
 
     def design(gain, starts):
         string = Individual([gain, starts / 10], 2)
@@ -157,7 +157,7 @@ def test_designs_of_few_starts_are_distinguished_from_those_that_are_known(outco
 
 
 @pytest.mark.slow
-def test_resumed_after_interrupt_it_is_the_same(path, tmp_path):
+def test_a_resumed_search_is_the_same(path, tmp_path):
     settings = {"ensemble": EnsembleSettings(max_starts=8, confirm=2), "generations": 2}
 
     def noisy(design, seed):
@@ -198,7 +198,7 @@ def test_cache_holds_all_objectives(path):
     assert verify(path).ok
 
 
-def test_what_cannot_be_is_refused(path):
+def test_impossible_values_are_refused(path):
     with pytest.raises(
         InputError,
         match="for several objectives: gaussian-process, genetic, nsga2, random; received 'zohdi'",
@@ -218,8 +218,8 @@ def test_what_cannot_be_is_refused(path):
         fake_problem(objective=OBJECTIVES, met_at=1.0)
 
 
-def test_one_objective_to_be_made_large(path):
-    """The same search as of its negative, shown as it is."""
+def test_one_maximised_objective(path):
+    """The search equals one for the negative objective, and shows the objective itself."""
     large = fake_problem(objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
     with Cache(path) as cache:
         high = search(large, FakeEvaluator(), cache, Settings(seed=1, generations=3, target=-0.6))

@@ -1,4 +1,4 @@
-"""Searches of one problem in one folder: one after the other, at once, killed; and warm starts."""
+"""Searches of one problem in one folder: in sequence, at once, and killed; and warm starts."""
 
 import csv
 import json
@@ -23,13 +23,13 @@ METHODS = ("zohdi", "cma-es", "random", "restart")
 
 @pytest.fixture(autouse=True)
 def without_pictures(monkeypatch):
-    """Sensitivities and pictures take most of the time of such searches."""
+    """Skip sensitivities and pictures, which take most of the time of such searches."""
     monkeypatch.setattr(report, "picture", lambda path, draw: [])
     monkeypatch.setattr(Analysis, "of", lambda outcome: Analysis(None, ()))
 
 
 def tables_of(folder, name):
-    """All that a search has left in its file, but for when it was."""
+    """The tables of a search in its file, except for dates."""
     cache = Cache(folder / "search.h5")
     return {
         table.removeprefix(name): repr(cache.table(table).columns)
@@ -38,7 +38,7 @@ def tables_of(folder, name):
     }
 
 
-def test_each_search_is_what_it_is_alone(tmp_path):
+def test_each_search_equals_the_same_search_alone(tmp_path):
     for method in ("zohdi", "cma-es"):
         alone = searched(tmp_path / method, method, 1)
         beside = searched(tmp_path / "both", method, 1)
@@ -51,8 +51,8 @@ def test_each_search_is_what_it_is_alone(tmp_path):
     assert len(file.logbook(file.searches[1])) == 4
 
 
-def test_a_search_takes_what_others_have_run(tmp_path):
-    """More generations, the same first generation, the same starting designs."""
+def test_a_search_reuses_the_runs_of_others(tmp_path):
+    """Searches with more generations, with the same first generation, and with the same starting designs."""
     first = searched(tmp_path, "zohdi", 1)
     more = searched(tmp_path, "zohdi", 1, generations=5)
     assert first.name == more.name
@@ -105,8 +105,8 @@ def test_a_warm_start_learns_and_runs_the_best_first(tmp_path):
     assert cold.logbook[0]["best"] > warm.logbook[0]["best"]
 
 
-def test_a_warm_start_goes_on_as_it_has_begun(tmp_path):
-    """Its own runs, and those of others since, are not what it has begun with."""
+def test_a_resumed_warm_start_uses_its_original_data(tmp_path):
+    """Neither its own runs nor later runs of others are part of its warm start."""
     searched(tmp_path, "zohdi", 1)
     warm = searched(tmp_path, "gaussian-process", 2, warm_start=True)
     assert searched(tmp_path, "gaussian-process", 2).name != warm.name
@@ -118,7 +118,7 @@ def test_a_warm_start_goes_on_as_it_has_begun(tmp_path):
     assert searched(tmp_path, "gaussian-process", 3, warm_start=True).name != warm.name
 
 
-def test_it_learns_only_from_what_it_could_ask_for(tmp_path):
+def test_a_warm_start_learns_only_from_designs_in_its_range(tmp_path):
     constraint = DesignConstraint("place", lambda design: design["x"], "m", at_most=0.9)
     whole = problem(constraints=[constraint])
     optimize.run(whole, out=tmp_path, method="random", seed=1, generations=0)
@@ -138,14 +138,14 @@ def test_it_learns_only_from_what_it_could_ask_for(tmp_path):
             assert max(told) <= 0.5
 
 
-def test_a_warm_start_wants_a_folder():
+def test_a_warm_start_needs_a_folder():
     with pytest.raises(InputError, match="warm_start must be given with a folder, out; received True"):
         optimize.run(problem(), warm_start=True)
 
 
 @pytest.mark.slow
-def test_killed_beside_another_it_ends_as_if_never_stopped(tmp_path):
-    """A warm start, killed again and again, while another search of the folder goes on."""
+def test_a_killed_search_beside_another_ends_as_if_undisturbed(tmp_path):
+    """A warm start is killed repeatedly while another search uses the folder."""
     for folder in ("whole", "cut"):
         searched(tmp_path / folder, "zohdi", 1)
     whole = searched(tmp_path / "whole", "gaussian-process", 2, warm_start=True)

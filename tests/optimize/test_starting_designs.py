@@ -1,4 +1,4 @@
-"""Designs of the user: run first with every method, or measured and learnt from without a run."""
+"""User designs: run first with every method, or given with measured values and learnt without a run."""
 
 import math
 
@@ -46,7 +46,7 @@ def run(path, evaluator=None, beginning=None, problem=None, **settings):
 
 
 @pytest.mark.parametrize("method", sorted(every()))
-def test_every_method_has_them_run_first(path, method):
+def test_every_method_runs_user_designs_first(path, method):
     evaluator = FakeEvaluator()
     outcome = run(path, evaluator, Beginning((BEST,)), method=method)
     assert {tuple(scene.design.values()) for scene in evaluator.calls[0]} == {(0.3, 0.3, 0.31)}
@@ -56,7 +56,7 @@ def test_every_method_has_them_run_first(path, method):
     assert outcome.name != run(path.with_name("alone.h5"), method=method, generations=0).name
 
 
-def test_a_method_is_told_of_what_it_has_asked_for_alone(path, monkeypatch):
+def test_a_method_gets_results_of_its_own_designs_only(path, monkeypatch):
     asked, told, tell = [], [], CmaEs.tell
 
     def noted(method, population, hall):
@@ -72,7 +72,7 @@ def test_a_method_is_told_of_what_it_has_asked_for_alone(path, monkeypatch):
 
 
 def learned(method, points):
-    """The method of five genes, as it is when it has learnt of these points, and what it asks for."""
+    """The method for five genes after it has learnt from these points, and the designs it asks for."""
     made = method_named(method)
     strings = [Individual(point) for point in points]
     worth(strings)
@@ -80,7 +80,7 @@ def learned(method, points):
     return made, [tuple(string) for string in made.ask()]
 
 
-def test_methods_learn_from_what_they_have_not_asked_for(rng):
+def test_methods_learn_from_user_designs(rng):
     points = [tuple(point) for point in rng.random((30, 5))]
     best = min(points, key=lambda point: quiet(dict(enumerate(point)), 0))
     cma, asked = learned("cma-es", points)
@@ -99,7 +99,7 @@ def test_methods_learn_from_what_they_have_not_asked_for(rng):
         assert len(asked) == (16 if method == "nsga2" else 6), "so many fewer random ones"
 
 
-def test_cma_es_goes_its_way_once_it_has_begun(rng):
+def test_cma_es_ignores_user_designs_after_its_start(rng):
     method, _ = learned("cma-es", rng.random((2, 5)))
     before = tuple(method.strategy.centroid)
     better = [Individual(np.full(5, 0.3))]
@@ -150,14 +150,14 @@ HEAD = "speed (m/s),blades,wall\n"
         ('speed,blades,wall\n3,4,"rough\n', "must be a CSV file that can be read; received"),
     ],
 )  # fmt: skip
-def test_what_is_no_design_is_refused(tmp_path, text, message):
+def test_invalid_designs_are_refused(tmp_path, text, message):
     (tmp_path / "d.csv").write_text(text)
     with pytest.raises(InputError, match=message):
         designs(tmp_path / "d.csv", MIXED)
 
 
 def test_files_are_read_as_spreadsheets_write_them(tmp_path):
-    """With a mark of byte order, line ends of Windows, empty lines, columns in any order, a design twice."""
+    """With a byte order mark, Windows line ends, empty lines, columns in any order, and a repeated design."""
     lines = (
         "wall,blades,length (m),speed,turns",
         "rough,4,0.2,2.5,7",
@@ -189,7 +189,7 @@ def test_files_are_read_as_spreadsheets_write_them(tmp_path):
         )
 
 
-def test_they_are_part_of_the_search_and_of_its_file(path):
+def test_user_designs_are_part_of_the_search_and_its_file(path):
     one = run(path, beginning=Beginning((BEST,)))
     assert Cache(path).table(f"{one.name}/starting_designs").columns == {k: [v] for k, v in BEST.items()}
     evaluator = FakeEvaluator()
@@ -199,7 +199,7 @@ def test_they_are_part_of_the_search_and_of_its_file(path):
 
 
 @pytest.mark.parametrize("after", [1, 3, 9, 30])
-def test_interrupted_among_them_it_goes_on_as_if_never_stopped(path, tmp_path, after):
+def test_a_search_interrupted_in_the_user_designs_continues_unchanged(path, tmp_path, after):
     beginning = Beginning(tuple({**BEST, "x0": 0.1 * k} for k in range(4)))
     whole = run(tmp_path / "whole.h5", beginning=beginning, generations=2)
     assert run(path, FakeEvaluator(interrupt_after=after), beginning, generations=2).interrupted
@@ -209,7 +209,7 @@ def test_interrupted_among_them_it_goes_on_as_if_never_stopped(path, tmp_path, a
     assert again.evaluations == whole.evaluations - after
 
 
-def test_more_than_the_budget_pays_for_are_cut_short(path):
+def test_user_designs_beyond_the_budget_are_not_run(path):
     beginning = Beginning(tuple({**BEST, "x0": 0.01 * k} for k in range(30)))
     outcome = run(path, beginning=beginning, max_evaluations=40)
     assert outcome.stopped == "evaluations"
@@ -245,7 +245,7 @@ def test_measured_designs_are_learnt_from_and_not_run(path, method):
     assert (again.evaluations, again.designs) == (0, outcome.designs)
 
 
-def test_methods_that_cannot_learn_from_them_refuse_them(path):
+def test_methods_that_cannot_learn_refuse_measured_designs(path):
     known = experiments(measured(3), fake_problem(3))
     with pytest.raises(
         InputError, match="method must be for experiments: cma-es, gaussian-process, genetic, nsga2"
@@ -311,8 +311,8 @@ def test_rows_of_experiments(tmp_path):
             experiments(tmp_path / "m.csv", two)
 
 
-def test_the_noise_of_what_was_measured_counts(path):
-    """A lucky value of large standard error does not lead the search astray."""
+def test_the_noise_of_measured_designs_counts(path):
+    """A lucky value with a large standard error does not mislead the search."""
     rows = [{**row, "std. error": 0.001} for row in measured(60)]
     lucky = {"x0": 0.95, "x1": 0.95, "x2": 0.95, "fitness": 0.2, "std. error": 1.0}
     ran = []

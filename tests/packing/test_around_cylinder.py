@@ -1,4 +1,4 @@
-"""Starts in a layer around a cylinder."""
+"""Initial states in a layer around a cylinder."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ CYLINDER = {
 
 
 def cylindrical(points):
-    """Distance from the axis and from the middle."""
+    """Distance from the axis and from the middle plane."""
     axis, offset = np.array([1.0, 2.0, 2.0]) / 3, points - [1.0, 2.0, 3.0]
     z = offset @ axis
     return np.linalg.norm(offset - z[:, None] * axis, axis=1), np.abs(z)
 
 
 @pytest.mark.parametrize("part", ["all", "top", "side"])
-def test_spheres_lie_wholly_in_their_part_and_fill_it_evenly(part):
+def test_spheres_lie_inside_their_layer_and_fill_it_uniformly(part):
     radius, number = 0.002, 4000
     placement = RandomAroundCylinder(**CYLINDER, part=part)
     points = placement.centres(np.full(number, radius), Open(), 1)
@@ -37,7 +37,7 @@ def test_spheres_lie_wholly_in_their_part_and_fill_it_evenly(part):
     share = placement.model_copy(update={"part": "top"}).volume() / placement.volume()
     expected = {"all": share, "top": 1.0, "side": 0.0}[part]
     assert beyond.mean() == pytest.approx(expected, abs=4 * np.sqrt(0.25 / number))
-    # Evenly over the squared distance from the axis, where the region goes from one to the other.
+    # The distribution is uniform in the squared distance from the axis.
     low = 0.0 if part == "top" else 0.25
     squares = rho[beyond == (part == "top")] ** 2
     assert squares.mean() == pytest.approx((low + 0.81) / 2, rel=0.02)
@@ -51,7 +51,7 @@ def test_volumes():
 
 
 @pytest.mark.parametrize("part", ["all", "top", "side"])
-def test_a_thin_layer_around_a_long_cylinder_has_room(part):
+def test_a_thin_layer_around_a_long_cylinder_is_filled(part):
     placement = RandomAroundCylinder(radius=1.0, length=40.0, thickness=1e-3, part=part)
     points = placement.centres(np.full(200, 1e-4), Open(), 0)
     assert len(points) == 200

@@ -1,4 +1,4 @@
-"""Templates of clumps: their bodies, and what is refused."""
+"""Clump templates: their rigid bodies, and invalid input."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ def test_the_body_is_the_union_in_its_principal_axes():
     np.testing.assert_allclose(solid.centre + body.places @ body.axes.T, PEAR.centres, atol=1e-14)
 
 
-def test_masses_of_spheres_weigh_at_the_centre_of_mass():
-    """They are above 0, and those of the volumes where spheres do not overlap."""
+def test_sphere_masses_preserve_the_centre_of_mass():
+    """Sphere masses are positive, and equal the volumes of spheres that do not overlap."""
     body = PEAR.body
     assert body.masses.sum() == pytest.approx(body.mass, rel=1e-14)
     assert (body.masses > 0).all()
@@ -31,7 +31,8 @@ def test_masses_of_spheres_weigh_at_the_centre_of_mass():
 
 
 def test_mass_and_inertia_may_be_given():
-    """About the centre of mass, from which the centres of spheres are; here the axes are not principal."""
+    """Inertia about the centre of mass, from which sphere centres are measured; here the axes are not
+    principal."""
     inertia = [(2.0, 0.3, 0.0), (0.3, 2.0, 0.1), (0.0, 0.1, 3.0)]
     body = Clump(centres=[(-1, 0, 0), (1, 0, 0)], radii=[0.5], mass=7.0, inertia=inertia).body
     assert body.mass == 7.0
@@ -55,7 +56,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("why", REFUSED)
-def test_what_cannot_be_is_refused(why):
+def test_impossible_values_are_refused(why):
     wrong, message = REFUSED[why]
     with pytest.raises(InputError, match=message):
         Clump(**{**PAIR, **wrong})
@@ -78,7 +79,7 @@ def test_poses_are_checked(wrong, message):
         Particles.of_clumps(**{"clumps": PEAR, "position": np.zeros((2, 3)), **wrong})
 
 
-def test_clumps_and_spheres_beside_them_are_of_the_materials_they_are_given():
+def test_clumps_and_spheres_have_their_given_materials():
     clump = Clump(centres=[(0, 0, 0), (1e-3, 0, 0)], radii=[1e-3], density=2500.0)
     places = [(0.0, 0.0, 0.1), (0.0, 0.0, 0.2)]
     alone = {"position": [(0.0, 0.0, 0.0)], "velocity": [(0.0, 0.0, 0.0)], "radius": 1e-3, "mass": 1e-6}
@@ -91,7 +92,7 @@ def test_clumps_and_spheres_beside_them_are_of_the_materials_they_are_given():
         Particles.of_clumps(clump, places, quantities={"charge": [1.0, 2.0, 3.0]})
 
 
-def test_what_is_a_rounding_below_a_joined_face_is_put_on_the_other():
+def test_a_position_rounded_below_a_periodic_face_is_wrapped():
     clump = Clump(centres=[(0, 0, 0)], radii=[0.1], density=2500.0)
     box = Box(low=(0, 0, 0), high=(1, 1, 1))
     made = Particles.of_clumps(clump, [(-1e-17, 0.5, 0.5)], box=box)

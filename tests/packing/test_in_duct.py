@@ -1,4 +1,4 @@
-"""Starts in a duct whose width changes along it."""
+"""Initial states in a duct of varying width."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,13 @@ from tisim.packing import EqualSizes, RandomInDuct
 
 DUCT = {"heights": (0.0, 3.0, 5.0, 6.0, 7.5, 10.0), "radii": (3.0, 3.0, 1.2, 1.2, 3.0, 3.0)}
 SHORT = {"heights": (0.0, 0.02, 0.6, 9.0, 10.0), "radii": (3.0, 3.0, 0.8, 0.8, 3.0)}
-"""One whose first part is so short that spheres at the upper face reach beyond it."""
+"""A duct whose first part is so short that spheres at the upper face extend beyond it."""
 LOW = (0.5, -0.5, -2.0)
 AROUND = Box(low=(-4.0, -4.0, -2.0), high=(4.0, 4.0, 8.0), periodic=(False, False, True))
 
 
 def off_wall(points, ends, duct=DUCT):
-    """How far points are from the lines of the profile, by samples of these, and whether they are inside."""
+    """Distance of points from the profile, by samples of its lines, and whether the points are inside."""
     rho = np.hypot(points[:, 0] - LOW[0], points[:, 1] - LOW[1])
     z = points[:, 2] - LOW[2]
     places = np.linspace(-10.0, 20.0, 120001)
@@ -34,7 +34,7 @@ def off_wall(points, ends, duct=DUCT):
 
 @pytest.mark.parametrize("domain", [AROUND, Open()])
 @pytest.mark.parametrize("fraction", [0.1, 0.345])
-def test_spheres_lie_wholly_in_the_duct_and_overlap_none(domain, fraction):
+def test_spheres_lie_inside_the_duct_without_overlap(domain, fraction):
     placement = RandomInDuct(centre=LOW, **DUCT)
     rng = np.random.default_rng(1)
     radii = rng.uniform(0.2, 0.4, 2000)
@@ -47,7 +47,7 @@ def test_spheres_lie_wholly_in_the_duct_and_overlap_none(domain, fraction):
     distance, inside = off_wall(points, domain is not AROUND)
     assert inside.all()
     assert (distance >= radii - 1e-6).all()
-    # Some reach across the faces where the duct goes on there.
+    # Some spheres cross the periodic faces.
     z = points[:, 2] - LOW[2]
     assert ((z < radii) | (z > 10 - radii)).any() == (domain is AROUND)
     again = placement.centres(radii, domain, 3)
@@ -64,7 +64,7 @@ def test_spheres_are_off_the_wall_beyond_a_short_part_at_the_face():
         assert (distance >= radii - 1e-6).all()
 
 
-def test_few_small_spheres_are_even_over_the_duct():
+def test_few_small_spheres_are_uniform_in_the_duct():
     placement = RandomInDuct(**DUCT)
     points = placement.centres(np.full(4000, 0.005), Open(), 0)
     a, b = 3.0, 1.2
@@ -73,12 +73,12 @@ def test_few_small_spheres_are_even_over_the_duct():
     assert placement.volume() == pytest.approx(volume)
     below = (points[:, 2] < 3).mean()
     assert below == pytest.approx(27 * np.pi / volume, abs=4 * np.sqrt(0.25 / 4000))
-    # In the straight part evenly over the squared distance from the axis.
+    # In the straight part the distribution is uniform in the squared distance from the axis.
     squares = (points[points[:, 2] < 3, :2] ** 2).sum(axis=1)
     assert squares.mean() == pytest.approx(4.5, rel=0.05)
 
 
-def test_a_cloud_of_it_is_that_of_its_seed():
+def test_the_seed_determines_the_cloud():
     cloud = Cloud(
         number=50,
         grains=[GrainClass(sizes=EqualSizes(radius=0.3), density=2.0)],
@@ -110,7 +110,7 @@ def test_wrong_ducts_are_refused(message):
         RandomInDuct(**WRONG[message])
 
 
-def test_what_finds_no_room_is_refused():
+def test_packings_without_space_are_refused():
     placement = RandomInDuct(centre=LOW, **DUCT)
     with pytest.raises(InputError, match=r"volume fraction must be at most 0\.5 in a duct"):
         placement.centres(np.full(3000, 0.3), AROUND, 0)

@@ -1,4 +1,4 @@
-"""Clouds of equal spheres: where they lie, how fast they are, what they carry, and as files."""
+"""Clouds of equal spheres: positions, velocities, charges, and files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tisim.backend import runtime
 from tisim.scene.placed_together import placed_together
 
 BALL = dict(number=2000, radius=0.05, density=7000.0, placement=RandomInBall(radius=1.0, centre=(3.0, 0, 0)))
-"""The blast of Z16 section 6.1, off the origin."""
+"""The blast of Z16 section 6.1, with its centre off the origin."""
 VIBRATION = dict(radius=0.005, density=2000.0, placement=Lattice(shape=(7, 7, 7), size=(0.2, 0.2, 0.2)))
 """The sample of Z13 section 4."""
 
@@ -48,13 +48,14 @@ def ball():
     return arrays(Cloud(**BALL, specific_charge=10.0, pulse=Blast(energy=1e4), mean_velocity=(0, 0, 2.0)))
 
 
-def test_spheres_lie_wholly_inside_the_ball_and_fill_it_evenly(ball):
+def test_spheres_lie_inside_the_ball_and_fill_it_uniformly(ball):
     distance = np.linalg.norm(ball["position"] - [3.0, 0, 0], axis=1)
     assert distance.max() <= 0.95
     assert distance.max() > 0.949
     assert overlaps(ball["position"], 0.05) == 0
     assert len(distance) * 0.05**3 == pytest.approx(0.25)
-    # No direction is favoured; a uniform ball would have var(x) = 0.95^2/5, and the wall draws spheres to it.
+    # No direction is preferred; a uniform ball would give var(x) = 0.95^2/5, and spheres accumulate at the
+    # wall.
     offset = ball["position"] - [3.0, 0, 0]
     assert np.abs(offset.mean(axis=0)).max() < 4 * np.sqrt(0.19 / 2000)
     assert np.ptp(offset.var(axis=0)) < 0.02
@@ -91,7 +92,7 @@ def test_blast_of_unequal_masses_starts_from_their_centre_of_mass():
     np.testing.assert_allclose(
         Blast(energy=6.0).velocity(position, mass), [[-2.0, 0, 0], [2.0, 0, 0]], rtol=1e-15
     )
-    # In three places on a line, the middle one has nowhere to go, and the others share the energy.
+    # With three positions on a line the middle sphere gets no velocity and the others share the energy.
     position = np.array([[-1.0, 5, 0], [0.0, 5, 0], [1.0, 5, 0]])
     moved = Blast(energy=4.0).velocity(position, np.full(3, 1.0))
     np.testing.assert_allclose(moved, [[-2.0, 0, 0], [0, 0, 0], [2.0, 0, 0]], rtol=1e-15)
@@ -107,7 +108,7 @@ def test_charge_is_by_mass_or_for_each(ball):
 
 
 def test_lattice_of_the_vibration_sample():
-    """7 x 7 x 7 sites in a cube of 0.2 m: neighbours 1/30 m apart."""
+    """7 x 7 x 7 sites in a cube of 0.2 m, with neighbours 1/30 m apart."""
     positions = arrays(Cloud(**VIBRATION))["position"]
     assert positions.shape == (343, 3)
     np.testing.assert_allclose(positions.mean(axis=0), 0.0, atol=1e-16)
@@ -238,8 +239,9 @@ def test_wrong_starts_are_refused(make, message):
         make()
 
 
-def test_more_than_the_machine_holds_is_refused_before_it_is_allocated(monkeypatch):
-    """A cloud of 1e8 makes a scene, whose check takes little memory; making its start says what it takes."""
+def test_too_much_memory_is_refused_before_it_is_allocated(monkeypatch):
+    """A scene with a cloud of 1e8 spheres can be made, as its check needs little memory; the start is
+    refused."""
     monkeypatch.setattr(runtime, "memory", lambda: 10**9)
     most = Lattice(shape=(500, 500, 400), spacing=1.0)
     for cloud in (Cloud(radius=0.1, density=1.0, placement=most), Cloud(number=10**8, radius=1, density=1)):
@@ -255,8 +257,8 @@ def test_more_than_the_machine_holds_is_refused_before_it_is_allocated(monkeypat
         tracemalloc.stop()
 
 
-def test_along_an_axis_that_is_not_periodic_spheres_lie_within_the_faces():
-    """There are walls where there are any; along the others they may reach over the faces."""
+def test_spheres_lie_inside_nonperiodic_faces():
+    """Such axes may have walls; along periodic axes spheres may extend over the faces."""
     box = Box(low=(0, 0, 0), high=(1, 1, 0.5), periodic=(True, True, False))
     place = arrays(Cloud(number=300, radius=0.04, density=1.0), box)["position"]
     assert place[:, 2].min() >= 0.04
@@ -267,8 +269,9 @@ def test_along_an_axis_that_is_not_periodic_spheres_lie_within_the_faces():
         arrays(Cloud(number=1, radius=0.3, density=1.0), box)
 
 
-def test_few_spheres_in_much_room_take_little_memory():
-    """A gas as thin as air: memory is that of the spheres, not of all that a cell could hold."""
+def test_few_spheres_in_a_large_box_take_little_memory():
+    """For a gas as thin as air the memory depends on the number of spheres, not on the capacity of the
+    cells."""
     placement = RandomInBox(low=(-1.0,) * 3, high=(1.0,) * 3)
     tracemalloc.start()
     assert len(arrays(Cloud(number=2000, radius=1e-6, density=1.0, placement=placement))["position"]) == 2000
@@ -278,7 +281,7 @@ def test_few_spheres_in_much_room_take_little_memory():
 
 
 def decades(low, high):
-    """Numbers of either end of a range of powers of ten, and between."""
+    """Numbers at both ends of a range of powers of ten, and between them."""
     return st.floats(low, high).map(lambda power: 10.0**power)
 
 
@@ -291,8 +294,9 @@ def decades(low, high):
     away=st.one_of(st.just(0.0), decades(-3, 20)),
     kind=st.sampled_from(["ball", "box", "domain", "lattice", "cylinder"]),
 )
-def test_a_start_of_any_size_is_apart_or_refused(number, radius, density, room, away, kind):
-    """Spheres of 1e-110 to 1e110 m in any room, any distance away: none overlap, or a message says why."""
+def test_starts_of_any_size_have_no_overlap_or_are_refused(number, radius, density, room, away, kind):
+    """Spheres of 1e-110 to 1e110 m, in any region at any distance, do not overlap, or a message gives the
+    reason."""
     side, centre = radius * room, (0.0, radius * away, 0.0)
     low, high = ([c + s * side for c in centre] for s in (-1, 1))
     try:
@@ -310,7 +314,7 @@ def test_a_start_of_any_size_is_apart_or_refused(number, radius, density, room, 
         check_message(str(fault))
         return
     assert all(np.isfinite(values).all() for values in start.values())
-    # Counted from the first sphere and in radii, whose squares are numbers.
+    # Relative to the first sphere and in units of radii, so that squares do not overflow.
     places = (start["position"] - start["position"][0]) / radius
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)[np.triu_indices(len(places), 1)]
     assert (apart >= 2 * (1 - 2e-3)).all()
@@ -326,7 +330,7 @@ def test_a_start_of_any_size_is_apart_or_refused(number, radius, density, room, 
     ],
     ids=["blast", "vibration", "box", "domain"],
 )
-def test_a_file_gives_the_scene_back(cloud):
+def test_the_scene_is_read_back_from_a_file(cloud):
     scene = Scene(particles=cloud, domain=Box(low=(-9,) * 3, high=(9,) * 3), duration=1.0)
     again = Scene.from_dict(tomllib.loads(scene.to_toml()))
     assert again == scene

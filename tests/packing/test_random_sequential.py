@@ -1,4 +1,4 @@
-"""Random sequential addition: spheres that do not overlap, the same for the same seed."""
+"""Random sequential addition: spheres do not overlap, and the same seed gives the same packing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PERIODIC = [(False,) * 3, (True,) * 3, (True, False, True)]
 
 
 def tree_of(centres, periodic):
-    """A tree of places; a side of 0 is that of an axis that is not periodic."""
+    """A search tree of positions; a side of 0 marks an axis that is not periodic."""
     sides = np.where(periodic, HIGH - LOW, 0.0)
     places = np.where(periodic, (centres - LOW) % (HIGH - LOW), centres - LOW)
     return cKDTree(places, boxsize=sides if any(periodic) else None)
@@ -34,7 +34,7 @@ def test_no_two_spheres_overlap_also_across_periodic_faces(periodic):
         assert ((centres >= LOW) & (centres < HIGH)).all()
         assert not tree_of(centres, periodic).query_pairs(2 * RADIUS * (1 - 1e-12))
     if not all(periodic):
-        # What the periodic option is for: without it spheres do overlap across the faces.
+        # Without the periodic option spheres overlap across the faces.
         assert tree_of(centres, (True,) * 3).query_pairs(2 * RADIUS * (1 - 1e-12))
 
 
@@ -44,23 +44,23 @@ def test_the_seed_decides():
     assert np.abs(first - other).max() > 0.1
 
 
-def test_places_are_uniform():
+def test_positions_are_uniform():
     centres = np.concatenate([place(np.full(50, 1e-3), box(LOW, HIGH), seed) for seed in range(200)])
     u = (centres - LOW) / (HIGH - LOW)
     assert np.abs(u.mean(axis=0) - 0.5).max() < 4 / np.sqrt(12 * len(u))
     assert np.abs(u.var(axis=0) - 1 / 12).max() < 4 * np.sqrt(1 / 180 / len(u))
 
 
-def test_what_cannot_be_reached_is_refused():
+def test_an_unreachable_fraction_is_refused():
     with pytest.raises(InputError, match=r"volume fraction must be at most 0.384.*; received 0\.8727"):
         place(np.full(5000, RADIUS), box(LOW, HIGH), 0)
 
 
-def test_what_is_just_beyond_reach_says_what_was_reached():
+def test_a_failed_packing_reports_the_fraction_reached():
     with pytest.raises(InputError, match=r"at most 0\.\d{4}, where no further sphere fits") as error_info:
         place(np.full(2280, RADIUS), box(LOW, HIGH, periodic=(True,) * 3), 0)
     reached = float(str(error_info.value).split("at most ")[1][:6])
-    # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
+    # One sphere is 0.00017; saturated packings of this size differ by about ten spheres.
     assert reached == pytest.approx(SATURATION_FRACTION, abs=0.006)
 
 
@@ -74,12 +74,12 @@ PACKINGS = [
     Packing(np.full(1, 0.5), box(LOW, HIGH), 2**63 - 1),
     Packing(np.array([0.3, 0.3, 0.3]), box(LOW, LOW + 0.4), 0),
 ]
-"""Unlike ones, two that are the same, and one with room for a single sphere."""
+"""Different packings, two identical ones, and one with room for a single sphere."""
 
 
 @pytest.fixture
 def rounds(monkeypatch):
-    """How many packings have been made at once, each time."""
+    """The number of packings made together, for each call."""
     made, everywhere = [], random_sequential.everywhere
 
     def counted(packings):
@@ -91,14 +91,14 @@ def rounds(monkeypatch):
 
 
 def made(packing):
-    """Centres of a packing, or why there are none."""
+    """Centres of a packing, or the message of its failure."""
     try:
         return place(packing.radii, packing.region, packing.seed)
     except InputError as error:
         return str(error)
 
 
-def test_side_by_side_packings_are_those_made_alone(rounds):
+def test_packings_made_together_equal_those_made_alone(rounds):
     alone = [made(packing) for packing in PACKINGS]
     assert rounds == [1] * 6
     assert "3 were placed" in alone[-1]
@@ -107,12 +107,12 @@ def test_side_by_side_packings_are_those_made_alone(rounds):
     assert rounds[6:] == [5]
     for one, other in zip(alone, together, strict=True):
         np.testing.assert_array_equal(one, other)
-    # Nothing is kept beyond.
+    # After the block nothing is kept.
     made(PACKINGS[0])
     assert rounds[7:] == [1]
 
 
-def test_many_spheres_are_placed_in_several_goes(rounds, monkeypatch):
+def test_many_spheres_are_placed_in_several_rounds(rounds, monkeypatch):
     monkeypatch.setattr(random_sequential, "SPHERES_AT_ONCE", 350)
     with placed_side_by_side(PACKINGS):
         together = [made(packing) for packing in PACKINGS]
@@ -125,7 +125,7 @@ TWO_WALLS = Box(low=(0.0,) * 3, high=(1.0,) * 3, periodic=(False, True, True))
 
 
 def cloud(number, radius, seed, placement=None):
-    """A scene of spheres in a box of two walls."""
+    """A scene of spheres in a box with two walls."""
     where = {} if placement is None else {"placement": placement}
     return Scene(
         particles=Cloud(number=number, radius=radius, density=1.0, **where),
@@ -136,8 +136,8 @@ def cloud(number, radius, seed, placement=None):
 
 
 def test_spheres_of_a_batch_are_placed_side_by_side(rounds):
-    """Scenes that cannot be made fail alone, before any place is tried: one has no room for a sphere, of
-    another spheres would fill too much."""
+    """Impossible scenes fail alone, before any insertion trial: in one no sphere fits, in another the volume
+    fraction is too high."""
     scenes = [
         cloud(20, 0.02, 0),
         cloud(20, 0.05, 1),
@@ -153,7 +153,7 @@ def test_spheres_of_a_batch_are_placed_side_by_side(rounds):
 
 
 class InASlab(RandomSequential):
-    """A placement of one's own."""
+    """A user-defined placement."""
 
     def region(self, radii, domain):
         return inside_box(np.array([0.1, 0.1, 0.1]), np.array([0.9, 0.9, 0.4]), radii.max())
@@ -169,7 +169,7 @@ class InASlab(RandomSequential):
     ],
     ids=lambda one: one.kind(),
 )
-def test_each_kind_is_placed_so_where_a_simulation_is_loaded(placement, rounds):
+def test_every_kind_of_placement_is_placed_together(placement, rounds):
     scenes = [cloud(20, 0.03, seed, placement) for seed in (5, 6)]
     simulation = compiled(scenes[0], 2, 20)
     rounds.clear()
@@ -180,7 +180,7 @@ def test_each_kind_is_placed_so_where_a_simulation_is_loaded(placement, rounds):
 
 
 def saturated(region, radius, seed=0):
-    """Centres of a packing that has no more room, started from none."""
+    """Centres of a saturated packing, filled from an empty region."""
     generator = np.random.Generator(np.random.Philox(seed))
     return fill(np.empty((0, 3)), 10**6, 2 * radius, region, generator)
 
@@ -196,8 +196,8 @@ def test_saturated_packing_has_no_room_left(rng, periodic):
 
 
 @pytest.mark.slow
-def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
-    """0.38413; for 700 spheres a single packing is off by about 0.002."""
+def test_bulk_saturation_equals_zhang_and_torquato():
+    """The fraction is 0.38413; a single packing of 700 spheres deviates by about 0.002."""
     region = box(np.zeros(3), np.ones(3), periodic=(True,) * 3)
     radius = (3 * SATURATION_FRACTION / (4 * np.pi * 700)) ** (1 / 3)
     sphere = 4 / 3 * np.pi * radius**3
@@ -206,8 +206,8 @@ def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
 
 
 @pytest.mark.slow
-def test_filling_voids_is_the_same_process_as_trying_everywhere():
-    """Mean number of neighbours within 1.1 diameters at the same volume fraction, by either way."""
+def test_filling_voids_equals_trials_everywhere():
+    """Mean number of neighbours within 1.1 diameters at the same volume fraction, with both methods."""
     region = box(np.zeros(3), np.ones(3), periodic=(True,) * 3)
     number, radius = 900, (3 * 0.3 / (4 * np.pi * 900)) ** (1 / 3)
 
@@ -221,5 +221,5 @@ def test_filling_voids_is_the_same_process_as_trying_everywhere():
         by_voids.append(neighbours(fill(np.empty((0, 3)), number, 2 * radius, region, generator)))
     spread = np.hypot(np.std(by_trial), np.std(by_voids)) / np.sqrt(7)
     assert abs(np.mean(by_trial) - np.mean(by_voids)) < 4 * spread
-    # Tight enough to tell a process that favours narrow voids from one that does not.
+    # The tolerance is small enough to detect a process that favours narrow voids.
     assert spread < 0.03 * np.mean(by_trial)

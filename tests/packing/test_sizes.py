@@ -1,4 +1,4 @@
-"""Size distributions against those of SciPy, by number and by volume, and mixtures of classes of grains."""
+"""Size distributions compared with SciPy, by number and by volume, and mixtures of grain classes."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,10 @@ LAWS = {
 
 
 def truth(law, power):
-    """The distribution over the number: its function, and its mean of r^k; ``power`` of r that q is over."""
+    """The cumulative distribution by number and a function for the mean of r^k.
+
+    power : power of r by which the density q is weighted.
+    """
     low, high = BOUNDS.values()
     points = np.linspace(low, high, 20001)
     density = law.pdf(points) / points**power
@@ -33,9 +36,11 @@ def truth(law, power):
 
 @pytest.mark.parametrize("by", ["number", "volume"])
 @pytest.mark.parametrize("name", LAWS)
-def test_sizes_are_distributed_as_scipy_has_it(name, by):
-    """Kolmogorov and Smirnov: 4e5 sizes of a seed are less far off than chance alone brings in one of a
-    hundred. A distribution over volume that is taken for one over number is off by 20 times as much."""
+def test_sizes_follow_the_distributions_of_scipy(name, by):
+    """Kolmogorov-Smirnov test of 4e5 sizes at the level of 1 %.
+
+    A distribution by volume taken for one by number would deviate by 20 times as much.
+    """
     kind, values, law = LAWS[name]
     sizes = kind(by=by, **BOUNDS, **values)
     cumulative, mean = truth(law, 0 if by == "number" else 3)
@@ -62,8 +67,11 @@ def test_by_mass_is_by_volume_within_a_class(name):
     assert by_mass.mean_cube() == by_volume.mean_cube()
 
 
-def test_scales_find_the_mass_that_passes_a_sieve_again_in_a_mixture_of_densities():
-    """Two classes by mass, the heavier a quarter of it: of all mass, and of that of each class."""
+def test_sieve_curves_of_a_mixture_of_densities():
+    """Two classes by mass; the denser one has a quarter of the mass.
+
+    Checked are the sieve curves of each class and of the mixture.
+    """
     diameters, passing = (1e-3, 2e-3, 4e-3), (0.0, 0.3, 1.0)
     coarse = SieveCurve(by="mass", diameters=diameters, passing=passing)
     fine = SieveCurve(by="mass", diameters=tuple(0.5 * d for d in diameters), passing=passing)
@@ -74,12 +82,12 @@ def test_scales_find_the_mass_that_passes_a_sieve_again_in_a_mixture_of_densitie
         own, size = mass[which == k], 2 * radius[which == k]
         found = [own[size <= d].sum() / own.sum() for d in one.diameters]
         np.testing.assert_allclose(found, passing, atol=0.01)
-    # Those of the coarser class that pass 2 mm, and all of the finer.
+    # Grains of the coarse class that pass 2 mm, and all of the fine class.
     assert mass[2 * radius <= 2e-3].sum() / mass.sum() == pytest.approx(0.75 * 0.3 + 0.25, abs=0.01)
 
 
 def test_a_lognormal_law_over_volume_is_one_over_number():
-    """Hatch and Choate, where the bounds are far out."""
+    """The Hatch-Choate conversion, with bounds far out."""
     far = {"smallest": 1e-4, "largest": 2e-2}
     by_volume = LognormalSizes(by="volume", median=1e-3, ratio=1.3, **far)
     median = 1e-3 * np.exp(-3 * np.log(1.3) ** 2)
@@ -88,8 +96,8 @@ def test_a_lognormal_law_over_volume_is_one_over_number():
     np.testing.assert_allclose(by_volume.radii(uniform), by_number.radii(uniform), rtol=1e-4)
 
 
-def test_a_sieve_curve_is_what_sieves_would_find_again():
-    """The mass of the grains that pass each sieve."""
+def test_a_sieve_curve_is_reproduced_by_sieves():
+    """Compared is the mass of the grains that pass each sieve."""
     diameters, passing = np.array([1e-3, 2e-3, 4e-3, 5e-3]), np.array([0.0, 0.3, 0.3, 1.0])
     curve = SieveCurve(by="volume", diameters=tuple(diameters), passing=tuple(passing))
     _, radius = draw([GrainClass(sizes=curve, density=2.0)], 400_000, seed=3)
@@ -133,8 +141,8 @@ def gaps(position, radius, side=np.inf):
     return distance[np.triu_indices(len(radius), 1)]
 
 
-def test_unlike_spheres_do_not_overlap_and_lie_within():
-    """Sizes over a factor of 5 and a fifth of the volume; also across periodic faces."""
+def test_unequal_spheres_lie_inside_without_overlap():
+    """Sizes span a factor of 5 and fill a fifth of the volume; checked also across periodic faces."""
     box = RandomInBox(low=(0, 0, 0), high=(0.02, 0.02, 0.05))
     start = Cloud(number=900, grains=MIXTURE, placement=box).arrays(Open(), seed=4)
     r, radius = start["position"], start["radius"]
@@ -142,7 +150,7 @@ def test_unlike_spheres_do_not_overlap_and_lie_within():
     assert gaps(r, radius).min() >= 0
     assert (r >= radius[:, None]).all()
     assert (r <= np.array([0.02, 0.02, 0.05]) - radius[:, None]).all()
-    # Small ones use the room that large ones cannot.
+    # Small grains use space that large grains cannot.
     assert r[:, 0].min() < 1e-3
     np.testing.assert_array_equal(start["temperature"], np.where(radius == 2e-3, 350.0, 300.0))
     np.testing.assert_array_equal(start["mass"], Cloud(number=900, grains=MIXTURE, placement=box).masses(4))
@@ -161,10 +169,10 @@ def test_spheres_lie_wholly_inside_a_cylinder():
     assert (np.abs(along) <= 0.02 - radius + 1e-15).all()
     assert (away <= 0.01 - radius + 1e-15).all()
     assert gaps(r, radius).min() >= -1e-15
-    # They fill it: the outer half of the section holds about half of the small ones.
+    # They fill the cylinder: the outer half of the section contains about half of the small grains.
     small = radius < 1e-3
     assert 0.3 < np.mean(away[small] > 0.01 / np.sqrt(2)) < 0.6
-    # Equal spheres go up to saturation, also where all is round.
+    # Equal spheres can be placed up to saturation, also in a round region.
     dense = RandomInCylinder(radius=0.01, length=0.04)
     start = Cloud(number=870, radius=1e-3, density=1.0, placement=dense).arrays(Open(), seed=2)
     assert gaps(start["position"], start["radius"]).min() >= -1e-15
@@ -172,7 +180,7 @@ def test_spheres_lie_wholly_inside_a_cylinder():
 
 
 def test_classes_name_their_materials():
-    """One that does not is of that of the cloud, or of the first of the scene."""
+    """A class without a material gets the material of the cloud, or the first of the scene."""
     named = (MIXTURE[0], MIXTURE[1].model_copy(update={"material": "ore"}))
     materials = {name: Material() for name in ("glass", "ore", "sand")}
     for material, index in ((None, 0), ("sand", 2)):
@@ -190,7 +198,7 @@ def test_classes_name_their_materials():
         scene.replace({"materials": {"glass": {}, "sand": {}}})
 
 
-def test_a_file_gives_a_mixture_back():
+def test_a_mixture_is_read_back_from_a_file():
     scene = Scene(
         particles=Cloud(number=9, grains=MIXTURE), domain=Box(low=(0, 0, 0), high=(1, 1, 1)), duration=1.0
     )

@@ -1,4 +1,4 @@
-"""Sums over all pairs, for tiles of particles at once: the same bits however many there are, and wherever."""
+"""Sums over all pairs in tiles of particles: the same bits for any number and order of worlds."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from tisim.program.team import Teams
 
 NUMBERS = (1, TILE - 1, TILE, TILE + 1, 2 * TILE + 6)
 ROOM = max(NUMBERS)
-"""No multiple of TILE: the last tile overlaps the one before."""
+"""Not a multiple of TILE, so the last tile overlaps the previous one."""
 LAW = NearField(alpha1=0.5, alpha2=0.1, strength="mass")
 
 
@@ -27,7 +27,7 @@ def cloud(n, seed=0, **more):
 
 
 def forces(state):
-    """By NumPy, nearest images, each sum in the order of the others."""
+    """Forces from NumPy with nearest images, each sum in the order of the other particles."""
     d = state["position"][None] - state["position"][:, None]
     d -= np.round(d)
     distance = np.linalg.norm(d, axis=2) + np.eye(len(d))
@@ -37,7 +37,7 @@ def forces(state):
 
 @pytest.fixture(scope="module")
 def usual():
-    """Clouds of all numbers in one batch, after three steps."""
+    """Clouds of all sizes in one batch, after three steps."""
     return simulate([cloud(n, n) for n in NUMBERS], worlds=len(NUMBERS), capacity=ROOM, schedule="world")
 
 
@@ -61,7 +61,7 @@ def test_forces_in_every_tile_are_their_numpy_twin(usual):
     ids=["a launch per phase", "a team", "more room", "too little room for a tile"],
 )
 def test_the_same_bits(usual, monkeypatch, schedule, room, numbers):
-    """Whatever else there is room for, tiles or not, on all schedules; one team takes all worlds."""
+    """For any capacity, with and without tiles, and on all schedules, including one team for all worlds."""
     if schedule == "team":
         monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
     again = simulate([cloud(n, n) for n in numbers], worlds=len(NUMBERS), capacity=room, schedule=schedule)
@@ -71,8 +71,8 @@ def test_the_same_bits(usual, monkeypatch, schedule, room, numbers):
 
 
 @pytest.mark.parametrize("pair", [(3, 5), (TILE - 1, TILE), (5, ROOM - 1)])
-def test_two_in_one_place_are_named_and_harm_no_other_world(usual, pair):
-    """Whether they share a tile or not."""
+def test_coincident_particles_are_named_and_affect_no_other_world(usual, pair):
+    """Both if they share a tile and if they do not."""
     position = np.random.default_rng(1).uniform(0, 1, (ROOM, 3))
     position[pair[1]] = position[pair[0]]
     scenes = [

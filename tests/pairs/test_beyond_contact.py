@@ -1,4 +1,4 @@
-"""A law that acts, and remembers, beyond contact: what a capillary bridge needs of the core."""
+"""A law that acts and keeps history beyond contact, as a capillary bridge does."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ RADIUS, MASS, PULL, RUPTURE, STEP = 0.1, 2.0, 3.0, 0.05, 1e-3
 
 
 def pair(gap, speed, others=0, steps=150):
-    """Two grains that part at a relative speed, and others far away in front of them in memory."""
+    """Two grains with a given separation speed, and others far away that precede them in memory."""
     far = 10.0 * np.arange(1, others + 1)[:, None] * [0.0, 1.0, 0.0]
     apart = 0.5 * (2 * RADIUS + gap)
     position = np.concatenate([far, [[-apart, 0, 0], [apart, 0, 0]]])
@@ -28,7 +28,7 @@ def pair(gap, speed, others=0, steps=150):
 
 
 def closing(result):
-    """Relative speed of the last two, positive when they part."""
+    """Relative speed of the last two grains, positive if they separate."""
     order = np.argsort(result.state["id"])[-2:]
     return float(np.diff(result.state["velocity"][order, 0])[0])
 
@@ -40,8 +40,9 @@ def simulation():
     made.close()
 
 
-def test_it_forms_at_contact_holds_beyond_it_and_breaks(simulation):
-    """A bridge of constant force takes work PULL * RUPTURE from the pair; without contact there is none."""
+def test_a_bridge_forms_at_contact_and_breaks_beyond(simulation):
+    """A bridge of constant force takes the work PULL * RUPTURE from the pair; without contact there is no
+    bridge."""
     fast, slow = 1.0, 0.3
     scenes = [pair(-1e-9, fast, 60), pair(-1e-9, slow, 60), pair(0.5 * RUPTURE, fast, 60), pair(-1e-9, fast)]
     simulation.load(scenes)
@@ -49,18 +50,21 @@ def test_it_forms_at_contact_holds_beyond_it_and_breaks(simulation):
     broken, held, dry, alone = (closing(result) for result in simulation.results())
     reduced = MASS / 2
     expected = np.sqrt(fast**2 - 2 * PULL * RUPTURE / reduced)
-    # It breaks in the step after the gap is passed.
+    # It breaks in the step after the rupture distance is passed.
     assert broken == pytest.approx(expected, abs=2 * STEP * PULL / reduced)
     assert dry == fast
     assert alone == broken
-    # Too slow to get away: on the way back after the run, with the bridge between them all the time.
+    # This pair is too slow to separate: at the end it is on its way back, and the bridge has held all the
+    # time.
     assert held == pytest.approx(slow - PULL / reduced * scenes[1].duration, abs=1e-9)
 
 
 @pytest.mark.slow
-def test_more_than_a_particle_can_remember_is_reported(simulation):
-    """A grain that larger ones, which lie in each other, touch all around: no bridge is lost without a
-    word."""
+def test_an_overflow_of_the_contact_history_is_reported(simulation):
+    """A grain is in contact with overlapping larger grains on all sides.
+
+    The overflow of its contact history is reported, so no bridge is lost silently.
+    """
     angle = 2 * np.pi * np.arange(18) / 18
     ring = 0.99 * (RADIUS + 1.1 * RADIUS) * np.stack([0 * angle, np.cos(angle), np.sin(angle)], axis=1)
     position = np.concatenate([[[0.0, 0.0, 0.0]], ring])
@@ -79,8 +83,8 @@ def test_more_than_a_particle_can_remember_is_reported(simulation):
     assert "more simultaneous contacts than there is room for, at particle 0" in result.status.reason
 
 
-def test_it_is_remembered_through_a_restart_between(simulation, tmp_path):
-    """Where only the memory tells a wet pair from a dry one: beyond contact, with a list made anew."""
+def test_a_bridge_survives_a_restart(simulation, tmp_path):
+    """Beyond contact only the history distinguishes a wet pair from a dry one; the list is rebuilt."""
     made = pair(-1e-9, 1.0, 60)
     simulation.load([made])
     simulation.run(steps=20)
@@ -99,16 +103,18 @@ def test_it_is_remembered_through_a_restart_between(simulation, tmp_path):
 
 
 def tried(made, effects, **control):
-    """A scene in steps found by trial; and what all of these are run by."""
+    """A scene with an adaptive implicit stepper, and the simulation that runs it."""
     stepper = Trapezoid(control=ErrorControl(**{"shortest": 1e-9, **control}))
     changed = made.model_copy(update={"effects": effects, "stepper": stepper})
     return changed, compiled(changed, worlds=2, capacity=80)
 
 
 @pytest.mark.slow
-def test_a_trial_that_is_given_up_takes_no_memory_away():
-    """The first attempt throws a wet pair far out of reach, and is rejected: the pair stays wet, and swings
-    about where the bridge holds what a soft shell presses, as it does from a short first step."""
+def test_a_rejected_trial_keeps_the_contact_history():
+    """The first attempt moves a wet pair far out of range and is rejected.
+
+    The pair stays wet and oscillates about the balance of bridge and soft shell, as after a short first step.
+    """
     ends = []
     laws = Bridge(pull=PULL, rupture=RUPTURE), SoftShell(stiffness=500.0, width=0.02), Trap(stiffness=0.0)
     for first in (1e-4, 0.5):
@@ -124,9 +130,11 @@ def test_a_trial_that_is_given_up_takes_no_memory_away():
 
 
 @pytest.mark.slow
-def test_a_pair_that_meets_between_the_last_trial_and_the_end_of_a_step_is_remembered():
-    """Pairs are pulled together from 40 distances, in steps of a single trial, which is far from their ends:
-    with lists that are made anew whenever something moves as with those that hold more."""
+def test_a_contact_after_the_last_trial_of_a_step_is_recorded():
+    """Pairs at 40 distances are pulled together in steps whose single trial is far from the end point.
+
+    Lists that are rebuilt at every move and lists with a larger skin must record the same contacts.
+    """
     gap, rows = np.linspace(1e-4, 1.5e-2, 40), 10.0 * np.arange(40)
     sides = [np.stack([side * (RADIUS + 0.5 * gap), rows, 0 * rows], axis=1) for side in (-1, 1)]
     laws = Bridge(pull=1e-3, rupture=1e-9), SoftShell(stiffness=1e-9, width=1e-9), Trap(stiffness=100.0)
@@ -141,7 +149,7 @@ def test_a_pair_that_meets_between_the_last_trial_and_the_end_of_a_step_is_remem
 
 
 class Afar(PairForce):
-    """A constant push within ten radii."""
+    """A constant force within ten radii."""
 
     fields = ("radius",)
     short_ranged = True
@@ -158,7 +166,7 @@ class Afar(PairForce):
 
 
 class Grow(Operator):
-    """Radii grow."""
+    """Increases the radii at a constant rate."""
 
     fields = ("radius",)
     rate: float = parameter("m/s", "rate", gt=0)
@@ -169,8 +177,8 @@ class Grow(Operator):
 
 
 @pytest.mark.slow
-def test_a_law_that_comes_to_reach_farther_acts_at_once():
-    """Radii of 0.1 + 0.1 t reach over 1.3 m when 12 of them do, after 84 steps."""
+def test_a_growing_interaction_range_acts_at_once():
+    """Radii of 0.1 + 0.1 t interact over 1.3 m when 12 radii reach that far, which is after 84 steps."""
     made = scene(
         [[0.0, 0.0, 0.0], [1.3, 0.0, 0.0]],
         np.zeros((2, 3)),

@@ -1,4 +1,4 @@
-"""Lists of pairs for short-ranged forces against brute force, and the order in which chunks have them."""
+"""Half lists of pairs for short-ranged forces compared with brute force, and the order of pairs in chunks."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ WORLDS, CAPACITY, STEPS, DT, GAP, SLOTS = 18, 300, 4, 1.0, 0.02, 32
 
 
 class Idle(PairForce):
-    """Within a gap it would act, and does nothing."""
+    """Acts within a gap, but with zero force."""
 
     short_ranged = True
     gap: float = parameter("m", "gap", gt=0)
@@ -33,7 +33,7 @@ class Idle(PairForce):
 
 @in_taichi_thread
 def listed(simulation):
-    """Pairs of each world, by index, as chunks have them; asserts that each is where it belongs."""
+    """Pairs of each world by index, as the chunks hold them; asserts that each is in the right chunk."""
     p, counts = simulation.assembly.pairs, simulation.s.count.to_numpy()
     first, second, fetched = (column.to_numpy() for column in (p.first, p.second, p.fetched))
     begin, outer, end = (column.to_numpy() for column in (p.begin, p.outer, p.end))
@@ -64,9 +64,10 @@ def listed(simulation):
     "domain", ["joined", *(pytest.param(d, marks=pytest.mark.slow) for d in ("slab", "open"))]
 )
 def test_every_near_pair_is_listed_once(rng, monkeypatch, domain, schedule):
-    """At the start, and after steps in which some move far and most do not; crowds make the list grow."""
+    """Checked at the start and after steps in which a few particles move far; dense clouds make the list
+    grow."""
     monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", SLOTS)
-    # Sums of many blocks.
+    # Sums extend over many blocks.
     monkeypatch.setitem(prefix_sum.LEAST_BLOCK, "cpu", 2)
     domain, names, scenes = DOMAINS[domain], [], []
     for name, position, radius in clouds(rng):
@@ -99,19 +100,19 @@ def test_every_near_pair_is_listed_once(rng, monkeypatch, domain, schedule):
             assert not missed, f"{where}: missed {sorted(missed)[:5]}"
         simulation.run(steps=1)
         assert (simulation.s.read("status")[: len(scenes)] == 0).all()
-    # A list is worth having: the equal cloud does not have all its pairs.
+    # The list must be useful: for equal particles it holds a small part of all pairs.
     assert len(listed(simulation)[0]) < 0.1 * 300 * 299 / 2
     simulation.close()
 
 
 class SolidShell(SoftShell):
-    """One that holds particles apart."""
+    """A soft shell that counts as solid."""
 
     solid = True
 
 
 def burst(seed=2, n=240):
-    """A cloud that falls together, so that its list overflows on the way."""
+    """A cloud that contracts, so that its list overflows during the run."""
     draw = np.random.default_rng(seed)
     position = draw.uniform(-1.0, 1.0, (n, 3))
     return scene(
@@ -127,7 +128,7 @@ def burst(seed=2, n=240):
 
 @pytest.fixture(scope="module")
 def simulation_of_bursts():
-    """One whose list has overflowed on the way."""
+    """A simulation whose list has overflowed during its run."""
     simulation = Simulation(burst())
     simulation.load(burst())
     simulation.run()
@@ -136,8 +137,9 @@ def simulation_of_bursts():
 
 
 @pytest.mark.long
-def test_solid_particles_whose_list_overflows_on_the_way_go_on(simulation_of_bursts):
-    """The step after is not taken for one in which they pass through each other."""
+def test_a_list_overflow_does_not_stop_solid_particles(simulation_of_bursts):
+    """The step after the growth of the list must not be mistaken for one in which particles pass through each
+    other."""
     (result,) = simulation_of_bursts.results()
     assert result.status.ok, result.status.reason
     assert result.time == burst().duration
@@ -146,7 +148,7 @@ def test_solid_particles_whose_list_overflows_on_the_way_go_on(simulation_of_bur
 
 @pytest.fixture
 def fresh():
-    """A simulation whose list has its first length."""
+    """A simulation whose list has its initial length."""
     simulation = Simulation(burst())
     yield simulation
     simulation.close()
@@ -154,7 +156,7 @@ def fresh():
 
 @pytest.fixture
 def kept(monkeypatch):
-    """Memory that is kept for later, 8 MB of it, until it is asked back."""
+    """8 MB of cached memory, which is freed on request."""
 
     @in_taichi_thread
     def keep():
@@ -168,9 +170,11 @@ def kept(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(fresh, kept, monkeypatch):
-    """Beside a run whose list is long enough from the start, and others of skins that the scene says. There
-    is room for it once what is kept for later has been given back."""
+def test_an_overflowing_list_grows_without_changing_bits(fresh, kept, monkeypatch):
+    """Compared are a run that grows its list, a run whose list is long enough, and runs with given skins.
+
+    The list can grow only after the cached memory is freed.
+    """
     simulation, rows, ends = fresh, [], []
     simulation.load(burst())
     present = memory.bytes_in_use()
@@ -190,8 +194,8 @@ def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(fresh, kept, 
 
 
 @pytest.mark.slow
-def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_them_twice():
-    """Boris' stepper reports how far they have moved before the list is made."""
+def test_the_skin_follows_the_speed_also_with_two_moves_in_a_step():
+    """The stepper of Boris reports the displacement before the list is built."""
     speed, dt, diameter = 1.0, 1e-3, 0.2
     made = scene(
         [[0, 0, 0], [0, 0, 2]],
@@ -206,7 +210,7 @@ def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_th
     simulation.load(made)
     simulation.run()
     u = speed * dt / 2 / diameter / (1 - half_list.REACH_PART)
-    # The least of 2 u / x * REBUILD_COST + n (1 + x)^3, of what a skin of x diameters costs.
+    # The skin of x diameters minimises the cost 2 u / x * REBUILD_COST + n (1 + x)^3.
     x = np.linspace(0.01, 0.5, 4901)
     cost = 2 * u / x * half_list.REBUILD_COST + half_list.FEWEST_PAIRS * (1 + x) ** 3
     assert chosen_skin(simulation) == pytest.approx(diameter * x[np.argmin(cost)], rel=1e-2)
@@ -220,12 +224,12 @@ def chosen_skin(simulation):
 
 @pytest.mark.slow
 def test_lists_do_not_grow_beyond_the_memory_of_the_machine(monkeypatch):
-    """What is good is kept, and another simulation can still be made."""
+    """The last good state is kept, and another simulation can still be made."""
     made = burst()
     simulation = Simulation(made)
     simulation.load(made)
     row = simulation.assembly.pairs.half_list.row
-    # What other tests have left is no room.
+    # Free the memory that earlier tests have left.
     memory.reclaim()
     present = memory.bytes_in_use()
     monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
@@ -244,7 +248,7 @@ def test_lists_do_not_grow_beyond_the_memory_of_the_machine(monkeypatch):
 
 
 @pytest.mark.long
-def test_the_first_list_of_a_run_knows_nothing_of_the_run_before(simulation_of_bursts):
+def test_the_first_list_of_a_run_is_independent_of_earlier_runs(simulation_of_bursts):
     simulation, made = simulation_of_bursts, burst()
     skins = []
     for _ in range(2):
@@ -255,8 +259,8 @@ def test_the_first_list_of_a_run_knows_nothing_of_the_run_before(simulation_of_b
 
 
 @pytest.mark.long
-def test_what_is_asked_for_at_each_load_is_made_once(simulation_of_bursts, monkeypatch):
-    """Many particles are looked at on the device."""
+def test_repeated_loads_allocate_only_once(simulation_of_bursts, monkeypatch):
+    """Large systems are checked on the device."""
     monkeypatch.setattr(monitor, "LARGE", 1)
     simulation = simulation_of_bursts
     for _ in range(3):
@@ -267,7 +271,7 @@ def test_what_is_asked_for_at_each_load_is_made_once(simulation_of_bursts, monke
 
 
 def through_a_ring(steps=60, n=18, dt=0.05, window=0.06, gap=0.01):
-    """A grain flies through a ring of larger ones, which are all near enough to list within ``window``."""
+    """A grain flies through a ring of larger grains, all of which are in its list within ``window``."""
     small, large = 1.0, 1.5
     width = np.sqrt((2 * small + large + gap) ** 2 - window**2)
     angle = 2 * np.pi * np.arange(n) / n
@@ -281,9 +285,11 @@ def through_a_ring(steps=60, n=18, dt=0.05, window=0.06, gap=0.01):
 
 
 @pytest.mark.slow
-def test_a_list_that_overflows_at_one_time_and_not_at_another_stops_no_world(monkeypatch):
-    """Run once more from an image the list is made in other steps, none of them in the ring: the world is as
-    good as any."""
+def test_a_list_overflow_missing_in_the_replay_stops_no_world(monkeypatch):
+    """In a replay from an image the list is rebuilt in other steps, none of them in the ring.
+
+    The list then does not overflow, and the world must not fail.
+    """
     monkeypatch.setattr(replay, "EVERY", 0.0)
     monkeypatch.setattr(replay, "IMAGES", np.inf)
     made = through_a_ring()

@@ -1,4 +1,4 @@
-"""Listed pairs are computed in lanes: however many there are, and whenever lists are made, the same bits."""
+"""Listed pairs are computed in lanes: the bits do not depend on the number of lanes or the list rebuilds."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ from tisim.steppers import Trapezoid
 from tisim.steppers.implicit.step_control import ErrorControl
 
 RADIUS, NARROW = 0.1, 1e-6
-"""m. With a skin so narrow lists are made anew whenever something moves."""
+"""A skin (m) so thin that lists are rebuilt at every move."""
 MATERIALS = {"grain": Material(young=1e5, poisson=0.25, restitution=0.6, friction=0.4)}
 LAWS = HERTZ_MINDLIN, Bridge(pull=3.0, rupture=0.02)
 
 
 def falling(stepper, skin=None):
-    """Grains of a loose lattice that fly into each other: contacts begin, slide, and end as bridges."""
+    """Grains of a loose lattice collide: contacts form, slide and become bridges."""
     rng = np.random.default_rng(5)
     lattice = 2.1 * RADIUS * np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
     return scene(
@@ -44,7 +44,7 @@ STEPPERS = {
 
 
 def ends(stepper, lanes, skins):
-    """What becomes of the grains, with a list of each skin."""
+    """Final states for each skin."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(listed_pairs, "LANES", lanes)
         simulation = Simulation(falling(stepper), worlds=len(skins))

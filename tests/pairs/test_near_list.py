@@ -1,4 +1,4 @@
-"""Lists of near pairs against brute force: every near pair is offered once, its larger member first."""
+"""Lists of near pairs compared with brute force: each near pair occurs once, with the larger member first."""
 
 import time
 from typing import ClassVar
@@ -22,7 +22,7 @@ WORLDS, CAPACITY, STEPS, DT = 18, 300, 5, 1.0
 
 
 class Recorder(PairEvent):
-    """Counts how often each pair is looked at, and does nothing to it."""
+    """Counts the visits of each pair and has no effect."""
 
     latest: ClassVar = None
 
@@ -52,13 +52,13 @@ LOW, HIGH = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 2.0, 1.0])
 
 
 def clouds(rng):
-    """Name, positions, radii: what is easy, and what is hard for a cell list."""
+    """Names, positions and radii of clouds that are easy or difficult for a cell list."""
 
     def anywhere(n):
         return rng.uniform(LOW, HIGH, (n, 3))
 
     def faces(n):
-        """On fractions p/q of the sides, the faces of the box among them."""
+        """Positions at fractions p/q of the sides, including the faces of the box."""
         q = rng.integers(1, 13, (n, 3))
         return LOW + (HIGH - LOW) * rng.integers(0, q) / q
 
@@ -83,14 +83,14 @@ def clouds(rng):
 
 
 def motion(rng, n):
-    """Most drift along together; a few are much faster."""
+    """Most particles drift together; a few are much faster."""
     v = np.array([0.3, 0.0, -0.2]) + rng.normal(size=(n, 3)) * 0.01
     v[:: max(n // 5, 1)] += rng.normal(size=v[:: max(n // 5, 1)].shape) * 0.3
     return v
 
 
 def near_pairs(position, radius, domain, horizon):
-    """Pairs (larger, smaller) with surfaces within the horizon, by a k-d tree."""
+    """Pairs (larger, smaller) with surfaces within the horizon, from a k-d tree."""
     reach = 2 * radius.max() + horizon
     low, high = domain.bounds()
     periodic = np.array(domain.imaged())
@@ -114,8 +114,8 @@ def near_pairs(position, radius, domain, horizon):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("domain", SOME)
-def test_every_near_pair_is_offered_once_its_larger_member_first(rng, domain):
-    """At the start, and after each of several steps in which some move far and most do not."""
+def test_every_near_pair_occurs_once_with_the_larger_member_first(rng, domain):
+    """Checked at the start and after steps in which a few particles move far."""
     names, scenes = [], []
     for name, position, radius in clouds(rng):
         names.append(name)
@@ -135,7 +135,7 @@ def test_every_near_pair_is_offered_once_its_larger_member_first(rng, domain):
     simulation = Simulation(scenes[0], WORLDS, CAPACITY)
     simulation.load(scenes)
     counts_on_device = Recorder.latest
-    # Rows that were too short at first have been looked through in part.
+    # Rows that were too short at first have been searched partly.
     in_taichi_thread(counts_on_device.fill)(0)
     simulation.begin()
     for step in range(STEPS):
@@ -166,16 +166,16 @@ def test_every_near_pair_is_offered_once_its_larger_member_first(rng, domain):
         row = simulation.assembly.lists.near.row
         simulation.run(steps=1)
         if simulation.assembly.lists.near.row > row:
-            # Rows that were too short have been looked through in part, and then again.
+            # Rows that were too short have been searched partly, and then again.
             in_taichi_thread(counts_on_device.fill)(0)
             simulation.run(steps=1)
         assert (simulation.s.read("status")[: len(scenes)] == 0).all()
-    # A cell list is worth having: the equal cloud does not look at all its pairs.
+    # The cell list must be useful: for equal particles it visits a small part of all pairs.
     assert counts[0].sum() < 0.1 * 300 * 299 / 2
 
 
 def crowd(rng, stepper, grains=300):
-    """Grains that collide and merge, and pass from lists to all pairs as they become few."""
+    """Grains that collide and merge until lists are replaced by an all-pairs search."""
     return scene(
         rng.uniform(-0.01, 0.01, (grains, 3)),
         np.array([100.0, 0, 0]) + rng.uniform(-1, 1, (grains, 3)) * [100, 10, 10],
@@ -189,7 +189,7 @@ def crowd(rng, stepper, grains=300):
 
 @pytest.fixture
 def outcome(monkeypatch):
-    """Run a scene with other settings of the near list, and room in its rows at first."""
+    """Run a scene with other settings of the near list and an initial row capacity."""
 
     def run(start, room=None, **settings):
         with monkeypatch.context() as patch:
@@ -218,7 +218,8 @@ def same(a, b):
 
 @pytest.mark.slow
 def test_results_do_not_depend_on_the_skin(rng, outcome):
-    """Lists made in every step, and too short for most grains: the same bits, adaptive steps among them."""
+    """Lists rebuilt in every step and too short for most grains give the same bits, also with adaptive
+    steps."""
     start = crowd(rng, Verlet())
     usual = outcome(start)
     assert usual.work["merges"] > 50
@@ -228,7 +229,7 @@ def test_results_do_not_depend_on_the_skin(rng, outcome):
 
 @pytest.mark.slow
 def test_results_do_not_depend_on_lists_at_all(rng, outcome):
-    """With steps of one length, cell lists and looking at all pairs give the same bits."""
+    """With fixed steps, cell lists and an all-pairs search give the same bits."""
     start = crowd(rng, fixed(4e-6))
     usual = outcome(start)
     assert usual.work["impacts"] > 100
@@ -236,8 +237,8 @@ def test_results_do_not_depend_on_lists_at_all(rng, outcome):
 
 
 def falling_together(steps=40, dt=1e-4, radius=1e-4):
-    """Grains fall together from far apart until each has all others near it, and one of 20 times their
-    radius falls onto them."""
+    """Distant grains contract until each has all others near it; a grain of 20 times the radius falls onto
+    them."""
     site = 14 * radius * (np.arange(5) - 2.0)
     position = np.stack(np.meshgrid(site, site, site), axis=-1).reshape(-1, 3)
     position += 0.3 * radius * np.sin(np.arange(375.0)).reshape(-1, 3)
@@ -257,8 +258,8 @@ def falling_together(steps=40, dt=1e-4, radius=1e-4):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["world", "particle"])
-def test_rows_that_overflow_grow_and_change_no_bit(schedule):
-    """Beside a world that looks at all pairs; grains of 20 times the size of others among them."""
+def test_overflowing_rows_grow_without_changing_bits(schedule):
+    """Compared with a world that searches all pairs; one grain has 20 times the radius of the others."""
     start = falling_together()
     simulation = Simulation(start, 2, schedule=schedule)
     row = simulation.assembly.lists.near.row
@@ -270,7 +271,7 @@ def test_rows_that_overflow_grow_and_change_no_bit(schedule):
     began = time.perf_counter()
     simulation.run()
     seconds = time.perf_counter() - began
-    # Compiling steps for longer lists is no part of the time that a run takes.
+    # Compiling steps for longer lists does not count as run time.
     assert simulation.setup_s > compiled
     assert simulation.wall_s < seconds - (simulation.setup_s - compiled)
     listed, all_pairs = simulation.results()

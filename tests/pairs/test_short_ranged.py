@@ -1,4 +1,4 @@
-"""Pair forces over the list: what contact laws need of the core. Grip is defined here only."""
+"""Pair forces over the half list, as contact laws use them, with a contact law defined only here."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tisim.steppers.implicit.step_control import ErrorControl
 
 
 def shells(kind, rng, images):
-    """Polydisperse grains in a box, one of them with more neighbours than a list holds."""
+    """Polydisperse grains in a box, one of them with more neighbours than a list row holds."""
     radius = np.concatenate([[0.2], rng.uniform(0.005, 0.05, 299)])
     return scene(
         rng.uniform(0.0, 1.0, (300, 3)),
@@ -32,8 +32,8 @@ def shells(kind, rng, images):
 @pytest.mark.parametrize(
     ("schedule", "images"), [("world", True), pytest.param("particle", False, marks=pytest.mark.slow)]
 )
-def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, schedule):
-    """Through many lists made anew: same trajectories to rounding, and momentum conserved to rounding."""
+def test_list_forces_equal_short_ranged_forces_over_all_pairs(images, schedule):
+    """After many list rebuilds trajectories agree to rounding and momentum is conserved to rounding."""
     results = []
     for kind in (SoftShell, SoftShellOfAll):
         setup = shells(kind, np.random.default_rng(3), images)
@@ -52,9 +52,11 @@ def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, sche
 
 
 @pytest.mark.long
-def test_grains_meet_as_soon_as_one_comes_through_a_face():
-    """Without images: far apart as forces see them, next to each other in the step after. Equal ones change
-    velocities, whenever the list was made; a force that begins too late would add energy."""
+def test_grains_collide_right_after_one_crosses_a_face():
+    """Without images two grains at opposite faces do not interact, but do so one step after a crossing.
+
+    Equal grains exchange their velocities, whenever the list was built. A delayed force would add energy.
+    """
     made = scene(
         [[0.975, 0.5, 0.5], [0.23, 0.5, 0.5]],
         [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
@@ -70,8 +72,10 @@ def test_grains_meet_as_soon_as_one_comes_through_a_face():
 
 
 class Grip(PairForce):
-    """A contact as in the discrete element method: normal spring, tangential spring that remembers how far
-    the surfaces have slid, both linear; torques about the centres. The spring follows the pair as it turns.
+    """A discrete-element contact with linear normal and tangential springs.
+
+    The tangential spring keeps the slip of the surfaces as history and rotates with the pair. Torques act
+    about the centres.
     """
 
     fields = ("spin",)
@@ -97,17 +101,17 @@ class Grip(PairForce):
 
 SIDE, STEP = 1.0, 2e-3
 TRIALS = Trapezoid(control=ErrorControl(error=1e-3, tolerance=1e-10, first=1e-4, longest=STEP, shortest=1e-9))
-"""Steps that are found by trial, after which what pairs remember is brought up to date by itself."""
+"""Adaptive implicit steps, after which the contact history is updated separately."""
 
 
 class CutOff(SoftShell):
-    """A shell that is far wider than grains are."""
+    """A shell much wider than the grains."""
 
     truncated = True
 
 
 def grains(seed=5, n=160, steps=150, grip=300.0, others=(), stepper=None):
-    """Rubbing grains of three sizes, overlapping at the start, in a periodic box."""
+    """Rubbing grains of three sizes in a periodic box, some overlapping at the start."""
     rng = np.random.default_rng(seed)
     return scene(
         rng.uniform(0.0, SIDE, (n, 3)),
@@ -122,8 +126,10 @@ def grains(seed=5, n=160, steps=150, grip=300.0, others=(), stepper=None):
 
 
 def twin(start, steps, stiffness, grip, shell=(0.0, 0.0)):
-    """The same in NumPy: all pairs, what they remember in a matrix, velocity Verlet; with shells of a
-    stiffness and width."""
+    """Reference implementation in NumPy: all pairs, history in a matrix, velocity Verlet.
+
+    shell : stiffness and width of additional shells.
+    """
     r, v, m, radius = (start[name].copy() for name in ("position", "velocity", "mass", "radius"))
     spin, n = np.zeros_like(v), len(m)
     inertia = 0.4 * m * radius**2
@@ -164,8 +170,8 @@ def twin(start, steps, stiffness, grip, shell=(0.0, 0.0)):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["world", "particle"])
-def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
-    """Through many new lists: velocity and spin of the twin, and the same bits after a restart half-way."""
+def test_contacts_with_history_are_their_numpy_twin(schedule, tmp_path):
+    """After many list rebuilds velocity and spin agree, and a restart half-way gives the same bits."""
     setup = grains()
     simulation = compiled(setup, capacity=160, schedule=schedule)
     simulation.load([setup])
@@ -179,7 +185,7 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     np.testing.assert_allclose(state["spin"], spin, rtol=0, atol=1e-8)
     momentum = (state["mass"][:, None] * (state["velocity"] - result.start["velocity"])).sum(axis=0)
     np.testing.assert_allclose(momentum, 0, atol=1e-12 * len(v))
-    # It is the memory that is tested: without it the grains do something else.
+    # The history matters here: without the tangential springs the result differs.
     assert np.abs(twin(result.start, 150, 500.0, 0.0)[0] - v).max() > 0.1
     assert np.abs(spin).max() > 1
 
@@ -192,8 +198,9 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_remembered_is_bounded_and_forgotten():
-    """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""
+def test_the_contact_history_is_bounded_and_cleared():
+    """No grain keeps more entries than contacts, each pair is stored once, and distant grains store
+    nothing."""
     setup = grains()
     (result,) = simulate([setup], capacity=160, schedule="world")
     state = by_id(result)
@@ -208,8 +215,8 @@ def test_what_is_remembered_is_bounded_and_forgotten():
     assert all(radius[i] <= radius[j] for i, j in partners)
 
 
-def of_chunks(setup, slots, monkeypatch):
-    """What becomes of grains in chunks of so many slots."""
+def run_in_chunks(setup, slots, monkeypatch):
+    """Result with chunks of ``slots`` slots."""
     monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", slots)
     simulation = Simulation(setup, capacity=160, schedule="world")
     simulation.load([setup])
@@ -223,25 +230,26 @@ SHELL = {"stiffness": 5.0, "width": 0.25}
 
 
 @pytest.mark.slow
-def test_contacts_within_a_far_cut_off_are_those_of_the_twin(monkeypatch):
-    """Grains part within the reach of another law, and what they remember is forgotten. Pairs reach particles
-    of another chunk, too."""
-    result = of_chunks(grains(others=(CutOff(**SHELL),), steps=75), 64, monkeypatch)
+def test_contacts_within_a_far_cut_off_equal_the_twin(monkeypatch):
+    """Grains that lose contact within the cut-off of another law lose their history.
+
+    Some pairs extend over two chunks.
+    """
+    result = run_in_chunks(grains(others=(CutOff(**SHELL),), steps=75), 64, monkeypatch)
     state, shell = by_id(result), tuple(SHELL.values())
     v, spin = twin(result.start, 75, 500.0, 300.0, shell)
     np.testing.assert_allclose(state["velocity"], v, rtol=0, atol=1e-9)
     np.testing.assert_allclose(state["spin"], spin, rtol=0, atol=1e-8)
-    # Both act.
+    # Both laws act.
     assert np.abs(twin(result.start, 75, 500.0, 300.0)[0] - v).max() > 0.1
     assert np.abs(twin(result.start, 75, 500.0, 0.0, shell)[0] - v).max() > 0.1
 
 
 @pytest.mark.slow
-def test_so_are_those_of_steps_found_by_trial(monkeypatch):
-    """After a step what pairs remember is brought up to date by itself, as it is where the other law is
-    summed over all pairs."""
+def test_contacts_in_implicit_steps_equal_all_pairs(monkeypatch):
+    """After an implicit step the history is updated separately, also if the other law sums over all pairs."""
     over_all, cut = (
-        by_id(of_chunks(grains(others=(kind(**SHELL),), stepper=TRIALS), slots, monkeypatch))
+        by_id(run_in_chunks(grains(others=(kind(**SHELL),), stepper=TRIALS), slots, monkeypatch))
         for kind, slots in ((SoftShellOfAll, 512), (CutOff, 64))
     )
     for name in ("velocity", "spin"):
@@ -251,8 +259,8 @@ def test_so_are_those_of_steps_found_by_trial(monkeypatch):
 
 
 @pytest.mark.slow
-def test_no_time_goes_by_for_contacts_when_a_world_is_written_to():
-    """Velocities are written as they are: what has slid has not slid farther."""
+def test_writing_a_state_does_not_advance_contacts():
+    """Overwriting velocities with their own values must not advance the slip."""
     setup = grains()
     simulation = compiled(setup, capacity=160, schedule="world")
     simulation.load([setup])
@@ -265,8 +273,8 @@ def test_no_time_goes_by_for_contacts_when_a_world_is_written_to():
 
 
 @pytest.mark.long
-def test_what_is_remembered_does_not_tell_when_it_was_looked_at():
-    """Free slots too: a state is the same whether its memory has been stored once or often."""
+def test_reading_states_does_not_change_the_history():
+    """Unused slots included, the state does not depend on how often the history has been stored."""
     setup, ends = grains(), []
     for parts in (1, 10):
         simulation = compiled(setup, capacity=160, schedule="world")

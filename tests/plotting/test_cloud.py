@@ -1,4 +1,4 @@
-"""Clouds of particles as seen in a square, which may be one that does not hold all of them."""
+"""Pictures of particle clouds in a square that may not contain all of them."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tisim.plotting.cloud import PROJECTION, panel
 
 
 def image(position):
-    """Of grains of 1 m in a square of 10 m around the middle."""
+    """Picture of grains with a radius of 1 m in a square of 10 m about the centre."""
     axis = Figure().subplots()
     state = {"position": position, "radius": np.ones(len(position))}
     panel(axis, state, (-5.0, -5.0, 10.0), np.empty((0, 3)))

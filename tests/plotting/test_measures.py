@@ -1,4 +1,4 @@
-"""Figures of measures: what is drawn is what was measured, in the units that are said."""
+"""Figures of measures show the measured values in the labelled units."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_neighbours_over_the_diameter_or_in_metres(diameter, label, end):
 
 
 def test_chain_lengths_are_fractions_of_particles():
-    """Six alone, two pairs, a chain of four."""
+    """Six single particles, two pairs and a chain of four."""
     cluster = np.repeat(np.arange(9), [1] * 6 + [2] * 2 + [4])
     (axis,) = chain_lengths(cluster).axes
     assert [bar.get_height() for bar in axis.patches] == pytest.approx([6 / 14, 4 / 14, 0, 4 / 14])
@@ -55,8 +55,9 @@ def test_profiles_have_no_prefix_before_a_power_of_a_unit():
     np.testing.assert_allclose(panels.axes[0].get_lines()[0].get_ydata(), (edges[1:] + edges[:-1]) / 2)
 
 
-def test_outlines_of_ellipsoid_and_hull_hold_all_that_is_seen(rng):
-    """A point of the ellipsoid is within its outline, the farthest one on it; so are spheres and the hull."""
+def test_outlines_of_ellipsoid_and_hull_enclose_all_points(rng):
+    """A point of the ellipsoid is within its outline and the farthest one on it; spheres and hull
+    likewise."""
     position, radius = rng.normal(size=(40, 3)) * (3, 2, 1), np.full(40, 0.2)
     around = bounding_ellipsoid(position, radius)
     made = scene(position, 0 * position, (Tether(stiffness=(1.0, 1.0, 1.0)),), radius=radius)

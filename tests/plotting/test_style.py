@@ -1,4 +1,4 @@
-"""What all figures have in common."""
+"""The common style of all figures."""
 
 import numpy as np
 import pytest
@@ -46,14 +46,14 @@ def test_symbols_are_printed_as_such():
     assert symbols("relative_velocity, Pink") == "relative_velocity, Pink"
 
 
-def test_axes_are_logarithmic_where_values_span_decades():
+def test_axes_are_logarithmic_if_values_span_decades():
     assert scale_of(np.array([1.0, 100.0])) == "log"
     for values in ([1.0, 20.0], [0.0, 100.0], [-1.0, 100.0], []):
         assert scale_of(np.array(values)) == "linear"
 
 
 def test_colours_of_time_rise_evenly_in_lightness():
-    """Rec. 709 luminance of the map; a rainbow goes up and down."""
+    """Rec. 709 luminance of the map rises monotonically, unlike a rainbow."""
 
     def rises(colours):
         light = colours[:, :3] ** 2.2 @ [0.2126, 0.7152, 0.0722]

@@ -1,4 +1,4 @@
-"""Standard pictures and movies of a run's file."""
+"""Standard pictures and movies from the file of a run."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def file(tmp_path_factory):
     return path
 
 
-def test_history_is_that_of_two_grains_in_straight_flight(file):
+def test_the_history_of_two_grains_in_straight_flight(file):
     with frames(file) as trajectory:
         series = history(trajectory)
     np.testing.assert_allclose(series.time, np.arange(5) * 1e-3, rtol=1e-12)
@@ -60,7 +60,7 @@ def test_quantities_draw_the_history(file):
     assert figure.get_suptitle() == "2 particles throughout"
 
 
-def test_a_number_of_particles_that_changes_has_a_panel():
+def test_a_changing_number_of_particles_has_a_panel():
     class Seen(list):
         times = np.array([0.0, 1.0])
         scene = SimpleNamespace(domain=Open())
@@ -75,8 +75,9 @@ def test_a_number_of_particles_that_changes_has_a_panel():
     assert (number.get_title("left"), figure.get_suptitle()) == ("(c)", "")
 
 
-def test_nothing_jumps_where_a_particle_crosses_the_face_of_a_sheared_box():
-    """It moves with the flow and 1 m/s up the gradient; the rate is 10 /s, and sides are 2 m."""
+def test_a_crossing_of_a_sheared_face_causes_no_jump():
+    """A particle moves with the flow and at 1 m/s along the gradient; the rate is 10 /s, and sides are 2
+    m."""
     box = ShearedBox(low=(-1, -1, -1), high=(1, 1, 1), rate=10.0)
 
     class Seen(list):
@@ -96,7 +97,7 @@ def test_nothing_jumps_where_a_particle_crosses_the_face_of_a_sheared_box():
 
 @pytest.mark.parametrize(("speeds", "scale"), [((0.0, 1e-3, 1.0), "log"), ((0.0, 0.9, 1.0), "linear")])
 def test_energies_that_span_decades_are_on_a_logarithmic_axis(speeds, scale):
-    """Also where the start is at rest; and frames at the sides have whole dots."""
+    """This includes a start at rest; markers at the edges of the plot are not clipped."""
 
     class Seen(list):
         times = np.arange(3.0)
@@ -111,7 +112,7 @@ def test_energies_that_span_decades_are_on_a_logarithmic_axis(speeds, scale):
     assert not energy.lines[0].get_clip_on()
 
 
-def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
+def test_the_velocity_is_drawn_if_grains_reenter(tmp_path):
     box = Box(low=(-0.02,) * 3, high=(0.02,) * 3)
     tisim.run(scene(**MOVING, domain=box), record=Recording(tmp_path / "t.h5", frames=4))
     with frames(tmp_path / "t.h5") as trajectory:
@@ -120,8 +121,8 @@ def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
     np.testing.assert_allclose(centre.lines[0].get_ydata(), 2.5)
 
 
-def test_pictures_of_an_interrupted_run_say_what_is_missing(file, tmp_path):
-    """The same frames of a run that was to last twice as long."""
+def test_pictures_of_an_interrupted_run_state_the_missing_time(file, tmp_path):
+    """The same frames, for a run with twice the duration."""
     longer = scene(**{**MOVING, "steps": 8})
     with frames(file) as trajectory, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
         assert mark_missing(quantities(trajectory), trajectory).get_supxlabel() == ""
@@ -146,7 +147,7 @@ def test_clouds_are_of_the_first_and_last_frame(file):
 
 
 def test_start_and_end_are_on_one_scale_with_the_axes_of_space_and_gravity():
-    """A cloud that spreads tenfold in open space."""
+    """A cloud that expands tenfold in open space."""
     states = [{"position": k * np.eye(3), "radius": np.full(3, 0.1)} for k in (1.0, 10.0)]
     for effects, letters in (((), "xyz"), ((tisim.effects.Gravity(acceleration=(0, 0, -2.0)),), "xyzg")):
         figure = start_and_end(states, (0.0, 1.0), SimpleNamespace(domain=Open(), effects=effects))
@@ -176,7 +177,7 @@ def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):
     assert all(np.abs(a - b).max() > 100 for a, b in itertools.pairwise(pictures))
 
 
-def test_what_a_movie_misses_is_reported_in_whole_and_covers_nothing(file, tmp_path, monkeypatch):
+def test_the_note_of_an_interrupted_run_is_complete_and_covers_nothing(file, tmp_path, monkeypatch):
     """In the narrowest picture, with numbers of all digits."""
     pages = []
 

@@ -1,4 +1,4 @@
-"""Outlines of walls in pictures: on their shapes, where their motions have them."""
+"""Outlines of walls in pictures lie on their shapes and follow their motions."""
 
 from types import SimpleNamespace
 
@@ -25,15 +25,15 @@ MOTIONS = (
 
 
 def among(*walls):
-    """A scene of a grain in these walls."""
+    """A scene of one grain in these walls."""
     return scene(
         [[0.5] * 3], np.zeros((1, 3)), (Granular(), *walls), 0.1, materials={"grain": Material(**USUAL)}
     )
 
 
 @pytest.mark.parametrize("motion", MOTIONS, ids=lambda motion: motion.kind())
-def test_places_of_a_body_move_as_its_motion_says(motion, rng):
-    """By the velocity of each, and back again."""
+def test_points_of_a_body_follow_its_motion(motion, rng):
+    """Each point moves with the velocity of its motion, and the inverse map returns it."""
     place, t, h = rng.normal(size=(5, 3)), 0.7, 1e-5
     there = placed(motion, place, t)
     np.testing.assert_allclose(placed(motion, there, -t), place, atol=1e-12)
@@ -56,7 +56,7 @@ def test_a_gate_rests_until_it_begins_to_move(rng):
 
 
 def test_planes_end_at_each_other_and_around_the_grains():
-    """A box without a lid: five rectangles, which go a bit beyond the grains where it is open."""
+    """A box without a lid: five rectangles, which extend slightly beyond the grains on the open side."""
     faces = [((0, 0, 0), axis) for axis in np.eye(3)] + [((1, 1, 1), -axis) for axis in np.eye(3)[:2]]
     planes = [geometry.Plane(point=point, normal=tuple(normal)) for point, normal in faces]
     lines = outlines(among(Walls(planes=planes)), 0.0, LOW, HIGH, TOWARDS)
@@ -92,8 +92,8 @@ def test_rims_and_silhouettes_lie_on_their_shapes():
     assert len(outline(tent, TOWARDS)) == 8
 
 
-def test_a_picture_has_walls_where_they_are():
-    """A disc that moves is elsewhere at the end; what moves by forces, and what is far away, is left out."""
+def test_walls_in_a_picture_are_in_place():
+    """A moving disc is at another place at the end; walls moved by forces and distant walls are left out."""
     disc = geometry.Disc(centre=(0.5, 0.5, 0), radius=0.5)
     goes = Walls(name="goes", discs=[disc], motion=Translation(velocity=(0, 0, 0.4)))
     made = among(
@@ -110,7 +110,7 @@ def test_a_picture_has_walls_where_they_are():
     assert heights[1] > heights[0]
 
 
-def test_a_movie_sees_walls_where_they_are_between_its_first_and_last_frame():
+def test_walls_in_a_movie_are_in_place_at_each_frame():
     disc = geometry.Disc(centre=(0.5, 0.5, 0), radius=0.5)
     shakes = Oscillation(amplitude=(0, 0, 0.4), frequency=1.0)
     made = among(Walls(discs=[disc], motion=shakes))

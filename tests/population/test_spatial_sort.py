@@ -1,4 +1,4 @@
-"""Particles that are sorted in memory while they run: results stay in the order of the start."""
+"""Particles are sorted in memory during a run; results keep the order of the start."""
 
 import itertools
 
@@ -24,8 +24,8 @@ THROWN = 3
 
 
 def bed(seed, n=GRAINS, exit_height=-1e3):
-    """Grains in a cell too small for them, in any order; those that sink to a height (m) are weighed and
-    taken out."""
+    """Grains in random order in a cell too small for them; grains below a height (m) are counted and
+    removed."""
     made = heap(np.random.default_rng(seed), n, side=2.7, dt=2e-4, steps=STEPS)
     planes = [Plane(point=(0.0, 0.0, exit_height))]
     return made.model_copy(
@@ -42,7 +42,7 @@ def made(patch, schedule, least, worlds=2, scene=None):
 
 @pytest.fixture(scope="module")
 def simulation():
-    """Worlds of 150 and more are sorted."""
+    """Worlds of 150 or more particles are sorted."""
     with pytest.MonkeyPatch.context() as patch:
         simulation = made(patch, "world", 150)
     yield simulation
@@ -76,7 +76,7 @@ def usual(simulation):
     return ends(simulation, [bed(1), bed(2, 140)])
 
 
-def test_memory_is_sorted_and_what_is_shown_is_not(simulation, usual):
+def test_memory_is_sorted_but_results_are_not(simulation, usual):
     sorted_ids, others = simulation.s.read("id")
     assert (np.diff(sorted_ids) < 0).any()
     assert (np.diff(others[:140]) == 1).all()
@@ -87,7 +87,7 @@ def test_memory_is_sorted_and_what_is_shown_is_not(simulation, usual):
 
 
 def neighbour_distance(simulation):
-    """Mean distance of particles that follow each other in memory."""
+    """Mean distance between particles that are adjacent in memory."""
     return np.linalg.norm(np.diff(simulation.s.read("position")[0], axis=0), axis=1).mean()
 
 
@@ -98,7 +98,7 @@ def test_neighbours_lie_near_each_other(simulation, usual):
     assert neighbour_distance(simulation) < 0.6 * before
 
 
-def test_the_bits_are_those_of_one_alone_and_of_a_run_that_is_restarted(simulation, usual, tmp_path):
+def test_batches_and_restarts_do_not_change_bits(simulation, usual, tmp_path):
     same(ends(simulation, [bed(2, 140), bed(1)])[1], usual[0])
     for stop in (EVERY, EVERY + 7):
         simulation.load([bed(1), bed(2, 140)])
@@ -115,7 +115,7 @@ def test_the_bits_are_those_of_one_alone_and_of_a_run_that_is_restarted(simulati
 
 
 def alike(found, expected):
-    """The same grains, and what is theirs to rounding."""
+    """Equal grains and quantities, to rounding."""
     assert found.work == expected.work
     assert found.measures == pytest.approx(expected.measures, rel=1e-9)
     one, other = by_id(found), by_id(expected)
@@ -123,22 +123,22 @@ def alike(found, expected):
     for name in ("position", "velocity", "spin", "force", "granular_past"):
         values, scale = [one[name], other[name]], np.abs(other[name]).max()
         if name == "granular_past":
-            # A grain remembers its partners in any order.
+            # The partners of a grain may be stored in any order.
             values = [np.sort(each.reshape(len(each), -1)) for each in values]
         np.testing.assert_allclose(*values, rtol=0, atol=1e-9 * scale, err_msg=name)
 
 
 @pytest.mark.slow
-def test_they_are_those_of_an_unsorted_run_but_for_rounding(unsorted, usual):
+def test_results_equal_an_unsorted_run_to_rounding(unsorted, usual):
     assert unsorted.sort is None
     alike(usual[0], ends(unsorted, [bed(1)])[0])
 
 
 @pytest.mark.slow
-def test_grains_are_taken_out_of_a_sorted_world(simulation, unsorted, tmp_path):
-    """As of one that is not; also beside another, and in a run that is restarted."""
+def test_grains_are_removed_from_a_sorted_world(simulation, unsorted, tmp_path):
+    """Compared with an unsorted world, in a batch, and in a restarted run."""
     leaving = bed(3, exit_height=0.4)
-    # What is taken out fills slots from the end, so the order of ids alone does not say that it is sorted.
+    # Removed grains are replaced by grains from the end, so the order of ids alone does not prove the sort.
     assert simulation.sort is not None
     assert unsorted.sort is None
     (alone,) = ends(simulation, [leaving])
@@ -157,8 +157,9 @@ def test_grains_are_taken_out_of_a_sorted_world(simulation, unsorted, tmp_path):
     same(simulation.results()[0], alone)
 
 
-def test_a_world_that_fails_after_a_sort_names_the_particle_and_gives_its_last_good_step(simulation, usual):
-    """A grain is thrown so fast that nothing is finite; memory has another in its place."""
+def test_a_failure_after_a_sort_names_the_particle_and_keeps_the_state(simulation, usual):
+    """A grain becomes so fast that the state is not finite, after another particle has taken its slot in
+    memory."""
 
     def thrown(steps=None):
         simulation.load([bed(1), bed(2, 140)])
@@ -178,7 +179,7 @@ def test_a_world_that_fails_after_a_sort_names_the_particle_and_gives_its_last_g
     same(thrown(good)[0], failed)
 
 
-def test_what_is_written_between_runs_goes_to_whom_it_is_for(simulation, usual):
+def test_states_written_between_runs_reach_the_right_particles(simulation, usual):
     simulation.load([bed(1)])
     simulation.run(steps=EVERY + 1)
     velocity = simulation.state["velocity"].copy()
@@ -199,8 +200,8 @@ def test_both_schedules_have_the_same_bits(usual):
 
 
 @pytest.mark.slow
-def test_grains_in_shear_are_those_of_a_twin(rng):
-    """Who crosses a face, and who is an image, follows particles that are sorted again and again."""
+def test_grains_in_shear_equal_the_twin(rng):
+    """Face crossings and images of particles in shear follow the repeatedly sorted particles."""
     crowd = sheared.crowd(rng, n=GRAINS, sides=1.5 * sheared.SIDES)
     with pytest.MonkeyPatch.context() as patch:
         simulation = made(patch, "world", GRAINS, scene=crowd)
@@ -212,7 +213,7 @@ def test_grains_in_shear_are_those_of_a_twin(rng):
     place, velocity = sheared.inside(crowd.domain, twin.x, twin.v, result.time)
     sides = np.subtract(crowd.domain.high, crowd.domain.low)
     off = result.state["position"] - place
-    # On a face an image may be taken for the other.
+    # On a face one image may stand for the other.
     assert np.abs(off - sides * np.round(off / sides)).max() < 1e-10
     for name, values in {"velocity": velocity, "spin": twin.w}.items():
         scale = np.abs(values).max()
@@ -220,7 +221,8 @@ def test_grains_in_shear_are_those_of_a_twin(rng):
 
 
 def bricks(dims):
-    """The cells of a grid in order: bricks along x, then y, then z, and the same for the cells in each."""
+    """The cells of a grid in order: bricks along x, then y, then z, and the same for the cells in each
+    brick."""
     numbers = [range(0, n, spatial_sort.BRICK) for n in dims]
     for z, y, x in itertools.product(*reversed(numbers)):
         ends = [min(k + spatial_sort.BRICK, n) for k, n in zip((x, y, z), dims, strict=True)]

@@ -1,4 +1,5 @@
-"""Particles that are removed: who fills their slots, and what is summed over all for an operator."""
+"""Removed particles: the order in which their slots are filled, and sums over all particles for an
+operator."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ N, STEPS = 300, 6
 
 
 class Cull(Operator):
-    """Removes each particle in a step of its own: by itself, or with what the world does; and weighs it."""
+    """Removes each particle in a given step, in the particle stage or in the world stage, and sums the
+    masses."""
 
     fields = (
         Field("step_of_end", "", 1, "keep", integer=True),
@@ -44,7 +46,7 @@ class Cull(Operator):
 
 
 def filled(order, gone):
-    """The ids in memory after some are gone: the last one fills the first slot that is free, one by one."""
+    """The ids in memory after removals: the last particle fills the first free slot, one by one."""
     left, k = list(order), 0
     while k < len(left):
         if left[k] in gone:
@@ -58,7 +60,7 @@ def filled(order, gone):
 
 @pytest.fixture(scope="module", params=["world", pytest.param("particle", marks=pytest.mark.slow)])
 def culled(request):
-    """Scenes, and what is in memory after each step: with several blocks of slots, and of particles."""
+    """Scenes, and the ids in memory after each step; slots and particles extend over several blocks."""
     rng = np.random.Generator(np.random.Philox(7))
     scenes = []
     for number in (N, N - 101, 1):
@@ -85,7 +87,7 @@ def culled(request):
 
 
 def test_slots_are_filled_from_the_end(culled):
-    """Each field goes along with its particle."""
+    """All fields of a particle move together."""
     scenes, states, _ = culled
     for w, made in enumerate(scenes):
         start = made.particles.quantities

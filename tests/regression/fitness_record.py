@@ -1,7 +1,7 @@
-"""Stored values of fitness functions: what they are made of, and the tool that makes them anew on purpose.
+"""Stored values of fitness functions, and the tool that deliberately renews them.
 
-python tests/regression/fitness_record.py          compare this machine's values with the stored ones
-python tests/regression/fitness_record.py --write  store this machine's values (after a change of physics)
+python tests/regression/fitness_record.py          compare this machine's values with the stored ones python
+tests/regression/fitness_record.py --write  store this machine's values (after a change of physics)
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ PROBLEM = Problem(
 
 
 def measure() -> FitnessRecord:
-    """Fitness of every design from every start, with the settings of the runtime."""
+    """Fitness of every design from every random start (seed), with the settings of the runtime."""
     return FitnessRecord.measure(PROBLEM, DESIGNS, STARTS)
 
 
 def main() -> int:
-    """Compare, or store."""
+    """Compare the values, or store them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--write", nargs="?", type=Path, const=FILE, help="store this machine's values")
     parser.add_argument("--precision", default="f64")

@@ -1,12 +1,12 @@
-"""Whether two versions of the code give the same bits: fingerprints of a trajectory of each case.
+"""Checks that two versions of the code give the same bits, by fingerprints of a trajectory of each case.
 
-python tests/regression/same_bits.py --write FILE [--check]     with one version
-python tests/regression/same_bits.py --compare FILE [--check]   with the other: exit code 1 where one differs
+python tests/regression/same_bits.py --write FILE [--check]     with one version python
+tests/regression/same_bits.py --compare FILE [--check]   with the other: exit code 1 on a difference
 
-A fingerprint is a SHA-256 hash of every frame (names, shapes and bytes of all its arrays), of the end and of
-the counts of the work. With --check, every number that ``tisim check`` finds is compared too (an hour).
-Bits belong to a machine, not to a backend: TISIM_BACKEND may be another one in the second command. The
-fitness record has its own tool, fitness_record.py.
+A fingerprint is a SHA-256 hash of every frame (names, shapes and bytes of all its arrays), of the final state
+and of the work counters. With --check, every number computed by ``tisim check`` is compared too (an hour).
+Bits depend on the machine, not on the backend: TISIM_BACKEND may differ in the second command. The fitness
+record has its own tool, fitness_record.py.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ RUNS = (
 
 
 def fingerprint(name: str, size: str, part: float) -> str:
-    """SHA-256, hexadecimal, of what one case gives from its start number 1."""
+    """SHA-256 (hexadecimal) of the output of one case with seed number 1."""
     import tisim
     from tisim.cases.case import every
     from tisim.io.reader import frames
@@ -65,14 +65,14 @@ def _add(digest: Any, arrays: dict[str, np.ndarray]) -> None:
 
 
 def checked(name: str) -> dict[str, str]:
-    """All numbers that the checks of a case find, by what they are of, bit by bit."""
+    """All numbers from the checks of a case, by name, bit by bit."""
     from tisim.cases.case import every
 
     return {item.name: repr(item) for item in every()[name].check()}
 
 
 def measure(check: bool) -> dict[str, Any]:
-    """Fingerprints of all runs, and the numbers of all checks where they are asked for."""
+    """Fingerprints of all runs, and the numbers of all checks if requested."""
     fingerprints: dict[str, Any] = {}
     for name, size, part in RUNS:
         fingerprints[f"{name}, {size}"] = fingerprint(name, size, part)
@@ -84,7 +84,7 @@ def measure(check: bool) -> dict[str, Any]:
 
 
 def main() -> int:
-    """Write, or compare."""
+    """Write the fingerprints, or compare them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument("--write", type=Path, metavar="FILE")

@@ -1,7 +1,7 @@
-"""The fitness functions of capture do not change by accident.
+"""The fitness functions of capture do not change unintentionally.
 
-Noise is a function of seed, particle and step, so which particles are caught is the same on every machine,
-but for those that rounding turns at the last moment.
+Noise is a function of seed, particle and step, so the captured particles are the same on every machine,
+except for marginal ones that rounding decides.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ CAUGHT = {
         (0.8, 0.0, 2.0, 10.0, 3.0, 90.0): (36, 50),
     },
 }
-"""Variant -> design, its genes in the order of the first test -> particles caught of two starts."""
+"""Variant -> design, with genes in the order of the first test -> captured particles of two starts
+(seeds)."""
 
 
 def names(variant):
@@ -51,7 +52,8 @@ def test_designs_of_the_record_are_in_the_order_of_the_genes():
 
 
 def caught(**changed):
-    """Particles caught by variant, shape (designs, starts), and the throughput (m^3/s) of the first."""
+    """Captured particles by variant, shape (designs, starts), and the throughput (m^3/s) of the first
+    variant."""
     scenes = []
     for variant, designs in CAUGHT.items():
         filters = problem(variant=variant)
@@ -66,13 +68,14 @@ def caught(**changed):
 
 
 @pytest.mark.long
-def test_fitness_of_capture_is_that_of_the_record():
+def test_fitness_of_capture_equals_the_record():
     fractions, flow = caught()
     turned = 1 if runtime.current().precision == "f64" else 2
     for variant, designs in CAUGHT.items():
         np.testing.assert_allclose(fractions[variant], list(designs.values()), atol=turned + 0.1)
     assert flow == pytest.approx(FLOW_SPEED * CHANNEL_WIDTH * CHANNEL_HEIGHT)
-    # Particles of 100 nm have half the moment: fewer are caught, in every variant, than rounding may turn.
+    # Particles of 100 nm have half the moment; in every variant the captures drop by more than rounding may
+    # change.
     smaller, _ = caught(radius=100.0)
     for variant in CAUGHT:
         assert (fractions[variant] - smaller[variant]).sum() > turned * fractions[variant].size

@@ -1,7 +1,7 @@
-"""The fitness functions of vibration and blast do not change by accident.
+"""The fitness functions of vibration and blast do not change unintentionally.
 
-Nothing in these runs is chaotic, so their values are stored as numbers: to the accuracy that other compilers
-keep in f64, and that f32 has.
+These runs are not chaotic, so their values are stored as numbers, to the accuracy of other compilers in f64
+and to the accuracy of f32.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ VIBRATION = {
     (0.2, 765.0): -5.549151949409214,
     (2.0, 630.0): -0.1307905496542935,
 }
-"""Flux (T) and stiffness (N/m) of a design -> its fitness: off, at the fast resonance, the slow one, off."""
+"""Flux (T) and stiffness (N/m) of a design -> fitness: off resonance, fast resonance, slow resonance, off."""
 
 BLAST = {
     ((0.6, 0.3, -0.2), 0): 0.02469592752685592,
@@ -38,7 +38,7 @@ def tolerance():
 
 
 def values(scale=1.0):
-    """Of both, with all fields scaled."""
+    """Fitness values of both cases, with all fields scaled by a factor."""
     wave = vibration.problem()
     shape = blast.problem("small")
     waves = [wave.scene({"flux": scale * b, "stiffness": k}, 0) for b, k in VIBRATION]
@@ -53,11 +53,11 @@ def values(scale=1.0):
 
 
 @pytest.mark.long
-def test_fitness_of_vibration_and_blast_is_that_of_the_record():
+def test_fitness_of_vibration_and_blast_equals_the_record():
     waves, shapes = values()
     np.testing.assert_allclose(waves, list(VIBRATION.values()), rtol=tolerance())
     np.testing.assert_allclose(shapes, list(BLAST.values()), rtol=tolerance())
-    # A field 1 % stronger shows in each that depends on it.
+    # A field stronger by 1 % changes each value that depends on it.
     waves, shapes = values(1.01)
     changed = [
         not np.isclose(a, b, rtol=2 * tolerance()) for a, b in zip(waves, VIBRATION.values(), strict=True)

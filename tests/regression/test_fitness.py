@@ -1,4 +1,4 @@
-"""Fitness functions do not change by accident."""
+"""Fitness functions do not change unintentionally."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tisim.optimize import FitnessRecord
 from tisim.scene.scene import PHYSICS_VERSION
 
 STANDARD_ERRORS = 4.0
-"""Bound on the difference of two means: exceeded by chance once in 16,000 comparisons."""
+"""Bound on the difference of two means, exceeded by chance once in 16,000 comparisons."""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,8 @@ def test_the_record_is_of_this_physics(recorded_fitness):
 
 @pytest.mark.long
 def test_same_settings_give_the_same_fitness_to_the_last_bit(recorded_fitness, now):
-    """On the platform of the record; on another one, whose exp and pow round differently, in the mean."""
+    """To the bit on the platform of the record; in the mean on others, whose exp and pow round
+    differently."""
     if recorded_fitness.same_arithmetic(now):
         assert now.values == recorded_fitness.values
     else:
@@ -54,7 +55,7 @@ def test_the_other_schedule_gives_the_same_fitness_to_the_last_bit(now):
 
 
 def elsewhere(folder, *options):
-    """The record of a process of its own: precision and threads belong to the runtime."""
+    """The record computed in a separate process, because precision and threads belong to the runtime."""
     file = folder / "fitness.json"
     command = [sys.executable, fitness_record.__file__, "--write", str(file), *options]
     subprocess.run(command, check=True, cwd=Path(fitness_record.__file__).parents[2])
@@ -75,10 +76,11 @@ def test_any_number_of_threads_gives_the_same_fitness_to_the_last_bit(now, tmp_p
 
 
 @pytest.mark.long
-def test_the_bound_would_notice_a_change_of_physics(now):
-    """Half as hard again, as f32 or another platform must not be: 7, 30 and 10 standard errors (measured).
+def test_the_bound_detects_a_change_of_physics(now):
+    """A hardness 1.5 times as large differs by 7, 30 and 10 standard errors (measured).
 
-    A quarter is seen too (19), by the design whose starts differ least.
+    A hardness 1.25 times as large is also detected (19), by the design with the least variation between
+    starts.
     """
     names = ("published", "hard and slow", "fragile")
     designs = {name: fitness_record.DESIGNS[name] for name in names}

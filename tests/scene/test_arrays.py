@@ -1,4 +1,4 @@
-"""Starts of arrays: the same scene as of lists, in less time; digests are those that they always were."""
+"""Starts given as arrays equal starts given as lists, take less time, and keep the existing digests."""
 
 import json
 import pickle
@@ -16,8 +16,8 @@ def text(value):
 
 
 @pytest.mark.parametrize("columns", [(), (3,)])
-def test_text_of_arrays_is_that_of_their_lists(rng, columns):
-    """Of numbers of all sizes, bit patterns at random and those near where the notation changes."""
+def test_text_of_arrays_equals_text_of_their_lists(rng, columns):
+    """Numbers of all sizes, random bit patterns, and numbers near the change of notation."""
     size = (ROWS_PER_PIECE + 5, *columns)
     bits = rng.integers(0, 2**64, size, dtype=np.uint64).view(np.float64)
     edges = [
@@ -44,7 +44,7 @@ def test_text_of_arrays_is_that_of_their_lists(rng, columns):
         assert text(array) == json.dumps(array.tolist())
 
 
-def test_text_of_what_has_arrays_in_it():
+def test_text_of_data_with_arrays():
     data = {"b": {"z": [1, {"y": 2, "x": None}], "a": np.eye(3)}, "a": "\0\"'µ", "c": (1.5, 2), "": {}}
     lists = {**data, "b": {**data["b"], "a": np.eye(3).tolist()}}
     assert text(data) == json.dumps(lists, sort_keys=True)
@@ -81,12 +81,12 @@ DIGESTS = {
     one: "4b907cc869046cdaeba1d9ec15d1ac9212be36a0bd935e74b20bc68eac21f701",
     magnitudes: "06a89ba40c956a8fd261f81054f1c79868b453e134a9d100b8e0f2c423e71f5b",
 }
-"""Written when a start was of tuples; caches of searches are found by them."""
+"""Recorded when starts consisted of tuples; search caches use these digests as keys."""
 
 
 @pytest.mark.parametrize("make", DIGESTS, ids=lambda make: make.__name__)
-def test_digests_are_those_of_before(monkeypatch, make):
-    """Those of physics version 2, when they were taken."""
+def test_digests_are_unchanged(monkeypatch, make):
+    """The digests were taken with physics version 2."""
     monkeypatch.setattr("tisim.scene.scene.PHYSICS_VERSION", 2)
     scene = Scene(name=make.__name__, particles=make(), duration=1.0, seed=3)
     assert scene.digest() == DIGESTS[make]
@@ -95,7 +95,7 @@ def test_digests_are_those_of_before(monkeypatch, make):
     assert scene.to_dict() == again.to_dict()
 
 
-def test_a_start_of_arrays_equals_that_of_lists():
+def test_a_start_of_arrays_equals_one_of_lists():
     start = one()
     data = {key: value for key, value in Scene(particles=start, duration=1.0).to_dict()["particles"].items()}
     assert data.pop("kind") == "particles"
@@ -153,14 +153,14 @@ def test_arrays_are_copies_that_cannot_be_written_to():
         ({"quantities": {"charge": np.array([1.0, np.inf, 0.0])}}, "particles.charge must be finite"),
     ],
 )
-def test_what_is_wrong_with_an_array_is_said_as_of_a_list(changes, message):
+def test_arrays_and_lists_give_the_same_error_messages(changes, message):
     data = one().model_dump()
     for arrays in (changes, {name: v if isinstance(v, dict) else v.tolist() for name, v in changes.items()}):
         with pytest.raises(InputError, match=message):
             Particles(**{**data, **arrays})
 
 
-def test_neither_making_nor_digesting_takes_lists_of_all(rng):
+def test_scenes_and_digests_need_no_lists_of_all_numbers(rng):
     """Lists of the numbers alone would take 45 MB."""
     where = rng.uniform(-1, 1, (200_000, 3))
     tracemalloc.start()
@@ -176,7 +176,7 @@ def test_neither_making_nor_digesting_takes_lists_of_all(rng):
 
 
 def test_lists_of_arrays_are_plain_data():
-    """A list of vectors, as NumPy makes them: a scene can be changed, written and told from others."""
+    """A list of NumPy vectors: such a scene can be changed, written and compared."""
     moment = np.array([0.0, 1.0, 2.0])
     quantities = {"moment": [moment, 2 * moment], "charge": [np.float64(1), np.int8(2)]}
     listed = {"moment": [[0.0, 1.0, 2.0], [0.0, 2.0, 4.0]], "charge": [1.0, 2]}

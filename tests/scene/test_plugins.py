@@ -1,4 +1,4 @@
-"""Effects of the user's own, from a file or an installed package: found by name, and part of the digest."""
+"""User-defined effects, from a file or an installed package, are found by name and included in the digest."""
 
 import pytest
 
@@ -47,7 +47,7 @@ def test_an_effect_of_a_file_is_found_by_its_name(own_file):
         Scene.from_dict(data("x"))
 
 
-def test_a_name_that_is_misspelt_is_told_with_those_next_to_it():
+def test_a_misspelt_name_is_reported_with_similar_ones():
     misspelt = {**scene(*ONE).to_dict(), "effects": {"gravty": {}}}
     rule = r"effects.gravty.kind must be one of \d+ that 'tisim effects' lists, such as gravity, "
     with pytest.raises(InputError, match=rule + r".*; received 'gravty'"):
@@ -69,7 +69,7 @@ def test_the_digest_and_versions_name_the_file_of_an_effect(own_file):
     ("name", "other"),
     [("Gravity", r"tisim\.effects\.external\.gravity\.Gravity"), ("Pull", r"own_laws\.Pull")],
 )
-def test_a_name_that_is_taken_is_refused_and_nothing_of_the_file_is_known(own_file, name, other):
+def test_a_file_with_a_name_in_use_is_refused_completely(own_file, name, other):
     plugins.load(own_file("own_laws.py", LAW))
     path = own_file("more_laws.py", LAW.replace("Pull", name))
     message = (

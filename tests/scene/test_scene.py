@@ -1,4 +1,5 @@
-"""Scenes as plain data: TOML and back, changes by dotted key, and a digest of all that decides a result."""
+"""Scenes as plain data: TOML and back, changes by dotted key, and a digest of everything that affects
+results."""
 
 import subprocess
 import sys
@@ -43,7 +44,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
-def test_toml_gives_the_scene_back_to_the_last_bit(make, tmp_path):
+def test_toml_keeps_the_scene_to_the_last_bit(make, tmp_path):
     before = make()
     file = tmp_path / "scene.toml"
     file.write_text(before.to_toml(), encoding="utf-8")
@@ -76,7 +77,7 @@ def other(key, value):
 
 
 def test_digest_changes_with_every_number_in_the_scene():
-    """Each leaf of the data, changed alone, changes the digest; and nothing else does."""
+    """Changing any single leaf of the data changes the digest, and nothing else does."""
     base = flow(grains=3)
     digests = {base.digest()}
     changed = 0
@@ -92,7 +93,7 @@ def test_digest_changes_with_every_number_in_the_scene():
 
 
 def test_a_skin_is_part_of_the_scene_and_not_of_its_digest(tmp_path):
-    """Results do not depend on it, so what is stored of them need not be made anew."""
+    """Results do not depend on the skin, so stored results stay valid."""
     base, file = flow(grains=3), tmp_path / "scene.toml"
     wide = base.replace({"skin": 0.125})
     file.write_text(wide.to_toml(), encoding="utf-8")
@@ -117,7 +118,7 @@ def test_digest_changes_with_each_quantity_and_effect():
 
 
 class TestReplace:
-    def test_changes_what_is_named_and_nothing_else(self):
+    def test_only_named_values_are_changed(self):
         after = cloud().replace({"effects.impact.hardness": 3e5, "duration": 0.25, "particles.number": 9})
         assert after.effects[0].hardness == 3e5
         assert (after.duration, after.particles.number) == (0.25, 9)
@@ -155,14 +156,14 @@ class TestReplace:
             ),
         ],
     )
-    def test_says_what_is_wrong(self, key, value, message):
+    def test_wrong_names_are_reported(self, key, value, message):
         with pytest.raises(InputError) as fault:
             cloud().replace({key: value})
         assert str(fault.value) == message
 
 
 class TestWithout:
-    def test_leaves_out_what_is_named_and_nothing_else(self):
+    def test_only_named_parts_are_left_out(self):
         assert cloud().without("cooling").effects == cloud().effects[:-1]
         assert cloud().without("cooling", "heating").effects == cloud().effects[:-2]
         assert cloud().without().digest() == cloud().digest()
@@ -177,7 +178,7 @@ class TestWithout:
             ("heating", "effects.cooling must be used together with effects.heating; received 'impact, "),
         ],
     )
-    def test_says_what_is_wrong(self, name, message):
+    def test_wrong_names_are_reported(self, name, message):
         with pytest.raises(InputError) as fault:
             cloud().without(name)
         assert str(fault.value).startswith(message)
@@ -206,7 +207,7 @@ class TestRequires:
         assert str(fault.value).startswith(message)
         assert "; received " in str(fault.value)
 
-    def test_a_contract_that_nobody_has_met_yet_is_named(self):
+    def test_an_unmet_contract_is_named(self):
         class Unmet(Operator):
             contract = True
 
@@ -249,7 +250,7 @@ def test_equal_structures_share_a_batch_and_others_do_not():
 
 
 def test_a_scene_is_a_value():
-    """Frozen, its arrays included; what it was made from can change without changing it."""
+    """It is frozen, including its arrays; later changes of its source data do not affect it."""
     place = np.zeros((2, 3))
     particles = Particles(position=place, velocity=place, radius=1.0, mass=1.0)
     place += 1
@@ -258,8 +259,8 @@ def test_a_scene_is_a_value():
         cloud().duration = 2.0
 
 
-def test_a_missing_effect_is_named_as_it_is_listed():
-    """Also where no other has been imported yet: in a process of its own."""
+def test_a_missing_effect_is_named_as_in_the_list():
+    """In a process of its own, because no other effect may have been imported yet."""
     code = (
         "import tisim; from tisim.effects import Walls; from tisim.geometry import Plane\n"
         "particles = tisim.Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=1e-3, density=1.0)\n"

@@ -1,4 +1,4 @@
-"""Quantities that follow from each other, in the field of a source: rules 6 and 7 of tisim/effects/base."""
+"""Self-consistent quantities in the field of a source: rules 6 and 7 of tisim/effects/base."""
 
 import numpy as np
 import pytest
@@ -104,7 +104,7 @@ def cloud(seed, n=30, chi=CHI, spread=3.0, **more):
 
 
 def solved(state, chi=CHI):
-    """Dipoles by one linear solve, and the forces on them; NumPy."""
+    """Dipoles from one linear solve, and the forces on them, in NumPy."""
     r, n = state["position"], len(state["radius"])
     d = r[None] - r[:, None]
     distance = np.linalg.norm(d, axis=2) + np.eye(n)
@@ -127,8 +127,9 @@ def solved(state, chi=CHI):
 
 
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
-def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
-    """At the start and after 20 steps, in two worlds that need different numbers of sweeps; and the force."""
+def test_induced_dipoles_equal_a_linear_solve(schedule):
+    """Dipoles and forces at the start and after 20 steps, in two worlds that need different numbers of
+    sweeps."""
     scenes = [cloud(1, tolerance=1e-13), cloud(2, chi=5.0, tolerance=1e-13)]
     simulation = Simulation(scenes[0], worlds=2, schedule=schedule)
     simulation.load(scenes)
@@ -140,7 +141,7 @@ def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
                 result.state["dipole"], dipole, rtol=0, atol=1e-11 * np.abs(dipole).max()
             )
             np.testing.assert_allclose(result.state["force"], force, rtol=0, atol=1e-10 * np.abs(force).max())
-            # The coupling matters: alone in the field they would be otherwise.
+            # The coupling matters: without it the dipoles would differ.
             alone = (
                 chi * result.state["radius"][:, None] ** 3 * (FIELD + SLOPE * result.state["position"][:, :1])
             )
@@ -151,9 +152,12 @@ def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
 
 
 @pytest.mark.long
-def test_what_does_not_converge_is_a_clear_failure():
-    """Sweeps of too strong a coupling grow without bound: the world stops and says which effect it was, and
-    by how much they grow, which tends to the spectral radius: as in NumPy."""
+def test_divergence_is_a_clear_failure():
+    """With too strong a coupling the sweeps diverge.
+
+    The world stops, and the message names the effect and the growth factor. The factor equals the NumPy value
+    and tends to the spectral radius.
+    """
     setup = cloud(3, n=20, chi=60.0, spread=1.0, sweeps=20, acceleration="none")
     start = setup.particles.arrays(setup.domain, 0)
     coupling = np.eye(60) - solved(start, 60.0)[2]
@@ -181,7 +185,7 @@ def test_what_does_not_converge_is_a_clear_failure():
 
 
 def mixed_sweeps(coupling, alone, tolerance):
-    """The values after each sweep until nothing changes by more than a tolerance; NumPy."""
+    """The values after each sweep until no value changes by more than a tolerance, in NumPy."""
     x, last, values = np.zeros_like(alone), None, []
     while True:
         f = alone + coupling @ x
@@ -195,8 +199,9 @@ def mixed_sweeps(coupling, alone, tolerance):
 
 
 @pytest.mark.long
-def test_mixed_sweeps_are_those_of_anderson():
-    """As many as in NumPy, for the same tolerance; under strong coupling a third of plain ones."""
+def test_mixed_sweeps_follow_anderson():
+    """The number of sweeps equals NumPy for the same tolerance; under strong coupling it is a third of plain
+    ones."""
     setups = [cloud(seed, n=20, chi=chi, spread=1.5, tolerance=1e-10) for seed, chi in ((1, 1.0), (2, 2.0))]
     simulation = Simulation(setups[0], worlds=2)
     simulation.load(setups)
@@ -212,9 +217,11 @@ def test_mixed_sweeps_are_those_of_anderson():
 
 
 @pytest.mark.slow
-def test_one_sweep_a_step_when_asked():
-    """``sweeps=0``: one sweep in each step, started from the last values; and as many at the start as it
-    takes, unless that is not wanted either."""
+def test_one_sweep_in_each_step():
+    """``sweeps=0``: one sweep in each step, started from the last values.
+
+    At the start the sweeps continue to convergence, unless that is disabled too.
+    """
     setups = [cloud(1, sweeps=0, largest_change=change) for change in (1e-2, 2.0)]
     simulation = Simulation(setups[0], worlds=2)
     simulation.load(setups)
@@ -223,7 +230,7 @@ def test_one_sweep_a_step_when_asked():
     assert first[1] == 1
     simulation.run()
     after = simulation.results()
-    # What never made three sweeps in a step does not know by how much they converge.
+    # The convergence factor is unknown if there were never three sweeps in a step.
     factor, unknown = (result.measures["sweep_factor"] for result in after)
     assert unknown == 0
     for result, sweeps in zip(after, first, strict=True):
@@ -232,14 +239,14 @@ def test_one_sweep_a_step_when_asked():
         exact = solved(result.state)[0]
         error = np.abs(result.state["dipole"] - exact).max() / np.abs(exact).max()
         assert 1e-8 < error < 1e-2
-        # It says itself about how far it is from that.
+        # The error estimated from the reported quantities is right within a factor of 2.
         said = result.measures["sweep_change"] * factor / (1 - factor)
         assert 0.5 < error / said < 2
     simulation.close()
 
 
 class Potential(SelfConsistentQuantity):
-    """phi_i = 1 + strength sum_j phi_j / d_ij: a number, not a vector."""
+    """phi_i = 1 + strength sum_j phi_j / d_ij, a scalar."""
 
     fields = (Field("potential", "V", 1, "keep"),)
     quantity = "potential"
@@ -255,8 +262,9 @@ class Potential(SelfConsistentQuantity):
 
 
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
-def test_a_number_converges_too_and_without_any_force(schedule):
-    """Two at distance d: phi = 1/(1 - strength/d). Nothing in the scene needs a force, so there is none."""
+def test_a_scalar_converges_without_any_force(schedule):
+    """Two particles at a distance d have phi = 1/(1 - strength/d); no effect needs forces, so there are
+    none."""
     effects = (Potential(strength=0.1, tolerance=1e-14),)
     setup = scene([[0.0, 0, 0], [1.0, 0, 0]], [[0.0, 0, 0], [0.5, 0, 0]], effects, dt=0.1, steps=10)
     (result,) = simulate([setup], schedule=schedule)
@@ -266,7 +274,7 @@ def test_a_number_converges_too_and_without_any_force(schedule):
 
 
 class Forgetful(Polarisation):
-    """Does not say that it needs its quantity."""
+    """Does not declare the quantity that it needs."""
 
     fields = ("radius",)
 

@@ -1,4 +1,4 @@
-"""The kill matrix: many mishaps of every kind, and what each has cost; exit code 1 unless nothing."""
+"""The kill matrix: many mishaps of every kind and the damage they cause; exit code 1 if there is any."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.soak.counts import Counts
 MISHAPS = ("searches", "runs", "damage", "scenes")
 """Modules of this package; each has ``soak(seed, share, folder)``, which yields Counts, one for each kind.
 
-seed : of what is random. share : part of the full number of trials to make, 0..1. folder : an empty one.
+seed : of the random choices. share : fraction of the full number of trials, 0..1. folder : an empty folder.
 """
 
 

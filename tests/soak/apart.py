@@ -1,4 +1,4 @@
-"""Trials in a process of their own: one that dies or does not answer costs a trial, and is replaced."""
+"""Trials in a separate process, which is replaced if it dies or does not answer."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 Outcome = tuple[str, str]
-"""What came of a trial: the column of Counts in which it belongs, "" when all is well; a word about it."""
+"""Outcome of a trial: its column of Counts, "" if it is good, and a message."""
 
 
 def _work(calls: Connection, make: Callable[..., Callable[[Any], str]], arguments: tuple[Any, ...]) -> None:
-    """Answer each call with what came of it."""
+    """Answer each call with the outcome of its trial."""
     answer = make(*arguments)
     calls.send("ready")
     while True:
@@ -30,8 +30,10 @@ def _work(calls: Connection, make: Callable[..., Callable[[Any], str]], argument
 
 
 class Apart:
-    """A process in which ``make(*arguments)`` gives a function of a call, which does a trial and may raise:
-    AssertionError for what is wrong, TimeoutError for what takes too long."""
+    """A process in which ``make(*arguments)`` returns a function that does one trial for each call.
+
+    The function raises AssertionError for a wrong result and TimeoutError for a trial that takes too long.
+    """
 
     def __init__(self, make: Callable[..., Callable[[Any], str]], *arguments: Any) -> None:
         self.make, self.arguments = make, arguments
@@ -46,7 +48,7 @@ class Apart:
         self.calls.recv()
 
     def trial(self, call: Any, patience: float) -> Outcome:
-        """What came of a trial; one that takes longer than ``patience`` (s, wall time) is ended."""
+        """Outcome of a trial; a trial that takes longer than ``patience`` (s, wall time) is ended."""
         self.calls.send(call)
         try:
             if self.calls.poll(patience):

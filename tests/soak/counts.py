@@ -1,4 +1,4 @@
-"""What a kind of mishap has cost: nothing, or how many of its trials went wrong and how."""
+"""Damage done by one kind of mishap: the number of trials that went wrong, by type."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass, fields
 class Counts:
     """The outcome of many trials of one kind.
 
-    trials : their number. lost : records or frames that had been acknowledged and are gone. doubled : records
-    that are there twice. wrong : answers that differ from those of an undisturbed process, without an error.
-    hung : trials that had to be ended from outside. tracebacks : errors that are not messages for people,
-    crashes of the process among them.
+    trials : number of trials. lost : acknowledged records or frames that are missing. doubled : records that
+    occur twice. wrong : answers that differ from an undisturbed process, without an error. hung : trials that
+    had to be ended from outside. tracebacks : errors without a user message, including crashes of the
+    process.
     """
 
     name: str
@@ -34,6 +34,6 @@ class Counts:
 
     @property
     def clean(self) -> bool:
-        """Whether something was tried and nothing went wrong."""
+        """Whether there were trials and none went wrong."""
         failures = (self.lost, self.doubled, self.wrong, self.hung, self.tracebacks)
         return self.trials > 0 and not any(failures)

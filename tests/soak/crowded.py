@@ -1,9 +1,9 @@
 """Trials on a full disk, in a process: ``python -m tests.soak.crowded ROOM SEED FIRST LAST FOLDER``.
 
-ROOM is how the disk is made full: "limit", the system's limit on the size of files, or "tmpfs", a small file
-system, for which the process must have mounts of its own (``unshare -rm``). Each trial gives a command a
-random part of the room that it needs. Of each trial from FIRST to before LAST it prints, as lines of JSON,
-what is tried, and then the column of Counts in which that belongs, "" when all is well, and why.
+ROOM is the way in which the disk is made full: "limit", a system limit on the size of files, or "tmpfs", a
+small file system, for which the process needs mounts of its own (``unshare -rm``). Each trial gives a command
+a random part of the space that it needs. For each trial from FIRST to LAST - 1 it prints, as lines of JSON,
+the name of the trial, and then its column of Counts ("" if it is good) and the reason.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ SCENE = Scene(
 
 
 class Wrong(Exception):
-    """A trial has gone wrong: the column of Counts, and why."""
+    """A trial has gone wrong: the column of Counts, and the reason."""
 
 
 def limited(folder: Path, size: int) -> contextlib.AbstractContextManager[None]:
-    """No file grows beyond so many bytes."""
+    """No file can grow beyond ``size`` bytes."""
     return files_of_at_most(size)
 
 
 @contextlib.contextmanager
 def mounted(folder: Path, size: int) -> Iterator[None]:
-    """The file system of the folder has room for so many bytes more, in pages of the system."""
+    """The file system of the folder has space for ``size`` more bytes, rounded to system pages."""
     used = shutil.disk_usage(folder).used
     mount(folder, f"remount,size={used + max(size, damage.BLOCK)}")
     try:
@@ -64,14 +64,14 @@ def mount(folder: Path, options: str) -> None:
 
 
 class Bench:
-    """Commands of tisim on one scene, compiled once, and what they give on a disk with room."""
+    """tisim commands on one scene, compiled once, and their output on a disk with enough space."""
 
     def __init__(self, folder: Path) -> None:
         self.simulation = Simulation(SCENE)
         self.toml = folder / "scene.toml"
         self.toml.write_text(SCENE.to_toml())
         self.whole = folder / "whole"
-        # All else in the command is as it is.
+        # The rest of the command is unchanged.
         command_line.Simulation = lambda scene: self.simulation  # type: ignore[assignment, misc]
         assert self.call("run", self.toml, "--frames", FRAMES, "--out", self.whole) == 0
         self.frames = damage._frames(self.whole / "trajectory.h5")
@@ -92,7 +92,8 @@ class Bench:
         raise AssertionError("a command ends with an exit code")
 
     def check(self, folder: Path, code: int) -> None:
-        """All files that a command has left must be those of a disk with room, or frames of them."""
+        """All files that a command has left must equal the files on a disk with enough space, or hold their
+        first frames."""
         for path in folder.iterdir():
             if path.name.endswith(".new") or ".new." in path.name:
                 raise Wrong("wrong", f"{path.name} is left")
@@ -112,7 +113,7 @@ class Bench:
 
 
 def run(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
-    """``tisim run --frames``; with room again, it goes on to the same end."""
+    """``tisim run --frames``; with enough space again, it continues to the same end."""
     command = ("run", bench.toml, "--frames", FRAMES, "--out", folder)
     with room(folder, _part(rng, bench.whole / "trajectory.h5", bench.whole / "cloud.png")):
         code = bench.call(*command)
@@ -126,7 +127,7 @@ def run(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) ->
 
 
 def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
-    """A second checkpoint in the place of a first: it is one of the two."""
+    """A second checkpoint replaces a first one: the file is one of the two."""
     simulation, path = bench.simulation, folder / "checkpoint.h5"
     simulation.load([SCENE])
     simulation.run(steps=10)
@@ -144,7 +145,7 @@ def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Genera
 
 
 def cost(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
-    """The rows of a study, written again when there is one more: all but the last, or all."""
+    """A study is rewritten with one more row: the file has all rows or all but the last."""
     from tisim.accuracy import storage
 
     path, study = damage._cost(folder), damage._study()
@@ -188,12 +189,12 @@ TRIALS = {"run": run, "checkpoint": checkpoint, "cost": cost, **{name: show(name
 
 
 def _part(rng: np.random.Generator, *files: Path) -> int:
-    """A random part of what the largest of these files takes, bytes; now and then all of it."""
+    """A random part of the size (bytes) of the largest of these files, occasionally all of it."""
     return int(rng.uniform(0, 1.1) * max(file.stat().st_size for file in files))
 
 
 def trial(bench: Bench, name: str, folder: Path, room: Callable, rng: np.random.Generator) -> tuple[str, str]:
-    """The column of Counts in which a trial belongs, and why; empty when all is well."""
+    """The column of Counts of a trial and the reason; empty if it is good."""
     folder.mkdir(parents=True)
     try:
         if room is mounted:

@@ -1,5 +1,8 @@
-"""Damaged files of every kind, ours and those of others that are read: each is read as it was, refused in a
-message for people, or read in part and said to be; never with other numbers in it, and never without end."""
+"""Damaged files of every kind, from tisim and from other programs.
+
+Each is read unchanged, refused with a message, or read in part with a remark. It is never read with other
+numbers, and reading always ends.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +20,22 @@ import numpy as np
 from tests.soak.counts import Counts
 
 FILES = 500
-"""Damaged files of each kind."""
+"""Number of damaged files of each kind."""
 PATIENCE = 40.0
-"""Seconds after which a read counts as hung; an undamaged file takes some hundredths."""
+"""Time (s) after which a read counts as hung; reading an undamaged file takes a few hundredths of a
+second."""
 BLOCK = 4096
-"""bytes, the largest stretch that is damaged at once: a page of the system"""
+"""bytes, the largest stretch damaged at once: a system page"""
 
 
 class Kind(NamedTuple):
-    """A kind of file: ``make`` writes one into a folder and returns its path, ``read`` returns what it holds,
-    in parts each of which is whole or missing. Files of other programs have no checksums (``ours`` is
-    False): other numbers in them are read as they are; reading must end, with a message at worst."""
+    """A kind of file: ``make`` writes one into a folder and returns its path, and ``read`` returns its
+    contents.
+
+    The contents are in parts, each of which is complete or missing. Files of other programs (``ours`` is
+    False) have no checksums: changed numbers in them are read unnoticed, but reading must end, possibly with
+    a message.
+    """
 
     make: Callable[[Path], Path]
     read: Callable[[Path], list[str]]
@@ -176,7 +184,7 @@ def _records(path: Path) -> list[str]:
 
 
 def _ball():
-    """Corners of the triangles of a rough ball, m, shape (triangles, 3, 3)."""
+    """Corners of the triangles of a rough ball (m), shape (triangles, 3, 3)."""
     from scipy.spatial import ConvexHull
 
     places = np.random.default_rng(1).normal(size=(60, 3))
@@ -205,7 +213,7 @@ def _binary_stl(folder: Path) -> Path:
 
 
 def _indexed(folder: Path, name: str, head: str, vertex: str, face: str, first: int) -> Path:
-    """A mesh of a list of vertices and one of faces, with indices from ``first`` on."""
+    """A mesh as a list of vertices and a list of faces, with indices that start at ``first``."""
     corners = _ball()
     vertices = "".join(f"{vertex}{x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in corners.reshape(-1, 3))
     places = np.arange(corners.shape[0] * 3).reshape(-1, 3) + first
@@ -255,7 +263,8 @@ KINDS = {
 
 
 def with_mishap(content: bytes, rng: np.random.Generator) -> bytes:
-    """The bytes after one mishap: bits flipped, a stretch zeroed or overwritten, cut short, two swapped."""
+    """The bytes after one mishap: flipped bits, a zeroed or overwritten stretch, truncation, or two swapped
+    stretches."""
     hurt, size = bytearray(content), len(content)
     at, other = (int(x) for x in rng.integers(size, size=2))
     length = int(min(rng.choice([1, 16, 512, BLOCK]), size - max(at, other)))
@@ -278,7 +287,7 @@ def with_mishap(content: bytes, rng: np.random.Generator) -> bytes:
 
 
 def verdict(kind: Kind, path: Path, whole: list[str] | None) -> tuple[str, object]:
-    """What reading a file has come to: the name of a column of Counts or "", and what was read."""
+    """Outcome of reading a file: the name of a column of Counts or "", and the contents."""
     from tisim import InputError
 
     with warnings.catch_warnings(record=True) as messages:
@@ -297,7 +306,7 @@ def verdict(kind: Kind, path: Path, whole: list[str] | None) -> tuple[str, objec
 
 
 def _reader(pipe: Connection) -> None:
-    """Makes and reads files as it is told, in a process of its own."""
+    """Makes and reads files on request, in a separate process."""
     from tisim.backend import runtime
 
     runtime.init(threads=1)
@@ -310,13 +319,13 @@ def _reader(pipe: Connection) -> None:
 
 
 class Reader:
-    """A process that reads files; another one takes its place when it hangs or crashes."""
+    """A process that reads files and is replaced if it hangs or crashes."""
 
     def __init__(self) -> None:
         self.process: multiprocessing.process.BaseProcess | None = None
 
     def __call__(self, name: str, action: str, path: Path, whole: object = None, patience: float = PATIENCE):
-        """What the process answers; "hung" or "tracebacks", and why, when it does not."""
+        """The answer of the process, or "hung" or "tracebacks" with the reason."""
         if self.process is None:
             context = multiprocessing.get_context("spawn")
             self.pipe, end = context.Pipe()
@@ -343,7 +352,7 @@ class Reader:
 
 
 def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
-    """Counts of damaged files, one for each kind; what went wrong is printed above them."""
+    """Counts of damaged files, one for each kind; failures are printed above them."""
     reader = Reader()
     try:
         for k, name in enumerate(KINDS):
@@ -358,7 +367,7 @@ def _count(name: str, rng: np.random.Generator, number: int, folder: Path, reade
     path = reader(name, "make", folder, patience=600.0)
     content = path.read_bytes()
     _, whole = reader(name, "read", path, patience=600.0)
-    # Or all that follows would be refused, as it should be, and nothing found.
+    # Otherwise all later reads would be refused, as they should be, and no error would be found.
     assert isinstance(whole, list), f"the undamaged {name} is not read: {whole}"
     for _ in range(number):
         path.write_bytes(with_mishap(content, rng))

@@ -1,4 +1,4 @@
-"""Runs of scenes with extreme numbers, some steps of each: to their end, or to a failure in words."""
+"""Some steps of scenes with extreme numbers, which must end normally or with a message."""
 
 from __future__ import annotations
 
@@ -16,26 +16,31 @@ from tisim.engine.monitor import REASONS
 from tisim.state.status import WorldStatus
 
 STEPS = 50
-"""Of a run, at most."""
+"""Largest number of steps in a run."""
 COMPILING, PATIENCE = 900.0, 60.0
-"""Wall time, s, after which compiling a scene, and a run, which takes some hundredths, count as hung."""
+"""Wall time (s) after which a compilation, and a run, which takes a few hundredths of a second, count as
+hung."""
 DRAWS = 1000
-"""Scenes that are drawn for one that is accepted, at most; of three about two are."""
+"""Most draws for one accepted scene; about two thirds of the scenes are accepted."""
 KEPT = 50
-"""Scenes that stay compiled at once, those that were run last: Taichi has room for some more."""
+"""Number of scenes that stay compiled, the most recent ones; Taichi has room for some more."""
 REFUSED, FAILED, RAN = "refused", "failed", "ran"
 
 Values = dict[extremes.Place, float]
-"""What is changed in a scene."""
+"""The changed numbers of a scene."""
 Call = tuple[str, Values | int | None]
-"""A name among ``extremes.scenes()``, and what to do: run it with these numbers, run it with such drawn from
-this seed as are accepted, or only compile it."""
+"""A name among ``extremes.scenes()``, and a task.
+
+The task is a set of numbers to run with, a seed from which accepted numbers are drawn, or None to compile
+only.
+"""
 
 
 def runner() -> Callable[[Call], str]:
-    """In a process of its own: what has come of a run, in which nothing was wrong."""
+    """The function of a separate process that returns the outcome of a run and raises if anything is
+    wrong."""
     warnings.simplefilter("error")
-    # Of numbers without sense grains may lie in each other: that is said, and no fault.
+    # With extreme numbers grains may overlap at the start; the warning about it is no fault.
     warnings.simplefilter("ignore", StartWarning)
     runtime.init(threads=1)
     compiled: dict[str, Simulation] = {}
@@ -74,14 +79,14 @@ def _run_values(simulation: Simulation, name: str, values: Values) -> str:
 
 
 class Runs:
-    """Scenes run in a process of their own, in which each is compiled once, and given time for that."""
+    """Scenes run in a separate process, which compiles each one once and allows time for that."""
 
     def __init__(self) -> None:
         self.apart = Apart(runner)
         self.compiled: list[str] = []
 
     def __call__(self, name: str, numbers: Values | int) -> Outcome:
-        """What came of a scene with these numbers, or with those drawn from a seed."""
+        """Outcome of a scene with these numbers, or with numbers drawn from a seed."""
         if name not in self.compiled:
             outcome = self.apart.trial((name, None), COMPILING)
             if outcome[0]:
@@ -89,7 +94,7 @@ class Runs:
         self.compiled = [*(other for other in self.compiled if other != name), name][-KEPT:]
         outcome = self.apart.trial((name, numbers), PATIENCE)
         if outcome[0]:
-            # Another process may have taken the place of the one that has compiled.
+            # The process that compiled the scenes may have been replaced.
             self.compiled.clear()
         return outcome
 

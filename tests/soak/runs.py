@@ -1,4 +1,5 @@
-"""Runs that are killed at random times; disks that are full at random sizes, for all that a run writes."""
+"""Runs killed at random times, and disks that become full at random sizes, for all files that a run
+writes."""
 
 from __future__ import annotations
 
@@ -19,11 +20,11 @@ from tests.soak import damage
 from tests.soak.counts import Counts
 
 KILLS = 20
-"""Runs that are killed; each is gone on with, and may be killed again, until it ends."""
+"""Number of killed runs; each is resumed, and may be killed again, until it ends."""
 SIZES = 20
-"""Sizes of the disk, for each command."""
+"""Number of disk sizes for each command."""
 PATIENCE = 900.0
-"""Seconds after which a trial counts as hung: many times what it takes on a machine under load."""
+"""Time (s) after which a trial counts as hung, many times its duration on a loaded machine."""
 ROOT = Path(__file__).parents[2]
 RUN = (
     "run", "agglomeration", "--size", "paper", "--set", "effects.impact.hardness=1e7", "--set",
@@ -32,7 +33,7 @@ RUN = (
 
 
 def begin(folder: Path, *more: str) -> subprocess.Popen[str]:
-    """A run that saves a checkpoint as often as it can."""
+    """A run that saves checkpoints as often as possible."""
     return subprocess.Popen(
         [sys.executable, "-c", "from tisim.cli.main import main; main()", *RUN, str(folder), *more],
         env={**os.environ, "TISIM_CHECKPOINT_SECONDS": "0", "PYTHONPATH": str(ROOT)},
@@ -41,7 +42,7 @@ def begin(folder: Path, *more: str) -> subprocess.Popen[str]:
 
 
 def wait_for_end(running: subprocess.Popen[str]) -> str:
-    """What a run says that ends in another way than it should; empty when all is well."""
+    """The error output of a run that fails; empty if it ends normally."""
     try:
         output = running.communicate(timeout=PATIENCE)[1]
     except subprocess.TimeoutExpired:
@@ -52,7 +53,7 @@ def wait_for_end(running: subprocess.Popen[str]) -> str:
 
 
 def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
-    """Counts of killed runs, and of each command on a full disk; what went wrong is printed above them."""
+    """Counts of killed runs, and of each command on a full disk; failures are printed above them."""
     yield _kill_runs(np.random.default_rng(seed), max(round(KILLS * share), 1), folder / "kills")
     yield from _fill_disks(seed, max(round(SIZES * share), 1), folder / "crowded")
 
@@ -76,7 +77,7 @@ def _kill_runs(rng: np.random.Generator, number: int, folder: Path) -> Counts:
 
 
 def _kill_one(folder: Path, rng: np.random.Generator, longest: float, whole: dict) -> tuple[str, str]:
-    """Kill a run at random times, go on with it, and compare with the whole one."""
+    """Kill a run at random times, resume it, and compare it with the uninterrupted run."""
     more: tuple[str, ...] = ()
     for _ in range(int(rng.integers(1, 4))):
         running = begin(folder, *more)
@@ -103,8 +104,8 @@ def _kill_one(folder: Path, rng: np.random.Generator, longest: float, whole: dic
 
 
 def _wait(running: subprocess.Popen[str], file: Path, rng: np.random.Generator, longest: float) -> None:
-    """Until a random instant, at most ``longest`` (s) from now or, half of the times, from when the file is
-    made."""
+    """Wait until a random instant, at most ``longest`` (s) from now or, in half of the cases, from the
+    creation of the file."""
     if rng.random() < 0.5:
         while running.poll() is None and not file.exists():
             time.sleep(0.001)
@@ -112,7 +113,7 @@ def _wait(running: subprocess.Popen[str], file: Path, rng: np.random.Generator, 
 
 
 def _fill_disks(seed: int, sizes: int, folder: Path) -> Iterator[Counts]:
-    """Half of the sizes are those of a small file system, where one can be mounted."""
+    """Half of the sizes are sizes of a small file system, if one can be mounted."""
     mounts = subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
     counts: dict[str, Counts] = {}
     for room, number in (
@@ -139,7 +140,7 @@ def _trials(room: str, seed: int, sizes: int, folder: Path, counts: dict[str, Co
 
 
 def _process(room: str, seed: int, first: int, last: int, folder: Path) -> Iterator[tuple[str, str, str]]:
-    """What a process says of its trials, until it has made them all, crashes, or has to be ended."""
+    """The trial reports of a process until it has finished them, crashes, or has to be ended."""
     alone = ("unshare", "-rm") if room == "tmpfs" else ()
     command = [
         *alone,

@@ -1,5 +1,7 @@
-"""Hostile scenes: plain data, files and settings, each accepted or refused in a line, within a second; and
-some steps of scenes that are accepted though numbers in them are extreme."""
+"""Hostile scenes: plain data, files and settings are accepted or refused in one line, within a second.
+
+Scenes that are accepted although their numbers are extreme run for some steps.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,13 @@ from tests.soak.running import RAN, REFUSED, Runs
 from tisim import InputError, Scene
 
 TRIALS = 1000
-"""Of each kind."""
+"""Number of trials of each kind."""
 OF_ONE = 50
-"""Runs of a scene with one set of numbers after another: compiling takes as long as some hundred of them."""
+"""Runs of one scene with different numbers; compiling it takes as long as several hundred of them."""
 SECOND = 1.0
-"""The work of one trial, s of the processor: what a loaded machine does not lengthen."""
+"""Processor time (s) of one trial, which does not depend on the load of the machine."""
 PATIENCE = 120.0
-"""The wall time, s, after which a trial that has not answered is ended from outside."""
+"""Wall time (s) after which a trial without an answer is ended from outside."""
 
 
 def plain_data(random: Random, folder: Path) -> None:
@@ -36,14 +38,14 @@ def plain_data(random: Random, folder: Path) -> None:
 
 
 def files(random: Random, folder: Path) -> None:
-    """The command ``run`` of a scene file."""
+    """The command ``run`` with a scene file."""
     path = folder / "scene.toml"
     path.write_bytes(hostile.mutated_toml(random))
     _command(["run", str(path)], folder)
 
 
 def settings(random: Random, folder: Path) -> None:
-    """The command ``run`` of a good file with --set."""
+    """The command ``run`` with a good file and --set."""
     data, path = random.choice(hostile.valid()), folder / "scene.toml"
     path.write_text(Scene.from_dict(data).to_toml(), encoding="utf-8")
     _command(["run", str(path), "--set", hostile.assignment(data, random)], folder)
@@ -63,7 +65,7 @@ KINDS = {"hostile plain data": plain_data, "hostile scene files": files, "hostil
 
 
 def reader(folder: Path) -> Callable[[tuple[str, int]], str]:
-    """In a process of its own: trials by (kind, seed)."""
+    """In a separate process: trials by (kind, seed)."""
     hostile.valid()
 
     def trial(call: tuple[str, int]) -> str:
@@ -78,7 +80,7 @@ def reader(folder: Path) -> Callable[[tuple[str, int]], str]:
 
 
 def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
-    """Counts of each kind; tests/soak/__main__.py says what they are."""
+    """Counts of each kind, as described in tests/soak/__main__.py."""
     number = max(1, round(share * TRIALS))
     worker = Apart(reader, folder)
     try:
@@ -97,7 +99,7 @@ def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
 
 
 def _count(kind: str, trials: Iterator[tuple[str, Outcome]]) -> Counts:
-    """Counts of trials, each with what it is; what went wrong is printed."""
+    """Counts of trials, each with a description; failures are printed."""
     counts = Counts(kind)
     for scene_name, (column, word) in trials:
         counts.trials += word != REFUSED

@@ -1,4 +1,4 @@
-"""Searches that are killed at random moments, begun again until they end, and held against one left alone."""
+"""Searches killed at random moments and restarted until they end, compared with an undisturbed search."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ WORKER = Path(__file__).parents[1] / "optimize" / "cache_worker.py"
 SEARCH = ("optimize", "drift", "--generations", "3", "--seed", "3")
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
 KILLS = 4
-"""Of each kind, at full share."""
+"""Number of kills of each kind, at full share."""
 PIPE = 4096
-"""Bytes that a search may write before they are read: it is not over before the shot."""
+"""Bytes that a search may write before they are read, so that it cannot end before the kill."""
 HUNG_S = 600.0
-"""A process that has not ended by then never will, seconds."""
+"""Time (s) after which a process counts as hung."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Which signal goes to whom: the searching process alone, all of its group, or one of its workers."""
+    """The signal and its target: the searching process alone, its whole group, or one of its workers."""
 
     number: signal.Signals
     whom: str = "search"
@@ -74,7 +74,7 @@ def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
 
 
 def killed(kind: Kind, kills: int, expected: dict, rng: random.Random, folder: Path) -> Counts:
-    """Kill so often; whenever a search has ended in spite of it, compare it and begin another one."""
+    """Kill a given number of times; whenever a search ends anyway, compare it and begin another one."""
     counts = Counts(kind.name)
     round_, acknowledged = 0, set()
     while True:
@@ -99,11 +99,11 @@ def killed(kind: Kind, kills: int, expected: dict, rng: random.Random, folder: P
 
 
 def shoot(search: _Search, kind: Kind, rng: random.Random) -> bool:
-    """Wait for a random number of evaluations and a little more, and send the signal; False if it had ended.
+    """Wait for a random number of evaluations and a little more, then send the signal; False if it had ended.
 
-    A part of the shots comes before there is anything: while Python starts, files are read, kernels compiled.
+    Some of the kills come early: while Python starts, files are read, and kernels are compiled.
     """
-    # Python itself starts with a stack for Ctrl-C.
+    # Ctrl-C during the start of Python gives a traceback of its own.
     if kind.number != signal.SIGINT and rng.random() < 0.2:
         time.sleep(rng.uniform(0.0, 3.0))
     elif not search.follow(rng.randint(1, 40)):
@@ -121,7 +121,7 @@ def shoot(search: _Search, kind: Kind, rng: random.Random) -> bool:
 
 
 class _Search:
-    """A search in a process group of its own. stored : keys of the evaluations that it has acknowledged."""
+    """A search in its own process group. stored : keys of the evaluations that it has acknowledged."""
 
     def __init__(self, folder: Path, executor: str) -> None:
         self.hung, self.stored = False, set[str]()
@@ -129,7 +129,7 @@ class _Search:
         self._errors.parent.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, str(WORKER), "tisim", *SEARCH, "--executor", executor, "--out"]
         paths = os.pathsep.join(filter(None, sys.path))
-        # The kernels of others on this machine are none of these kills' business.
+        # A separate kernel cache, so that kills do not affect other processes on this machine.
         kernels = {LOCKS[BACKEND][0]: str(self._errors.parents[1] / "kernels")}
         with self._errors.open("w") as errors:
             self.process = subprocess.Popen(
@@ -140,7 +140,7 @@ class _Search:
         self._dog.start()
 
     def follow(self, evaluations: int | None = None) -> bool:
-        """Read on until so many more have been stored, or no process is left to tell; whether there were."""
+        """Read until ``evaluations`` more are stored or all processes have ended; whether they are."""
         remaining = evaluations
         while remaining is None or remaining > 0:
             line = self.process.stdout.readline()
@@ -152,7 +152,7 @@ class _Search:
         return True
 
     def wait(self) -> int:
-        """The exit code, when no process of the group is left."""
+        """The exit code, after all processes of the group have ended."""
         self.follow()
         code = self.process.wait()
         while living(self.process.pid):
@@ -161,7 +161,7 @@ class _Search:
         return code
 
     def stderr_text(self) -> str:
-        """What it has written to its standard error."""
+        """The contents of its standard error."""
         return self._errors.read_text()
 
     def _end(self) -> None:
@@ -171,7 +171,7 @@ class _Search:
 
 
 def living(group: int) -> list[tuple[int, str]]:
-    """Ids and command lines of the processes of a group that have not ended."""
+    """Ids and command lines of the running processes of a group."""
     command = ["ps", "-eo", "pid=,pgid=,stat=,args="]
     table = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     rows = (line.split(maxsplit=3) for line in table.splitlines())
@@ -179,7 +179,7 @@ def living(group: int) -> list[tuple[int, str]]:
 
 
 def keys(folder: Path) -> set[str]:
-    """Of the evaluations in the file of a search, if there is one yet."""
+    """Keys of the evaluations in the file of a search, if there is one yet."""
     file = folder / "search.h5"
     if not (file.exists() or file.with_name("search.h5.journal").exists()):
         return set()
@@ -187,7 +187,7 @@ def keys(folder: Path) -> set[str]:
 
 
 def contents(folder: Path) -> dict:
-    """All that a search has left in its folder: evaluations, tables and best designs."""
+    """The contents of the folder of a search: evaluations, tables and best designs."""
     cache = Cache(folder / "search.h5")
     return {
         "records": {record.key: (record.values, record.seed, record.design) for record in cache.records()},

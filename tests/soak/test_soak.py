@@ -1,4 +1,4 @@
-"""The kill matrix in small; tests/soak.sh is the whole of it."""
+"""A small version of the kill matrix; tests/soak.sh runs all of it."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ SCRIPT = Path(__file__).parents[1] / "soak.sh"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mishap", MISHAPS)
-def test_mishaps_cost_nothing(mishap):
+def test_mishaps_do_no_damage(mishap):
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     command = ["bash", str(SCRIPT), mishap, "--share", "0.1", "--seed", "1"]
     completed = subprocess.run(

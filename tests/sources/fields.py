@@ -1,4 +1,4 @@
-"""Field and gradient of a source at many points, as kernels see it."""
+"""Field and gradient of a source at many points, as computed in kernels."""
 
 import numpy as np
 
@@ -37,22 +37,22 @@ def fields(sources, points):
     assert points.shape[0] == len(sources) <= WORLDS
     out = np.zeros((*points.shape[:2], 8, 3))
     _evaluate(source, points, out)
-    # One at a time or both together: the same numbers.
+    # Field and gradient are the same if computed separately or together.
     np.testing.assert_array_equal(out[:, :, :4], out[:, :, 4:])
     return out[:, :, 0], np.swapaxes(out[:, :, 1:4], 2, 3)
 
 
 def relative(values, expected):
-    """Length of the difference over that of the expected vector or matrix, for each point of one world."""
+    """Norm of the difference over the norm of the expected vector or matrix, for each point of one world."""
     axes = tuple(range(1, values.ndim))
     return np.sqrt(((values - expected) ** 2).sum(axes) / (expected**2).sum(axes))
 
 
 def steepness(field, gradient, points, half):
-    """What errors of a cylinder's gradient are relative to, at points of one world; along z, of radius 1.
+    """Reference size for errors of a cylinder's gradient, at points of one world; axis along z, radius 1.
 
-    In its middle the gradient passes through 0, but not what cancels there: B over the distance to the rim,
-    to which the radius is added across.
+    In the middle of the cylinder the gradient passes through 0, but its terms do not. They are of size B over
+    the distance to the rim, with the radius added across.
     """
     far = np.hypot(np.abs(np.hypot(*points.T[:2]) - 1) + 1, np.abs(points[:, 2]) - half)
     return np.linalg.norm(gradient, axis=(1, 2)) + np.linalg.norm(field, axis=1) / far

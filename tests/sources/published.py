@@ -1,4 +1,4 @@
-"""B16's own formulas for a magnetised cylinder, with so many digits that what cancels does not matter."""
+"""B16's formulas for a magnetised cylinder, in enough digits to make cancellation harmless."""
 
 import mpmath as mp
 import numpy as np
@@ -29,7 +29,7 @@ def flux_density(point, radius, half, m):
             sums[name] += sign * value
     c, s = mp.cos(phi - turn), mp.sin(phi - turn)
     inside = rho < radius and abs(z) < half
-    # Of transverse M the formulas give H, of longitudinal M they give B.
+    # For transverse M the formulas give H, for longitudinal M they give B.
     h_rho = across * radius * c / (2 * mp.pi * rho) * sums["b4"] + (across * c if inside else 0)
     h_phi = across * radius * s / (mp.pi * rho) * sums["b3"] - (across * s if inside else 0)
     h_z = across * radius * c / mp.pi * sums["a1"]
@@ -40,15 +40,15 @@ def flux_density(point, radius, half, m):
 
 
 def field_and_gradient(point, radius, half, m):
-    """B, and its gradient by differences with so many digits that they are exact."""
+    """B, and its gradient from differences with enough digits to be exact."""
     return anywhere(point, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius, 2 * half, m)
 
 
 def anywhere(point, centre, axis, radius, length, magnetisation):
-    """The same of a cylinder in any direction: of these very numbers, none of which is rounded on the way."""
+    """Field and gradient of a cylinder in any direction, from the exact input numbers without rounding."""
     with mp.workdps(100):
         turn, place = seen_from(point, centre, axis)
-        # Beside the axis and the surface, where the formulas are 0/0, by less than any digit asked for.
+        # Shifted off the axis and the surface, where the formulas are 0/0, by less than any digit needed.
         place += radius * mp.matrix([mp.mpf(10) ** -20 * (i + 1) for i in range(3)])
         radius, half = mp.mpf(float(radius)), mp.mpf(float(length)) / 2
         arguments = radius, half, list(turn * exactly(magnetisation))
@@ -64,14 +64,15 @@ def anywhere(point, centre, axis, radius, length, magnetisation):
 
 
 def from_rim(point, centre, axis, radius, length):
-    """How far beyond the side of a cylinder a point is, and beyond its ends; negative before them. m."""
+    """Distance (m) of a point beyond the side of a cylinder, and beyond its ends; negative inside."""
     with mp.workdps(100):
         x, y, z = seen_from(point, centre, axis)[1]
         return float(mp.sqrt(x * x + y * y) - mp.mpf(radius)), float(abs(z) - mp.mpf(length) / 2)
 
 
 def seen_from(point, centre, axis):
-    """The matrix that turns a cylinder's axis to the last one, and the point in its coordinates."""
+    """The matrix that rotates the axis of a cylinder onto the third axis, and the point in its
+    coordinates."""
     turn = frame(exactly(axis))
     return turn, turn * (exactly(point) - exactly(centre))
 
@@ -81,7 +82,7 @@ def exactly(numbers):
 
 
 def frame(axis):
-    """Rows: unit vectors of axes of which the last is along the given one."""
+    """Orthonormal basis vectors as rows; the third is along the given axis."""
     size = mp.norm(axis)
     c = [v / size for v in axis]
     least = min(range(3), key=lambda i: abs(c[i]))
@@ -97,7 +98,8 @@ def as_floats(m):
 
 
 def by_quadrature(point, radius, half, m):
-    """B of charges on the side for M across the axis, of currents in it for M along: integrals over phi."""
+    """B by integrals over phi: of charges on the side for transverse M, of surface currents for longitudinal
+    M."""
     with mp.workdps(30):
         x, y, z = (mp.mpf(float(v)) for v in point)
         radius, half = mp.mpf(float(radius)), mp.mpf(float(half))

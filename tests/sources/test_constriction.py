@@ -1,4 +1,4 @@
-"""The flow through a constriction against L21's profile in NumPy, its gradient and what flows through it."""
+"""The flow through a constriction compared with L21's profile in NumPy, its gradient and its flow rate."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ SHAPE = {
 
 
 def profile(z, rho, transition):
-    """L21 section 3.4.4, with the speed in the constriction reached over a length before and after it."""
+    """L21 section 3.4.4, with linear transitions before and after the constriction."""
     across = np.clip((2.5 - rho) / 1.5, 0, 1)
     part = np.where(np.abs(z) <= 1.5, 1.0, 0.0)
     if transition:
@@ -30,13 +30,13 @@ def profile(z, rho, transition):
 
 
 def places(z, rho, angle):
-    """Points at these places along the axis, distances from it and angles around it."""
+    """Points with these positions along the axis, distances from it and angles around it."""
     around = np.cos(angle)[:, None] * ACROSS[0] + np.sin(angle)[:, None] * ACROSS[1]
     return CENTRE + z[:, None] * AXIS + rho[:, None] * around
 
 
 @pytest.mark.parametrize("transition", [0.0, 0.8])
-def test_velocity_is_that_of_the_profile(transition, rng):
+def test_the_velocity_follows_the_profile(transition, rng):
     z, rho, angle = rng.uniform(-4, 4, 200), rng.uniform(0, 3, 200), rng.uniform(0, 2 * np.pi, 200)
     flow = ConstrictionFlow(**SHAPE, transition=transition)
     velocity, _ = sample((flow,), "flow_velocity", places(z, rho, angle))
@@ -45,7 +45,7 @@ def test_velocity_is_that_of_the_profile(transition, rng):
 
 
 def test_gradient_is_the_derivative_and_its_trace_is_not_zero_in_the_transitions(rng):
-    """A central difference of the twin, away from its edges."""
+    """Compared with central differences of the reference implementation, away from its edges."""
     z, rho, angle = rng.uniform(-4, 4, 400), rng.uniform(0.01, 3, 400), rng.uniform(0, 2 * np.pi, 400)
     h, apart = 1e-6, 1e-3
     edges = (np.abs(np.abs(z) - 1.5), np.abs(np.abs(z) - 2.3), np.abs(rho - 1.0), np.abs(rho - 2.5))
@@ -70,8 +70,8 @@ def test_gradient_is_the_derivative_and_its_trace_is_not_zero_in_the_transitions
     np.testing.assert_allclose(divergence, expected, atol=1e-5)
 
 
-def test_more_flows_through_the_constriction_than_before_it():
-    """By 3 R^2 / (R^2 + R R_c + R_c^2), as its text says."""
+def test_the_flow_rate_is_larger_in_the_constriction():
+    """The flow rate ratio is 3 R^2 / (R^2 + R R_c + R_c^2), as stated in its docstring."""
     flow, rho = ConstrictionFlow(**SHAPE), np.linspace(0, 2.5, 2001)
 
     def through(z, end):
@@ -79,7 +79,7 @@ def test_more_flows_through_the_constriction_than_before_it():
         return quad(lambda x: 2 * np.pi * x * np.interp(x, rho, speed), 0, end, limit=200, points=[1.0])[0]
 
     expected = 3 * 2.5**2 / (2.5**2 + 2.5 + 1)
-    # In the constriction its wall is at 1.
+    # The wall of the constriction is at 1.
     assert through(0.0, 1.0) / through(5.0, 2.5) == pytest.approx(expected, rel=1e-4)
 
 
@@ -99,7 +99,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     with pytest.raises(InputError) as fault:
         ConstrictionFlow(**{**SHAPE, **WRONG[message]})
     assert str(fault.value) == message

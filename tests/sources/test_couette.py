@@ -1,4 +1,4 @@
-"""The flow between two sliding walls against its closed form, and a grain that is dragged along in it."""
+"""The flow between two sliding walls compared with its closed form, and a grain dragged by it."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from tisim.steppers import ErrorControl, Trapezoid
 
 N = np.array([1.0, -2.0, 2.0])
 LOW, HIGH = np.array([2.0, 2.0, 1.0]), np.array([-4.0, 0.0, 2.0])
-"""m/s; both along walls of this normal."""
+"""Velocities (m/s), perpendicular to the given wall normal."""
 FLOW = CouetteFlow(
     normal=tuple(N), first=-0.5, second=1.5, first_velocity=tuple(LOW), second_velocity=tuple(HIGH)
 )
@@ -33,7 +33,7 @@ def test_beyond_a_wall_the_fluid_moves_with_it():
     assert (gradient == 0).all()
 
 
-def test_the_fluid_is_still_until_the_walls_begin_to_move():
+def test_the_fluid_is_at_rest_until_the_walls_move():
     late = FLOW.model_copy(update={"begin": 2.0})
     for t, part in ((1.99, 0.0), (2.0, 1.0)):
         velocity, gradient = sample((late,), "flow_velocity", [0.5 * N / 3], t)
@@ -42,8 +42,8 @@ def test_the_fluid_is_still_until_the_walls_begin_to_move():
 
 
 @pytest.mark.slow
-def test_a_grain_in_it_moves_with_its_layer():
-    """From rest, v = v_f (1 - exp(-t/tau)): the flow along the wall does not carry it to another layer."""
+def test_a_grain_moves_with_its_layer():
+    """From rest, v = v_f (1 - exp(-t/tau)): the flow along the wall keeps the grain in its layer."""
     flow = CouetteFlow(first=-1.0, second=3.0, first_velocity=(-1, 0, 0), second_velocity=(7, 4, 0))
     tau = 2.0 / (6 * np.pi * 0.5 * 0.1)
     setup = scene(
@@ -67,7 +67,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
+def test_invalid_values_are_refused(message):
     right = {"first": 0.0, "second": 1.0, "first_velocity": (0, 0, 0), "second_velocity": (1, 0, 0)}
     with pytest.raises(InputError) as fault:
         CouetteFlow(**{**right, **WRONG[message]})

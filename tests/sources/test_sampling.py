@@ -1,4 +1,4 @@
-"""Fields at any points, without a run."""
+"""Fields at arbitrary points, without a run."""
 
 import numpy as np
 import pytest
@@ -44,8 +44,8 @@ def test_nothing_to_sample_and_points_of_another_shape():
         sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [0.0, 0, 0])
 
 
-def test_fields_of_sources_go_when_the_kernel_fails(monkeypatch):
-    """As it does for a source that does not compile. Whoever keeps the error keeps no memory."""
+def test_fields_of_sources_are_freed_if_the_kernel_fails(monkeypatch):
+    """As for a source that does not compile. A stored error must not keep the memory."""
     before = len(memory.in_use())
 
     def broken(self, time, places, out):
@@ -59,7 +59,7 @@ def test_fields_of_sources_go_when_the_kernel_fails(monkeypatch):
 
 
 def test_a_uniform_field_is_switched_on_at_a_time():
-    """Its oscillation has the phase that it would have had without."""
+    """The oscillation has the same phase as without the switch."""
     field = MagneticField(constant=(1.0, 0, 0), amplitude=(0.0, 2.0, 0), omega=(0, np.pi, 0), begin=0.5)
     for t, expected in ((0.4999, [0.0, 0, 0]), (0.5, [1.0, 2.0, 0.0]), (0.75, [1.0, np.sqrt(2.0), 0.0])):
         value, gradient = sample((field,), "magnetic_flux_density", [[0.3, 0, 0]], t)

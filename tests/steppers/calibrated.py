@@ -1,8 +1,9 @@
-"""Scenes whose end is known, to see how far from it a run ends for the error that was asked for.
+"""Scenes with known final states, for the ratio of the final error to the requested one.
 
-One particle under linear forces: in closed form, by the exponential of a matrix. Particles that attract and
-repel each other: by scipy's DOP853 at its tightest. Errors are of position, over the size of the motion: the
-largest distances of particles from their start. One structure of scenes for each of the two kinds.
+A single particle under linear forces is solved in closed form, by a matrix exponential. Particles that
+attract and repel each other are solved by SciPy's DOP853 with its tightest tolerance. Errors are errors of
+position, relative to the size of the motion: the largest distances of particles from their starts. Each of
+the two kinds has one structure of scenes.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from tisim.sources import ElectricField, MagneticField, UniformFlow
 from tisim.steppers import Collocation, ErrorControl, StageControl, Stepper, Trapezoid
 
 TURN = 2 * np.pi
-"""rad/s: one turn or vibration a second."""
+"""rad/s: one rotation or oscillation a second."""
 RADIUS = 0.01
-"""m. Every particle has 1 kg and 1 C."""
+"""Radius (m). Every particle has 1 kg and 1 C."""
 LOOKS = 4000
-"""Times at which the size of a motion is looked for."""
+"""Number of times at which the size of a motion is sampled."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class End:
     size: float
 
     def error(self, result: Result) -> float:
-        """Of a run, over the size of the motion."""
+        """Error of a run, relative to the size of the motion."""
         assert result.status.ok, result.status.reason
         order = np.argsort(result.state["id"])
         off = np.linalg.norm(result.state["position"][order] - self.position, axis=1)
@@ -46,9 +47,11 @@ class End:
 
 @dataclass(frozen=True)
 class Single:
-    """A particle of 1 kg and 1 C on a spring to the origin along x (N/m), under drag (kg/s) of a fluid that
-    flows along x (m/s), in a field along x that is constant or goes as its sine (V/m, rad/s), and a magnetic
-    field along z (T)."""
+    """A particle of 1 kg and 1 C under linear forces.
+
+    It is on a spring to the origin along x (N/m), under drag (kg/s) in a fluid that flows along x (m/s), in a
+    field along x that is constant or sinusoidal in time (V/m, rad/s), and in a magnetic field along z (T).
+    """
 
     duration: float
     place: tuple[float, float] = (0.0, 0.0)
@@ -76,7 +79,7 @@ class Single:
 
     @cached_property
     def end(self) -> End:
-        """By the exponential of the matrix of (x, y, v_x, v_y, 1, sin, cos)."""
+        """From the exponential of the matrix for (x, y, v_x, v_y, 1, sin, cos)."""
         m = np.zeros((7, 7))
         m[0, 2] = m[1, 3] = 1.0
         m[2] = -self.spring, 0, -self.drag, self.flux, self.push + self.drag * self.flow, self.shake, 0
@@ -130,10 +133,10 @@ class Several:
 
 
 def orbit(eccentricity: float, turns: float, far: bool = False) -> Several:
-    """Two bodies about each other from where they are nearest, or farthest; the large semi-axis is 1 m."""
+    """Two bodies in orbit, starting at the pericentre or apocentre; the semi-major axis is 1 m."""
     side = -1 if far else 1
     distance = 1 - side * eccentricity
-    # Two masses of 1 kg, so the relative motion has a pull of 2 m^3/s^2.
+    # Both masses are 1 kg, so the relative motion has the attraction parameter 2 m^3/s^2.
     speed = np.sqrt(2 * (1 + side * eccentricity) / distance)
     place, velocity = np.zeros((2, 3)), np.zeros((2, 3))
     place[:, 0], velocity[:, 1] = [-distance / 2, distance / 2], [-speed / 2, speed / 2]
@@ -141,7 +144,7 @@ def orbit(eccentricity: float, turns: float, far: bool = False) -> Several:
 
 
 def crowd() -> Several:
-    """Five in a cluster: neighbouring paths separate."""
+    """Five particles in a cluster, whose neighbouring paths diverge."""
     rng = np.random.default_rng(3)
     return Several(6.0, rng.normal(size=(5, 3)), 0.3 * rng.normal(size=(5, 3)), 1.0, 0.1)
 
@@ -192,7 +195,7 @@ CONTROLS = {
 def ratios(
     make: Callable[[float], Stepper], tolerances: Sequence[float], scenes=KNOWN
 ) -> dict[str, np.ndarray]:
-    """The error at the end over that asked for, of each scene for each error."""
+    """The ratio of the final error to the requested one, for each scene and each requested error."""
     ratios_by_name = {}
     for kind in (Single, Several):
         names = [name for name in scenes if isinstance(scenes[name], kind)]

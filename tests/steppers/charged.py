@@ -1,4 +1,4 @@
-"""Charged particles in uniform fields, one to a world, for tests of steppers."""
+"""Charged particles in uniform fields, one in each world, for tests of steppers."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ def equal_steps(dt, phi=0.5, tolerance=1e-13, **more):
 
 
 def accurate(error, longest=1.0):
-    """The implicit stepper, its truncation error controlled."""
+    """The implicit stepper with control of the truncation error."""
     return Trapezoid(control=ErrorControl(error=error, tolerance=error / 100, first=1e-4, longest=longest))
 
 
 def boris(dt):
-    """Boris' stepper with steps of one length."""
+    """The stepper of Boris with steps of one length."""
     return Boris(control=FixedStep(dt=dt))
 
 
@@ -57,5 +57,5 @@ def final(result):
 
 
 def order(steps, errors):
-    """Of a stepper, by regression."""
+    """Order of a stepper, by regression."""
     return -np.polyfit(np.log(steps), np.log(errors), 1)[0]

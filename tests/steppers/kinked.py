@@ -1,7 +1,7 @@
-"""Scenes whose forces have kinks or jumps on the way, with ends that are known to 1e-12.
+"""Scenes with kinks or jumps in the forces along the path, and final states known to 1e-12.
 
-A kind of scene is a function of a generator of random numbers. It returns a scene, without a stepper of its
-own, and the positions at the end (m, shape (n, 3)), by scipy's DOP853 at its tightest, stopped at every kink.
+A kind of scene is a function of a random number generator. It returns a scene, without a stepper, and the
+final positions (m, shape (n, 3)), from SciPy's DOP853 with its tightest tolerance, stopped at every kink.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ KINDS: dict[str, Callable[[np.random.Generator], tuple[tisim.Scene, np.ndarray]]
 RADIUS, VISCOSITY = 5e-3, 1e-2
 MASS = 500.0 * 4 / 3 * np.pi * RADIUS**3
 RATE = 6 * np.pi * VISCOSITY * RADIUS / MASS
-"""1/s, of Stokes's drag."""
+"""Rate of Stokes drag, 1/s."""
 DRAG = laws.StokesDrag(viscosity=VISCOSITY)
 
 
@@ -30,10 +30,10 @@ def kind(function):
 
 
 def exact(acceleration, place, velocity, duration, switches: Sequence[Callable] = ()) -> np.ndarray:
-    """Return where a motion ends.
+    """Return the final positions of a motion.
 
-    acceleration : of (t, r, v, sides). sides are the signs of the switches, each a function of (t, r, v): a
-    piece of the motion ends where one of them changes.
+    acceleration : function of (t, r, v, sides). sides are the signs of the switches, each a function of
+    (t, r, v): a piece of the motion ends at a sign change of one of them.
     """
     n = np.size(place)
 
@@ -54,7 +54,7 @@ def exact(acceleration, place, velocity, duration, switches: Sequence[Callable] 
             def event(t, y, switch=switch):
                 return switch(t, *split(y))
 
-            # Away from the present side, so that the switch itself does not stop the piece after it.
+            # Offset to the present side, so that the switch itself does not stop the next piece.
             event.terminal, event.direction = True, -sides[k]
             events.append(event)
         piece = solve_ivp(
@@ -109,8 +109,10 @@ def field_that_begins(draw):
 
 
 def slowed(law, speed, duration, jump, above, below):
-    """Return a sphere in air that slows down past the Reynolds number at which its drag coefficient jumps,
-    from ``above`` to ``below``, functions of that number; and its end."""
+    """Return a sphere in air that slows down through a jump of its drag coefficient, and its final position.
+
+    above, below : functions of the Reynolds number on either side of the jump.
+    """
     rho, mu, v = 1.2, 1.8e-5, np.array([speed, 0, 0])
     per_speed = 2 * RADIUS * rho / mu
 
@@ -168,7 +170,7 @@ def out_of_a_shear_flow(draw):
 
 
 def pair(speed, effects, duration, mass=1.0):
-    """Return a scene of two spheres of 0.05 m that meet along x from 0.3 m."""
+    """Return a scene of two spheres of 0.05 m that approach along x from 0.3 m."""
     return tisim.Scene(
         particles=tisim.Particles(
             position=[(-0.15, 0, 0), (0.15, 0, 0)], velocity=[(speed / 2, 0, 0), (-speed / 2, 0, 0)],
@@ -180,7 +182,7 @@ def pair(speed, effects, duration, mass=1.0):
 
 
 def met(push, cutoff, speed, duration):
-    """Return the ends of two of 1 kg that push each other apart within a cut-off."""
+    """Return the final positions of two particles of 1 kg that repel each other within a cut-off."""
 
     def acceleration(t, r, u, sides):
         return 2 * push(r) if sides[0] < 0 else 0.0
@@ -210,7 +212,7 @@ def powers_with_a_cutoff(draw):
 
 
 def error(scene: tisim.Scene, end: np.ndarray, result: tisim.Result) -> float:
-    """Return the largest error of a particle's position at the end, over its distance from the start."""
+    """Return the largest error of a final position, relative to the distance from the start."""
     result.check()
     order = np.argsort(result.state["id"])
     moved = np.linalg.norm(end - result.start["position"], axis=1)

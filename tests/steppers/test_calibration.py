@@ -1,4 +1,4 @@
-"""How far from the right end a run is for the error asked for: bands over scenes whose end is known."""
+"""Ratio of the final error to the requested one: bounds over scenes with known final states."""
 
 import numpy as np
 import pytest
@@ -22,9 +22,9 @@ from tisim.steppers.implicit.stages import leading
 
 ASKED = 10.0 ** -np.arange(2, 6)
 FORGETS = "drag in a flow"
-"""Its errors die out within the run."""
+"""Its errors decay during the run."""
 BAND = 1 / 20, 20.0
-"""Of the error at the end over that asked for, where a motion neither forgets errors nor multiplies them."""
+"""Bounds on this ratio for motions that neither damp nor amplify errors."""
 
 
 def within(ratios_by_scene, least=BAND[0], most=BAND[1]):
@@ -34,15 +34,16 @@ def within(ratios_by_scene, least=BAND[0], most=BAND[1]):
 
 
 @pytest.mark.long
-def test_the_error_at_the_end_of_a_particle_alone_is_that_asked_for():
-    """By the trapezoidal rule: within a factor of 4 for each motion that is linear, whatever is asked for."""
+def test_the_final_error_of_a_single_particle_is_the_requested_one():
+    """With the trapezoidal rule the ratio is within a factor of 4 for each linear motion and requested
+    error."""
     ratios_by_scene = ratios(trapezoid("run"), ASKED, SINGLE)
     within(ratios_by_scene, 0.25, 4.0)
     assert list(ratios_by_scene) == list(SINGLE)
 
 
 def test_particles_in_a_batch_and_from_a_checkpoint_have_the_same_bits(tmp_path):
-    """How far a particle has been from its start is its own, and kept."""
+    """The largest distance from the start is stored for each particle."""
     scenes = [calibrated.scene(trapezoid("run")(ASKED[0])) for calibrated in SINGLE.values()]
     worlds = len(SINGLE) * len(ASKED)
     together = simulate(scenes, worlds=worlds, capacity=1)
@@ -51,7 +52,7 @@ def test_particles_in_a_batch_and_from_a_checkpoint_have_the_same_bits(tmp_path)
         (alone,) = simulate([scene], worlds=worlds, capacity=1)
         assert alone.work == result.work
         np.testing.assert_array_equal(alone.state["position"], result.state["position"])
-    # Windows of a tenth of a second, to stop at.
+    # Windows of a tenth of a second, at which a run can stop.
     control = ErrorControl(error=1e-3, tolerance=1e-5, per="run", first=1e-4, longest=0.1)
     stops = scenes[0].model_copy(update={"stepper": Trapezoid(control=control)})
     simulation.load([stops])
@@ -69,16 +70,20 @@ def test_particles_in_a_batch_and_from_a_checkpoint_have_the_same_bits(tmp_path)
 
 
 def from_first_steps(tolerances):
-    """The error at the end over that asked for, of an oscillator by collocation, for each first step (s)."""
+    """Ratio of the final error to the requested one for an oscillator with collocation, for each first step
+    (s)."""
     oscillator = {"oscillator": Single(3.25, (1.0, 0.0), spring=(2 * np.pi) ** 2)}
     makes = [collocation("run", first) for first in (1e-4, StageControl().first, 1e-8)]
     return [ratios(make, tolerances, oscillator)["oscillator"].tolist() for make in makes]
 
 
 @pytest.mark.slow
-def test_steps_are_solved_whatever_the_first_one():
-    """A first step so short that a sweep changes nothing there says nothing of longer ones: taken for a
-    contraction of 0 it had them all unsolved, and the end 20 times as far off as asked for."""
+def test_steps_are_solved_for_any_first_step():
+    """In a very short first step a sweep changes nothing, which says nothing about longer steps.
+
+    If it were taken as a contraction rate of 0, all later steps would be left unsolved, and the final error
+    would be 20 times the requested one.
+    """
     ratios_by_step = np.array(from_first_steps(10.0 ** -np.arange(7, 11)))
     assert (ratios_by_step > 0.25).all(), ratios_by_step
     assert (ratios_by_step < 1.0).all(), ratios_by_step
@@ -86,27 +91,28 @@ def test_steps_are_solved_whatever_the_first_one():
 
 @pytest.mark.slow
 def test_steps_are_solved_in_single_precision(single):
-    """There a sweep changes nothing in steps a thousand times as long."""
+    """In single precision a sweep changes nothing in steps a thousand times as long."""
     within({"single precision": np.array(single("steppers.test_calibration", "few_digits"))}, 0.1, 1.0)
 
 
 def few_digits():
-    """In a process of its own."""
+    """For a separate process in single precision."""
     return from_first_steps(10.0 ** -np.arange(2, 6))
 
 
-def test_what_the_estimate_says_of_the_leading_term():
-    """With two stages that is the trapezoidal rule's own: (k dt)^3/12 of the amplitude."""
+def test_the_leading_term_of_the_estimate():
+    """With two stages it is the term of the trapezoidal rule: (k dt)^3/12 of the amplitude."""
     factor, power = leading(2)
-    # An estimate of a/6 k dt by two stages, over a.
+    # The estimate with two stages is a/6 k dt, here divided by a.
     assert (factor * 0.3 / 6) ** power == pytest.approx(0.3 / 12)
     assert [leading(s)[1] for s in (2, 3, 5)] == [1.0, 1.5, 1.75]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CONTROLS if "run" in name])
-def test_the_error_at_the_end_is_that_asked_for(name):
-    """Within a factor of 20 for every decade; the chaotic motion multiplies errors, by some 50."""
+def test_the_final_error_is_the_requested_one(name):
+    """The ratio is within a factor of 20 for every decade; the chaotic motion amplifies errors by about
+    50."""
     make, tolerances = CONTROLS[name]
     ratios_by_scene = ratios(make, tolerances)
     within({scene: values for scene, values in ratios_by_scene.items() if scene != CHAOTIC})
@@ -114,8 +120,9 @@ def test_the_error_at_the_end_is_that_asked_for(name):
 
 
 @pytest.mark.slow
-def test_the_error_at_the_end_from_the_first_step_by_default():
-    """Collocation takes few steps, and where they fall matters: a factor of 50, for the same motions."""
+def test_the_final_error_with_the_default_first_step():
+    """Collocation takes few steps and depends on their places, so the bound is a factor of 50 for these
+    motions."""
     ratios_by_scene = ratios(
         collocation("run", StageControl().first), CONTROLS["Collocation, StageControl"][1]
     )
@@ -124,9 +131,11 @@ def test_the_error_at_the_end_from_the_first_step_by_default():
 
 
 @pytest.mark.slow
-def test_an_error_of_steps_says_less_of_the_end():
-    """Of the same motions: what is asked of steps is missed at the end by a factor of 100 and more, either
-    way, and by one that depends on what is asked for."""
+def test_an_error_per_step_determines_the_final_error_less():
+    """For the same motions the final error differs from the error requested for steps by factors above 100.
+
+    The factor goes either way and depends on the requested error.
+    """
     for name, (make, tolerances) in CONTROLS.items():
         if "run" not in name:
             values = np.concatenate(
@@ -141,7 +150,7 @@ def test_an_error_of_steps_says_less_of_the_end():
     [(trapezoid, ASKED, 2.0), (collocation, 10.0 ** -np.arange(4, 11), 8.0)],
 )
 def test_order_is_kept(make, tolerances, expected):
-    """The error falls with the number of steps as that of equal ones does."""
+    """The error falls with the number of steps as for equal steps."""
     oscillator = Single(30.25, (1.0, 0.0), spring=(2 * np.pi) ** 2)
     results = simulate(
         [oscillator.scene(make("run")(e)) for e in tolerances], worlds=len(tolerances), capacity=1
@@ -153,8 +162,8 @@ def test_order_is_kept(make, tolerances, expected):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [trapezoid("run"), collocation("run")])
-def test_the_size_of_a_motion_is_that_of_open_space_in_a_box(make):
-    """Two bodies that go round each other through the faces of a box take the steps they take without."""
+def test_the_size_of_a_motion_in_a_box_equals_open_space(make):
+    """Two bodies in orbit through the faces of a periodic box take the same steps as in open space."""
     free = orbit(0.5, 1.3).scene(make(1e-4))
     results = []
     for shift in (0.0, 4.0):

@@ -1,4 +1,4 @@
-"""Every closed form of Z13 section 3 over a sweep of parameters, by each stepper."""
+"""Every closed form of Z13 section 3 over a sweep of parameters, with each stepper."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def rates(flux, stiffness):
 
 
 def forms():
-    """Each closed form: what it is called, what the scene has more than B, and the velocity at the end."""
+    """Each closed form: its name, the parts of the scene besides B, and the final velocity."""
     for flux, k in GRID:
         w, k_m = rates(flux, k)
         yield f"static {flux}", {"flux": flux, "constant": 1.5}, static_field(DURATION, w, 1.5 / flux)
@@ -33,7 +33,7 @@ def forms():
 
 
 def turned(v, angle):
-    """Velocity that B, along z, has turned through an angle, clockwise for a positive charge."""
+    """Velocity rotated by B along z through an angle, clockwise for a positive charge."""
     c, s = np.cos(angle), np.sin(angle)
     return c * v[0] + s * v[1], -s * v[0] + c * v[1]
 
@@ -41,7 +41,7 @@ def turned(v, angle):
 @pytest.mark.long
 @pytest.mark.parametrize("name", STEPPERS)
 def test_error_falls_as_the_square_of_the_step(name):
-    """All forms at once, four step lengths each: order 2, with Omega at resonance too."""
+    """All forms at once with four step lengths each: order 2, also at resonance."""
     steps = 2 ** np.arange(7, 11)
     named, scenes, expected = [], [], []
     for what, settings, velocity in forms():
@@ -73,8 +73,8 @@ def test_order_of_the_implicit_stepper(phi, expected):
 
 
 @pytest.mark.slow
-def test_the_error_asked_for_is_met_and_costs_work():
-    """Error control over five decades: the error falls with what is asked, and work rises."""
+def test_the_requested_error_is_met_with_more_work():
+    """Over five decades the error decreases with the requested one, and the work increases."""
     tolerances = 10.0 ** -np.arange(3, 8)
     scenes = [charged(accurate(e), DURATION, stiffness=8.0, amplitude=1.5, omega=2.0) for e in tolerances]
     results = simulate(scenes, worlds=len(scenes), capacity=1)
@@ -83,6 +83,7 @@ def test_the_error_asked_for_is_met_and_costs_work():
     work = np.array([r.work["force_evaluations"] for r in results])
     assert (np.diff(errors) < 0).all()
     assert (np.diff(work) > 0).all()
-    # A second-order rule: a hundredth of the error for ten times the steps, within what iterations vary.
+    # A second-order rule: a hundredth of the error for ten times the steps, within the variation of
+    # iterations.
     assert (errors < 30 * tolerances).all()
     assert errors[-1] < errors[0] * 1e-3

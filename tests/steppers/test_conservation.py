@@ -1,4 +1,4 @@
-"""Energy and momentum of an array that throws itself apart, by every stepper."""
+"""Energy and momentum of an exploding array, with every stepper."""
 
 import sys
 from pathlib import Path
@@ -18,13 +18,13 @@ BOUNDS = {
     "Collocation, error=1e-4": (0.0, 8e-6),
     "Collocation, error=1e-8": (0.0, 3e-11),
 }
-"""Least and greatest change of the energy, over the kinetic energy at the end."""
+"""Least and greatest change of the energy, relative to the final kinetic energy."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STEPPERS)
 def test_energy_and_momentum(name):
-    """Forces between pairs cancel to rounding; energy is as good as the steps."""
+    """Pair forces cancel to rounding, and the energy error follows the steps."""
     result = measure(STEPPERS[name], sites=4)
     assert result.status.ok
     energy, momentum = drift(result)

@@ -1,4 +1,4 @@
-"""A stepper that the core has never heard of: implicit, with an iteration around lists and forces."""
+"""A stepper unknown to the core: implicit, with an iteration around lists and forces."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from tisim.steppers import Controller, Step, Stepper
 
 
 class Begin(Phase):
-    """A step of the controller's length, cut at the end."""
+    """Sets the step length from the controller, cut at the end of the run."""
 
     def __init__(self, context) -> None:
         self.s, self.control = context.s, context.control
@@ -31,7 +31,7 @@ class Begin(Phase):
 
 
 class Keep(PerParticle):
-    """Where the step began."""
+    """Stores the state at the beginning of the step."""
 
     @ti.func
     def run(self, w, i):
@@ -41,7 +41,7 @@ class Keep(PerParticle):
 
 
 class Correct(PerParticle):
-    """v' = v + dt/m (F + F')/2, r' = r + dt (v + v')/2. Lists and forces want places inside the domain."""
+    """v' = v + dt/m (F + F')/2, r' = r + dt (v + v')/2. Lists and forces need positions inside the domain."""
 
     def __init__(self, context) -> None:
         super().__init__(context.s)
@@ -60,7 +60,7 @@ class Correct(PerParticle):
 
 
 class Judge(Phase):
-    """Once more while anything moves; a list of pairs is made anew every time."""
+    """Continues while anything moves; the pair list is rebuilt every time."""
 
     def __init__(self, context) -> None:
         self.s, self.tolerance = context.s, context.stepper.tolerance
@@ -113,8 +113,8 @@ def implicit(setup: Scene, **more) -> Scene:
     return setup.model_copy(update={"stepper": Implicit(control=setup.stepper.control, **more)})
 
 
-def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
-    """The trapezoidal rule is exact in energy for a linear spring, whatever the step."""
+def test_the_stepper_is_of_second_order_and_conserves_energy():
+    """The trapezoidal rule conserves the energy of a linear spring exactly for any step."""
     stiffness, end = 4.0, 3.0
     steps = 2 ** np.arange(6, 11)
     scenes = [
@@ -137,7 +137,7 @@ def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
         assert result.work["corrections"] > 3 * n
 
 
-def test_its_parameters_may_differ_per_world_and_are_written_to_files():
+def test_parameters_may_differ_per_world_and_are_written_to_files():
     setup = scene([[1.0, 0, 0]], [[0, 1.0, 0]], (Trap(stiffness=4.0),), mass=1.0, dt=0.1, steps=30)
     loose, tight = implicit(setup, tolerance=1e-4), implicit(setup, tolerance=1e-12)
     assert loose.structure() == tight.structure()
@@ -149,7 +149,7 @@ def test_its_parameters_may_differ_per_world_and_are_written_to_files():
 
 @pytest.mark.slow
 def test_lists_and_forces_in_an_iteration():
-    """Short-ranged forces over lists that are made anew within it, and the same over all pairs."""
+    """Short-ranged forces with lists rebuilt in the iteration equal forces over all pairs."""
     results = []
     for kind in (SoftShell, SoftShellOfAll):
         setup = implicit(shells(kind, np.random.default_rng(3), True), tolerance=1e-13)
@@ -161,8 +161,8 @@ def test_lists_and_forces_in_an_iteration():
 
 
 @pytest.mark.slow
-def test_what_settles_in_an_iteration_is_an_iteration_in_an_iteration():
-    """Induced dipoles, in every correction of every step: the same bits on both schedules, worlds at odds."""
+def test_self_consistent_quantities_are_nested_iterations():
+    """Induced dipoles are solved in every correction of every step; both schedules agree to the bit."""
     scenes = [implicit(cloud(1), tolerance=1e-13), implicit(cloud(2, chi=5.0), tolerance=1e-12)]
     results = [simulate(scenes, worlds=2, schedule=schedule) for schedule in ("world", "particle")]
     for a, b in zip(*results, strict=True):

@@ -1,8 +1,9 @@
-"""What an error asked for is worth at the end of a run where forces have kinks or jumps.
+"""Final errors relative to the requested one, for forces with kinks or jumps.
 
     python -m pytest -n 0 -m slow -s tests/steppers/test_kinked_forces.py
 
-prints, for each kind of scene in kinked.py, the median and the largest error at the end over that asked for.
+prints, for each kind of scene in kinked.py, the median and the largest ratio of the final error to the
+requested one.
 """
 
 import numpy as np
@@ -19,16 +20,19 @@ pytestmark = pytest.mark.long
 ASKED = (1e-3, 1e-5, 1e-7)
 PAIRS = ("mie_at_its_cutoff", "powers_with_a_cutoff")
 STRIDE = {name: 0.025 for name in PAIRS}
-"""m. Half a radius: in longer steps particles may pass what acts at short range unseen."""
+"""Half a radius (m); in longer steps particles may pass short-ranged forces undetected."""
 LARGEST = {
     "run": dict.fromkeys(KINDS, 15.0) | dict.fromkeys(PAIRS, 100.0),
     "step": dict.fromkeys(KINDS, 50.0) | dict.fromkeys(PAIRS, 800.0),
 }
-"""The largest ratio that docs/steppers.md states, with a margin: for errors per run and per step."""
+"""The largest ratio stated in docs/steppers.md, with a margin: for errors per run and per step."""
 
 
 def ratios(name, make, number):
-    """Return errors at the end over that asked for, shape (asked, scenes). make : of (error, stride, s)."""
+    """Return ratios of the final to the requested error, shape (asked, scenes).
+
+    make : function of (error, stride, duration in s) that returns a stepper.
+    """
     drawn = [KINDS[name](np.random.Generator(np.random.Philox(key=[k, 1]))) for k in range(number)]
     found = []
     for asked in ASKED:
@@ -46,15 +50,15 @@ def ratios(name, make, number):
 
 
 def collocation(stages, per="run"):
-    """Return how collocation of a number of stages is made for an error."""
+    """Return a function that makes a collocation stepper with a number of stages for an error."""
     return lambda asked, stride, duration: Collocation(
         stages=stages, control=StageControl(error=asked, per=per, stride=stride)
     )
 
 
 def trapezoid(per="run"):
-    """Return how the trapezoidal rule is made for an error; its steps are bounded, as a jump may hide within
-    one."""
+    """Return a function that makes a trapezoidal stepper for an error; steps are bounded, because a jump may
+    be hidden within one."""
     return lambda asked, stride, duration: Trapezoid(
         control=ErrorControl(
             error=asked, tolerance=1e-2 * asked, per=per, longest=duration / 50, stride=stride
@@ -63,7 +67,7 @@ def trapezoid(per="run"):
 
 
 @pytest.mark.parametrize("name", [pytest.param("constriction", marks=pytest.mark.slow), "flow_that_begins"])
-def test_collocation_meets_the_error_asked_for_past_kinks(name):
+def test_collocation_meets_the_requested_error_past_kinks(name):
     assert ratios(name, collocation(5), 12).max() < LARGEST["run"][name]
 
 
@@ -80,8 +84,8 @@ def test_40_scenes_of_each_kind(name, stepper, per, capsys):
     assert found.max() < LARGEST[per][name]
 
 
-def test_fields_that_begin_and_fields_that_do_not_may_run_in_one_batch():
-    """Each with the estimate of error that suits it: the same bits as alone."""
+def test_fields_with_and_without_a_start_time_run_in_one_batch():
+    """Each has the error estimate that suits it, and the bits equal separate runs."""
     scenes = [
         tisim.Scene(
             particles=tisim.Particles(

@@ -1,4 +1,5 @@
-"""Single precision: displacements below the last digits of positions add up, and steps are counted right."""
+"""Single precision: displacements below the last digit of a position add up, and steps are counted
+exactly."""
 
 import numpy as np
 import pytest
@@ -26,8 +27,10 @@ STEPPERS = {
 
 
 def flights():
-    """Return, for each stepper, where a slow particle gets, and its steps. At 0.1 m one step moves
-    it by 1.3 last digits, at 1 m by a sixth of one."""
+    """Return the final position of a slow particle and its number of steps, for each stepper.
+
+    One step moves it by 1.3 units in the last place at 0.1 m, and by a sixth of one at 1 m.
+    """
     ends = {}
     for name, stepper in STEPPERS.items():
         scene = tisim.Scene(
@@ -44,7 +47,7 @@ def flights():
 
 
 def counts():
-    """Return how many steps are taken where a number is asked for, by Verlet."""
+    """Return the numbers of Verlet steps taken for given numbers of steps."""
     scenes = [
         tisim.Scene(
             particles=tisim.Particles(position=[(0, 0, 0)], velocity=[(1, 0, 0)], radius=1e-3, density=1.0),
@@ -58,13 +61,13 @@ def counts():
 
 
 def fast_flights():
-    """Return the same in fast arithmetic, which may regroup sums."""
+    """Return the result of ``flights`` in fast arithmetic, which may regroup sums."""
     tisim.init(precision="f32", arithmetic="fast")
     return flights()
 
 
 @pytest.mark.parametrize("function", ["flights", pytest.param("fast_flights", marks=pytest.mark.slow)])
-def test_a_slow_particle_gets_as_far_as_it_flies(single, function):
+def test_a_slow_particle_moves_the_right_distance(single, function):
     ends = single("steppers.test_single_precision", function)
     for place, steps in ends.values():
         assert steps == STEPS
@@ -72,14 +75,14 @@ def test_a_slow_particle_gets_as_far_as_it_flies(single, function):
         assert np.abs(np.array(place) - exact).max() < 2e-7
 
 
-def test_as_many_steps_are_taken_as_were_asked_for(single):
+def test_the_requested_number_of_steps_is_taken(single):
     assert single("steppers.test_single_precision", "counts") == [
         n for n in (1, 7, 2000, 100_001) for _ in "abc"
     ]
 
 
 def restarts():
-    """Return whether a run that is taken up from its checkpoint ends with the same bits."""
+    """Return whether a run restarted from its checkpoint ends with the same bits."""
     import tempfile
     from pathlib import Path
 
@@ -106,7 +109,7 @@ def restarts():
     return straight == simulation.results()[0].state["position"].tolist()
 
 
-def test_a_checkpoint_has_what_rounding_has_taken(single):
+def test_a_checkpoint_includes_rounding_remainders(single):
     assert single("steppers.test_single_precision", "restarts")
 
 
@@ -120,7 +123,7 @@ ASKED = {
 
 
 def refusals():
-    """Return what is said of each error that is asked for; nothing where it runs."""
+    """Return the message for each requested error, empty if it is accepted."""
     said = {}
     for name, asked in ASKED.items():
         scene = tisim.Scene(
@@ -137,7 +140,7 @@ def refusals():
     return said
 
 
-def test_errors_that_it_cannot_reach_are_refused(single):
+def test_unreachable_errors_are_refused(single):
     said = single("steppers.test_single_precision", "refusals")
     rule = "must be at least {} in f32, which rounds positions by 1.2e-07; received {}"
     assert said == {

@@ -1,4 +1,4 @@
-"""How long a step is: fixed, cut to end on time, at its floor, at its ceiling."""
+"""The length of a step: fixed, cut at the end of the run, at its lower bound, at its upper bound."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def run(scenes):
 
 
 def test_fixed_steps_end_exactly_on_time():
-    """A duration that is no multiple of the step: the last step is cut, and time is exact."""
+    """The duration is not a multiple of the step: the last step is cut, and the time is exact."""
     results = run(
         [
             scene([[0, 0, 0]], [[1.0, 2, 3]], (), stepper=fixed(dt), duration=1.0)
@@ -28,7 +28,7 @@ def test_fixed_steps_end_exactly_on_time():
 
 
 def row():
-    """Hard grains in a row, all but touching, each moving at 50 m/s against the next."""
+    """Hard grains in a row with tiny gaps, each moving at 50 m/s against the next."""
     grains = 12
     return scene(
         np.arange(grains)[:, None] * [2 * RADIUS * (1 + 1e-9), 0, 0],
@@ -41,8 +41,9 @@ def row():
 
 
 @pytest.mark.slow
-def test_step_control_at_its_floor():
-    """Gaps far smaller than v times the shortest step: the step rests on its floor, the run ends."""
+def test_step_control_at_its_lower_bound():
+    """The gaps are far smaller than v times the shortest step: the step stays at its lower bound, the run
+    ends."""
     simulation = compiled(row(), 8, 16)
     simulation.load([row()])
     simulation.run(steps=1)
@@ -59,8 +60,8 @@ def test_step_control_at_its_floor():
 
 
 @pytest.mark.long
-def test_a_grain_alone_takes_the_longest_step():
-    """Nothing near anything: the step is its ceiling, and a grain alone crosses its time in few steps."""
+def test_a_single_grain_takes_the_longest_step():
+    """A single grain takes steps at the upper bound, so few steps."""
     alone = scene([[0, 0, 0]], [[100.0, 0, 0]], row().effects, stepper=Verlet(), duration=0.01,
                   quantities={"temperature": 300.0})  # fmt: skip
     (result,) = run([alone])
@@ -69,9 +70,12 @@ def test_a_grain_alone_takes_the_longest_step():
 
 
 @pytest.mark.slow
-def test_a_scene_that_the_default_steps_cannot_resolve_is_refused():
-    """Two grains of 1 um, 10 um apart, that meet at 5 m/s each: in 1 us, the shortest step of the default,
-    they would be past each other and no impact be seen. With shorter steps they collide."""
+def test_a_scene_too_fast_for_the_default_steps_is_refused():
+    """Two grains of 1 um, 10 um apart, approach at 5 m/s each.
+
+    In 1 us, the shortest default step, they would pass each other undetected. With shorter steps they
+    collide.
+    """
     apart, speed = [[0, 0, 0], [1e-5, 0, 0]], [[5.0, 0, 0], [-5.0, 0, 0]]
     common = {"radius": 1e-6, "duration": 2e-6}
     meeting = scene(apart, speed, (Impact(hardness=1e5),), stepper=Verlet(), **common)
@@ -81,7 +85,7 @@ def test_a_scene_that_the_default_steps_cannot_resolve_is_refused():
     shorter = Verlet(control=ApproachTime(shortest=1e-9, longest=1e-6))
     (result,) = run([meeting.model_copy(update={"stepper": shorter})])
     assert result.work["impacts"] == 1
-    # Where all move alike nothing meets, and without impacts nothing can be missed.
+    # If all grains move alike they do not meet, and without impacts nothing can be missed.
     along = scene(apart, [[5.0, 0, 0]] * 2, (Impact(hardness=1e5),), stepper=Verlet(), **common)
     free = scene(apart, speed, (), stepper=Verlet(), **common)
     assert all(result.status.ok for result in (*run([along]), *run([free])))

@@ -1,4 +1,4 @@
-"""What cannot be done in as many steps as can be counted is refused."""
+"""Runs with more steps than can be counted are refused."""
 
 import pytest
 
@@ -39,7 +39,7 @@ def moving(stepper, duration):
     ],
 )
 def test_more_steps_than_can_be_counted_are_refused(stepper, duration, steps):
-    """With the duration and the number of steps; also where steps may grow, but not fast enough."""
+    """The message gives the duration and the number of steps, also if steps may grow, but too slowly."""
     with pytest.raises(InputError, match=r"duration must be reached in at most 9.01e\+15 steps") as refused:
         moving(stepper, duration)
     number = str(refused.value).split("takes at least ")[1].split(" of ")[0]
@@ -47,8 +47,8 @@ def test_more_steps_than_can_be_counted_are_refused(stepper, duration, steps):
     assert str(refused.value).endswith(f"received {duration!r}")
 
 
-def test_colloids_by_themselves_number_their_intervals_with_32_bits():
-    """More of them would have the noise of the first again."""
+def test_independent_colloids_count_intervals_with_32_bits():
+    """With more intervals the noise would repeat."""
     assert straight("brownian", False, 1.0, 2.0**32).duration == 2.0**32
     with pytest.raises(
         InputError, match=r"at most 4.29e\+09 steps, but takes at least 4.3e\+09 of drift_limit"
@@ -60,23 +60,23 @@ def test_colloids_by_themselves_number_their_intervals_with_32_bits():
 @pytest.mark.parametrize(
     "control", [FixedStep, ApproachTime, IterationControl, ErrorControl, StageControl, DriftLimit]
 )
-def test_no_step_is_shorter_than_any_time_that_numbers_can_square(control):
-    """1e-300 s of any limit of a step."""
+def test_steps_whose_square_underflows_are_refused(control):
+    """1e-300 s is refused for every limit of a step."""
     for name in {"dt", "first", "longest", "shortest"} & set(control.model_fields):
         needed = {"longest": 1.0} if control is DriftLimit else {}
         with pytest.raises(InputError, match=f"{name} must be at least {SHORTEST_STEP}; received 1e-300"):
             control(**{**needed, name: 1e-300})
 
 
-def test_it_is_said_of_files_too():
+def test_too_many_steps_in_a_file_are_refused():
     data = moving(fixed(1e-3), 1.0).to_dict()
     with pytest.raises(InputError, match=r"^scene\.duration must be reached"):
         Scene.from_dict({**data, "duration": 1e300})
 
 
 @pytest.mark.parametrize("control", [ErrorControl, StageControl])
-def test_a_safety_that_leaves_but_the_shortest_steps_is_refused(control):
-    """No step is so short that the error of it is 1e-300 of that asked for: rounding makes it larger."""
+def test_a_tiny_safety_factor_is_refused(control):
+    """No step has an error of 1e-300 times the requested one, because rounding is larger."""
     with pytest.raises(InputError, match=r"safety must be at least 0.01; received 1e-300"):
         control(safety=1e-300)
     assert control(safety=0.01).safety == 0.01

@@ -1,4 +1,4 @@
-"""Particles on which nothing acts, for any time from 1e-15 to 1e3 of the longest step: straight lines."""
+"""Free particles move along straight lines, for any time from 1e-15 to 1e3 times the longest step."""
 
 import numpy as np
 import pytest
@@ -23,9 +23,9 @@ from tisim.steppers import (
 )
 
 PARTICLES = 9
-"""One more than go together on a CPU."""
+"""One more than a vector on a CPU holds."""
 NOTHING = NearField(alpha1=0.0, alpha2=0.0)
-"""A force between pairs, for which they take common steps."""
+"""A pair force, for which all particles take common steps."""
 FREE = {
     "verlet, fixed": lambda longest: Verlet(control=FixedStep(dt=longest)),
     "verlet, approach": lambda longest: Verlet(
@@ -49,10 +49,10 @@ CASES = [
 ]
 DECADES = 10.0 ** np.arange(-15, 4)
 NEAR = np.array([1.0, 1 - 1e-12, 1 + 1e-12, 1 - 1e-7, 1 + 1e-7, 1 + 3e-6])
-"""A little less or more than whole steps, too."""
+"""Includes slightly less and more than a whole number of steps."""
 RATIOS = np.unique(np.concatenate([DECADES, NEAR, 3 * NEAR, 1e-6 * NEAR, DECADES * np.pi / 2]))
 LONGEST = np.array([2.0**-12, 1e3])
-"""s; a small one and a generous one, both whole in single precision."""
+"""Longest steps (s), a small one and a large one, both exact in single precision."""
 WORLDS = len(RATIOS) * len(LONGEST)
 
 
@@ -61,8 +61,7 @@ def limits(longest):
 
 
 def straight(name, together, longest, ratio):
-    """Particles side by side, at velocities across the line they stand on, which are those of a flow for
-    colloids."""
+    """Particles in a row that move across it; colloids move with a flow."""
     place, velocity = np.zeros((PARTICLES, 3)), np.zeros((PARTICLES, 3))
     place[:, 0] = 10.0 * np.arange(PARTICLES)
     velocity[:, 1:] = [1e6, -3.0] if name == "brownian" else np.random.default_rng(1).normal(size=(9, 2))
@@ -79,7 +78,7 @@ def straight(name, together, longest, ratio):
 
 
 def on_line(arrays, start, time):
-    """Whether particles are where they get in so much time (s)."""
+    """Check that particles have the right positions after a time (s)."""
     rounding = roundoff()
     order = np.argsort(arrays["id"])
     gone = arrays["position"][order][:, 1:]
@@ -88,7 +87,8 @@ def on_line(arrays, start, time):
 
 @pytest.mark.parametrize(("name", "together", "schedule"), CASES)
 def test_straight_lines(name, together, schedule):
-    """For any duration: at least one step, the time asked for to the last bit, the place to rounding."""
+    """For any duration there is at least one step, the time is exact to the last bit, and the position to
+    rounding."""
     scenes = [straight(name, together, longest, ratio) for longest in LONGEST for ratio in RATIOS]
     for result in simulate(scenes, worlds=WORLDS, capacity=PARTICLES, schedule=schedule):
         assert result.status.ok, result.status.reason
@@ -99,19 +99,19 @@ def test_straight_lines(name, together, schedule):
 
 
 def short(scenes):
-    """Results of scenes without effects, in a simulation that is compiled already."""
+    """Results of scenes without effects, in a simulation that is already compiled."""
     return simulate(scenes, worlds=WORLDS, capacity=PARTICLES, schedule="world")
 
 
-def test_a_moment_of_the_default_stepper():
-    """A picosecond at 1e6 m/s, with limits as they come."""
+def test_a_very_short_run_with_the_default_stepper():
+    """A picosecond at 1e6 m/s, with default limits."""
     (result,) = short([scene([[0.0] * 3], [[1e6, 0, 0]], stepper=Trapezoid(), duration=1e-12)])
     assert result.state["position"][0, 0] == 1e-6
     assert result.work["particle_steps"] == 1
 
 
 def test_growth_of_steps_is_counted():
-    """Steps that double from 1 s need ten for 1023 s, and a little more if they may be 100 s at most."""
+    """Steps that double from 1 s need ten for 1023 s, and slightly more if limited to 100 s."""
     control = IterationControl(first=1.0, longest=2e3, most=2.0)
     assert control.fewest(1023.0) == pytest.approx(10.0)
     (result,) = short([scene([[0.0] * 3], [[1.0] * 3], stepper=Trapezoid(control=control), duration=1023.0)])
@@ -119,8 +119,8 @@ def test_growth_of_steps_is_counted():
     assert IterationControl(first=1.0, longest=100.0, most=2.0).fewest(1023.0) == pytest.approx(10.23)
 
 
-def test_steps_ahead():
-    """As many as are left at the length of the last one, in the world that has most."""
+def test_remaining_steps():
+    """The number of steps left at the length of the last one, in the world that has most."""
     scenes = [
         scene([[0.0] * 3], [[1.0] * 3], stepper=FREE["verlet, fixed"](dt), duration=1.0)
         for dt in (1e-2, 1e-3)
@@ -135,9 +135,11 @@ def test_steps_ahead():
 
 
 @pytest.mark.parametrize("name", ["trapezoid, iteration", "brownian"])
-def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
-    """They meet at multiples of the longest step. Frames a little before or after one: each shows particles
-    where they were, none comes too early, and the end is the same to the last bit."""
+def test_frames_near_the_times_of_synchronisation(name, tmp_path):
+    """Particles synchronise at multiples of the longest step, and frames are due just before and after them.
+
+    Each frame shows consistent positions, none comes too early, and the end is the same to the last bit.
+    """
     ratios = np.array([1e-9, 1e-6, 0.3, 1.0, 1 + 1e-7, 7.0, 7 - 1e-7])
     scenes = [straight(name, False, LONGEST[0], ratio) for ratio in ratios]
     alone = simulate(scenes, worlds=WORLDS, capacity=PARTICLES, schedule="world")
@@ -156,7 +158,7 @@ def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
                     on_line(frame.arrays, result.start, frame.time)
             assert times[0] == 0.0
             assert times[-1] == result.time
-            # One for each time that was asked for, at the next meeting or at the end.
+            # One frame for each time asked for, at the next synchronisation or at the end.
             meetings = np.append(
                 np.arange(np.ceil(result.time / LONGEST[0] - 1e-6)) * LONGEST[0], result.time
             )

@@ -40,7 +40,8 @@ def potential(state):
 
 
 def test_energy_of_an_eccentric_orbit_does_not_drift():
-    """Twenty periods at e = 0.36: the energy error stays that of one step size, and falls as its square."""
+    """Twenty periods at e = 0.36: the energy error does not grow with time and falls as the square of the
+    step."""
     q = np.sqrt(4.0 / K_E)
     results = run(
         [

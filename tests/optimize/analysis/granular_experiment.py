@@ -1,8 +1,8 @@
-"""A closed-form experiment with grains, of which the right intervals are known, and archives of searches.
+"""A closed-form granular experiment with known exact intervals, and archives of searches on it.
 
-Friction tells a sliding angle, restitution a rebound, both frictions a heap and a rate of discharge. The
-right interval is that of the exact derivatives: 1.96 times the root of the diagonal of (J^T J)^-1, J in
-uncertainties.
+Friction determines a sliding angle, restitution a rebound, and both frictions together an angle of repose and
+a discharge rate. The exact interval follows from the derivatives: 1.96 times the square root of the diagonal
+of (J^T J)^-1, with J in units of the uncertainties.
 
     PYTHONPATH=. python tests/optimize/analysis/granular_experiment.py METHOD QUANTITIES RUNS DATA_SETS
 """
@@ -22,11 +22,11 @@ GENES = (
 )
 LOW, HIGH = np.array([gene.low for gene in GENES]), np.array([gene.high for gene in GENES])
 UNCERTAINTY = np.array([1.0, 0.02, 2.0, 0.02])
-"""Of the sliding angle (degrees), the rebound, the angle of repose (degrees) and the rate (kg/s)."""
+"""Uncertainties of the sliding angle (degrees), rebound, angle of repose (degrees) and rate (kg/s)."""
 
 
 def quantities(points, number=4):
-    """The first quantities of points of the unit cube, shape (..., quantities)."""
+    """The first ``number`` quantities at points of the unit cube, shape (..., quantities)."""
     friction, rolling, restitution = np.moveaxis(LOW + np.asarray(points) * (HIGH - LOW), -1, 0)
     all_four = (
         np.degrees(np.arctan(friction)),
@@ -38,7 +38,7 @@ def quantities(points, number=4):
 
 
 def right_widths(truth, number):
-    """The widths of the right 95 % intervals, in ranges; three quantities or more."""
+    """Widths of the exact 95 % intervals, in units of the ranges; needs three quantities or more."""
     steps = 1e-5 * np.eye(3)
     slopes = (quantities(truth + steps, number) - quantities(truth, number)) / 1e-5 / UNCERTAINTY[:number]
     return 2 * 1.96 * np.sqrt(np.diag(np.linalg.inv(slopes @ slopes.T)))
@@ -50,14 +50,14 @@ def measured_objective(wanted):
 
 
 def synthetic(seed, number=4, inside=(0.2, 0.8)):
-    """A true design, and data measured of it: (truth, data, rng)."""
+    """A true design and synthetic measurements of it: (truth, data, rng)."""
     rng = np.random.default_rng(seed)
     truth = rng.uniform(*inside, 3)
     return truth, quantities(truth, number) + UNCERTAINTY[:number] * rng.normal(size=number), rng
 
 
 def cloud(rng, misfits, runs=300, size=10):
-    """Points as a search by normal clouds draws them, in generations: the cloud follows the better half."""
+    """Points drawn in generations from a normal cloud that moves to the better half, as in a search."""
     middle, covariance, points, values = np.full(3, 0.5), 0.09 * np.eye(3), [], []
     for _ in range(runs // size):
         drawn = np.abs(rng.multivariate_normal(middle, covariance, size))
@@ -71,9 +71,9 @@ def cloud(rng, misfits, runs=300, size=10):
 
 
 def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8)):
-    """(truth, intervals, right widths) of a data set, by an archive of 300 designs.
+    """(truth, intervals, exact widths) for a data set, from an archive of 300 designs.
 
-    tau : what random starts add to each quantity, in uncertainties.
+    tau : noise of the random starts in each quantity, in uncertainties.
     """
     truth, data, rng = synthetic(seed, number, inside)
     sigma = UNCERTAINTY[:number]
@@ -91,7 +91,8 @@ def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8
 
 
 def coverage(data_sets, **settings):
-    """The part of the intervals of each gene that have the truth, and their mean width over the right one."""
+    """Fraction of the intervals of each gene that contain the truth, and their mean width over the exact
+    width."""
     found = [interval_of(k, **settings) for k in range(data_sets)]
     truths, intervals, right = map(np.array, zip(*found, strict=True))
     inside = (intervals[..., 0] <= truths) & (truths <= intervals[..., 1])
@@ -99,7 +100,7 @@ def coverage(data_sets, **settings):
 
 
 def searched(seed, method, number, runs):
-    """(truth, outcome) of a search for the design that data were measured of."""
+    """(truth, outcome) of a search for the design behind the measurements."""
     truth, data, _ = synthetic(seed, number)
 
     names = ("sliding angle", "rebound", "angle of repose", "rate")[:number]
@@ -115,7 +116,7 @@ def searched(seed, method, number, runs):
 
 
 def searched_coverage(method, number, runs, data_sets):
-    """As ``coverage``, by searches."""
+    """The result of ``coverage``, from searches."""
     inside, widths, right = [], [], []
     for seed in range(data_sets):
         truth, outcome = searched(seed, method, number, runs)

@@ -1,8 +1,7 @@
-"""Known answers by the package's own physics: parameters of small scenes, found from what is measured.
+"""Parameter recovery with the physics of the package: parameters of small scenes are found from measurements.
 
-Each scene is run at a true design, and its measured quantities are those of the run with normal errors of the
-uncertainties that are given. A search with the default method finds the design, and ``calibration`` its
-intervals.
+Each scene is run at a true design, and normal errors with the given uncertainties are added to its
+quantities. A search with the default method finds the design, and ``calibration`` gives its intervals.
 
     PYTHONPATH=. python tests/optimize/analysis/known_answers.py [DATA_SETS [NAME ...]]
 """
@@ -45,8 +44,9 @@ RUNS = 60
 
 @dataclass(frozen=True)
 class Experiment:
-    """genes : that are to be found. scene : of a design. quantities : of a run, in the units of
-    ``uncertainty``, the standard deviations of what is measured."""
+    """genes : the unknown parameters. scene : function of a design. quantities : function of a run, in the
+    units of ``uncertainty``, which contains the standard deviations of the measurements.
+    """
 
     genes: tuple[Gene, ...]
     scene: Callable
@@ -55,7 +55,8 @@ class Experiment:
 
 
 def slide_roll_and_bounce(design, seed):
-    """Three grains of 1 m and 1 kg: one slides on the floor until it rolls, one rolls, one meets a wall."""
+    """Three grains of 1 m and 1 kg: one slides on the floor until it rolls, one rolls, and one hits a
+    wall."""
     speed, rolling, bounce = 12.0, 3.0, 1.0
     planes = (
         Plane(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0)),
@@ -64,7 +65,7 @@ def slide_roll_and_bounce(design, seed):
     law = Granular(
         normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
     )
-    sunk = 1.2e-4  # m, about as far as the weight presses a grain in
+    sunk = 1.2e-4  # m, about the depth to which the weight presses a grain into the floor
     return scene(
         [[0, 0, 1 - sunk], [0, 10, 1 - sunk], [98.95, 20, 50]],
         [[speed, 0, 0], [rolling, 0, 0], [bounce, 0, 0]],
@@ -79,14 +80,14 @@ def slide_roll_and_bounce(design, seed):
 
 
 def speeds_and_spins(result):
-    """Speed and spin of the one that slides, speed of the one that rolls, and of the one that bounced."""
+    """Speed and spin of the sliding grain, and speeds of the rolling and the bouncing grain."""
     state = by_id(result)
     velocity, spin = state["velocity"][:, 0], state["spin"][:, 1]
     return velocity[0], spin[0], velocity[1], -velocity[2]
 
 
 def drawn_together(design, seed):
-    """Two grains of a susceptible material, 1 mm in radius, fly side by side through a field along x."""
+    """Two magnetisable grains of 1 mm radius fly side by side through a field along x."""
     law = (
         MagneticField(constant=(design["flux"], 0.0, 0.0)),
         InducedMoment(susceptibility=3.0),
@@ -97,13 +98,13 @@ def drawn_together(design, seed):
 
 
 def gap_and_way(result):
-    """Distance of the centres (mm) and the way flown (mm)."""
+    """Distance between the centres (mm) and distance flown (mm)."""
     position = 1e3 * by_id(result)["position"]
     return position[1, 0] - position[0, 0], position[:, 2].mean()
 
 
 def rebounds(design, seed):
-    """Three pairs of grains meet head on at 1, 2 and 3 m/s, by Zohdi's law of impact."""
+    """Three pairs of grains collide head-on at 1, 2 and 3 m/s under Zohdi's impact law."""
     speeds = np.array([1.0, 2.0, 3.0])
     position = [[sign * 1.05e-3, 0.1 * k, 0] for k in range(3) for sign in (-1, 1)]
     velocity = [[-sign * v / 2, 0, 0] for v in speeds for sign in (-1, 1)]
@@ -111,7 +112,7 @@ def rebounds(design, seed):
 
 
 def rebound_speeds(result):
-    """Relative speed of each pair after it has met, m/s."""
+    """Relative speed of each pair after the impact, m/s."""
     velocity = by_id(result)["velocity"][:, 0]
     return tuple(velocity[1::2] - velocity[::2])
 
@@ -129,7 +130,7 @@ EXPERIMENTS = {
 
 
 class KnownAnswers:
-    """Searches for the true designs of an experiment; all have one evaluator, which compiles once."""
+    """Searches for the true designs of an experiment; all share one evaluator, which compiles once."""
 
     def __init__(self, name):
         self.name, self.experiment = name, EXPERIMENTS[name]
@@ -137,7 +138,7 @@ class KnownAnswers:
         self.evaluator = evaluator_named("batch", threads=1)
 
     def quantities(self, design):
-        """What a run of a design gives."""
+        """The quantities of a run at a design."""
         ((_, result),) = self.evaluator.evaluate([self.experiment.scene(design, 0)])
         assert result.status.ok, result.status.reason
         return np.array(self.experiment.quantities(result))
@@ -168,7 +169,8 @@ class KnownAnswers:
             return truth, search(problem, self.evaluator, cache, settings)
 
     def inside(self, seed, runs=RUNS):
-        """For each gene whether its interval has the truth, and which part of its range that is."""
+        """For each gene, whether its interval contains the truth, and the width as a fraction of its
+        range."""
         truth, outcome = self.outcome(seed, runs)
         found = optimize.calibration(outcome).genes
         assert found, "too few designs near the least misfit"
@@ -176,7 +178,8 @@ class KnownAnswers:
 
 
 def coverage(name, data_sets, runs=RUNS):
-    """The part of the intervals of each gene that have the truth, and their median part of its range."""
+    """Fraction of the intervals of each gene that contain the truth, and their median fraction of the
+    range."""
     experiments = KnownAnswers(name)
     found = np.array([experiments.inside(seed, runs) for seed in range(data_sets)], dtype=float)
     return found[..., 0].mean(axis=0), np.median(found[..., 1], axis=0)

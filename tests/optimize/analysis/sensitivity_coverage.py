@@ -1,4 +1,4 @@
-"""How often the intervals of sensitivities hold the truth, by functions of which it is known.
+"""Coverage of the intervals of sensitivities, for functions with known sensitivities.
 
 PYTHONPATH=. python tests/optimize/analysis/sensitivity_coverage.py [SEARCHES [FUNCTION ...]]
 """
@@ -30,7 +30,7 @@ FUNCTIONS = {
     "valley": (valley, 2, 0.0, 60),
     "valley with noise": (valley, 2, 0.1, 60),
 }
-"""Function, number of genes, standard deviation of its noise, and designs that are run."""
+"""Function, number of genes, standard deviation of the noise, and number of designs."""
 
 
 def exact_indices(function, genes, points=81):
@@ -58,7 +58,7 @@ def exact_indices(function, genes, points=81):
 
 
 def searched(name, seed):
-    """The outcome of a search at random, and the function that it ran."""
+    """The outcome of a random search, and its function."""
     function, genes, noise, designs = FUNCTIONS[name]
 
     def run(design, seed):
@@ -75,7 +75,8 @@ def searched(name, seed):
 
 
 def held(name, seed):
-    """Whether intervals hold the truth: of changes by 1 % and by 10 %, and of indices; one list for each."""
+    """Whether the intervals contain the truth: of changes by 1 % and by 10 %, and of indices; one list for
+    each."""
     function, outcome = searched(name, seed)
     (found,) = optimize.sensitivity(outcome)
     at = np.array([gene.at for gene in found.genes])
@@ -94,7 +95,7 @@ def held(name, seed):
 
 
 def coverage(name, searches):
-    """The part of the intervals that have the truth and its standard error, for each kind of ``held``."""
+    """Fraction of intervals that contain the truth, with its standard error, for each kind in ``held``."""
     found = [[np.mean(one) if one else math.nan for one in held(name, seed)] for seed in range(searches)]
     return np.nanmean(found, axis=0), np.nanstd(found, axis=0) / math.sqrt(searches)
 

@@ -1,4 +1,4 @@
-"""Intervals of calibrated genes hold the truth as often as they say, at the right width."""
+"""Intervals of calibrated genes have their nominal coverage and the right width."""
 
 import csv
 
@@ -22,13 +22,14 @@ SETS = 200
 
 
 def holds(inside, sets=SETS):
-    """Whether 0.95 is within three deviations of what is seen of each of three genes, and of their mean."""
+    """Whether the coverages of the three genes agree with 0.95 within three deviations, and their mean
+    too."""
     deviation = np.sqrt(0.95 * 0.05 / sets)
     return np.all(np.abs(inside - 0.95) < 3 * deviation) and abs(inside.mean() - 0.95) < 1.75 * deviation
 
 
 @pytest.mark.parametrize("number", [4, 3])
-def test_intervals_hold_the_truth_and_have_the_right_width(number):
+def test_intervals_contain_the_truth_and_have_the_right_width(number):
     inside, width = coverage(SETS, number=number)
     assert holds(inside)
     assert width == pytest.approx(1.0, abs=0.05)
@@ -36,14 +37,17 @@ def test_intervals_hold_the_truth_and_have_the_right_width(number):
 
 @pytest.mark.parametrize(("common", "grown"), [(True, 1.118), (False, 1.0)])
 def test_noise_of_random_starts_widens_and_does_not_bias(common, grown):
-    """Four starts whose spread is the uncertainty: common to all designs they shift all means by a variance
-    of 1/4, so that the interval is sqrt(1.25) = 1.118 times as wide; each design's own average out."""
+    """The spread of four starts equals the uncertainty.
+
+    If all designs share the starts, the means shift with a variance of 1/4, and the interval is sqrt(1.25) =
+    1.118 times as wide. If each design has its own starts, the noise averages out.
+    """
     inside, width = coverage(SETS, tau=1.0, starts=4, common=common)
     assert holds(inside)
     assert width == pytest.approx(grown, abs=0.06)
 
 
-def test_near_an_end_of_the_range_intervals_are_from_one_side():
+def test_near_an_end_of_the_range_intervals_are_one_sided():
     found = [interval_of(k, inside=(0.0, 0.05)) for k in range(60)]
     truths, intervals = np.array([one[0] for one in found]), np.array([one[1] for one in found])
     assert np.mean(intervals[:, 1, 0] == 0.0) > 0.9
@@ -51,7 +55,7 @@ def test_near_an_end_of_the_range_intervals_are_from_one_side():
     assert inside.mean() > 0.92
 
 
-def test_of_a_quadratic_all_is_exact():
+def test_a_quadratic_gives_exact_results():
     hessian = np.array([[200.0, 120.0], [120.0, 300.0]])
     at = np.array([0.4, 0.6])
     points = np.random.default_rng(1).uniform(0, 1, (200, 2))
@@ -68,7 +72,7 @@ def test_of_a_quadratic_all_is_exact():
 
 
 def test_an_interval_that_reaches_an_end_is_the_profile_within_the_range():
-    """chi^2 = ((x + y - 0.1) / 0.02)^2 + ((x - y) / 0.1)^2, along x: y cannot go below 0."""
+    """chi^2 = ((x + y - 0.1) / 0.02)^2 + ((x - y) / 0.1)^2, along x; y cannot be below 0."""
     points = np.random.default_rng(2).uniform(0, 0.4, (400, 2))
     total, difference = points.sum(axis=1) - 0.1, points[:, 0] - points[:, 1]
     chi2 = (total / 0.02) ** 2 + (difference / 0.1) ** 2
@@ -86,20 +90,20 @@ def outcome_of(function, genes, wanted, runs=200):
     return optimize.run(problem, method="cma-es", seed=1, max_evaluations=runs, generations=10**6)
 
 
-def test_what_is_not_told_is_said():
+def test_undetermined_genes_are_reported():
     truth, outcome = searched(1, "cma-es", 2, 200)
     found = optimize.calibration(outcome)
     friction, rolling, restitution = found.genes
     assert [one.told for one in (friction, rolling, restitution)] == [True, False, True]
     assert (rolling.low, rolling.high) == pytest.approx((0.0, 0.4))
     assert any("The measurements do not determine rolling_friction" in remark for remark in found.remarks)
-    # With four quantities these two are known from the same ones.
+    # Even with four quantities, the same two determine friction and restitution.
     assert [friction.part, restitution.part] == pytest.approx(right_widths(truth, 4)[[0, 2]], rel=0.06)
     assert np.isnan(found.correlation[1]).all()
     assert abs(found.correlation[0, 2]) < 0.1
 
 
-def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
+def test_genes_with_only_their_sum_measured_are_not_separable():
     genes = [Gene("a", "", 0, 1), Gene("b", "", 0, 1), Gene("c", "", 0, 1)]
     outcome = outcome_of(
         lambda d: {"sum": d["a"] + d["b"], "own": d["c"]}, genes, {"sum": (1.0, 0.1), "own": (0.5, 0.1)}
@@ -112,7 +116,7 @@ def test_genes_of_which_only_the_sum_is_measured_cannot_be_told_apart():
     assert found.correlation[0, 1] < -0.85
 
 
-def test_measurements_that_are_not_met_together_are_told():
+def test_contradictory_measurements_are_reported():
     genes = [Gene("a", "", 0, 1)]
     outcome = outcome_of(
         lambda d: {"one": d["a"], "other": d["a"]}, genes, {"one": (0.2, 0.02), "other": (0.6, 0.02)}
@@ -120,7 +124,7 @@ def test_measurements_that_are_not_met_together_are_told():
     assert any("does not meet all measurements" in remark for remark in optimize.calibration(outcome).remarks)
 
 
-def test_too_few_designs_ask_for_more_and_say_which():
+def test_too_few_designs_give_a_list_of_further_ones():
     genes, wanted = [Gene("a", "m", 0, 1), Gene("b", "m", 0, 1)], {"p": (0.5, 0.001), "q": (0.5, 0.001)}
     outcome = outcome_of(lambda d: {"p": d["a"], "q": d["b"]}, genes, wanted, runs=12)
     found = optimize.calibration(outcome)
@@ -131,7 +135,7 @@ def test_too_few_designs_ask_for_more_and_say_which():
     assert "more are needed" in found.remarks[0]
 
 
-def test_a_choice_is_kept_at_the_best_and_others_as_good_are_listed():
+def test_a_choice_stays_at_its_best_and_equally_good_ones_are_listed():
     genes = [Gene("a", "", 1, 100, "log"), Choice("law", ("one", "two", "three"))]
     extra = {"one": 0.0, "two": 0.0, "three": 7.0}
     outcome = outcome_of(
@@ -165,8 +169,8 @@ def test_table_and_pictures_are_written(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("method", "sets"), [("cma-es", 100), ("gaussian-process", 30)])
-def test_intervals_of_searches_hold_the_truth(method, sets):
-    """Searches of 300 runs; one with a Gaussian process takes half a minute."""
+def test_intervals_of_searches_contain_the_truth(method, sets):
+    """Searches of 300 runs; with a Gaussian process each takes half a minute."""
     inside, width = searched_coverage(method, 4, 300, sets)
     print(f"{method}: truth inside {inside}, width over the right one {width}")
     assert holds(inside, sets)

@@ -1,4 +1,4 @@
-"""Friction, rolling friction and restitution; flux and speed; hardness: the truth is in the interval.
+"""The true friction, rolling friction, restitution, flux, speed and hardness are in their intervals.
 
 PYTHONPATH=. python tests/optimize/analysis/known_answers.py
 """
@@ -13,13 +13,13 @@ SETS = 200
 
 @pytest.fixture(autouse=True)
 def quick_disk(monkeypatch):
-    """Nothing of these searches is kept."""
+    """Skip fsync, as no file of these searches is kept."""
     monkeypatch.setattr("os.fsync", lambda file: None)
 
 
 @pytest.mark.long
-def test_flux_and_speed_are_found_again():
-    """Of the errors of these data, drawn with seeds 0 and 1, none is beyond 1.96 deviations."""
+def test_flux_and_speed_are_recovered():
+    """With seeds 0 and 1 no error of the data exceeds 1.96 deviations."""
     answers = KnownAnswers("flux")
     for seed in range(2):
         for inside, part in answers.inside(seed):

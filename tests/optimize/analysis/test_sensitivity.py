@@ -1,4 +1,4 @@
-"""Sensitivities of functions of which they are known."""
+"""Sensitivities of functions with known sensitivities."""
 
 import csv
 import math
@@ -46,7 +46,7 @@ def test_a_linear_function_changes_by_its_slopes():
     for move in (-0.1, -0.01, 0.01, 0.1):
         for gene, slope in ((a, 3.0), (b, -2.0)):
             change = gene.changes[move]
-            if math.isfinite(change.value):  # the best design is near the ends
+            if math.isfinite(change.value):  # the best design is near the ends of the ranges
                 assert change.value == pytest.approx(slope * move, abs=2e-3)
                 assert change.low - 1e-3 <= slope * move <= change.high + 1e-3
     at = c.at
@@ -59,7 +59,7 @@ def test_a_linear_function_changes_by_its_slopes():
         assert gene.total.value == pytest.approx(part / whole, abs=0.01)
 
 
-def test_of_a_whole_number_or_a_choice_nothing_between_is_told():
+def test_whole_numbers_and_choices_have_no_values_between():
     genes = [Gene("n", "", 1, 3, integer=True), Choice("law", ("one", "two")), Gene("x", "", 0, 1)]
     (found,) = optimize.sensitivity(
         outcome_of(lambda d: d["n"] + (d["law"] == "two") + 0.1 * d["x"], genes, 60)
@@ -73,7 +73,7 @@ def test_of_a_whole_number_or_a_choice_nothing_between_is_told():
     assert law.total.value == pytest.approx(0.25 / whole, abs=0.03)
 
 
-def test_indices_are_refused_where_designs_left_out_are_not_predicted():
+def test_indices_need_predictions_of_left_out_designs():
     def chance(design):
         return float(np.random.default_rng(int(1e9 * design["x1"] + 4e9)).normal())
 
@@ -83,8 +83,8 @@ def test_indices_are_refused_where_designs_left_out_are_not_predicted():
     assert all(math.isnan(gene.first.value) for gene in found.genes)
 
 
-def test_designs_in_one_place_do_not_pass_for_knowledge_of_the_whole_range():
-    """Of 150 designs of a search by cma-es most are near the best; they predict each other."""
+def test_clustered_designs_do_not_inflate_the_predictivity():
+    """Of 150 designs of a CMA-ES search most are near the best and predict each other well."""
     outcome = outcome_of(ishigami, ANGLES, 150, method="cma-es", seed=2)
     (found,) = optimize.sensitivity(outcome)
     assert found.q2.value < 0.9
@@ -97,7 +97,7 @@ def noisy(design, seed):
 NOISY = {"genes": [Gene("a", "", 0, 1), Gene("b", "", 0, 1)], "ensemble": {"min_starts": 4, "max_starts": 4}}
 
 
-def test_noise_is_nobodys_to_predict():
+def test_noise_does_not_reduce_the_predictivity():
     (found,) = optimize.sensitivity(outcome_of(noisy, runs=600, **NOISY))
     assert found.q2.value > 0.8
     a, b = found.genes
@@ -106,8 +106,9 @@ def test_noise_is_nobodys_to_predict():
     assert b.total.value < 0.1
 
 
-def test_how_much_is_predicted_is_not_known_for_sure_from_few_noisy_designs():
-    """The process predicts 0.9 and more of 3 a by 30 designs; each of 8 searches has its own noise."""
+def test_the_predictivity_is_uncertain_with_few_noisy_designs():
+    """The process predicts 0.9 or more of the variance of 3 a from 30 designs; the 8 searches differ in
+    noise."""
     found = []
     for seed in range(8):
         outcome = outcome_of(noisy, runs=120, seed=seed, **NOISY)
@@ -144,7 +145,7 @@ def test_too_few_designs_are_refused():
         optimize.sensitivity(outcome_of(ishigami, ANGLES, 5, options={"population": 5}))
 
 
-def test_drawn_functions_have_the_mean_and_deviation_of_the_process():
+def test_sampled_functions_have_the_mean_and_deviation_of_the_process():
     rng = np.random.default_rng(0)
     points = rng.random((12, 2))
     values = np.sin(5 * points[:, 0]) + points[:, 1]
@@ -152,6 +153,6 @@ def test_drawn_functions_have_the_mean_and_deviation_of_the_process():
     at = rng.random((5, 2))
     drawn = np.vstack([Draws(model, 50, np.random.default_rng(k))(at) for k in range(60)])
     mean, deviation = model.predict(at)
-    # The deviation of the process takes its constant mean for known, the functions do not.
+    # The deviation of the process takes its constant mean as known; the sampled functions do not.
     assert drawn.mean(axis=0) == pytest.approx(mean, abs=4 * (deviation / math.sqrt(600)).max())
     assert drawn.std(axis=0) == pytest.approx(deviation, rel=0.15)

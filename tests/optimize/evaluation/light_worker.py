@@ -1,4 +1,4 @@
-"""A worker process for tests of what becomes of processes: it compiles nothing."""
+"""A worker process for tests of worker failures, which compiles nothing."""
 
 import os
 import pickle
@@ -6,7 +6,7 @@ import struct
 
 
 def serve(connection, share):
-    """Echo what is asked, end, or end in the middle of an answer."""
+    """Echo each request, end, or end in the middle of an answer."""
     while True:
         try:
             scenes = pickle.loads(connection.recv()[0])

@@ -21,7 +21,7 @@ def ensemble(tmp_path, evaluator, problem=None, seed=4, **settings):
 
 
 def twin(values, tolerance, min_starts):
-    """Z04 Eq. 8.1 word for word."""
+    """Z04 Eq. (8.1), written out literally."""
     for e in range(1, len(values)):
         now, before = np.mean(values[: e + 1]), np.mean(values[:e])
         if e + 1 >= min_starts and (abs(now - before) < tolerance * abs(now) or now == before):
@@ -29,7 +29,7 @@ def twin(values, tolerance, min_starts):
     return None
 
 
-def test_it_converges_where_the_twin_says():
+def test_the_ensemble_converges_like_its_twin():
     rng = np.random.default_rng(0)
     counts = set()
     for _ in range(500):
@@ -44,7 +44,7 @@ def test_it_converges_where_the_twin_says():
 
 
 @pytest.mark.parametrize("block", [1, 3, 6, 50])
-def test_estimate_is_the_mean_of_the_starts_up_to_the_converged_one_whatever_the_block(tmp_path, block):
+def test_the_estimate_is_the_mean_up_to_convergence_for_any_block_size(tmp_path, block):
     evaluator = FakeEvaluator()
     result = ensemble(tmp_path, evaluator, block=block, tolerance=2e-3, min_starts=3, max_starts=60).estimate(
         DESIGNS
@@ -147,7 +147,7 @@ def test_nothing_is_evaluated_twice(tmp_path):
 
 
 @pytest.mark.parametrize("change", ["precision", "problem", "version"])
-def test_what_changes_a_fitness_is_not_reused(tmp_path, change):
+def test_changed_problems_do_not_reuse_fitness_values(tmp_path, change):
     ensemble(tmp_path, FakeEvaluator()).estimate(DESIGNS)
     evaluator = FakeEvaluator()
     problem = fake_problem(2, **{"problem": {"name": "dish"}, "version": {"version": 2}}.get(change, {}))
@@ -176,7 +176,7 @@ def test_finished_evaluations_are_stored_before_the_rest_runs(tmp_path):
     assert len(Cache(tmp_path / "cache.h5")) == 7
 
 
-def test_evaluator_that_forgets_a_scene_is_caught(tmp_path):
+def test_an_evaluator_that_forgets_a_scene_is_detected(tmp_path):
     class Forgetful(FakeEvaluator):
         def evaluate(self, scenes, progress):
             return (pair for pair in super().evaluate(scenes, progress) if pair[0] != 1)

@@ -1,4 +1,4 @@
-"""The same results, bit for bit, wherever runs are made; a killed worker costs time and nothing else."""
+"""All executors give the same bits; a killed worker costs time and nothing else."""
 
 import concurrent.futures as cf
 import contextlib
@@ -41,9 +41,9 @@ from tisim.optimize.storage.maintenance import verify
 ROOT = Path(__file__).parents[3]
 SCENES = [scene({"speed": 3.0 + k, "rise": 5.0}, seed=k) for k in range(9)]
 LONG = [s.model_copy(update={"duration": 150.0}) for s in SCENES]
-"""The same for 150,000 steps: seconds rather than milliseconds."""
+"""The same scenes with 150,000 steps, which take seconds instead of milliseconds."""
 CROWDED = SCENES[0].model_copy(update={"particles": Cloud(number=4, radius=0.2, density=1.0)})
-"""Cannot be packed."""
+"""Cannot be pickled."""
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def cluster():
 
 @pytest.fixture(scope="module", params=["processes", "dask"])
 def away(request):
-    """An evaluator in other processes, and how to know their ids."""
+    """An evaluator in other processes, and a function that returns their ids."""
     if request.param == "dask":
         cluster = request.getfixturevalue("cluster")
         evaluator = executors.evaluator_named(f"dask://{cluster.scheduler_address.removeprefix('tcp://')}")
@@ -91,7 +91,7 @@ def same(results, others):
 
 
 @pytest.mark.long
-def test_results_are_those_of_one_process_to_the_bit_and_so_are_failures(away, here):
+def test_results_and_failures_equal_one_process_to_the_bit(away, here):
     evaluator, pids = away
     fractions = []
     results = list(evaluator.evaluate([*SCENES, CROWDED], fractions.append))
@@ -107,7 +107,7 @@ def test_results_are_those_of_one_process_to_the_bit_and_so_are_failures(away, h
 
 @pytest.mark.slow
 def test_effects_of_the_users_own_act_in_workers(away, own_file):
-    """Each worker is given the file; one that has another version of it takes the new one."""
+    """Each worker receives the file; a worker that has another version of it loads the new one."""
     evaluator, _ = away
     for factor in ("", "2.0 * "):
         law = python_file.load(own_file("own_law.py", LAW.replace("-self", f"-{factor}self")))
@@ -118,7 +118,7 @@ def test_effects_of_the_users_own_act_in_workers(away, own_file):
             )
 
 
-def test_what_a_worker_cannot_import_is_reported_in_a_line(own_file):
+def test_a_missing_module_in_a_worker_is_reported_in_a_line(own_file):
     law = python_file.load(own_file("own_law.py", LAW))
     pickled = working.pack_scenes([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
     here = WorkerSettings()
@@ -149,7 +149,7 @@ def test_scenes_that_cannot_be_sent_are_reported_in_a_line():
 @pytest.mark.parametrize("away", ["processes", pytest.param("dask", marks=pytest.mark.slow)], indirect=True)
 def test_killed_worker_loses_nothing(away, here):
     evaluator, pids = away
-    dict(evaluator.evaluate(SCENES))  # all have started and compiled
+    dict(evaluator.evaluate(SCENES))  # all workers have started and compiled
     killed, results = [], []
 
     def progress(fraction):
@@ -194,7 +194,7 @@ def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("away", ["processes"], indirect=True)
-def test_worker_killed_while_it_has_nothing_to_do(away, here):
+def test_an_idle_worker_is_killed(away, here):
     evaluator, pids = away
     dict(evaluator.evaluate(SCENES))
     for pid in pids():
@@ -205,7 +205,7 @@ def test_worker_killed_while_it_has_nothing_to_do(away, here):
 
 
 @pytest.mark.long
-def test_stopped_it_leaves_no_process():
+def test_a_stopped_evaluator_leaves_no_process():
     evaluator = executors.evaluator_named("processes:2")
     with closing(evaluator):
         dict(evaluator.evaluate(SCENES))
@@ -223,7 +223,7 @@ def test_stopped_it_leaves_no_process():
 
 @pytest.fixture
 def light(monkeypatch):
-    """Processes that do what they are told and compile nothing; see light_worker.py."""
+    """Processes that obey commands and compile nothing; see light_worker.py."""
     monkeypatch.setattr("tisim.optimize.evaluation.executors.worker.serve", light_worker.serve)
     with closing(Remote(Processes(2), WorkerSettings())) as evaluator:
         yield evaluator.pool
@@ -241,7 +241,7 @@ def test_process_that_ends_takes_only_its_own_work_with_it(light):
     assert [light.outcome(f) for f in [light.submit("echo", None) for _ in range(4)]] == ["echo"] * 4
 
 
-def test_process_that_is_killed_with_nothing_to_do_is_noticed_by_the_next(light):
+def test_a_killed_idle_process_is_noticed_at_the_next_task(light):
     os.kill(light.outcome(light.submit("pid", None)), signal.SIGKILL)
     (killed,) = light._crew
     killed.process.join()
@@ -268,7 +268,7 @@ def test_process_that_cannot_be_started_is_a_message(light, monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize("away", ["processes"], indirect=True)
 def test_error_of_the_program_in_a_worker_is_raised_here(away):
-    """It says where in the worker it was; the worker goes on."""
+    """The message gives the place in the worker, and the worker continues."""
     evaluator, pids = away
     dict(evaluator.evaluate(SCENES))
     before = pids()
@@ -287,8 +287,8 @@ class Unreadable:
 
 
 @pytest.mark.long
-def test_workers_end_with_the_searching_process_whatever_they_are_at():
-    """Killed itself, it can tell them nothing."""
+def test_workers_end_with_the_searching_process():
+    """The parent is killed, so it cannot tell its workers to stop."""
     with worker("asleep", start_new_session=True) as process:
         assert process.stdout.readline() == "2 at work\n"
         assert len(alive(process.pid)) >= 3
@@ -297,7 +297,7 @@ def test_workers_end_with_the_searching_process_whatever_they_are_at():
 
 
 class Doomed:
-    """Workers that die of everything."""
+    """Workers that die on every task."""
 
     workers = 2
 
@@ -357,7 +357,7 @@ def test_unknown_executors_are_refused(name, message):
         executors.evaluator_named("processes:2", precision="f16")
 
 
-def test_nobody_at_the_address(monkeypatch):
+def test_an_address_without_a_scheduler_is_refused(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("tisim.optimize.evaluation.executors.dask_cluster.CONNECT_S", 0.3)
     with pytest.raises(InputError, match="must be the address of a running Dask scheduler; received '127"):
@@ -377,7 +377,7 @@ def test_nobody_at_the_address(monkeypatch):
         ("wss://h:1", "received 'wss://h:1' .there are no certificates in Dask's configuration"),
     ],
 )
-def test_addresses_that_are_none(monkeypatch, address, message):
+def test_invalid_addresses_are_refused(monkeypatch, address, message):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(distributed, "Client", lambda *a, **k: pytest.fail("nobody is to be asked"))
     with pytest.raises(InputError, match=message):
@@ -386,7 +386,7 @@ def test_addresses_that_are_none(monkeypatch, address, message):
 
 @pytest.fixture
 def encrypted():
-    """A Dask cluster in this process that speaks TLS: its address, and the settings of whom it lets in."""
+    """A Dask cluster with TLS in this process: its address, and the security settings of a client."""
     pytest.importorskip("cryptography")
     distributed = pytest.importorskip("distributed")
     lets_in = distributed.Security.temporary()
@@ -402,7 +402,7 @@ def encrypted():
 
 
 def test_dask_cluster_with_tls(encrypted):
-    """Connecting asks its worker what program it is."""
+    """During the connection the worker is asked for its program version."""
     import dask
 
     address, settings = encrypted
@@ -421,7 +421,7 @@ def test_dask_is_optional(monkeypatch):
 
 
 class Other:
-    """Workers that answer as they are told to."""
+    """Workers that give preset answers."""
 
     workers = 1
 
@@ -455,7 +455,7 @@ class Other:
     ],
 )
 def test_worker_of_another_program_is_refused(name, value):
-    """Its last bits may be others, and the cache would take them for the same."""
+    """Its results may differ in the last bits, but the cache would treat them as equal."""
     worker_settings = WorkerSettings()
     made_by = {**worker_settings.made_by, name: value}
     message = (
@@ -479,7 +479,7 @@ def test_one_edited_source_file_makes_another_program(tmp_path, monkeypatch):
 
 
 def elsewhere(address, folder):
-    """A Dask worker that finds its packages in a folder."""
+    """A Dask worker that imports its packages from a folder."""
     command = [sys.executable, "-m", "distributed.cli.dask_worker", address]
     options = ["--no-nanny", "--no-dashboard", "--nthreads", "1", "--local-directory", str(folder)]
     return subprocess.Popen(
@@ -490,7 +490,7 @@ def elsewhere(address, folder):
 
 @pytest.fixture
 def join(cluster, tmp_path):
-    """Adds a worker of other packages to the cluster."""
+    """Adds a worker with other packages to the cluster."""
     joined = []
 
     def start():
@@ -509,7 +509,7 @@ def join(cluster, tmp_path):
 
 
 def without(folder, *names):
-    """Packages as of another version: without some modules, and with another number."""
+    """Packages of another version: some modules are missing, and the version number differs."""
     for name in ("tisim", "optimize", "cases"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", *names))
     text = folder / "tisim" / "version.py"
@@ -550,7 +550,7 @@ def test_dask_worker_of_another_version_that_comes_later_is_refused(cluster, joi
             list(evaluator.evaluate(many))
 
 
-def test_dask_futures_that_hold_no_answer_are_messages():
+def test_dask_futures_without_an_answer_give_messages():
     distributed = pytest.importorskip("distributed")
     for answer, error, message in (
         ([], InputError, r"one with the program of the search \(tisim .*\); received \[\]"),
@@ -573,8 +573,8 @@ def test_dask_futures_that_hold_no_answer_are_messages():
 
 
 @pytest.mark.slow
-def test_dask_without_workers_says_so_and_gives_up(cluster, monkeypatch):
-    """Simulated here; the next test kills real ones."""
+def test_dask_without_workers_ends_with_a_message(cluster, monkeypatch):
+    """Simulated here; the next test kills real workers."""
     monkeypatch.setattr(dask_cluster, "SILENCE_S", 0.5)
     monkeypatch.setattr(dask_cluster, "WORKER_CHECK_S", 0.0)
     with closing(connected(cluster)) as evaluator:
@@ -588,7 +588,7 @@ def test_dask_without_workers_says_so_and_gives_up(cluster, monkeypatch):
 
 
 def alive(group):
-    """Command lines of the processes of a group that have not ended."""
+    """Command lines of the processes of a group that are still running."""
     processes = []
     for status in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
@@ -599,7 +599,7 @@ def alive(group):
 
 
 def await_end(group):
-    """Wait until no process of a group is left; those at work finish the kernel that they are at."""
+    """Wait until no process of a group is left; busy workers finish their current kernel."""
     ends = time.monotonic() + 600
     while pids := alive(group):
         assert time.monotonic() < ends, pids
@@ -610,14 +610,14 @@ def await_end(group):
 @pytest.mark.parametrize(
     ("number", "all_of_them", "code"),
     [
-        (signal.SIGINT, True, 130),  # as a terminal sends it
+        (signal.SIGINT, True, 130),  # as sent by a terminal
         (signal.SIGHUP, True, 129),
         (signal.SIGTERM, False, 143),
         (signal.SIGTERM, True, 143),
         (signal.SIGKILL, False, -9),
     ],
 )
-def test_whatever_stops_the_command_stops_all_its_workers(tmp_path, number, all_of_them, code):
+def test_a_stopped_command_stops_all_its_workers(tmp_path, number, all_of_them, code):
     command = ("optimize", "drift", "--generations", "5000")
     folder = tmp_path / "s"
     with worker(
@@ -638,7 +638,7 @@ def test_whatever_stops_the_command_stops_all_its_workers(tmp_path, number, all_
 
 @pytest.fixture
 def grid(tmp_path):
-    """A Dask scheduler and one worker that nobody starts again: the processes, and the address."""
+    """A Dask scheduler and one worker that is not restarted: the processes, and the address."""
     file = tmp_path / "scheduler.json"
     options = ["--no-dashboard", "--scheduler-file", str(file)]
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", *options]

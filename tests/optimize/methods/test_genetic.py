@@ -1,4 +1,4 @@
-"""A genetic algorithm of DEAP's operators, by name or of the user, with a surrogate and without."""
+"""A genetic algorithm with DEAP or user operators, with and without a surrogate."""
 
 import functools
 import random
@@ -30,7 +30,7 @@ def method(objectives=1, genome=None, seed=3, **options):
 
 
 def told(strings, function):
-    """Tell strings their costs, one number or several."""
+    """Assign costs to individuals, one number or several."""
     for string in strings:
         string.know(
             tuple(FitnessEstimate.certain(float(c)) for c in np.atleast_1d(function(np.array(string))))
@@ -39,7 +39,7 @@ def told(strings, function):
 
 
 def searched(function, evaluations, **settings):
-    """All designs that a method by itself has asked for."""
+    """All designs that a method asks for when it runs on its own."""
     found, one = [], method(**settings)
     while len(found) < evaluations:
         strings = one.ask()
@@ -49,18 +49,18 @@ def searched(function, evaluations, **settings):
 
 
 def valley(x):
-    """Rosenbrock's function, 0 at 1/2; genes depend on each other."""
+    """Rosenbrock's function, 0 at 1/2; the genes are coupled."""
     y = 4 * x - 1
     return float(np.sum(100 * (y[1:] - y[:-1] ** 2) ** 2 + (1 - y[:-1]) ** 2))
 
 
 def two_costs(x):
-    """Two bowls; every design between their middles is on the front."""
+    """Two bowls; every design between their centres is on the front."""
     return np.sum((x - 0.3) ** 2), np.sum((x - 0.7) ** 2)
 
 
-def test_designs_near_the_best_are_the_trust_regions():
-    """Without noise: of each generation half lie in the region, and the others away from its middle."""
+def test_half_of_each_generation_is_in_the_trust_region():
+    """Without noise: half of each generation lies in the trust region, and the rest away from its centre."""
     one = method()
     one.tell(told(one.ask(), valley), [])
     for _ in range(5):
@@ -71,8 +71,8 @@ def test_designs_near_the_best_are_the_trust_regions():
         one.tell(strings, [])
 
 
-def test_the_surrogate_spends_runs_where_they_decide():
-    """At 60 runs each, three seeds: far below the same algorithm without one."""
+def test_the_surrogate_saves_runs():
+    """With 60 runs and three seeds it is far better than the same algorithm without a surrogate."""
     best = {
         assisted: [
             min(s.fitness.values[0] for s in searched(valley, 60, seed=seed, surrogate=assisted))
@@ -83,8 +83,8 @@ def test_the_surrogate_spends_runs_where_they_decide():
     assert np.median(best[True]) < np.median(best[False]) / 3
 
 
-def test_noisy_runs_are_spent_where_they_decide():
-    """With noise there is no trust region: the ranking by the surrogate alone must do it."""
+def test_the_surrogate_saves_noisy_runs():
+    """With noise there is no trust region, so the ranking by the surrogate alone must help."""
     noise = np.random.default_rng(0)
     best = {}
     for assisted in (True, False):
@@ -111,7 +111,7 @@ def test_several_objectives_with_a_surrogate_come_nearer_to_the_front():
             two_costs, 56, objectives=2, surrogate=assisted, **({} if assisted else {"population": 8})
         )
         costs = np.array([string.fitness.values for string in found[-16:]])
-        # On the line between the middles sqrt(f1) + sqrt(f2) is their distance, elsewhere it is more.
+        # On the line between the centres sqrt(f1) + sqrt(f2) is their distance; elsewhere it is larger.
         excess[assisted] = np.sqrt(costs).sum(axis=1) - 0.4 * np.sqrt(GENES)
     assert np.median(excess[True]) < np.median(excess[False]) / 3
     assert np.median(excess[True]) < 0.05
@@ -173,7 +173,7 @@ def test_deap_operators_breed_within_the_range(role, name):
 
 
 def swapped(one, two, share=0.5):
-    """A crossover of the user."""
+    """A user-defined crossover."""
     for i in range(len(one)):
         if random.random() < share:
             one[i], two[i] = two[i], one[i]
@@ -181,7 +181,7 @@ def swapped(one, two, share=0.5):
 
 
 def moved(string, low, up, width=0.1):
-    """A mutation of the user, by random numbers of NumPy."""
+    """A user-defined mutation with NumPy random numbers."""
     for i, change in enumerate(np.random.normal(0.0, width, len(string))):  # noqa: NPY002
         string[i] = min(max(string[i] + change, low), up)
     return (string,)
@@ -223,7 +223,7 @@ def test_operators_of_a_toolbox_of_deap():
     assert by_toolbox == by_name
 
 
-def test_a_search_knows_what_its_operators_are():
+def test_operators_are_part_of_the_search():
     def made(**options):
         return identity(fake_problem(GENES), Settings(method="genetic", options=options), {})
 
@@ -269,7 +269,7 @@ def test_an_operator_is_given_by_its_name_alone():
     assert method(mate="cxOnePoint").options.mate == GeneticOperator(name="cxOnePoint")
 
 
-def test_nsga2_is_it_without_a_surrogate():
+def test_nsga2_equals_the_genetic_method_without_a_surrogate():
     kind = find("nsga2")
     costs = {1: lambda x: x, 2: lambda x: np.append(x, 1 - x)}
     for objectives, population in ((1, 20), (2, 40)):

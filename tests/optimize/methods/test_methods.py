@@ -1,4 +1,4 @@
-"""What every search method must do, and what each does by itself."""
+"""Requirements for every search method, and properties of single methods."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from tisim.optimize.storage.cache import Cache
 ONE = EnsembleSettings(min_starts=1, select=0, confirm=0)
 METHODS = sorted(every())
 SURROGATE = ("gaussian-process", "genetic")
-"""Methods of which a generation costs 0.05 s and more."""
+"""Methods that take 0.05 s or more for a generation."""
 
 
 def run(cache, function, evaluator=None, genes=5, **settings):
@@ -30,7 +30,7 @@ def quiet(design, seed):
 
 
 def rosenbrock(design, seed):
-    """A bent valley along which genes depend on each other; its minimum 0 at 1/2 in the unit cube."""
+    """A curved valley along which the genes are coupled; its minimum is 0 at 1/2 in the unit cube."""
     x = 4 * np.array(list(design.values())) - 1
     return float(np.sum(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2))
 
@@ -41,7 +41,7 @@ def method_named(name, genes=5, seed=3, **options):
 
 
 def worth(strings, function=quiet):
-    """Tell strings their costs; best first."""
+    """Assign costs to individuals and sort them, best first."""
     for string in strings:
         cost = function(dict(enumerate(string)), 0)
         reason = "" if np.isfinite(cost) else "failed"
@@ -69,7 +69,7 @@ def test_asks_within_the_unit_cube_and_by_its_seed_alone(name):
 
 
 def driven(name, function, evaluations, genes, seed=3):
-    """The least cost that a method finds by itself, without a cache and all that."""
+    """The least cost that a method finds on its own, without a cache or other parts of a search."""
     method, hall, evaluated = method_named(name, genes=genes, seed=seed), [], 0
     while evaluated < evaluations:
         strings = method.ask()
@@ -80,7 +80,7 @@ def driven(name, function, evaluations, genes, seed=3):
 
 
 @pytest.mark.parametrize("name", [name for name in METHODS if name != "random"])
-def test_beats_chance_at_equal_evaluations(name):
+def test_methods_beat_random_search_at_equal_evaluations(name):
     costs, chance, evaluations = [], [], 60 if name in SURROGATE else 300
     for seed in range(2 if name in SURROGATE else 5):
         costs.append(driven(name, quiet, evaluations, genes=8, seed=seed) - 0.5)
@@ -101,7 +101,7 @@ def test_budget_is_spent_and_not_exceeded(name):
 
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("after", [pytest.param(1, marks=pytest.mark.slow), 140])
-def test_resumed_after_interrupt_it_is_the_same(path, name, after):
+def test_a_resumed_search_is_the_same(path, name, after):
     settings = {
         "method": name, "generations": 5 if name in SURROGATE else 9,
         "ensemble": EnsembleSettings(tolerance=3e-3, min_starts=2, block=2, max_starts=8, race=12),
@@ -123,7 +123,7 @@ def test_resumed_after_interrupt_it_is_the_same(path, name, after):
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_failures_and_nothing_but_failures(name):
+def test_some_failures_and_only_failures(name):
     def half(design, seed):
         return quiet(design, seed) if design["x0"] > 0.5 else "lost"
 
@@ -143,12 +143,12 @@ def test_cma_es_follows_a_valley_that_the_genetic_algorithm_does_not():
 
 
 def corner(design, seed):
-    """A cone whose least value is at a corner of the unit cube."""
+    """A cone with its minimum at a corner of the unit cube."""
     return float(np.linalg.norm(list(design.values())))
 
 
 def test_cma_es_finds_a_corner():
-    """With reflection at the bounds it comes to 1e-4."""
+    """With reflection at the bounds it would only reach 1e-4."""
     method, least = method_named("cma-es", genes=4), np.inf
     for _ in range(50):
         strings = method.ask()
@@ -158,7 +158,7 @@ def test_cma_es_finds_a_corner():
     assert least < 1e-6
 
 
-def test_the_way_to_the_bounds():
+def test_designs_beyond_the_bounds_are_moved_inside():
     points = np.linspace(-EDGE, 1 + EDGE, 2001)
     inside, slope = within(points), np.gradient(within(points), points)
     assert (inside[0], inside[-1]) == (0.0, 1.0)
@@ -174,7 +174,7 @@ def test_the_way_to_the_bounds():
     )
 
 
-def test_cma_es_begins_again_with_twice_the_strings_when_it_has_converged():
+def test_cma_es_restarts_with_twice_the_population_after_convergence():
     method = method_named("cma-es", genes=2, smallest=1e-2)
     sizes, moved = [], []
     for _ in range(60):
@@ -189,7 +189,7 @@ def test_cma_es_begins_again_with_twice_the_strings_when_it_has_converged():
     assert method.width > 0
 
 
-def test_restart_draws_anew_around_the_best_when_it_has_stalled():
+def test_a_stalled_search_restarts_around_the_best():
     method = method_named("restart", genes=3, stalled=2, smallest=0.2)
     widths, best = [], None
     for generation in range(14):
@@ -209,7 +209,7 @@ def test_restart_draws_anew_around_the_best_when_it_has_stalled():
     assert widths == [0.5, 0.25, 1.0, 0.5, 0.25, 1.0]
 
 
-def test_options_are_those_of_the_method():
+def test_options_belong_to_the_method():
     assert Settings(method="cma-es", options={"sigma": 0.2}).options.sigma == 0.2
     for name, options, message in (
         ("cma-es", {"parents": 3}, r"search\.options\.parents must be a known key: .*; received 3"),

@@ -1,4 +1,4 @@
-"""A search method of the user's, in a Python file."""
+"""A user-defined search method in a Python file."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from tisim.optimize.settings import Settings, identity
 from tisim.scene import plugins
 
 
-def test_it_is_found_by_its_name_and_its_code_is_part_of_the_search(own_file):
+def test_a_user_method_is_found_by_name_and_its_code_counts(own_file):
     plugins.load(own_file("my_steps.py", METHOD))
     kind = find("steps")
     settings = Settings(method="steps", options={"width": 0.2})
@@ -24,7 +24,7 @@ def test_it_is_found_by_its_name_and_its_code_is_part_of_the_search(own_file):
     assert "method_code" not in identity(fake_problem(), Settings(method="zohdi"), {})
 
 
-def test_it_is_forgotten_with_its_file():
+def test_a_user_method_disappears_with_its_file():
     assert "steps" not in every()
     with pytest.raises(InputError, match=r"method must be one of .*, or your own \(--plugin, import\)"):
         find("steps")
@@ -38,7 +38,7 @@ def test_it_is_forgotten_with_its_file():
         ("    Options = Options\n", "", "Options of my_steps.Steps must be a class made of"),
     ],
 )
-def test_one_that_cannot_be_used_is_refused(own_file, old, new, message):
+def test_an_unusable_user_method_is_refused(own_file, old, new, message):
     plugins.load(own_file("my_steps.py", METHOD.replace(old, new)))
     with pytest.raises(InputError, match=message):
         find("zohdi")

@@ -1,4 +1,4 @@
-"""Numbers of a generation that were not given follow those that were, whatever the method and the case."""
+"""Options of a generation that are not given follow from those that are, for every method and case."""
 
 import numpy as np
 import pytest
@@ -17,9 +17,9 @@ POPULATIONS = range(2, 101)
 REFUSED = {
     "cma-es": (lambda n: n < 4, "search.options.population must be at least 4; received {}"),
 }
-"""For a real reason: adaptation of a covariance from fewer."""
+"""The reason for a real limit: too few individuals to adapt a covariance."""
 SURROGATE = ("gaussian-process", "genetic")
-"""Methods whose generation 0 has a size of its own, and whose second costs 0.05 s and more."""
+"""Methods with a generation 0 of a different size, whose second generation takes 0.05 s or more."""
 USUAL = {
     "of no case": {},
     "vibration": {"options": {"population": 8}},
@@ -31,7 +31,7 @@ USUAL = {
 
 
 def generations(settings):
-    """How many strings the first two generations have, and how many of the second are new."""
+    """Sizes of the first two generations, and the number of new individuals in the second."""
     method = find(settings.method)(fake_problem(GENES).genome, 1, settings.options, seed=1)
     first = method.ask()
     for rank, string in enumerate(first):
@@ -42,7 +42,7 @@ def generations(settings):
 
 
 def settings_of(usual, method, options):
-    """As the command line makes them: --method, --population or --set, on a case."""
+    """Settings as made by the command line: --method, --population or --set, for a case."""
     wishes = {f"options.{name}": value for name, value in options.items()}
     return Settings(
         **with_changes(
@@ -51,7 +51,7 @@ def settings_of(usual, method, options):
     )
 
 
-def test_the_table_is_of_the_cases_there_are():
+def test_the_table_lists_the_existing_cases():
     searches = [case.sizes["default"].search for case in catalogue.every().values() if case.problem]
     options = [search["options"] for search in searches if "options" in search]
     assert all(any(usual.get("options") == own for usual in USUAL.values()) for own in options)
@@ -59,7 +59,7 @@ def test_the_table_is_of_the_cases_there_are():
 
 @pytest.mark.parametrize("case", USUAL)
 @pytest.mark.parametrize("method", every())
-def test_every_population_is_taken_or_refused_for_a_real_reason(case, method):
+def test_every_population_is_accepted_or_refused_for_a_real_reason(case, method):
     unfit, message = REFUSED.get(method, (lambda n: False, None))
     for population in (2, 3, 12, 33) if method in SURROGATE else POPULATIONS:
         if unfit(population):
@@ -108,7 +108,7 @@ def test_proportions_are_the_published_ones():
         ({"parents": 12, "offspring": 10}, 37, 12, 10),
     ],
 )
-def test_what_is_given_stays_and_the_rest_follows(options, population, parents, bred):
+def test_given_options_stay_and_the_others_follow(options, population, parents, bred):
     breeding = Breeding(**options)
     assert (breeding.population, breeding.parents, breeding.bred) == (population, parents, bred)
 
@@ -126,7 +126,7 @@ def test_options_are_given_by_name(options):
         Settings(options=options)
 
 
-def test_what_is_no_number_is_reported_as_such():
+def test_a_non_numeric_option_is_reported():
     for wrong in ("many", [8], None, 2.5):
         with pytest.raises(InputError, match=r"search\.options\.population must be a whole number; received"):
             Breeding(population=wrong)
@@ -136,11 +136,11 @@ def test_what_is_no_number_is_reported_as_such():
 
 @pytest.mark.parametrize("same", [float, str, np.int64, np.float64])
 @pytest.mark.parametrize("options", [{"population": 5}, {"parents": 12}, {"offspring": 12}])
-def test_a_number_is_followed_however_it_is_written(options, same):
-    """As ``--set search.options.population=5.0``, which a file may also say as text."""
+def test_numbers_are_accepted_in_every_notation(options, same):
+    """As in ``--set search.options.population=5.0``; a file may also contain the number as text."""
     assert Breeding(**{name: same(number) for name, number in options.items()}) == Breeding(**options)
 
 
-def test_what_is_no_number_is_refused_as_such():
+def test_non_numeric_options_are_refused():
     with pytest.raises(InputError, match=r"population must be .*; received 5\.5"):
         Breeding(population=5.5)

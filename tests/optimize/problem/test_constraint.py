@@ -1,4 +1,5 @@
-"""Inequalities: what they allow, how far a value is beyond them, and where they are asked."""
+"""Inequality constraints: the values they allow, the size of a violation, and the time of their
+evaluation."""
 
 import functools
 import math
@@ -34,11 +35,11 @@ FIRST = DesignConstraint("first", lambda design: design["x0"], "m", at_most=0.5)
         ({"at_most": 3.0}, math.nan, math.inf),
     ],
 )
-def test_a_violation_is_the_excess_in_parts_of_the_bound(bounds, value, violation):
+def test_a_violation_is_the_excess_relative_to_the_bound(bounds, value, violation):
     assert ResultConstraint("mass", len, "kg", **bounds).violation(value) == pytest.approx(violation)
 
 
-def test_a_rule_is_told_in_words():
+def test_a_constraint_is_described_in_words():
     assert ResultConstraint("mass", len, "kg", at_most=3.0).rule == "at most 3 kg"
     assert ResultConstraint("mass", len, at_least=1, at_most=2.5).label == "mass, at least 1 and at most 2.5"
 
@@ -80,12 +81,12 @@ def test_a_rule_is_told_in_words():
         ),
     ],
 )
-def test_what_cannot_be_is_refused(make, message):
+def test_impossible_values_are_refused(make, message):
     with pytest.raises(InputError, match=f"^{message}"):
         make()
 
 
-def test_a_design_that_does_not_keep_to_it_makes_no_scene():
+def test_an_infeasible_design_makes_no_scene():
     made = []
 
     def scene(design, seed):
@@ -109,8 +110,8 @@ def test_an_infeasible_design_costs_no_run():
     assert (len(evaluator.digests), runs.requested) == (3, 3)
 
 
-def test_a_search_keeps_to_it_and_reports_it():
-    """The bowl is least at 0.3, which is not allowed."""
+def test_a_search_satisfies_and_reports_a_constraint():
+    """The minimum of the bowl, 0.3, is not allowed."""
     below = DesignConstraint("first", lambda design: design["x0"], at_most=0.1)
     problem = Problem.of_function(
         lambda design: (design["x0"] - 0.3) ** 2, [Gene("x0", "m", 0.0, 1.0)], constraints=[below]
@@ -122,7 +123,7 @@ def test_a_search_keeps_to_it_and_reports_it():
     ]
 
 
-def test_a_constraint_at_fault_is_told_in_a_line():
+def test_a_faulty_constraint_is_reported_in_a_line():
     for of, received in (
         (lambda design: design["y"], r"KeyError: 'y' \(test_constraint.py, line \d+\)"),
         (lambda design: None, "None"),
@@ -147,8 +148,8 @@ def far(result, limit):
     return result.value - limit
 
 
-def test_a_run_is_another_with_another_constraint_and_a_search_with_another_bound():
-    """Values of a run are stored beside those of its objectives, those of a design and bounds are not."""
+def test_constraints_identify_runs_and_bounds_identify_searches():
+    """Constraint values of a run are stored with its objectives; design values and bounds are not."""
 
     def of(kind, limit, **bounds):
         constraint = kind("c", functools.partial(far, limit=limit), **(bounds or {"at_most": 1}))

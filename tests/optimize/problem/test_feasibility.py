@@ -1,4 +1,4 @@
-"""Feasibility first: the order of designs with constraints, for one objective and for several."""
+"""Feasibility first: the order of designs with constraints, for one and several objectives."""
 
 import numpy as np
 import pytest
@@ -15,11 +15,11 @@ def test_the_three_rules_of_deb():
     assert not beats(2.0, 0.0, 2.0, 0.0)
     assert beats(9.0, 0.0, 2.0, 0.1)  # feasible before infeasible
     assert not beats(2.0, 0.1, 9.0, 0.0)
-    assert beats(9.0, 0.1, 2.0, 0.2)  # both infeasible: the one that violates less
+    assert beats(9.0, 0.1, 2.0, 0.2)  # both infeasible: the smaller violation
     assert not beats(2.0, 0.1, 1.0, 0.1)
 
 
-def test_of_several_objectives_a_feasible_one_must_dominate():
+def test_with_several_objectives_feasible_designs_must_dominate():
     assert beats([1.0, 2.0], 0.0, [1.0, 3.0], 0.0)
     assert not beats([1.0, 3.0], 0.0, [2.0, 2.0], 0.0)
     assert beats([1.0, 3.0], 0.0, [0.0, 0.0], 1e-9)
@@ -36,7 +36,7 @@ def test_ranks_of_one_objective():
     assert ranks(costs, violations).tolist() == [2, 0, 1, 0, 4, 3]
 
 
-def test_ranks_where_none_or_all_are_feasible():
+def test_ranks_if_none_or_all_are_feasible():
     assert ranks([1.0, 2.0], [0.2, 0.1]).tolist() == [1, 0]
     assert ranks([1.0, 2.0], [0.0, 0.0]).tolist() == [0, 1]
     assert ranks(np.empty((0, 2)), []).tolist() == []
@@ -50,11 +50,12 @@ def test_ranks_agree_with_the_comparison_of_two(objectives):
         place = ranks(costs, violations)
         for i in range(30):
             better = [j for j in range(30) if beats(costs[j], violations[j], costs[i], violations[i])]
-            # Behind each that is better, and directly behind one of them: the meaning of a front.
+            # Each design is behind all better ones, and directly behind one of them, as in nondominated
+            # sorting.
             assert place[i] == max((place[j] + 1 for j in better), default=0)
 
 
-def test_fronts_of_feasible_designs_are_those_of_deap():
+def test_fronts_of_feasible_designs_equal_deap():
     costs = RNG.random((60, 3))
 
     class Point(list):

@@ -1,4 +1,4 @@
-"""Plain functions in the place of scenes, through the public API: nothing is simulated, and nothing stale."""
+"""Plain functions instead of scenes, through the public API: nothing is simulated or reused by mistake."""
 
 import csv
 import functools
@@ -20,7 +20,7 @@ ONE = (Gene("x", "", 0.0, 1.0),)
 
 
 def test_a_method_finds_the_minimum_of_an_analytic_function():
-    """Rosenbrock's valley in two dimensions: least, 0, at (1, 1)."""
+    """Rosenbrock's valley in two dimensions, with its minimum, 0, at (1, 1)."""
     outcome = optimize.run(
         Problem.of_function(rosenbrock, TWO), max_evaluations=600, generations=600, method="cma-es", seed=3
     )
@@ -30,8 +30,8 @@ def test_a_method_finds_the_minimum_of_an_analytic_function():
     assert outcome.problem.name == "rosenbrock"
 
 
-def test_a_function_of_the_design_is_called_once_for_each():
-    """And the budget is one of calls."""
+def test_a_function_is_called_once_for_each_design():
+    """The budget counts calls."""
     calls = []
     problem = Problem.of_function(lambda design: len(calls.append(design) or ()) + design["x"], ONE, code="c")
     outcome = optimize.run(problem, max_evaluations=37, generations=50, seed=1)
@@ -58,7 +58,7 @@ def test_a_function_that_takes_a_seed_is_called_from_several_starts():
         (functools.partial(lambda scale, design, seed: 0, 2.0), True), (max, False),
     ],
 )  # fmt: skip
-def test_whether_it_takes_a_seed_is_seen(of, takes_seed):
+def test_a_seed_argument_is_detected(of, takes_seed):
     assert PlainFunction(of).takes_seed == takes_seed
 
 
@@ -76,14 +76,14 @@ def test_several_objectives_by_place_or_by_name_give_a_front():
     assert [design.values for design in again.designs] == [design.values for design in front.designs]
 
 
-def test_an_objective_reads_what_the_function_has_given():
+def test_an_objective_reads_the_values_of_the_function():
     height = Objective("height", lambda result: result.value["top"], "m", maximise=True)
     problem = Problem.of_function(lambda d: {"top": 1 - d["x"] ** 2}, ONE, [height], name="hill")
     best = optimize.run(problem, generations=8, seed=1).designs[0]
     assert best.values["height"] == pytest.approx(1.0, abs=1e-4)
 
 
-def test_runs_are_found_again_and_not_those_of_another_function(tmp_path):
+def test_runs_of_the_same_function_are_reused(tmp_path):
     def of(target):
         return Problem.of_function(lambda design: abs(design["x"] - target), ONE, name="p")
 
@@ -97,7 +97,7 @@ def test_runs_are_found_again_and_not_those_of_another_function(tmp_path):
     assert of(0.25).objective_identity != of(0.75).objective_identity
 
 
-def test_a_folder_has_all_but_a_scene(tmp_path):
+def test_a_folder_of_a_function_has_no_scene(tmp_path):
     genes = (Gene("x", "m", 0.0, 1.0), Gene("n", "", 1, 3, integer=True), Choice("wall", ("flat", "round")))
     problem = Problem.of_function(lambda d: d["x"] + d["n"] + (d["wall"] == "flat"), genes, name="mixed")
     outcome = optimize.run(problem, out=tmp_path, generations=6, seed=1)
@@ -128,7 +128,7 @@ def test_neither_taichi_nor_a_device_is_started():
 
 
 @pytest.mark.long
-def test_worker_processes_call_it_too():
+def test_worker_processes_call_functions_too():
     problem = Problem.of_function(noisy, ONE)
     settings = {"generations": 2, "seed": 5, "options": {"population": 6}}
     here = optimize.run(problem, **settings)
@@ -148,20 +148,20 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_function_at_fault_ends_the_search_in_a_line(name):
+def test_a_faulty_function_ends_the_search_with_a_line(name):
     function, message = FAULTS[name]
     with pytest.raises(InputError, match=f"^{message}"):
         optimize.run(Problem.of_function(function, ONE), generations=2)
 
 
-def test_what_is_no_function_is_refused():
+def test_non_functions_are_refused():
     with pytest.raises(InputError, match=r"^function must be one of the design; received 3"):
         Problem.of_function(3, ONE)
     with pytest.raises(InputError, match=r"^objectives must be a list of names or Objectives; received 'f'"):
         Problem.of_function(rosenbrock, TWO, "f")
 
 
-def test_a_design_that_it_refuses_or_gives_no_number_for_is_out_of_the_race():
+def test_designs_that_fail_or_give_no_number_are_excluded():
     def partly(design):
         if design["x"] < 0.5:
             raise InputError("x must be large; received little")
@@ -171,14 +171,14 @@ def test_a_design_that_it_refuses_or_gives_no_number_for_is_out_of_the_race():
     assert 0.75 <= outcome.designs[0].genes["x"] < 0.76
 
 
-def test_a_search_of_which_every_design_fails_ends_without_a_best():
+def test_a_search_without_successful_designs_has_no_best():
     def refuse(design):
         raise InputError("x must be large; received little")
 
     assert optimize.run(Problem.of_function(refuse, ONE), generations=2).best is None
 
 
-def test_a_file_that_it_reads_must_be_declared(tmp_path):
+def test_a_file_read_by_a_function_must_be_declared(tmp_path):
     target = tmp_path / "target.txt"
     target.write_text("0.5")
 
@@ -194,7 +194,7 @@ def test_a_file_that_it_reads_must_be_declared(tmp_path):
     assert before.objective_identity != identity
 
 
-def test_it_cannot_change_the_design_of_the_search():
+def test_a_function_cannot_change_the_design():
     def meddle(design):
         design["x"] = 0.0
         return 1.0
@@ -205,7 +205,7 @@ def test_it_cannot_change_the_design_of_the_search():
     assert (call.design, call.digest()) == ({"x": 0.5}, before)
 
 
-def test_a_record_of_what_designs_are_worth(tmp_path):
+def test_a_fitness_record_of_a_function(tmp_path):
     problem = Problem.of_function(noisy, [*ONE, optimize.FixedGene("k", 2)])
     record = FitnessRecord.measure(problem, {"low": {"x": 0.1}}, starts=3)
     record.save(tmp_path / "fitness.json")
@@ -221,7 +221,7 @@ def test_a_gene_is_fixed_in_a_problem():
     assert problem.objective_identity == Problem.of_function(rosenbrock, TWO).objective_identity
 
 
-def test_where_a_constraint_refuses_every_design_the_error_says_why():
+def test_the_error_explains_that_no_design_is_feasible():
     far = optimize.DesignConstraint("far", lambda design: design["x"], "m", at_most=-1)
     problem = Problem.of_function(lambda design: 0.0, ONE, name="p", constraints=[far])
     with pytest.raises(RunError, match=r"infeasible: far must be at most -1 m; received 0\.\d+ m$"):

@@ -1,4 +1,4 @@
-"""Whole numbers and choices in the unit cube: cells, their middles, and the way back."""
+"""Whole numbers and choices in the unit cube: cells, their centres, and the inverse map."""
 
 import math
 
@@ -34,8 +34,8 @@ def test_whole_numbers_reach_both_ends(gene):
     assert (gene.decode(0.0), gene.decode(1.0)) == (gene.low, gene.high)
 
 
-def test_every_whole_number_and_choice_is_as_likely():
-    """Chi squared of 40000 draws; beyond the bound with a chance of 1e-6."""
+def test_every_whole_number_and_choice_is_equally_likely():
+    """Chi-squared test of 40000 draws; the bound is exceeded with a probability of 1e-6."""
     points = np.random.default_rng(6).random(40000)
     for gene, number in ((BLADES, 6), (WALL, 3), (GRID, 4), (OPEN, 2)):
         _, counts = np.unique([gene.decode(u) for u in points], return_counts=True)
@@ -44,16 +44,16 @@ def test_every_whole_number_and_choice_is_as_likely():
         assert np.sum((counts - expected) ** 2 / expected) < 35.0
 
 
-def test_a_log_scale_gives_a_whole_number_its_part_of_it():
-    """k has from k - 1/2 to k + 1/2 of the scale from 0.5 to 1000.5."""
+def test_a_whole_number_has_its_share_of_a_log_scale():
+    """k takes the interval from k - 1/2 to k + 1/2 of the logarithmic scale from 0.5 to 1000.5."""
     values = np.array([CELLS.decode(u) for u in np.random.default_rng(7).random(40000)])
     for k in (1, 2, 10, 100):
         share = math.log((k + 0.5) / (k - 0.5)) / math.log(1000.5 / 0.5)
         assert np.mean(values == k) == pytest.approx(share, abs=5 * math.sqrt(share / 40000))
 
 
-def test_what_was_decoded_is_encoded_to_its_last_bit():
-    """Or a warm start would run again what a table has."""
+def test_decoded_designs_are_encoded_to_the_last_bit():
+    """Otherwise a warm start would repeat runs that a table already has."""
     for point in POINTS[:500]:
         design = GENOME.decode(point)
         assert GENOME.decode(GENOME.encode(design)) == design
@@ -66,7 +66,7 @@ def test_what_was_decoded_is_encoded_to_its_last_bit():
             assert gene.decode(gene.encode(gene.decode(u))) == gene.decode(u)
 
 
-def test_every_whole_number_and_choice_is_in_the_middle_of_its_cell():
+def test_every_whole_number_and_choice_is_at_the_centre_of_its_cell():
     for gene, values in (
         (BLADES, range(2, 8)), (CELLS, range(1, 1001)), (WALL, WALL.choices), (GRID, GRID.choices),
         (Gene("big", "", -(10**9), 10**9, integer=True), (-(10**9), -1, 0, 10**9)),
@@ -79,7 +79,7 @@ def test_every_whole_number_and_choice_is_in_the_middle_of_its_cell():
 
 def test_points_of_one_design_have_one_representative_and_one_row_of_features():
     points, canonical = POINTS.copy(), GENOME.canonical(POINTS)
-    points[:, [0, 4]] = 0.25  # only what has cells is compared
+    points[:, [0, 4]] = 0.25  # only genes with cells are compared
     by_design = {}
     for point, row in zip(GENOME.canonical(points), GENOME.features(points), strict=True):
         by_design.setdefault(tuple(GENOME.decode(point).items()), set()).add((tuple(point), tuple(row)))
@@ -140,13 +140,13 @@ def test_a_dependent_gene_cannot_change_the_design():
         (lambda design: [1.0], r"\[1.0\]"),
     ],
 )
-def test_a_dependent_gene_at_fault_is_told_in_a_line(of, received):
+def test_a_faulty_dependent_gene_is_reported_in_a_line(of, received):
     rule = "dependent gene y must return a finite number, a text or a flag"
     with pytest.raises(InputError, match=rf"^{rule}; received {received}"):
         Genome((Gene("x", "", 0, 1), DependentGene("y", "", of))).decode([0.5])
 
 
-def test_numpy_values_become_those_of_python():
+def test_numpy_values_become_python_values():
     genome = Genome((
         Choice("n", (np.int64(1), np.float32(2.5), "auto")), FixedGene("f", np.bool_(True)),
         DependentGene("d", "", lambda design: np.float64(2.0)),
@@ -156,7 +156,7 @@ def test_numpy_values_become_those_of_python():
 
 
 def test_a_row_of_a_table_is_a_design():
-    """Headings with or without units; texts of a CSV."""
+    """Headings with or without units, and text values from a CSV file."""
     row = {"rank": "1", "speed (m/s)": "2.5", "blades": "3.0", "wall": "round", "cells": "1e2",
            "hardness": "1e6", "grid": "64.0", "open": "True", "Pi": "0.3"}  # fmt: skip
     assert GENOME.parse(row) == {
@@ -217,12 +217,12 @@ DESIGN = GENOME.decode(np.full(7, 0.5))
         (lambda: Genome(("x",)), r"gene must be a Gene, Choice, FixedGene or DependentGene; received 'x'"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_refused(make, message):
+def test_impossible_values_are_refused(make, message):
     with pytest.raises(InputError, match=f"^{message}"):
         make()
 
 
-def test_what_a_gene_may_be_and_what_it_follows_from_are_part_of_the_search():
+def test_ranges_and_formulas_of_genes_are_part_of_the_search():
     def of(**changes):
         genes = {
             "n": Gene("n", "", 1, 4, integer=True), "c": Choice("c", ("a", "b")), "f": FixedGene("f", 1.0),

@@ -1,4 +1,4 @@
-"""Statistics of the starts of a design: their estimates, their intervals, and searches for them."""
+"""Statistics over the starts of a design: estimates, intervals, and searches for them."""
 
 from itertools import combinations
 
@@ -24,7 +24,7 @@ def objective(statistic, maximise=False, of=lambda result: result.value):
     return Objective("value", of, statistic=statistic, maximise=maximise)
 
 
-def test_estimates_are_those_of_their_definitions():
+def test_estimates_follow_their_definitions():
     assert Expectation().value(VALUES) == pytest.approx(VALUES.mean(), rel=1e-14)
     assert Quantile(0.9).value(VALUES) == pytest.approx(hdquantiles(VALUES, [0.9])[0], rel=1e-12)
     subsets = [max(part) for part in combinations(VALUES, 3)]
@@ -37,8 +37,9 @@ def test_estimates_are_those_of_their_definitions():
     assert Misfit(TARGET).value(runs) == pytest.approx(np.mean(off**2 - variance), rel=1e-12)
 
 
-def test_large_values_that_are_wanted_are_small_costs():
-    """A quantile is of the value, whichever is wanted; the worst is the least where large ones are wanted."""
+def test_maximised_values_are_small_costs():
+    """A quantile refers to the value, whether it is minimised or maximised; the worst of maximised values is
+    the least."""
     up, down = objective(Quantile(0.1), maximise=True), objective(Quantile(0.9))
     assert up.cost(VALUES) == pytest.approx(-hdquantiles(VALUES, [0.1])[0], rel=1e-12)
     assert down.cost(-VALUES) == pytest.approx(up.cost(VALUES), rel=1e-12)
@@ -49,8 +50,8 @@ def test_large_values_that_are_wanted_are_small_costs():
     assert objective(WorstOf(12)).cost(VALUES) == VALUES.max()
 
 
-def test_the_misfit_of_means_has_no_part_of_their_variance():
-    """Of 4 runs whose noise is twice the uncertainty a naive misfit is 1 too large."""
+def test_the_misfit_of_means_excludes_their_variance():
+    """For 4 runs whose noise is twice the uncertainty a naive misfit is too large by 1."""
     misfit, found = Misfit({"a": (0.0, 1.0)}), []
     for _ in range(4000):
         found.append(misfit.value(RNG.normal(1.5, 2.0, size=(4, 1))))
@@ -68,7 +69,7 @@ def test_the_misfit_of_means_has_no_part_of_their_variance():
     ids=str,
 )
 def test_standard_errors_are_right(statistic, variance):
-    """Of the mean of pseudo-values, beside the variance of large samples."""
+    """The mean of pseudo-values, compared with the variance of large samples."""
     errors = []
     for _ in range(400):
         sample = RNG.normal(size=(40, 1) if statistic.quantities else 40)
@@ -87,7 +88,7 @@ def intervals():
         fresh = max(16, Quantile(share).fewest_fresh)
         yield f"quantile {share}, normal", Quantile(share), rng.normal, norm.ppf(share), fresh
         yield f"quantile {share}, exponential", Quantile(share), rng.exponential, -np.log(1 - share), fresh
-    top = beta(4, 1)  # of the largest of four uniform numbers
+    top = beta(4, 1)  # distribution of the largest of four uniform numbers
     yield "worst of 4, uniform", WorstOf(4), rng.uniform, top.mean(), 16
     yield "worst of 4, exponential", WorstOf(4), rng.exponential, 1 + 1 / 2 + 1 / 3 + 1 / 4, 16
     for distance in (0.0, 0.3, 2.0):
@@ -97,7 +98,7 @@ def intervals():
 @pytest.mark.parametrize(
     ("name", "statistic", "draw", "truth", "shape"), [*intervals()], ids=lambda x: str(x)[:30]
 )
-def test_intervals_hold_the_truth(name, statistic, draw, truth, shape):
+def test_intervals_contain_the_truth(name, statistic, draw, truth, shape):
     inside = covered(statistic, draw, truth, 400, shape)
     print(f"{name}: {inside:.3f}")
     assert 0.915 < inside < 0.99
@@ -110,7 +111,7 @@ def test_a_misfit_of_several_quantities_is_within_its_interval():
     assert 0.92 < inside < 0.995
 
 
-def test_an_end_that_few_values_do_not_tell_is_not_given():
+def test_interval_ends_need_enough_values():
     low, high = Quantile(0.9).interval(VALUES)
     assert np.isfinite(low)
     assert np.isnan(high)
@@ -118,13 +119,13 @@ def test_an_end_that_few_values_do_not_tell_is_not_given():
 
 
 def noisy(design, seed):
-    """Its mean is least at 0.2; there is less noise at 1."""
+    """The mean is least at 0.2; the noise is smaller at 1."""
     x = design["x"]
     return (x - 0.2) ** 2 + (1.0 - x) * np.random.default_rng(seed).normal()
 
 
 WORST = norm.expect(lambda z: 4 * z * norm.cdf(z) ** 3)
-"""The expectation of the largest of four normal numbers, 1.03."""
+"""The expected maximum of four normal numbers, 1.03."""
 
 
 def searched_problem(statistic):
@@ -136,8 +137,8 @@ def searched_problem(statistic):
     [(Expectation(), 0.0, WORST), (WorstOf(4), WORST, 0.0)],
     ids=["mean", "worst"],
 )
-def test_a_search_finds_the_best_of_what_is_asked(statistic, noise, other):
-    """Nearer in value to its own best design than to that of the other statistic."""
+def test_a_search_finds_the_best_of_its_statistic(statistic, noise, other):
+    """The result is closer in value to its own best design than to the best design of the other statistic."""
 
     def truth(x):
         return (x - 0.2) ** 2 + noise * (1.0 - x)
@@ -148,8 +149,8 @@ def test_a_search_finds_the_best_of_what_is_asked(statistic, noise, other):
     assert all(len(values) >= statistic.fewest_starts for values in outcome.quantities.values())
 
 
-def test_a_statistic_is_not_reported_from_fewer_starts_than_it_needs():
-    """The worst of four, of two starts or four, is too good."""
+def test_a_statistic_is_reported_only_from_enough_starts():
+    """The worst of four runs, estimated from two or four starts, would be too optimistic."""
     outcome = optimize.run(searched_problem(WorstOf(4)), seed=1, max_evaluations=24, generations=100)
     assert all(len(values) >= 5 for values in outcome.quantities.values())
     assert all(not one.confirmed or one.confirmed[0].starts >= 5 for one in outcome.hall)
@@ -161,7 +162,7 @@ def test_a_statistic_is_not_reported_from_fewer_starts_than_it_needs():
 
 
 def test_the_same_runs_serve_every_statistic(tmp_path):
-    """Values of runs are kept, so that another statistic of them costs nothing."""
+    """The values of runs are stored, so another statistic of them needs no new runs."""
     counts = []
     settings = Settings(seed=1, method="random", options={"population": 6}, generations=0)
     for statistic in (Quantile(0.5), Expectation()):
@@ -173,7 +174,7 @@ def test_the_same_runs_serve_every_statistic(tmp_path):
     assert counts[1] == 0
 
 
-def test_what_cannot_be_is_refused():
+def test_impossible_values_are_refused():
     for make, words in (
         (lambda: Quantile(1.0), "share of a quantile must be between 0 and 1; received 1"),
         (lambda: WorstOf(1), "starts of WorstOf must be a whole number above 1; received 1"),
@@ -194,7 +195,7 @@ def test_what_cannot_be_is_refused():
         optimize.run(problem)
 
 
-def test_a_quantity_that_was_measured_must_be_there():
+def test_a_measured_quantity_must_be_returned():
     problem = Problem.of_function(
         lambda design: {"angle": 21.0}, [Gene("x", "m", 0, 1)], [objective(Misfit(TARGET))], "short", code="s"
     )

@@ -1,4 +1,5 @@
-"""Methods compared: equal runs, fresh starts that no search has used, and a table that ranks them."""
+"""Comparison of methods: equal numbers of runs, held-out seeds that no search has used, and a ranking
+table."""
 
 import csv
 import io
@@ -36,7 +37,7 @@ def compared(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache
     return list(compare(searches, evaluator or FakeEvaluator(noisy), cache))
 
 
-def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
+def test_methods_get_equal_runs_and_held_out_seeds():
     evaluator, cache = FakeEvaluator(noisy), FakeCache()
     results = compared(["random", "zohdi", "cma-es"], evaluator=evaluator, cache=cache)
     assert [(f.method, f.repeat) for f in results] == [
@@ -105,7 +106,7 @@ def test_stopping_rules_and_options_of_the_case():
     assert settings_of(fake_problem(), BASE, "cma-es", 50, 3).options.population is None
 
 
-def test_what_cannot_be_compared_is_refused():
+def test_incomparable_objects_are_refused():
     for arguments, message in (
         ({"methods": ["zohdi", "zohdi"]}, "methods must be one or more, all different"),
         ({"methods": []}, "methods must be one or more"),
@@ -121,7 +122,7 @@ def test_what_cannot_be_compared_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [("--methods", "simplex"), ("--repeats", "0"), ("--executor", "nobody")])
-def test_a_comparison_that_cannot_be_leaves_the_files_of_before(tmp_path, monkeypatch, capsys, wrong):
+def test_a_refused_comparison_keeps_earlier_files(tmp_path, monkeypatch, capsys, wrong):
     monkeypatch.setattr(catalogue, "every", lambda: {CASE.name: CASE})
     ownership.claim(tmp_path, comparison.COMPARISON_FILES)
     with Cache(tmp_path / "compare.h5") as cache:

@@ -1,4 +1,4 @@
-"""Designs with whole numbers, texts and flags in all that a search shows."""
+"""Designs with whole numbers, texts and flags in all outputs of a search."""
 
 import io
 from dataclasses import replace
@@ -55,7 +55,7 @@ def test_the_table_of_the_best_has_every_kind(outcome):
     assert rows["drag,"][4] == f"{best['speed'] / 5:.4g}"
 
 
-def test_the_spread_of_those_that_meet_has_names_of_choices():
+def test_the_spread_of_designs_at_the_target_names_choices():
     """Three designs: blades 2 and 3 of 2 to 5 are in neighbouring cells; both walls; never open."""
     outcome = Outcome(PROBLEM, Settings(), {"problem": "p"})
     for design, cost in (
@@ -77,14 +77,14 @@ def test_the_spread_of_those_that_meet_has_names_of_choices():
     assert lines[1] == "1.0,2,round,False,2.5,2.0,3.0"
 
 
-def test_the_bar_tells_the_best_design():
+def test_the_bar_shows_the_best_design():
     text = Display(PROBLEM, Settings(generations=3), Console(file=io.StringIO()))._design(
         PROBLEM.genome.decode([0.5] * 4)
     )
     assert text == "speed 5 m/s, blades 4, wall round, open True, gap 2.5 mm, tip 10 m/s"
 
 
-def test_what_was_run_is_read_again_from_a_journal():
+def test_runs_are_read_back_from_a_journal():
     record = replace(fake_record(1), design=PROBLEM.genome.decode([0.5] * 4))
     again = Record.parse(record.payload())
     assert again == record

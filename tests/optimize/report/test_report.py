@@ -98,7 +98,7 @@ def test_derived_columns_reproduce_z04_table_3():
 
 
 def printed_lines(outcome, width=80):
-    """Lines of the table of the best designs, headings to last row."""
+    """Lines of the table of the best designs, from the headings to the last row."""
     console = Console(width=width, record=True, file=io.StringIO())
     console.print(report.best_table(outcome))
     lines = console.export_text().splitlines()
@@ -117,7 +117,7 @@ def test_terminal_table_shows_the_best_designs(outcome):
 
 
 def agglomerations(number):
-    """Designs of Z04's ten genes; values such as 1.234e15 among them."""
+    """Designs of Z04's ten genes, with values such as 1.234e15."""
     outcome = Outcome(agglomeration("paper"), Settings(), {"problem": "agglomeration"})
     for k in range(number):
         string = Individual([0.851234 + k / 200] * 10)
@@ -162,7 +162,7 @@ def test_symbols_of_the_table_are_explained_under_it(outcome):
 
 
 def moves(figure):
-    """The generations that a picture marks as those after which the search box was moved."""
+    """Generations that a picture marks because the search box moved after them."""
     return [line.get_xdata()[0] for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
 
 
@@ -195,7 +195,7 @@ def test_report_of_failures_and_of_nothing(tmp_path, settings):
 
 
 def spread(table):
-    """Rows of the table of designs that meet what is asked, by their first word."""
+    """Rows of the table of designs that meet the target, by their first word."""
     console = Console(width=80, record=True, file=io.StringIO())
     console.print(table)
     title, *rows = [line for line in console.export_text().splitlines() if line]
@@ -203,9 +203,9 @@ def spread(table):
 
 
 @pytest.mark.parametrize("maximise", [False, True])
-def test_designs_that_meet_what_is_asked_are_told_with_how_far_they_spread(tmp_path, maximise):
-    """Those of a bowl below 0.6, or of the same turned over above -0.6; a gene that counts for nothing
-    spreads over all of its range."""
+def test_designs_that_meet_the_target_are_reported_with_their_spread(tmp_path, maximise):
+    """Designs of a bowl below 0.6, or of the inverted bowl above -0.6; a gene without effect spreads over its
+    whole range."""
     sign = -1 if maximise else 1
 
     def flat_in_x0(design, seed):
@@ -235,7 +235,7 @@ def test_designs_that_meet_what_is_asked_are_told_with_how_far_they_spread(tmp_p
     assert depths == sorted(depths)
 
 
-def test_where_no_design_meets_what_is_asked_that_is_said(tmp_path):
+def test_a_target_met_by_no_design_is_reported(tmp_path):
     problem = fake_problem(met_at=0.1)
     with Cache(tmp_path / "cache.h5") as cache:
         found = search(problem, FakeEvaluator(), cache, Settings(seed=1, generations=1))
@@ -246,11 +246,11 @@ def test_where_no_design_meets_what_is_asked_that_is_said(tmp_path):
 
 
 def rare(design, seed):
-    """One start in 40 is another one."""
+    """One start in 40 gives a different result."""
     return design["x"] + (np.random.default_rng(seed).random() < 1 / 40)
 
 
-def test_starts_that_happen_to_be_equal_are_not_taken_for_one():
+def test_starts_with_equal_results_count_separately():
     problem = Problem.of_function(rare, [Gene("x", "m", 0, 1)])
     kept = {"select": 0, "confirm": 0}
     outcome = optimize.run(problem, method="random", options={"population": 20}, generations=0, ensemble=kept)

@@ -45,12 +45,12 @@ def test_damage_inside_the_journal_loses_only_the_damaged(path):
         assert len(Cache(path)) == 3
 
 
-def test_in_both_hdf5_and_journal_counts_once(path):
+def test_a_record_in_file_and_journal_counts_once(path):
     with Cache(path) as cache:
         for number in range(5):
             cache.put(fake_record(number))
         journal = journal_of(path).read_bytes()
-    journal_of(path).write_bytes(journal)  # as if killed between replacing the one and emptying the other
+    journal_of(path).write_bytes(journal)  # as if killed between replacing the file and emptying the journal
     assert len(Cache(path)) == 5
     assert (verify(path).duplicates, verify(path).ok) == (5, True)
     assert compact(path) == 5
@@ -126,7 +126,7 @@ def test_no_flipped_bit_anywhere_goes_unnoticed(path):
 
 
 @pytest.mark.parametrize("content", ["cut", "text", "empty", "foreign"])
-def test_file_that_is_none_of_ours_is_refused_and_kept(path, content):
+def test_foreign_files_are_refused_and_kept(path, content):
     with Cache(path) as cache:
         for number in range(20):
             cache.put(fake_record(number))
@@ -152,8 +152,8 @@ def test_missing_file_is_refused(path):
     assert list(path.parent.iterdir()) == []
 
 
-def test_a_damaged_checksum_does_not_open_the_door_to_a_damaged_structure(path):
-    """HDF5 may hang on one; whatever is behind its end, it gets only what is whole."""
+def test_a_damaged_checksum_does_not_admit_a_damaged_structure(path):
+    """HDF5 may hang on such a file, so it only ever receives intact structures."""
     with Cache(path) as cache:
         for number in range(5):
             cache.put(fake_record(number))
@@ -186,7 +186,7 @@ NO_RECORDS = {
 
 
 @pytest.mark.parametrize("payload", NO_RECORDS.values(), ids=NO_RECORDS)
-def test_a_whole_frame_that_is_no_record_is_reported_and_left_out(path, payload):
+def test_an_intact_frame_without_a_record_is_reported_and_left_out(path, payload):
     assert payload != fake_record(7).payload()
     journal_of(path).write_bytes(
         b"".join(map(frame, (fake_record(0).payload(), payload, fake_record(1).payload())))
@@ -203,7 +203,7 @@ def test_a_whole_frame_that_is_no_record_is_reported_and_left_out(path, payload)
 
 
 @pytest.mark.parametrize("folded", [0, 2])
-def test_a_journal_that_was_cut_says_how_much_was_lost(path, folded):
+def test_a_truncated_journal_reports_the_loss(path, folded):
     cache = Cache(path)
     for number in range(folded):
         cache.put(fake_record(number))
@@ -230,7 +230,7 @@ def test_a_journal_that_was_cut_says_how_much_was_lost(path, folded):
 
 
 @pytest.mark.parametrize("folded", [0, 2])
-def test_a_journal_that_was_cut_in_a_copied_folder_says_so_too(path, folded):
+def test_a_truncated_journal_in_a_copied_folder_is_reported_too(path, folded):
     with Cache(path) as cache:
         for number in range(folded):
             cache.put(fake_record(number))
@@ -247,7 +247,7 @@ def test_a_journal_that_was_cut_in_a_copied_folder_says_so_too(path, folded):
 
 
 @pytest.mark.parametrize("mark", [b"", b"the user's own", frame(b"{}"), frame(b"[1,2,3]"), frame(b"[[1],2]")])
-def test_a_lock_file_without_a_mark_says_nothing_of_the_journal(path, mark):
+def test_a_lock_file_without_a_mark_gives_no_alarm(path, mark):
     Cache(path).put(fake_record(1))
     lock_of(path).write_bytes(mark)
     assert verify(path).ok
@@ -255,7 +255,8 @@ def test_a_lock_file_without_a_mark_says_nothing_of_the_journal(path, mark):
 
 
 def test_a_folded_or_killed_writer_leaves_no_alarm(path):
-    """The mark goes with one state of the HDF5 file; one folded into another is not cut."""
+    """The mark belongs to one state of the HDF5 file; a journal folded into another state is not
+    truncated."""
     with Cache(path) as cache:
         for number in range(3):
             cache.put(fake_record(number))
@@ -281,7 +282,7 @@ IN_PLACE = {
 
 @pytest.mark.parametrize("place", IN_PLACE.values(), ids=IN_PLACE)
 @pytest.mark.parametrize("name", ["cache.h5", "cache.h5.journal", "cache.h5.lock"])
-def test_what_is_no_file_is_refused_by_all(path, place, name):
+def test_irregular_files_are_refused(path, place, name):
     with Cache(path) as cache:
         cache.put(fake_record(1))
     path.with_name(name).unlink()
@@ -311,7 +312,7 @@ SPOILT = {
 
 
 @pytest.mark.parametrize("spoil", SPOILT.values(), ids=SPOILT)
-def test_compact_keeps_what_can_be_read_of_a_damaged_file(path, spoil):
+def test_compact_keeps_the_readable_part_of_a_damaged_file(path, spoil):
     with Cache(path) as cache:
         for number in range(5):
             cache.put(fake_record(number))
@@ -337,8 +338,8 @@ def test_compact_keeps_what_can_be_read_of_a_damaged_file(path, spoil):
     assert path.read_bytes() == damaged
 
 
-def test_reading_what_is_damaged_ends_in_any_case(path, monkeypatch):
-    """As when HDF5 never returns; and the file is then as it was."""
+def test_reading_a_damaged_file_always_ends(path, monkeypatch):
+    """The read ends even if HDF5 never returns, and the file is unchanged."""
     with Cache(path) as cache:
         cache.put(fake_record(1))
     before = SPOILT["without the checksum"](path.read_bytes())

@@ -26,7 +26,7 @@ def test_disk_full_while_appending(path, monkeypatch, room_left):
     end = journal_of(path).stat().st_size
 
     def full(handle, data, offset):
-        """A disk with room for `room_left` more bytes."""
+        """A disk with space for ``room_left`` more bytes."""
         room = end + room_left - offset
         if room <= 0:
             raise OSError(errno.ENOSPC, "No space left on device")
@@ -86,7 +86,7 @@ def test_replace_file_is_all_or_nothing(tmp_path):
 
 
 def test_writers_without_a_lock_of_their_own_take_turns(tmp_path):
-    """Some write much and some little, to one path: it is always one of the contents, whole."""
+    """Writers with large and small contents use one path; the file is always one complete content."""
     target = tmp_path / "file"
     contents = [bytes([65 + k]) * (1 + 300_000 * (k % 2)) for k in range(4)]
     replace_file(target, contents[0])

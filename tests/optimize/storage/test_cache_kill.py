@@ -29,7 +29,7 @@ def test_sigkill_at_random_moments_loses_no_announced_evaluation(path):
         cache = Cache(path)
         for number in range(announced):
             assert cache.get(fake_record(number).key) is not None, (round_, number)
-        assert len(cache) in (announced, announced + 1)  # killed between storing and announcing
+        assert len(cache) in (announced, announced + 1)  # killed between the write and the print
         announced = len(cache)
     assert announced > 60
     assert "journal" in leftovers

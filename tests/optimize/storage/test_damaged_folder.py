@@ -1,4 +1,4 @@
-"""Every command in the damaged folder of a search or a comparison says so in a line and changes nothing."""
+"""Every command reports a damaged folder of a search or comparison in one line and changes nothing."""
 
 import os
 
@@ -94,7 +94,7 @@ DAMAGE = {
 
 
 def looked_at(folder):
-    """What is in the folder, without opening what cannot be read."""
+    """The contents of the folder, without opening unreadable files."""
     return {
         path.name: path.read_bytes() if path.is_file() else path.lstat().st_mode for path in folder.iterdir()
     }
@@ -125,7 +125,7 @@ def test_a_damaged_file_is_reported_in_one_line_and_left_as_it_is(command, tmp_p
 
 
 @pytest.mark.parametrize("words", [COMMANDS["optimize"], COMMANDS["compare"]], ids=["optimize", "compare"])
-def test_a_search_goes_on_over_a_damaged_journal_and_says_so(command, tmp_path, words):
+def test_a_search_continues_with_a_damaged_journal_and_reports_it(command, tmp_path, words):
     name = "compare.h5" if words[0] == "compare" else "search.h5"
     assert command(words)[0] == 0
     journal = journal_of(tmp_path / "s" / name)
@@ -138,8 +138,8 @@ def test_a_search_goes_on_over_a_damaged_journal_and_says_so(command, tmp_path, 
 @pytest.mark.parametrize(
     "words", [COMMANDS[k] for k in ("list", "verify", "compact")], ids=lambda words: words[-1]
 )
-def test_a_search_that_may_only_be_read_is_read(command, tmp_path, monkeypatch, words):
-    """As on a read-only disk: no lock file can be made, and none is there."""
+def test_a_read_only_search_can_be_read(command, tmp_path, monkeypatch, words):
+    """As on a read-only disk: there is no lock file and none can be made."""
     path = tmp_path / "s" / "search.h5"
     with Cache(path) as cache:
         cache.put(fake_record(1))

@@ -1,4 +1,4 @@
-"""A folder belongs to one problem: another one is refused before it runs, and nothing is overwritten."""
+"""A folder belongs to one problem: another problem is refused before it runs, and nothing is overwritten."""
 
 import csv
 import json
@@ -29,7 +29,7 @@ SEARCH = ["optimize", "bowl", "--out", "s", "--generations", "1"]
 
 @pytest.fixture
 def optimize(tmp_path, monkeypatch, capsys):
-    """Runs a search in a fresh folder with more arguments: (exit code, standard error)."""
+    """Runs a search in a fresh folder with further arguments: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
     monkeypatch.setattr("tisim.optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
@@ -46,7 +46,7 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_the_same_search_goes_on_and_with_overwrite_all_begins_anew(optimize, tmp_path):
+def test_the_same_search_continues_and_overwrite_restarts_it(optimize, tmp_path):
     folder = tmp_path / "s"
     assert optimize("--seed", 1)[0] == 0
     first, runs = contents(folder), len(Cache(folder / "search.h5"))
@@ -92,7 +92,7 @@ def test_another_problem_is_refused_and_nothing_changes(optimize, tmp_path, monk
 
 
 def test_searches_of_one_problem_share_their_runs(optimize, tmp_path):
-    """Two methods that propose the same designs first, from common starts of the same seed."""
+    """Two methods that propose the same designs first, with common starts of the same seed."""
     folder = tmp_path / "s"
     assert optimize("--seed", 1)[0] == 0
     runs = len(Cache(folder / "search.h5"))
@@ -124,7 +124,7 @@ def test_results_are_of_the_search_that_ended_last(optimize, tmp_path):
     first = contents(folder)
     assert shown() == next(iter(searches(Cache(folder / "search.h5"))))
     assert "sensitivity.csv" in first
-    # So few designs tell nothing of sensitivity: what the search before has told must not stay.
+    # Too few designs for sensitivities; those of the search before must not remain.
     assert optimize("--seed", 2, "--generations", 0, "--population", 4)[0] == 0
     now = contents(folder)
     with Cache(folder / "search.h5") as cache:
@@ -138,7 +138,7 @@ def test_results_are_of_the_search_that_ended_last(optimize, tmp_path):
     } == {name: content for name, content in first.items() if name.endswith((".csv", ".toml"))}
 
 
-def test_resume_asks_for_a_search_that_has_begun(optimize, tmp_path):
+def test_resume_needs_an_existing_search(optimize, tmp_path):
     assert optimize("--seed", 1)[0] == 0
     assert optimize("--seed", 2, "--population", 9)[0] == 0
     before = contents(tmp_path / "s")
@@ -151,7 +151,7 @@ def test_resume_asks_for_a_search_that_has_begun(optimize, tmp_path):
     assert optimize("--seed", 1, "--resume")[0] == 0
 
 
-def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp_path, monkeypatch):
+def test_a_running_search_is_not_restarted_but_may_be_joined(optimize, tmp_path, monkeypatch):
     assert optimize("--generations", 0)[0] == 0
     interrupted = []
 
@@ -170,8 +170,8 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
     assert optimize("--generations", 0, "--overwrite")[0] == 0
 
 
-def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path, monkeypatch):
-    """On a case that has more parents than this population has strings; and to compare methods, too."""
+def test_the_population_option_adapts_the_parents(optimize, tmp_path, monkeypatch):
+    """This holds for a case with more parents than this population has individuals, and for comparisons."""
     usual = {"method": "zohdi", "options": {"population": 24, "parents": 8}}
     monkeypatch.setattr(
         catalogue, "every", lambda: {BOWL.name: replace(BOWL, sizes={"default": Size("", {}, usual)})}
@@ -183,7 +183,7 @@ def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path,
 
 
 @pytest.mark.slow
-def test_a_search_begins_with_files_and_with_the_folder(optimize, tmp_path):
+def test_a_search_starts_with_its_files_and_folder(optimize, tmp_path):
     assert optimize("--seed", 1)[0] == 0
     (tmp_path / "tried.csv").write_text("x0,x1 (m)\n0.25,0.5\n0.3,0.3\n")
     (tmp_path / "measured.csv").write_text("x0,x1,fitness,std. error\n0.3,0.35,0.51,0.01\n0.9,0.9,1.2,0.01\n")
@@ -216,7 +216,7 @@ OF_USERS = ["best.csv", "convergence.png.new", "search.h5.journal", "best_scene.
 
 
 @pytest.mark.parametrize("name", OF_USERS)
-def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
+def test_user_files_are_not_replaced_by_default(optimize, tmp_path, name):
     users = tmp_path / "s" / name
     users.parent.mkdir()
     users.write_text("the user's own")
@@ -229,7 +229,7 @@ def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
     assert contents(users.parent) == {name: b"the user's own"}
 
 
-def test_files_of_the_user_are_replaced_where_that_is_asked_for(optimize, tmp_path):
+def test_user_files_are_replaced_on_request(optimize, tmp_path):
     (tmp_path / "s").mkdir()
     for name in OF_USERS:
         (tmp_path / "s" / name).write_text("the user's own")
@@ -252,13 +252,13 @@ def test_planted_links_are_refused_and_not_followed(optimize, tmp_path, name, wa
     assert [path.name for path in folder.iterdir()] == [name]
 
 
-def test_a_folder_of_before_markers_goes_on_and_unrelated_files_do_not_matter(optimize, tmp_path):
+def test_a_folder_without_a_marker_continues_beside_unrelated_files(optimize, tmp_path):
     folder = tmp_path / "s"
     folder.mkdir()
     (folder / "notes.txt").write_text("the user's own")
     assert optimize()[0] == 0
     (folder / MARKER).unlink()
-    # Searches of that time left none of these.
+    # Searches of earlier versions left none of these.
     for later in (*folder.glob("sensitivity.*"), folder / "shown.json"):
         later.unlink()
     first = contents(folder)
@@ -268,7 +268,7 @@ def test_a_folder_of_before_markers_goes_on_and_unrelated_files_do_not_matter(op
     assert "notes.txt" not in (folder / MARKER).read_text().splitlines()
 
 
-def test_time_over_in_the_first_generation_says_how_to_go_on(optimize, tmp_path):
+def test_a_time_limit_in_the_first_generation_explains_how_to_continue(optimize, tmp_path):
     code, err = optimize("--budget-minutes", 1e-9)
     assert code == 1
     assert (
@@ -279,7 +279,7 @@ def test_time_over_in_the_first_generation_says_how_to_go_on(optimize, tmp_path)
 
 
 @pytest.mark.parametrize("common", ["true", "false"])
-def test_best_scene_is_one_that_the_search_has_run(optimize, tmp_path, common):
+def test_the_best_scene_was_run_by_the_search(optimize, tmp_path, common):
     assert optimize("--set", f"search.ensemble.common_starts={common}")[0] == 0
     seed = tomllib.loads((tmp_path / "s" / "best_scene.toml").read_text())["seed"]
     with (tmp_path / "s" / "best.csv").open() as file:

@@ -1,4 +1,4 @@
-"""A search.h5 explains itself to h5py alone, and costs as much as is new in it."""
+"""A search.h5 file explains itself to plain h5py, and each write costs only the new data."""
 
 import json
 import math
@@ -53,7 +53,7 @@ def text(dataset):
     return [cell.decode() for cell in dataset[...]]
 
 
-def test_h5py_alone_tells_what_every_column_is(path):
+def test_h5py_shows_the_meaning_of_every_column(path):
     outcome = searched(path)
     records = Cache(path).records()
     with h5py.File(path) as file:
@@ -93,7 +93,7 @@ def test_h5py_alone_tells_what_every_column_is(path):
         assert list(found["logbook/gen"]) == [0, 1, 2]
 
 
-def test_the_file_is_there_from_the_beginning_and_follows(path, monkeypatch):
+def test_the_file_exists_from_the_start_and_is_updated(path, monkeypatch):
     monkeypatch.setattr("tisim.optimize.storage.cache.FOLD_BYTES", 3000)
     seen = []
 
@@ -153,7 +153,7 @@ def test_integers_texts_and_flags_are_genes(path):
             run_of(0, **bad)
 
 
-def test_whole_numbers_beside_others_are_kept_as_these(path):
+def test_whole_numbers_beside_reals_are_stored_as_reals(path):
     with Cache(path) as cache:
         cache.put(run_of(0, n=3))
         cache.fold()
@@ -165,7 +165,7 @@ def test_whole_numbers_beside_others_are_kept_as_these(path):
     assert verify(path).ok
 
 
-def test_quantities_that_come_later_are_columns_of_the_same_table(path):
+def test_later_quantities_are_columns_of_the_same_table(path):
     with Cache(path) as cache:
         cache.put(run_of(0, values={"mass": 1.0}))
         cache.fold()
@@ -193,7 +193,7 @@ def test_problems_and_designs_of_other_genes_have_groups_of_their_own(path):
 
 
 @pytest.mark.parametrize("name", [".", "a/b", "a\u2215b", "ä", "x" * 300, "a\0b"])
-def test_any_name_can_be_that_of_a_gene_or_a_value(path, name):
+def test_genes_and_values_may_have_any_name(path, name):
     genes = {name: 0.5, "a\u2215b'": 1.0, "a/b'": 2.0}
     record = Record(**{**vars(run_of(0)), "design": genes, "values": {name: 2.0}})
     with Cache(path) as cache:
@@ -205,7 +205,7 @@ def test_any_name_can_be_that_of_a_gene_or_a_value(path, name):
     assert verify(path).ok
 
 
-def test_opening_makes_no_record_before_it_is_asked_for(path, monkeypatch):
+def test_opening_a_file_reads_no_records(path, monkeypatch):
     records = [fake_record(number) for number in range(500)]
     path.write_bytes(hdf5_store.build_image(tabulated([], records), {}))
     made = []
@@ -223,7 +223,7 @@ def test_opening_makes_no_record_before_it_is_asked_for(path, monkeypatch):
 
 @pytest.fixture
 def written(monkeypatch):
-    """How many bytes each file has got since it was last emptied, by name."""
+    """Bytes written to each file since it was last emptied, by name."""
     sizes = {}
     write = atomic.write_at
 
@@ -245,8 +245,8 @@ def generation(cache, number, log, size=20):
     cache.put_table("searches/a/logbook", log, about={"best": {"unit": "m"}})
 
 
-def test_a_generation_costs_what_is_new(path, written):
-    """Bytes written by a generation of 20 runs, after 300 others and after 20000 and a long logbook."""
+def test_a_generation_writes_only_new_data(path, written):
+    """Bytes written by a generation of 20 runs, after 300 other runs and after 20000 and a long logbook."""
     costs = {}
     for runs, generations in ((300, 3), (20000, 2000)):
         file = path.with_name(f"{runs}.h5")
@@ -267,7 +267,7 @@ def test_a_generation_costs_what_is_new(path, written):
 
 @pytest.mark.slow
 def test_a_hundred_thousand_runs_are_opened_in_less_than_a_second(path):
-    """Ten genes; with a journal that is nearly due."""
+    """Ten genes, with a journal that is almost due for folding."""
     rng = np.random.default_rng(1)
     genes = [f"gene {number}" for number in range(10)]
     records = [
@@ -289,7 +289,7 @@ def test_a_hundred_thousand_runs_are_opened_in_less_than_a_second(path):
         assert seconds < 1
 
 
-def test_all_that_is_written_is_a_few_times_what_is_stored(path, written, monkeypatch):
+def test_writing_amounts_to_a_few_times_the_stored_data(path, written, monkeypatch):
     monkeypatch.setattr("tisim.optimize.storage.cache.FOLD_BYTES", 3000)
     log, totals = {"gen": [], "best": []}, []
     cache = Cache(path)
@@ -306,8 +306,9 @@ def test_all_that_is_written_is_a_few_times_what_is_stored(path, written, monkey
     assert FOLD_BYTES < 1e5
 
 
-def test_rows_of_a_table_that_were_folded_and_are_in_the_journal_too_count_once(path):
-    """As after a kill between replacing the file and emptying the journal, whatever became of the table."""
+def test_folded_rows_that_are_also_in_the_journal_count_once(path):
+    """As after a kill between the replacement of the file and the emptying of the journal, for any state of
+    the table."""
     nan = float("nan")
     steps = [{"g": [0, 1], "v": [nan, 2.0]}, {"g": [0, 1, 2], "v": [nan, 2.0, 3.0]}, {"g": [5], "v": [0.5]},
              {"g": [5, 6], "v": [0.5, nan]}]  # fmt: skip
@@ -349,7 +350,7 @@ def test_rows_of_a_table_that_are_cut_off_or_damaged_are_reported(path):
     assert cache.table("log").columns == log
 
 
-def test_what_follows_rows_that_were_lost_is_left_out(path):
+def test_rows_after_lost_rows_are_left_out(path):
     cache, log, ends = Cache(path), {"g": []}, []
     for number in range(5):
         log["g"].append(number)
@@ -365,7 +366,7 @@ def test_what_follows_rows_that_were_lost_is_left_out(path):
     assert cache.table("log").columns == log
 
 
-def test_a_run_that_is_there_twice_counts_once(path):
+def test_a_repeated_run_counts_once(path):
     records = [run_of(0), run_of(1), run_of(0, values={"mass": 9.0}), run_of(2)]
     path.write_bytes(hdf5_store.build_image(tabulated([], records), {}))
     report = verify(path)

@@ -1,4 +1,4 @@
-"""A file of the format before this one is read, and written anew at the first fold."""
+"""A file of the previous format is read, and rewritten at the first fold."""
 
 import io
 import json
@@ -42,7 +42,7 @@ def old_table(file, name, columns, attrs):
 
 
 def old_file(path, rows, identity=IDENTITY):
-    """Write rows as the cache did: text of one length a column, designs as JSON, objectives without names."""
+    """Write rows in the previous format: fixed-length text columns, designs as JSON, unnamed objectives."""
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
         file.attrs["format"] = "tisim evaluations 1"
@@ -112,7 +112,7 @@ def test_runs_of_one_objective(path):
 
 
 @pytest.mark.parametrize("column", ["key", "fitness", "design", "others", "crc"])
-def test_damage_costs_a_row(path, column):
+def test_damage_loses_one_row(path, column):
     old_file(path, ROWS)
     hurt(path, f"evaluations/{column}", 1)
     assert verify(path).damaged == ["row 1: its checksum does not fit"]
@@ -120,7 +120,7 @@ def test_damage_costs_a_row(path, column):
         assert len(Cache(path)) == 5
 
 
-def test_a_file_that_is_damaged_as_a_whole_is_salvaged(path):
+def test_a_completely_damaged_file_is_salvaged(path):
     old_file(path, ROWS)
     path.write_bytes(path.read_bytes()[:-5])
     assert compact(path) == 6
@@ -128,7 +128,7 @@ def test_a_file_that_is_damaged_as_a_whole_is_salvaged(path):
 
 
 @pytest.mark.parametrize("identity", [None, {**IDENTITY, "objective_order": ["one"]}])
-def test_runs_whose_objectives_nothing_names_are_reported_and_run_again(path, identity):
+def test_runs_with_unnamed_objectives_are_reported_and_repeated(path, identity):
     old_file(path, ROWS, identity)
     told = "no search in the file names its objectives"
     assert verify(path).damaged == [f"row {k}: {told}" for k in range(6)]
@@ -136,8 +136,8 @@ def test_runs_whose_objectives_nothing_names_are_reported_and_run_again(path, id
         assert len(Cache(path)) == 0
 
 
-def test_a_search_of_before_goes_on(path):
-    """As the version before would have left it in the middle: nothing that it has run is run again."""
+def test_a_search_of_the_previous_version_continues(path):
+    """An unfinished search of the previous version continues, and none of its runs is repeated."""
     settings, problem = Settings(seed=3, generations=3), fake_problem(2)
     with Cache(path) as cache:
         whole = search(problem, FakeEvaluator(), cache, settings)

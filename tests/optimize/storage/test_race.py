@@ -1,4 +1,4 @@
-"""More starts for the designs that compete: fewer are lost to bad luck, and no more is spent than allowed."""
+"""Races give more starts to competing designs: fewer good ones are lost by chance, within the budget."""
 
 import math
 
@@ -17,7 +17,7 @@ DESIGNS = [{"x0": x} for x in (0.10, 0.12, 0.5, 0.9)]
 
 
 def noisy(design, seed, noise=0.1):
-    """Own noise of every design, whatever the start."""
+    """Independent noise for every design, whatever the start."""
     rng = np.random.default_rng([seed, int(1e6 * design["x0"])])
     return design["x0"] + noise * float(rng.normal())
 
@@ -32,12 +32,12 @@ def ensemble(function=noisy, problem=None, budget=None, **settings):
 
 
 def twin(first, second):
-    """The paired t test of SciPy: whether first is surely lower, two-sided 95 %."""
+    """The paired t test of SciPy: whether the first is significantly lower, two-sided 95 %."""
     test = stats.ttest_rel(second, first)
     return test.statistic > 0 and test.pvalue < 0.05
 
 
-def test_starts_go_to_those_that_compete():
+def test_competing_designs_get_more_starts():
     run = ensemble(race=60)
     assert [e.starts for (e,) in run.estimate(DESIGNS)] == [4] * 4
     raced = [e for (e,) in run.race(DESIGNS)]
@@ -51,7 +51,7 @@ def test_starts_go_to_those_that_compete():
     assert [e for (e,) in again] == raced, "what is known of a design is not forgotten"
 
 
-def test_who_is_out_is_who_loses_the_paired_test():
+def test_losers_of_the_paired_test_are_out():
     costs = {design["x0"]: [noisy(design, start_seed(2, k), 0.3) for k in range(60)] for design in DESIGNS}
     run = ensemble(lambda design, seed: noisy(design, seed, 0.3), race=1000)
     run.estimate(DESIGNS)
@@ -67,7 +67,7 @@ def test_who_is_out_is_who_loses_the_paired_test():
     assert len(set(used.values())) > 1
 
 
-def test_race_ends_with_its_purse_with_the_budget_and_with_max_starts():
+def test_a_race_ends_with_its_share_the_budget_or_max_starts():
     run = ensemble(race=20)
     run.estimate(DESIGNS[:2])
     run.race(DESIGNS[:2])
@@ -105,7 +105,7 @@ def test_a_design_is_out_only_when_beaten_in_every_objective():
 
 
 def noisy_bowl(design, seed):
-    """Noise as large as what designs differ by in the end, and every design its own."""
+    """The noise is as large as the final differences between designs, and independent for every design."""
     x = np.array(list(design.values()))
     own = np.random.default_rng([seed, *(x * 2**32).astype(np.int64).tolist()])
     return float(np.sum((x - 0.3) ** 2) + 0.3 * own.normal())
@@ -113,7 +113,8 @@ def noisy_bowl(design, seed):
 
 @pytest.mark.slow
 def test_search_with_races_finds_better_designs_at_equal_evaluations():
-    """True costs of the best of 12 searches of 400 runs; and what is claimed of the best is less wrong."""
+    """Compared are the true costs of the best of 12 searches of 400 runs, and the errors of the claimed
+    costs."""
     true, claimed = {}, {}
     for race in (0, 16):
         starts = EnsembleSettings(min_starts=2, block=2, max_starts=40, tolerance=0.9, race=race)

@@ -1,4 +1,5 @@
-"""The Gaussian process beside a dense twin, and the worth of designs beside integrals and known fronts."""
+"""The Gaussian process compared with a dense reference, and acquisition values with integrals and known
+fronts."""
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def matern(a, b):
     return PARAMETERS.signal * (1 + 5**0.5 * r + 5 * r**2 / 3) * np.exp(-(5**0.5) * r)
 
 
-def test_predictions_are_those_of_a_dense_twin():
+def test_predictions_equal_a_dense_twin():
     process = GaussianProcess(POINTS, VALUES, NOISE, PARAMETERS)
     new = RNG.random((4, 3))
     z = (VALUES - VALUES.mean()) / VALUES.std()
@@ -44,15 +45,15 @@ def test_predictions_are_those_of_a_dense_twin():
         )
 
 
-def test_the_gradient_of_the_likelihood_is_that_of_its_values():
+def test_the_gradient_of_the_likelihood_matches_its_values():
     z = (VALUES - VALUES.mean()) / VALUES.std()
     likelihood = gaussian_process._Likelihood(POINTS, z, NOISE, Parameters.prior(3))
     at = PARAMETERS.logarithms
     assert check_grad(lambda x: likelihood(x)[0], lambda x: likelihood(x)[1], at) < 1e-5
 
 
-def test_a_known_noise_is_not_taken_for_the_function():
-    """From 120 values with noise 0.3 it is within 0.15 of the truth, rms, and as unsure as it says."""
+def test_known_noise_is_not_fitted():
+    """With 120 values of noise 0.3 the rms error is below 0.15 and agrees with the predicted deviation."""
     points = RNG.random((120, 2))
     process = GaussianProcess(points, bowl(points) + 0.3 * RNG.standard_normal(120), np.full(120, 0.09))
     new = RNG.random((400, 2))
@@ -68,7 +69,8 @@ def bowl(points):
 
 @pytest.mark.parametrize("z", [-35.0, -8.0, -1.0, 0.0, 3.0])
 def test_expected_improvement_is_the_integral(z):
-    """E[max(best - f, 0)] of f normal about 2 with deviation 0.5; far out the first term of a series."""
+    """E[max(best - f, 0)] for a normal f with mean 2 and deviation 0.5; far out, the first term of a
+    series."""
     mean, deviation = 2.0, 0.5
     level = mean + z * deviation
     found = log_expected_improvement(np.array([mean]), np.array([deviation]), level)[0]
@@ -81,7 +83,7 @@ def test_expected_improvement_is_the_integral(z):
         assert found == pytest.approx(np.log(value), rel=1e-6)
 
 
-def test_of_designs_that_improve_for_sure_the_most_uncertain_is_worth_most():
+def test_of_certain_improvements_the_most_uncertain_is_best():
     """The predicted improvements are 40, 10, 2 and 1 standard deviations."""
     worth = worth_of([(0.0,), (1.0,), (2.0,)])
     deviations = np.array([0.01, 0.02, 0.02, 0.02])
@@ -93,7 +95,7 @@ def test_of_designs_that_improve_for_sure_the_most_uncertain_is_worth_most():
 
 
 def test_the_hypervolume_that_a_design_adds_is_counted_right():
-    """Two costs, exactly: a front of (0, 1), (0.4, 0.4), (1, 0), and areas that are counted by hand."""
+    """Two costs, computed exactly: a front of (0, 1), (0.4, 0.4), (1, 0), and areas computed by hand."""
     worth = worth_of([(0.0, 1.0), (0.4, 0.4), (1.0, 0.0)])
     volume = worth.volume
     reference = 1.1  # a tenth of the range beyond the worst
@@ -117,7 +119,7 @@ def worth_of(costs):
     return Worth(belief, np.random.default_rng(0))
 
 
-def test_a_batch_is_spread_where_one_design_would_be_asked_for_again():
+def test_a_batch_is_spread_out():
     strings = [
         string_of(point, value) for point, value in zip(RNG.random((30, 2)), RNG.random(30), strict=True)
     ]
@@ -132,8 +134,9 @@ def test_a_batch_is_spread_where_one_design_would_be_asked_for_again():
     assert np.std(batch, axis=0).sum() > np.std(nearest, axis=0).sum()
 
 
-def test_noise_that_is_not_known_is_not_none():
-    """One start of each design: a belief does not go through the values, but near the bowl behind them."""
+def test_unknown_noise_is_not_zero():
+    """With one start for each design the model does not interpolate the values but recovers the bowl behind
+    them."""
     rng = np.random.default_rng(2)
     points = rng.random((60, 2))
     truth, values = bowl(points), bowl(points) + 0.1 * rng.standard_normal(60)
@@ -146,16 +149,18 @@ def test_noise_that_is_not_known_is_not_none():
     assert belief.predict(points)[0][:, 0] == pytest.approx(belief.means[:, 0], abs=1e-3)
 
 
-def test_of_designs_close_together_the_best_stands_for_all():
+def test_the_best_represents_close_designs():
     points = np.array([[0.5, 0.5], [0.51, 0.5], [0.5, 0.6], [0.52, 0.5]])
     costs = np.array([3.0, 1.0, 2.0, 4.0])
     assert list(thinned(points, costs, 0.015)) == [1, 2]
     assert list(thinned(points, costs, 0.005)) == [0, 1, 2, 3]
 
 
-def test_a_process_of_part_of_a_large_archive_does_not_take_luck_for_truth():
-    """All 1200 designs cost 1; the means of two starts have a deviation of 0.7. A process of the 250 that
-    were luckiest and some others would predict 0.7."""
+def test_a_subset_of_a_large_archive_is_not_biased_by_luck():
+    """All 1200 designs cost 1; the means of two starts have a deviation of 0.7.
+
+    A process trained on the 250 luckiest and a few others would predict 0.7.
+    """
     rng = np.random.default_rng(5)
     points, runs = rng.random((1200, 2)), 1.0 + rng.standard_normal((1200, 2))
     belief = Belief()
@@ -178,15 +183,18 @@ def test_without_noise_half_of_a_large_archive_are_the_best():
     assert list(representative(costs, 5, exact=False)) == [0, 249, 499, 749, 999]
 
 
-def test_who_is_beaten():
+def test_beaten_designs():
     costs = np.array([[0.0, 1.0], [1.0, 0.0], [1.0, 1.0], [2.0, 2.0], [1.0, 1.0]])
     assert list(beaten_by(costs)) == [0, 0, 2, 4, 2]
     assert list(spread(np.array([[0.0, 4.0], [0.1, 3.9], [2.0, 2.0], [4.0, 0.0]]), 3)) == [0, 2, 3]
 
 
 def test_the_luckiest_of_many_is_not_the_best():
-    """100 designs of a bowl with two noisy starts each, 20 times: the truth of the design with the best
-    posterior mean is half of that of the design with the best mean, or less."""
+    """100 designs of a bowl with two noisy starts each, 20 times.
+
+    The true cost of the design with the best posterior mean is at most half of the true cost of the design
+    with the best sample mean.
+    """
     genome, regrets = fake_problem(2).genome, []
     for seed in range(20):
         rng = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""The shape of noise is told by designs of two starts each, with the direction in which it is skewed."""
+"""The shape of noise is estimated from designs with two starts each, including the sign of its skewness."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ BOWL = Objective("bowl", lambda result: result.value)
 
 
 def designs(draw, number=400, starts=2, seed=1):
-    """Designs of a bowl with noise, each with so many starts."""
+    """Designs of a bowl with noise, each with ``starts`` starts."""
     rng = np.random.default_rng(seed)
     made = []
     for _ in range(number):
@@ -28,8 +28,8 @@ def designs(draw, number=400, starts=2, seed=1):
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("starts", [2, 5])
-def test_rare_outcomes_are_told_with_their_direction(sign, starts):
-    """Of one outcome in 20 at 20 deviations the moments are 1 + 19 and 0.05 * 0.95 * 0.9 * 20^3."""
+def test_rare_outcomes_are_detected_with_their_sign(sign, starts):
+    """For one outcome in 20 at 20 deviations the moments are 1 + 19 and 0.05 * 0.95 * 0.9 * 20^3."""
     made = designs(lambda rng, n: sign * (rng.normal(size=n) + 20 * (rng.random(n) < 0.05)), starts=starts)
     (found,) = moments(GENOME, made)
     assert found.second == pytest.approx(20, rel=0.3)
@@ -37,21 +37,21 @@ def test_rare_outcomes_are_told_with_their_direction(sign, starts):
     assert 0.5 * 400 * starts < found.count <= 400 * starts
 
 
-def test_normal_noise_has_none():
+def test_normal_noise_has_no_skewness():
     (found,) = moments(GENOME, designs(lambda rng, n: 0.1 * rng.normal(size=n)))
     assert found.second == pytest.approx(0.01, rel=0.15)
     assert abs(found.skewness) < 0.5
 
 
-def test_what_is_not_predicted_counts_for_less():
-    """Beside 100 deviations that no neighbour tells, noise of 1 is seen badly."""
+def test_unpredicted_deviations_reduce_the_weight():
+    """Next to an unpredictable deviation of 100, noise of 1 is hardly visible."""
     rng = np.random.default_rng(2)
     made = designs(lambda _, n: 100 * rng.normal() + rng.normal(size=n))
     (found,) = moments(GENOME, made)
     assert found.count < 4
 
 
-def test_of_few_designs_or_single_starts_nothing_is_told():
+def test_few_designs_or_single_starts_give_no_shape():
     def noise(rng, n):
         return rng.normal(size=n)
 

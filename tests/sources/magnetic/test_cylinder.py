@@ -1,4 +1,5 @@
-"""The field of magnetised cylinders: against B16's formulas in many digits, another library, and laws."""
+"""The field of magnetised cylinders, compared with B16's formulas in many digits, magpylib, and field
+laws."""
 
 import magpylib
 import numpy as np
@@ -23,8 +24,9 @@ def in_plane(rho, z, angle=0.7):
     return [rho * np.cos(angle), rho * np.sin(angle), z]
 
 
-def hard_places(half, rng, n=3):
-    """On and beside the axis, at rho = R, about the rim, in the end's plane, and far away; radius 1."""
+def difficult_points(half, rng, n=3):
+    """Difficult points for radius 1: on and beside the axis, at rho = R, at the rim, in the end planes, far
+    away."""
     small = 10.0 ** rng.uniform(-12, -1, n)
     turn = rng.uniform(0, 2 * np.pi, n)
     wide = 10.0 ** rng.uniform(0.5, 5, n)
@@ -52,8 +54,8 @@ def hard_places(half, rng, n=3):
     "halves", [(0.05, 0.5, 1.0, 5 / 3), pytest.param((20 / 3, 20.0, 100.0, 1000.0), marks=pytest.mark.slow)]
 )
 def test_field_and_gradient_at_the_hard_places(halves, rng):
-    """1e-12 of the field, and of its gradient, wherever it is finite."""
-    places = [hard_places(half, rng) for half in halves]
+    """Relative errors are below 1e-12 for the field and its gradient, wherever they are finite."""
+    places = [difficult_points(half, rng) for half in halves]
     n = min(len(p) for p in places)
     places = np.array([p[:n] for p in places])
     b, slope = fields([one(half) for half in halves], places)
@@ -62,15 +64,18 @@ def test_field_and_gradient_at_the_hard_places(halves, rng):
         field, gradient = (np.array(v) for v in zip(*expected, strict=True))
         rho, z = np.hypot(*places[w].T[:2]), np.abs(places[w][:, 2])
         size = steepness(field, gradient, places[w], half)
-        # The place itself is known to rounding only, and so is how far it is from the rim.
+        # The position, and therefore its distance from the rim, is known to rounding only.
         rounding = 1e-12 + 4 * 2.3e-16 / np.hypot(rho - 1, z - half)
         assert (relative(b[w], field) / rounding).max() < 1
         assert (np.linalg.norm(slope[w] - gradient, axis=(1, 2)) / size / rounding).max() < 1
 
 
 def inclined(ratio, towards, rng):
-    """One of this length, in radii, that lies anywhere in any direction; towards : how it is magnetised."""
-    # Neither its direction nor what is parallel to it has digits to spare.
+    """A cylinder of this length (in radii) at a random place in a random direction.
+
+    towards : direction of the magnetisation.
+    """
+    # Direction and parallel vectors use all digits.
     axis = rng.normal(size=3)
     across = np.cross(axis, rng.normal(size=3))
     m = {
@@ -87,7 +92,7 @@ def inclined(ratio, towards, rng):
 
 
 def about(body, n, rng):
-    """Points beside its side, within it, about its rim, and farther away."""
+    """Points beside its surface, inside it, around its rim, and farther away."""
     radius, half, up = body["radius"], 0.5 * body["length"], body["axis"] / np.linalg.norm(body["axis"])
     kind = np.arange(n) % 4
     small, turn = 10.0 ** rng.uniform(-8, -1, n), rng.uniform(0, 2 * np.pi, n)
@@ -100,8 +105,10 @@ def about(body, n, rng):
 
 
 def errors_of_inclined(ratios, n, rng):
-    """Of field and gradient, as parts of what the docstring allows; a row for each point, for long bodies of
-    every way to be magnetised."""
+    """Errors of field and gradient, as fractions of the bound in the docstring.
+
+    There is a row for each point, for long bodies with every direction of the magnetisation.
+    """
     errors = []
     for towards in ("along", "nearly along", "across", "anywhere"):
         bodies = [inclined(ratio, towards, rng) for ratio in ratios]
@@ -121,7 +128,8 @@ def errors_of_inclined(ratios, n, rng):
 
 @pytest.mark.long
 def test_long_cylinders_in_any_direction(rng):
-    """Beside one that is magnetised along its axis the field is 1e-7 of what it would be across."""
+    """Beside a cylinder magnetised along its axis the field is 1e-7 of the field with transverse
+    magnetisation."""
     assert errors_of_inclined((1.0, 30.0, 300.0, 2000.0), 3, rng).max() < 1
 
 
@@ -132,8 +140,8 @@ def test_many_cylinders_in_any_direction(rng):
         assert errors_of_inclined(ratios, 12, rng).max() < 1
 
 
-def test_what_is_parallel_stays_parallel_and_files_keep_what_was_written():
-    """A direction is not rounded before it is used."""
+def test_parallel_vectors_stay_parallel_and_files_keep_all_digits():
+    """The direction is not rounded before it is used."""
     body = Cylinder(axis=(1, 2, 3), radius=1, length=2, magnetisation=(1e5, 2e5, 3e5))
     assert body.axis == (1, 2, 3)
     assert np.linalg.norm(body.direction) == pytest.approx(1, abs=3e-16)
@@ -145,7 +153,7 @@ def test_what_is_parallel_stays_parallel_and_files_keep_what_was_written():
 
 
 def test_the_published_formulas_are_right():
-    """Charges and currents on the surface, summed numerically, give the same; so the reference is one."""
+    """Numerical integrals over surface charges and currents agree, so the reference is valid."""
     for point in ([0.4, 0.3, 0.2], [1.5, -0.4, 0.9], [0.1, 0.0, -2.5], [1e-3, 2e-3, 0.5]):
         np.testing.assert_allclose(
             by_quadrature(point, 1.0, 1.2, M), field_and_gradient(point, 1.0, 1.2, M)[0], rtol=1e-14
@@ -153,7 +161,7 @@ def test_the_published_formulas_are_right():
 
 
 def scattered(rng, n):
-    """Cylinders anywhere, in any orientation."""
+    """Cylinders at random positions and orientations."""
     return MagneticCylinders(
         cylinders=[
             Cylinder(
@@ -169,7 +177,7 @@ def scattered(rng, n):
 
 
 def peer(source, points):
-    """The same by magpylib, in T."""
+    """The field by magpylib, in T."""
     total = np.zeros_like(points)
     for cylinder in source.cylinders:
         turned = Rotation.align_vectors([cylinder.axis], [[0, 0, 1]])[0]
@@ -184,27 +192,32 @@ def peer(source, points):
 
 
 STEP = 1e-5
-"""m, of differences."""
+"""Step (m) of the differences."""
 
 
-def peers_gradient(source, points):
-    """dB_a/dr_c by central differences of the same. They divide errors of the field by STEP, and leave out
-    less than that: STEP^2/6 times the third derivative."""
+def peer_gradient(source, points):
+    """dB_a/dr_c from central differences of magpylib fields.
+
+    They divide errors of the field by STEP. The truncation error, STEP^2/6 times the third derivative, is
+    smaller.
+    """
     steps = STEP * np.eye(3)
     slopes = [(peer(source, points + d) - peer(source, points - d)) / (2 * STEP) for d in steps]
     return np.stack(slopes, axis=-1)
 
 
 def test_against_an_independent_library(rng):
-    """Worlds with 1, 2, 5 and 20 cylinders, at thousands of points inside and out. The bound of the gradient
-    is that of the field over STEP."""
+    """Worlds with 1, 2, 5 and 20 cylinders, at thousands of points inside and outside.
+
+    The bound for the gradient is the bound for the field over STEP.
+    """
     worlds = [scattered(rng, n) for n in (1, 2, 5, 20)]
     points = rng.normal(size=(WORLDS, 1500, 3)) * 2.5
     b, slope = fields(worlds, points)
     inside = 0
     for w, world in enumerate(worlds):
         expected = peer(world, points[w])
-        off = np.linalg.norm(slope[w] - peers_gradient(world, points[w]), axis=(1, 2))
+        off = np.linalg.norm(slope[w] - peer_gradient(world, points[w]), axis=(1, 2))
         for apart in relative(b[w], expected), STEP * off / np.linalg.norm(expected, axis=1):
             assert apart.max() < 1e-9
             assert np.median(apart) < 1e-12
@@ -216,10 +229,10 @@ def test_against_an_independent_library(rng):
     assert inside > 300
 
 
-def test_where_the_library_differs_it_is_the_one_that_is_wrong(rng):
-    """At the points where the two are farthest apart, the published formulas side with this field."""
+def test_the_library_is_wrong_at_the_largest_differences(rng):
+    """At the points of the largest difference, the published formulas agree with this field."""
     world, points = one(0.8), rng.normal(size=(3000, 3)) * 5
-    results, expected = fields([world], points[None]), (peer(world, points), peers_gradient(world, points))
+    results, expected = fields([world], points[None]), (peer(world, points), peer_gradient(world, points))
     for k, (ours, theirs, least) in enumerate(zip(results, expected, (1e-13, 1e-8), strict=True)):
         worst = np.argsort(-relative(ours[0], theirs))[:3]
         true = np.array([field_and_gradient(p, 1.0, 0.8, M)[k] for p in points[worst]])
@@ -228,7 +241,7 @@ def test_where_the_library_differs_it_is_the_one_that_is_wrong(rng):
 
 
 def test_a_world_is_the_same_alone_and_in_a_batch(rng):
-    """Its own number of cylinders, to the last bit."""
+    """Worlds with different numbers of cylinders, to the last bit."""
     worlds = [scattered(rng, n) for n in (3, 0, 30, 7)]
     points = rng.normal(size=(WORLDS, 200, 3)) * 4
     together = fields(worlds, points)
@@ -240,10 +253,12 @@ def test_a_world_is_the_same_alone_and_in_a_batch(rng):
     assert (together[0][2] != 0).all()
 
 
-def test_many_points_at_once_are_the_same_as_one_by_one(rng):
-    """Most go through vectors; about the axis, far away and at the rim they do not. To the last bit, where
-    compilers do not choose between fused and rounded products."""
-    points = np.concatenate([hard_places(1.0, rng), rng.normal(size=(60, 3)) * 2])
+def test_many_points_at_once_equal_single_points(rng):
+    """Most points are evaluated in vectors; points near the axis, far away and at the rim are not.
+
+    The results are equal to the last bit if the compiler has no choice between fused and rounded products.
+    """
+    points = np.concatenate([difficult_points(1.0, rng), rng.normal(size=(60, 3)) * 2])
     magnets = MagneticCylinders(cylinders=[*one(1.0).cylinders, *scattered(rng, 2).cylinders])
     alone, together = fields([magnets], points[None]), sample([magnets], magnets.quantity, points)
     exact = current().device == "cpu" and current().arithmetic == "strict"
@@ -251,8 +266,8 @@ def test_many_points_at_once_are_the_same_as_one_by_one(rng):
         np.testing.assert_allclose(b, a[0], rtol=0 if exact else 1e-9)
 
 
-def test_sums_and_turns(rng):
-    """The field of many is the sum of those of each; turning all turns the field along."""
+def test_sums_and_rotations(rng):
+    """The field of several cylinders is the sum of their fields, and it rotates with them."""
     many = scattered(rng, 4)
     points = rng.normal(size=(1, 300, 3)) * 4
     b, slope = fields([many], points)
@@ -277,7 +292,7 @@ def test_sums_and_turns(rng):
 
 
 def test_laws_of_maxwell(rng):
-    """div B = 0 and curl H = 0 of the gradient that is claimed, and of the field by its differences."""
+    """div B = 0 and curl H = 0 for the computed gradient, which also equals differences of the field."""
     worlds = [scattered(rng, n) for n in (1, 2, 3, 4)]
     points = rng.normal(size=(WORLDS, 200, 3)) * 4
     _, slope = fields(worlds, points)
@@ -289,7 +304,7 @@ def test_laws_of_maxwell(rng):
         for c in range(3):
             slope_by_difference[..., c] += weight / step * fields(worlds, points + k * step * np.eye(3)[c])[0]
     error = np.linalg.norm(slope_by_difference - slope, axis=(2, 3)) / size
-    # Near a surface a difference reaches across it.
+    # Near a surface a difference extends across it.
     assert np.median(error) < 1e-9
     assert np.quantile(error, 0.95) < 1e-5
 
@@ -318,7 +333,7 @@ def test_limits():
 
 
 def test_passing_the_rim_the_axis_and_the_surface():
-    """Finite everywhere, also where there is no value; and it has no jumps but at the surface."""
+    """The field is finite everywhere, also at singular points, and jumps only at the surface."""
     edge = [[1.0, 0, 1.0], [0, -1.0, -1.0], [1.0, 0, 0.3], [0.2, 0, 1.0], [0, 0, 1.0], [0, 0, 0]]
     b, slope = fields([one(1.0)], [edge])
     assert np.isfinite(b).all()

@@ -1,4 +1,4 @@
-"""The field from a table: as accurate as it says, for cylinders of any shape, and what it refuses."""
+"""The tabulated field has its stated accuracy for cylinders of any shape; invalid settings are refused."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def magnet(length, digits=None):
 
 
 def around(rng, length, n=1500):
-    """All about a cylinder, near its rim and far away; anywhere in it, and about its middle."""
+    """Points around the cylinder, near its rim, far away, inside, and about its centre."""
     wide = rng.uniform(-1, 1, (n, 3)) * [4, 4, length]
     rim = rng.normal(size=(n, 3)) * 10 ** rng.uniform(-4, 0, (n, 1)) + [1, 0, length / 2]
     far = rng.normal(size=(n, 3)) * 5 * length
@@ -31,9 +31,11 @@ def around(rng, length, n=1500):
 
 @pytest.mark.long
 @pytest.mark.parametrize("digits", [3, pytest.param(5, marks=pytest.mark.slow)])
-def test_it_is_as_accurate_as_it_says(digits, rng):
-    """Field and gradient, each relative to its own size, the gradient inside to what cancels in it; and no
-    more accurate by a factor of a thousand."""
+def test_the_table_has_its_stated_accuracy(digits, rng):
+    """Errors of field and gradient relative to their sizes; inside, relative to the terms of the gradient.
+
+    The errors are also not more than a thousand times below the bound.
+    """
     points = np.array([around(rng, length) for length in LENGTHS])
     exact = fields([magnet(length) for length in LENGTHS], points)
     tabulated = fields([magnet(length, digits) for length in LENGTHS], points)
@@ -46,14 +48,14 @@ def test_it_is_as_accurate_as_it_says(digits, rng):
             assert 10.0 ** -(digits + 3) < errors.max() < 10.0**-digits
 
 
-def test_what_tisim_cost_tries():
-    """Coarser first; none for one that is a table already, or where a cylinder is too flat for one."""
+def test_approximations_for_tisim_cost():
+    """Coarse tables come first; tabulated or too flat cylinders have none."""
     assert [law.table_digits for law in magnet(2.0).approximations(1.0)] == [3, 4, 5]
     assert magnet(2.0, 3).approximations(1.0) == ()
     assert magnet(0.1).approximations(1.0) == ()
 
 
-def test_what_is_wrong_is_named():
+def test_invalid_values_are_refused():
     with pytest.raises(InputError) as fault:
         magnet(0.5, 4)
     text = "magnetic_cylinders.cylinders.0.length must be at least the radius, 1 m, with table_digits"
@@ -62,7 +64,7 @@ def test_what_is_wrong_is_named():
         magnet(1.0, 9)
 
 
-def test_digits_that_no_table_has_are_refused(monkeypatch):
+def test_invalid_table_digits_are_refused(monkeypatch):
     monkeypatch.setattr(cylinder_table, "GRIDS", cylinder_table.GRIDS[:1])
     with pytest.raises(InputError, match=r"^table_digits must be fewer in f(32|64); received 6$"):
         cylinder_table.table(6)

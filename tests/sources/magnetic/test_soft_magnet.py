@@ -1,4 +1,4 @@
-"""A soft cylinder in a uniform field."""
+"""A soft magnetic cylinder in a uniform field."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_saturates_sooner_along_a_long_axis():
         return np.linalg.norm(magnetisation((0, 0, 1), 1.0, 40.0, SATURATION, field))
 
     assert size((0.0, 0.0, 0.1)) == pytest.approx(SATURATION)
-    # Across N is near 1/2, so that it takes mu_0 M_s / 2 = 0.62 T.
+    # Across the axis N is near 1/2, so saturation takes mu_0 M_s / 2 = 0.62 T.
     assert size((0.1, 0.0, 0.0)) == pytest.approx(0.1 / (mu_0 * 0.5), rel=0.05)
     assert size((0.7, 0.0, 0.0)) == pytest.approx(SATURATION)
     assert size((0.0, 0.0, 0.0)) == 0.0
@@ -34,7 +34,7 @@ def test_saturates_sooner_along_a_long_axis():
 
 @pytest.mark.parametrize("field", [(0.05, 0.0, 0.05), (0.3, 0.0, 0.3), (0.8, 0.0, 0.4), (4.0, 0.0, 3.0)])
 @pytest.mark.parametrize("aspect", [5 / 3, 20.0])
-def test_energy_is_least_of_all_that_do_not_exceed_saturation(aspect, field):
+def test_the_energy_is_minimal_within_saturation(aspect, field):
     n, b = demagnetising_factor(1.0, 2 * aspect), np.array(field)
     factors = np.array([(1 - n) / 2, (1 - n) / 2, n])
 
@@ -50,7 +50,7 @@ def test_energy_is_least_of_all_that_do_not_exceed_saturation(aspect, field):
     np.testing.assert_allclose(moment, least, atol=0.01 * SATURATION)
 
 
-def test_what_is_no_magnet_is_refused():
+def test_invalid_magnets_are_refused():
     with pytest.raises(InputError, match="axis of a cylinder must be a direction"):
         magnetisation((0, 0, 0), 1.0, 1.0, SATURATION, (0, 0, 1))
     with pytest.raises(InputError, match="saturation magnetisation must be greater than 0"):

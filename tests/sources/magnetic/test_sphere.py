@@ -1,4 +1,4 @@
-"""The field of magnetised spheres, against an independent library and its own differences."""
+"""The field of magnetised spheres, compared with magpylib and with differences of the field."""
 
 import magpylib
 import numpy as np
@@ -35,7 +35,7 @@ def test_field_and_gradient(rng):
 
 
 def test_inside_and_at_the_centre():
-    """2/3 mu_0 M, and no slope."""
+    """2/3 mu_0 M, with zero gradient."""
     m = np.array([1e6, -2e6, 5e5])
     b, slope = fields(
         [MagneticSpheres(spheres=[Sphere(radius=2, magnetisation=m)])], [[[0, 0, 0], [0, 1, 1]]]

@@ -1,4 +1,4 @@
-"""Which way a field magnetises a cylinder: demagnetising factors and the closed forms of the model."""
+"""Magnetisation of a cylinder in a field: demagnetising factors and the closed forms of the model."""
 
 import numpy as np
 import pytest
@@ -16,17 +16,17 @@ def test_demagnetising_factor():
     """Tabulated values (D.-X. Chen et al., IEEE Trans. Magn. 27 (1991) 3601, no susceptibility), limits."""
     for ratio, expected in ((0.1, 0.7967), (1.0, 0.3116), (10.0, 0.0412)):
         assert demagnetising_factor(1.0, 2 * ratio) == pytest.approx(expected, abs=6e-5)
-    # Equal along and across where length is 0.9065 of the diameter.
+    # The factors are equal along and across the axis if the length is 0.9065 of the diameter.
     assert demagnetising_factor(1.0, 2 * 0.90647) == pytest.approx(1 / 3, abs=1e-5)
     assert demagnetising_factor(1.0, 1e-6) == pytest.approx(1.0, abs=1e-5)
     assert demagnetising_factor(1.0, 2e4) == pytest.approx(4 / (3 * np.pi * 1e4), rel=1e-3)
 
 
-def test_it_is_the_mean_of_the_field_inside():
+def test_the_factor_is_the_mean_field_inside():
     """-H / M along the axis, averaged over the cylinder by quadrature."""
     x, weight = np.polynomial.legendre.leggauss(60)
     half = 0.7
-    # Squared towards the rim, where the field grows as a logarithm.
+    # The radial variable is squared towards the rim, because the field diverges logarithmically there.
     rho2, z = 1 - (0.5 - 0.5 * x) ** 2, half * (1 - (0.5 - 0.5 * x) ** 2)
     share = weight * (1 - x) * 0.5
     points = np.array([[np.sqrt(r), 0, h] for r in rho2 for h in z])
@@ -38,7 +38,10 @@ def test_it_is_the_mean_of_the_field_inside():
 
 
 def test_along_the_easy_axis_and_across_it():
-    """Along: it stays. Across: sin(psi) = B / B_K up to B_K = mu_0 M (1 - 3N)/2, then it is saturated."""
+    """Along the easy axis the magnetisation stays.
+
+    Across it, sin(psi) = B / B_K up to B_K = mu_0 M (1 - 3N)/2, and then it is saturated.
+    """
     m = magnetisation((0, 0, 2), 1.0, 10.0, SATURATION, (0, 0, 0.1))
     np.testing.assert_allclose(m, (0, 0, SATURATION), atol=1e-9 * SATURATION)
     threshold = mu_0 * SATURATION * (1 - 3 * demagnetising_factor(1.0, 10.0)) / 2
@@ -47,7 +50,7 @@ def test_along_the_easy_axis_and_across_it():
         assert m[0] == pytest.approx(min(part, 1.0), abs=1e-12)
         assert m[1] == 0
         assert m[2] == pytest.approx(np.sqrt(1 - m[0] ** 2), abs=1e-7)
-    # A flat one lies in its plane whatever points along, until that is strong.
+    # The magnetisation of a flat cylinder stays in its plane until the field along the axis is strong.
     m = np.array(magnetisation((0, 0, 1), 1.0, 0.2, SATURATION, (0, 1e-3, 0.1))) / SATURATION
     assert m[2] == pytest.approx(
         0.1 / (mu_0 * SATURATION * (3 * demagnetising_factor(1.0, 0.2) - 1) / 2), rel=0.01
@@ -55,8 +58,8 @@ def test_along_the_easy_axis_and_across_it():
     assert m[1] > 0.9
 
 
-def test_no_direction_is_better(rng):
-    """Against the energy of every direction, of random cylinders in random fields, weak and strong."""
+def test_the_energy_is_minimal(rng):
+    """Compared with the energy of every direction, for random cylinders in random weak and strong fields."""
     psi = np.linspace(-np.pi, np.pi, 3601)
     for _ in range(200):
         axis, field = rng.normal(size=3), rng.normal(size=3) * 10 ** rng.uniform(-2, 1)
@@ -81,7 +84,7 @@ def test_no_direction_is_better(rng):
 
 
 def test_without_a_field():
-    """Along the axis of a long one, across a flat one; of size M."""
+    """Along the axis of a long cylinder, across a flat one; with magnitude M."""
     assert magnetisation((1, 0, 0), 1.0, 9.0, 2.0, (0, 0, 0)) == pytest.approx((2.0, 0, 0))
     flat = magnetisation((1, 0, 0), 1.0, 0.1, 2.0, (0, 0, 0))
     assert flat[0] == pytest.approx(0, abs=1e-15)
@@ -97,7 +100,7 @@ def test_without_a_field():
         (((0, 0, 1), 1, 1, 0, (0, 0, 1)), "saturation magnetisation must be greater than 0; received 0"),
     ],
 )
-def test_what_is_wrong_is_named(arguments, message):
+def test_invalid_values_are_refused(arguments, message):
     with pytest.raises(InputError) as fault:
         magnetisation(*arguments)
     assert str(fault.value) == message

@@ -1,4 +1,4 @@
-"""Scenes of Brownian particles, and what they are made of that only tests need."""
+"""Scenes of Brownian particles, and parts of them that only tests need."""
 
 import numpy as np
 
@@ -15,13 +15,13 @@ from tisim.steppers import Brownian, DriftLimit
 
 RADIUS, TEMPERATURE, VISCOSITY = 1e-7, 298.0, 1e-3
 HEAT = 1.380649e-23 * TEMPERATURE
-"""kT, J."""
+"""Thermal energy kT, J."""
 MOBILITY = 1 / (6 * np.pi * VISCOSITY * RADIUS)
-"""s/kg."""
+"""Mobility, s/kg."""
 DIFFUSIVITY = HEAT * MOBILITY
-"""m^2/s."""
+"""Diffusivity, m^2/s."""
 FREELY = 1e6
-"""Radii: a limit of drift that limits nothing."""
+"""A drift limit (in radii) that never limits a step."""
 SIGMAS = 5.0
 """Confidence of every statistical bound: one in two million fails by chance, and seeds are fixed."""
 
@@ -38,7 +38,7 @@ class Shear(Source):
 
 
 class Stop(Operator):
-    """Fixes what has got beyond a place along x, and notes when."""
+    """Fixes particles that have passed a place along x, and records the time."""
 
     fields = (Field("fixed", "", 1, "keep", integer=True), Field("stopped_at", "s", 1, "keep"))
     world_fields = (WorldField("stops", "counter"),)
@@ -54,11 +54,12 @@ class Stop(Operator):
 
 
 def colloids(position, together=False, trap=0.0, shear=0.0, fall=0.0, extra=(), dt=1e-4, steps=1, **more):
-    """Spheres in water of room temperature, for a number of longest steps.
+    """Spheres in water at room temperature, for a number of longest steps.
 
-    together : whether there is a (weak) repulsion between pairs, for which they take common steps. trap :
-    rate (1/s) at which a sphere of RADIUS relaxes in a spring to the origin; shear : of the flow, 1/s; fall :
-    along -y, m/s^2. They are effects of every scene, so that most have the same structure.
+    together : whether there is a weak pair repulsion, for which all particles take common steps. trap :
+    relaxation rate (1/s) of a sphere of RADIUS in a spring to the origin; shear : shear rate of the flow,
+    1/s;
+    fall : acceleration along -y, m/s^2. These effects are in every scene, so most scenes share one structure.
     """
     springs = (Trap(stiffness=trap / MOBILITY), Shear(rate=shear), Gravity(acceleration=(0.0, -fall, 0.0)))
     shell = (SoftShellOfAll(stiffness=more.pop("stiffness", 1e-6), width=1e-12),) if together else ()
@@ -84,6 +85,6 @@ def colloids(position, together=False, trap=0.0, shear=0.0, fall=0.0, extra=(), 
 
 
 def run(scenes):
-    """Results of scenes of one structure, in a simulation that tests share."""
+    """Results of scenes of one structure, from a simulation that tests share."""
     together = isinstance(scenes[0].effects[0], SoftShellOfAll)
     return simulate(scenes, worlds=5, capacity=600 if together else 10_000)

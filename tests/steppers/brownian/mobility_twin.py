@@ -1,16 +1,16 @@
-"""Diffusion matrices written again from their papers, over kT/(6 pi eta); and what TEA-HI makes of one."""
+"""Reference diffusion matrices from the papers, over kT/(6 pi eta), and the TEA-HI expansion."""
 
 import numpy as np
 
 
 def oseen(r, one, other):
-    """B16 Eq. (6.9); r from one to the other."""
+    """B16 Eq. (6.9); r is the vector from one sphere to the other."""
     d = np.linalg.norm(r)
     return 6 / (8 * d) * (np.eye(3) + np.outer(r, r) / d**2)
 
 
 def rotne_prager(r, one, other):
-    """Zuk et al. (2014), their three cases."""
+    """Zuk et al. (2014), all three cases."""
     d = np.linalg.norm(r)
     if d <= abs(one - other):
         return np.eye(3) / max(one, other)
@@ -23,7 +23,7 @@ def rotne_prager(r, one, other):
 
 
 def matrix(tensor, position, radius):
-    """All blocks; Stokes's on the diagonal. 1/m, shape (3n, 3n)."""
+    """The full matrix with Stokes terms on the diagonal, 1/m, shape (3n, 3n)."""
     n = len(radius)
     full = np.zeros((n, 3, n, 3))
     for i in range(n):
@@ -34,7 +34,7 @@ def matrix(tensor, position, radius):
 
 
 def expansion(full):
-    """B of z = B g: Geyer and Winter (2009), with what is equal for all taken from one axis."""
+    """B in z = B g: Geyer and Winter (2009), with common factors computed from one axis."""
     m, n = len(full), len(full) // 3
     own = np.sqrt(np.diag(full))
     rho = full / np.outer(own, own)

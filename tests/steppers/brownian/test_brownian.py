@@ -1,4 +1,4 @@
-"""Brownian particles without hydrodynamic interaction, against closed forms."""
+"""Brownian particles without hydrodynamic interaction, compared with closed forms."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def moved(result):
 
 
 def check_variance(sample, expected, what=""):
-    """That of normal numbers of mean 0 is known to sqrt(2/n)."""
+    """The variance of n normal numbers of mean 0 has the relative error sqrt(2/n)."""
     assert np.mean(sample**2) / expected == pytest.approx(1.0, abs=SIGMAS * np.sqrt(2 / sample.size)), what
     assert abs(sample.mean()) < SIGMAS * np.sqrt(expected / sample.size), what
 
@@ -47,14 +47,14 @@ def test_free_diffusion_is_normal_with_variance_2dt_for_each_radius(together):
     for kind in (standard[::2], standard[1::2]):
         check_variance(kind, 1.0)
     assert stats.kstest(standard.ravel(), "norm").pvalue > 1e-6
-    # Axes of a particle, and neighbours, know nothing of each other.
+    # Different axes of a particle, and neighbouring particles, are uncorrelated.
     for a, b in ((standard[:, 0], standard[:, 1]), (standard[:-1, 2], standard[1:, 2])):
         assert abs(np.mean(a * b)) < SIGMAS / np.sqrt(len(a))
 
 
 @both
 def test_sedimentation_at_stokes_velocity_and_shear_without_heat(together):
-    """At T = 0 there is no noise: v = mu F + u(r), to rounding, and Euler's steps of it."""
+    """At T = 0 there is no noise: v = mu F + u(r), to rounding, with Euler steps."""
     radius, shear, dt, steps = np.array([1e-7, 3e-7]), 5.0, 1e-3, 40
     begin = np.array([[0, 1e-5, 0], [0, -2e-5, 1e-4]])
     more = {"radius": tuple(radius), "temperature": 0.0}
@@ -67,8 +67,8 @@ def test_sedimentation_at_stokes_velocity_and_shear_without_heat(together):
     np.testing.assert_allclose(result.state["position"], expected, rtol=0, atol=1e-17)
 
 
-def test_steps_ahead_are_intervals():
-    """Of 300 longest steps, of which a launch takes a colloid by itself through many."""
+def test_remaining_steps_count_intervals():
+    """There are 300 longest steps, many of which a launch takes for a single colloid."""
     scene = colloids(np.zeros((1, 3)), steps=300)
     simulation = compiled(scene, 5, 10_000)
     simulation.load([scene])
@@ -77,8 +77,10 @@ def test_steps_ahead_are_intervals():
 
 
 def test_diffusion_in_shear():
-    """<x^2> = 2Dt (1 + (rate t)^2/3), <xy> = D rate t^2 (R. T. Foister, T. G. M. van de Ven 1980), with the
-    sums over Euler's n steps in place of the integrals."""
+    """<x^2> = 2Dt (1 + (rate t)^2/3), <xy> = D rate t^2 (R. T. Foister, T. G. M. van de Ven 1980).
+
+    The integrals are replaced by sums over the n Euler steps.
+    """
     shear, dt, n = 50.0, 1e-3, 40
     (result,) = run([colloids(np.zeros((MANY, 3)), shear=shear, dt=dt, steps=n, seed=3)])
     x, y, _ = moved(result).T
@@ -91,7 +93,7 @@ def test_diffusion_in_shear():
 
 
 def test_equipartition_in_a_trap_with_the_bias_of_eulers_steps():
-    """The variance is kT/k / (1 - rate dt/2) at last: off by first order in dt, as it must be."""
+    """The final variance is kT/k / (1 - rate dt/2), which has the expected error of first order in dt."""
     rate, sizes = 100.0, (0.05, 0.2, 1.0)
     place = np.zeros((MANY, 3))
     scenes = [colloids(place, trap=rate, dt=a / rate, steps=round(8 / a), seed=7) for a in sizes]
@@ -99,9 +101,11 @@ def test_equipartition_in_a_trap_with_the_bias_of_eulers_steps():
         check_variance(moved(result), DIFFUSIVITY / rate / (1 - a / 2) * (1 - (1 - a) ** (16 / a)), a)
 
 
-def test_noise_keeps_its_law_where_the_step_depends_on_the_state():
-    """Step by step, what is left of a displacement without the drift is normal of variance 2 D dt, for short
-    steps and for long ones, and later steps know nothing of it."""
+def test_noise_keeps_its_law_with_state_dependent_steps():
+    """In each step the displacement minus the drift is normal with variance 2 D dt.
+
+    This holds for short and long steps, and successive steps are independent.
+    """
     apart = 4e-7 * np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3), axis=-1).reshape(-1, 3)
     scenes = [colloids(apart, True, trap=200.0, dt=1e-3, steps=400, drift=0.3, seed=k) for k in range(5)]
     simulation = compiled(scenes[0], 5, 600)
@@ -128,8 +132,8 @@ def test_noise_keeps_its_law_where_the_step_depends_on_the_state():
             assert abs(product.mean()) < SIGMAS * product.std() / np.sqrt(product.size)
 
 
-def test_steps_of_its_own_leave_a_particle_the_right_distribution():
-    """In a trap, with steps cut to a tenth and less where it is steep; their bias is below 1 %."""
+def test_individual_steps_give_the_right_distribution():
+    """In a trap, with steps cut to a tenth or less in steep regions; the bias is below 1 %."""
     rate = 100.0
     width = np.sqrt(DIFFUSIVITY / rate)
     place = np.zeros((MANY, 3))
@@ -163,7 +167,7 @@ def test_same_bits_on_both_schedules_alone_in_a_batch_and_in_portions(together):
 
 
 class Pinned(Force):
-    """None, for particles some of which may be fixed."""
+    """Exerts no force; lets particles have the field ``fixed``."""
 
     fields = ("fixed",)
 
@@ -174,9 +178,12 @@ class Pinned(Force):
     [Open(), pytest.param(Box(low=(-1.1e-6,) * 3, high=(1.1e-6,) * 3), marks=pytest.mark.slow)],
     ids=["open", "box"],
 )
-def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
-    """To the bit: where all take an interval in one step, where some do not, where some are fixed, and where
-    a force is too steep; in a flow, and also in portions."""
+def test_vectorised_particles_equal_single_ones(domain, monkeypatch):
+    """Vectorised and single steps agree to the bit.
+
+    The scenes contain intervals with one step for all particles, intervals with several, fixed particles, and
+    too steep a force. There is a flow, and one of the runs is done in portions.
+    """
     place = np.random.default_rng(2).uniform(-1e-6, 1e-6, (70, 3))
     more = {"dt": 1e-3, "steps": 30, "drift": 0.3, "domain": domain, "shear": 5.0, "extra": (Pinned(),)}
     pinned = {"fixed": (np.arange(70) == 40).astype(int)}
@@ -195,7 +202,7 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
         runs.append(simulation.results())
     for many, single in zip(*runs, strict=True):
         assert many.status == single.status
-        # Of a world that fails they depend on how far a launch would have gone.
+        # The counts of a failed world depend on the progress of its last launch.
         assert many.work == single.work or not many.status.ok
         for name, values in many.state.items():
             np.testing.assert_array_equal(values, single.state[name], err_msg=name)
@@ -206,7 +213,7 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
 
 
 @both
-def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
+def test_a_checkpoint_continues_to_the_same_bits(together, tmp_path):
     place = np.random.default_rng(1).uniform(-1e-6, 1e-6, (40, 3))
     scene = colloids(place, together, trap=200.0, dt=1e-3, steps=30, drift=0.3)
     simulation = compiled(scene, 5, 600 if together else MANY)
@@ -226,8 +233,9 @@ def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("together", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_what_is_fixed_stays_and_the_others_go_on(together):
-    """In a flow along x, particles are stopped by an operator, after the very step that brings them there."""
+def test_fixed_particles_stay_and_the_others_move(together):
+    """In a flow along x an operator stops each particle right after the step that brings it past the
+    place."""
     shear, dt, place = 10.0, 1e-3, 1.05e-6
     height = 1e-5 * np.arange(8)
     begin = np.stack([np.full(8, -1e-6), height, 3e-5 * np.arange(8)], axis=1)
@@ -247,7 +255,7 @@ def test_what_is_fixed_stays_and_the_others_go_on(together):
 
 @both
 def test_a_force_that_is_too_steep_is_refused_with_time_and_particle(together):
-    """The spring of the second particle asks at once for a step below the shortest; other worlds go on."""
+    """The spring of the second particle at once needs a step below the shortest; other worlds continue."""
     place = np.array([[1e-9, 0, 0], [-1e-3, 0, 0]])
     limits = {"dt": 1e-3, "steps": 5, "drift": 1.0, "shortest": 1e-6}
     cases = ((1, 1e3), (1e-3, 1e3), ([[0], [1]], 1e158))
@@ -261,8 +269,10 @@ def test_a_force_that_is_too_steep_is_refused_with_time_and_particle(together):
 
 
 def test_overlapping_pair_is_pushed_apart_in_short_steps():
-    """A repulsion for which the longest step is 300 times what is stable: the pair parts by what overlaps,
-    and by no more than a step of the limit beyond that."""
+    """The longest step is 300 times the stability limit of the repulsion.
+
+    The pair separates by the overlap, and by no more than one step of the drift limit beyond it.
+    """
     overlap, drift, stable = 0.2 * RADIUS, 0.02, 1 / 1.2e9
     pair = np.array([[0.0, 0, 0], [2 * RADIUS - overlap, 0, 0]])
     scene = colloids(pair, True, stiffness=1e-3, dt=300 * stable, steps=20, drift=drift, temperature=0.0,
@@ -283,7 +293,7 @@ def test_overlapping_pair_is_pushed_apart_in_short_steps():
     ],
     ids=["drag", "impact", "dissipation"],
 )
-def test_what_needs_velocities_is_refused(effects):
+def test_effects_that_need_velocities_are_refused(effects):
     rule = "must be one that does not depend on velocity in a scene stepped by brownian"
     with pytest.raises(InputError, match=rf"effects.{effects[0].kind()} {rule}"):
         colloids(np.zeros((1, 3)), extra=effects)

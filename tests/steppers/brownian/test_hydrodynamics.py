@@ -1,4 +1,4 @@
-"""Hydrodynamic interaction of Brownian particles, against matrices written from the papers."""
+"""Hydrodynamic interaction of Brownian particles, compared with matrices from the papers."""
 
 import numpy as np
 import pytest
@@ -35,14 +35,14 @@ tensors = pytest.mark.parametrize("hydrodynamics", [pytest.param("oseen", marks=
 
 
 def crowd(seed, n=12, side=6.0, sizes=4.0):
-    """Spheres anywhere, some within others; radii up to so many times the least."""
+    """Random spheres, some inside others; the radii differ by up to a factor ``sizes``."""
     draw = np.random.default_rng(seed)
     radius = RADIUS * sizes ** draw.uniform(0, 1, n)
     return draw.uniform(-side / 2, side / 2, (n, 3)) * RADIUS, radius
 
 
 def lattice(seed):
-    """Spheres near places so far apart that Oseen's tensor is positive definite."""
+    """Spheres near sites so far apart that the Oseen tensor is positive definite."""
     draw = np.random.default_rng(seed)
     place = 6.0 * np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3), axis=-1).reshape(-1, 3)
     return (place + draw.uniform(-0.5, 0.5, (8, 3))) * RADIUS, RADIUS * draw.uniform(0.7, 1.4, 8)
@@ -58,7 +58,8 @@ def run(scenes):
 
 
 def pairs():
-    """Two spheres apart, touching, overlapping, one inside the other, at its surface, and in one place."""
+    """Two spheres: separate, touching, overlapping, one inside the other, internally touching, and
+    concentric."""
     for one, other in ((1.0, 1.0), (1.0, 3.0)):
         for distance in (1e3, 4.5, one + other, 0.8 * (one + other), other - one, 0.5 * (other - one), 0.0):
             yield (
@@ -69,7 +70,7 @@ def pairs():
 
 @pytest.mark.parametrize("hydrodynamics", TENSORS)
 def test_tensors_have_no_divergence(hydrodynamics):
-    """sum_b dD_ab/dr_b = 0 in every branch, by central differences: nothing is to be added to the drift."""
+    """sum_b dD_ab/dr_b = 0 in every branch, from central differences, so the drift needs no correction."""
     places = [(1.0, 1.0, 2.5), (1.0, 3.0, 4.2)]
     if hydrodynamics == "rotne-prager":
         places += [(1.0, 1.0, 1.2), (1.0, 3.0, 2.7), (1.0, 3.0, 1.5)]
@@ -84,7 +85,7 @@ def test_tensors_have_no_divergence(hydrodynamics):
 
 @noises
 @tensors
-def test_velocities_that_forces_give_at_once(hydrodynamics, noise):
+def test_velocities_follow_forces_at_once(hydrodynamics, noise):
     """v_i = sum_j D_ij F_j / kT with springs to the origin and weight, for every branch of the tensor."""
     cases = [lattice(k) for k in range(4)]
     if hydrodynamics == "rotne-prager":
@@ -103,9 +104,12 @@ def test_velocities_that_forces_give_at_once(hydrodynamics, noise):
         np.testing.assert_allclose(result.state["velocity"], expected, rtol=0, atol=1e-12 * size)
 
 
-def test_spheres_in_one_place_and_a_pair_that_sediments():
-    """Each drags the other by the mobility of the larger; and 1 + 3a/(2r) - (a/r)^3 along, 1 + 3a/(4r) +
-    (a/r)^3/2 across the line of centres (J. Rotne, S. Prager 1969) for two that sediment together."""
+def test_concentric_spheres_and_a_sedimenting_pair():
+    """Concentric spheres drag each other by the mobility of the larger one.
+
+    For a sedimenting pair the factor is 1 + 3a/(2r) - (a/r)^3 along and 1 + 3a/(4r) + (a/r)^3/2 across the
+    line of centres (J. Rotne, S. Prager 1969).
+    """
     one = make((np.zeros((2, 3)), [RADIUS, 2 * RADIUS]), fall=9.81, temperature=0.0)
     apart = 2.5
     along, across = (
@@ -123,8 +127,10 @@ def test_spheres_in_one_place_and_a_pair_that_sediments():
 
 
 def shifts(scenes, steps):
-    """What noise did in each step, over sqrt(2 dt), shape (steps, worlds, 3n); with the numbers it is made
-    of, and the places before it."""
+    """Noise displacements in each step over sqrt(2 dt), shape (steps, worlds, 3n).
+
+    Also returns the random numbers they are made of, and the positions before each step.
+    """
     simulation = compiled(scenes[0], WORLDS, CAPACITY)
     simulation.load(scenes)
     n = len(scenes[0].particles.position)
@@ -142,8 +148,10 @@ def shifts(scenes, steps):
 
 @tensors
 def test_exact_noise_has_the_covariance_2_d_dt(hydrodynamics):
-    """C C^T = D to rounding; and noise that C^-1 takes apart is standard normal, and not correlated. 11: the
-    decomposition takes particles in twos."""
+    """C C^T = D to rounding, and the noise multiplied by C^-1 is standard normal and uncorrelated.
+
+    There are 11 particles because the decomposition takes them in pairs.
+    """
     cases = [lattice(k) if hydrodynamics == "oseen" else crowd(k, 11) for k in range(WORLDS)]
     scenes = [make(c, hydrodynamics, dt=1e-6, steps=1000, seed=k) for k, c in enumerate(cases)]
     displacements, normals, places = shifts(scenes, 60)
@@ -177,7 +185,7 @@ def test_fast_noise_is_the_truncated_expansion(hydrodynamics):
 
 
 def off(position, radius):
-    """Largest error of the expansion's covariances, of D_ij over sqrt(D_ii D_jj)."""
+    """Largest error of the covariances of the expansion, relative to sqrt(D_ii D_jj)."""
     full = matrix(rotne_prager, position, radius)
     truncated = expansion(full)
     size = np.sqrt(np.diag(full))
@@ -185,7 +193,7 @@ def off(position, radius):
 
 
 def cloud(n, side, seed=0):
-    """Unit spheres anywhere in a box, none overlapping."""
+    """Random unit spheres in a box, without overlap."""
     draw, centres = np.random.default_rng(seed), []
     while len(centres) < n:
         place = draw.uniform(0, side, 3)
@@ -194,9 +202,12 @@ def cloud(n, side, seed=0):
     return np.array(centres), np.ones(n)
 
 
-def test_what_the_expansion_leaves_out():
-    """Variances are right. Covariances of two near spheres are off by less than the 5 % of D_ii of B16 6.3,
-    those in a cloud by much more."""
+def test_the_error_of_the_expansion():
+    """Variances are right.
+
+    Covariances of two near spheres differ by less than the 5 % of D_ii of B16 6.3; in a cloud the error is
+    much larger.
+    """
     for r, most in ((2.0, 0.025), (3.0, 0.015), (10.0, 0.001)):
         pair = np.array([[0, 0, 0], [r, 0, 0]]), np.ones(2)
         full = matrix(rotne_prager, *pair)
@@ -209,8 +220,9 @@ def test_what_the_expansion_leaves_out():
 
 @slow
 @noises
-def test_noise_and_drift_leave_out_what_is_fixed(noise):
-    """The first of the spheres is beyond the place, and fixed in the first step: it drags nobody any more."""
+def test_noise_and_drift_exclude_fixed_particles(noise):
+    """One sphere starts beyond the place and is fixed in the first step; from then on it drags no other
+    sphere."""
     position, radius = crowd(3, 10)
     position[0] = position[5] + [0.1 * RADIUS, 0, 0]
     scene = make((position, radius), noise=noise, trap=100.0, steps=2, dt=1e-9, seed=4,
@@ -252,7 +264,8 @@ def test_any_number_but_0_fixes(noise):
 @slow
 @noises
 def test_oseen_tensor_of_near_spheres_is_refused(noise):
-    """Not positive definite below 3/2 R: that world stops, with time and particle, the others go on."""
+    """The tensor is not positive definite below 3/2 R: the world stops with time and particle, others
+    continue."""
     places = [(np.array([[9, 0, 0], [0, 0, 0], [gap, 0, 0]]) * RADIUS, [RADIUS] * 3) for gap in (1.499, 1.6)]
     near, far = (make(where, "oseen", noise, steps=3, dt=1e-9) for where in places)
     stopped, fine = run([near, far])
@@ -264,8 +277,9 @@ def test_oseen_tensor_of_near_spheres_is_refused(noise):
 
 
 @noises
-def test_spheres_in_one_place_and_a_heap_of_them_stay_finite(noise):
-    """The matrix of Rotne and Prager is singular there, and no worse: two equal ones stay together."""
+def test_concentric_spheres_and_a_heap_stay_finite(noise):
+    """The Rotne-Prager matrix is singular there, but not worse: two equal concentric spheres stay
+    together."""
     position, radius = crowd(2, 30, side=1.0, sizes=1.0)
     position[7] = position[3]
     (result,) = run([make((position, radius), noise=noise, steps=20, dt=1e-5)])
@@ -278,7 +292,7 @@ def test_spheres_in_one_place_and_a_heap_of_them_stay_finite(noise):
 
 @slow
 @pytest.mark.parametrize("noise", ["exact", pytest.param("fast", marks=pytest.mark.slow)])
-def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_path):
+def test_the_bits_do_not_depend_on_schedule_batch_or_portions(noise, tmp_path):
     scenes = [
         make(crowd(k, 35), noise=noise, trap=300.0, drift=0.2, dt=1e-3, steps=20, seed=k) for k in range(8)
     ]
@@ -302,9 +316,11 @@ def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_p
 
 @pytest.mark.slow
 @slow
-def test_interaction_does_not_change_where_particles_are_in_equilibrium():
-    """Spheres that overlap as they like, in traps as wide as they are: each coordinate is still of variance
-    kT/k, as drift and noise come from the same matrix."""
+def test_interaction_does_not_change_the_equilibrium():
+    """Overlapping spheres in traps of their own width: each coordinate keeps the variance kT/k.
+
+    Drift and noise come from the same matrix.
+    """
     rate = DIFFUSIVITY / RADIUS**2
     n, steps = 20, 400
     draw = np.random.default_rng(8)
@@ -319,9 +335,11 @@ def test_interaction_does_not_change_where_particles_are_in_equilibrium():
     assert (places**2).mean() == pytest.approx(1.0, abs=0.02 + SIGMAS * np.sqrt(2 / places.size))
 
 
-def test_cost_sets_exact_and_fast_noise_side_by_side():
-    """Both noises, each with its length of steps, and no stepper of particles that have inertia; what is
-    compared is a statistic."""
+def test_cost_compares_exact_and_fast_noise():
+    """Both noises are listed, each with its step length, but no stepper for inertial particles.
+
+    The costs are compared at equal errors of a statistic.
+    """
     scene = make(lattice(0), trap=20.0)
     methods_ = methods(scene, 1e-4, 1e-6, (1.0, 0.0), (), 8)
     turned = {
@@ -335,7 +353,7 @@ def test_cost_sets_exact_and_fast_noise_side_by_side():
     assert [quantity.random for quantity in usual(scene)] == [True]
 
 
-def test_matrices_for_which_there_is_no_room_are_refused():
+def test_matrices_larger_than_the_memory_are_refused():
     scene = make((np.zeros((1, 3)), np.array([RADIUS])))
     capacity = int(np.sqrt(memory() / 4) / 3) + 100
     with pytest.raises(InputError, match=r"memory for diffusion matrices must be within the \d+ GB"):

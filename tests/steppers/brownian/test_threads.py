@@ -1,4 +1,4 @@
-"""Brownian particles are where one thread puts them, whatever the number of threads of a CPU."""
+"""Brownian particles have the same positions for any number of CPU threads."""
 
 import subprocess
 import sys
@@ -20,8 +20,11 @@ np.save(sys.argv[1], test_threads.PLACES[sys.argv[2]]())
 
 
 def places(run, worlds, number, together=False, **more):
-    """Where particles are at the end. Each phase is a launch over all of them: of phases with little to do
-    for each, fewer than a thousand would all be one thread's."""
+    """Final positions of the particles.
+
+    Each phase is a launch over all of them. With little work for each particle, fewer than a thousand
+    particles would all be given to one thread.
+    """
     more = {"trap": 200.0, "dt": 1e-3, "drift": 0.3, "steps": 6, **more}
     draw = np.random.default_rng(1)
     starts = draw.uniform(-1e-6, 1e-6, (worlds, number, 3))

@@ -1,4 +1,4 @@
-"""Brownian particles in a harmonic trap: their variance is that of the scheme, and steps that bias it are
+"""Brownian particles in a harmonic trap have the variance of the scheme, and steps with a large bias are
 refused."""
 
 import math
@@ -18,7 +18,7 @@ NUMBER = 20000
 
 
 def trapped(part, number=NUMBER, stiffness=STIFFNESS, mass=4e-15):
-    """Return a scene of particles in traps of their own, with steps of a part of the relaxation time (s)."""
+    """A scene of particles in separate traps, with steps of a given fraction of the relaxation time (s)."""
     return tisim.Scene(
         particles=tisim.Particles(
             position=np.zeros((number, 3)), velocity=np.zeros((number, 3)), radius=RADIUS, mass=mass
@@ -37,7 +37,7 @@ def trapped(part, number=NUMBER, stiffness=STIFFNESS, mass=4e-15):
 def test_the_variance_is_larger_by_half_of_a_step_over_the_relaxation_time(part):
     result = tisim.run(trapped(part))
     places = result.state["position"] / math.sqrt(scipy.constants.k * TEMPERATURE / STIFFNESS)
-    # Of 3 n normal numbers the variance is known to sqrt(2 / (3 n)).
+    # The variance of 3 n normal numbers has the relative error sqrt(2 / (3 n)).
     exact = 1 / (1 - part / 2)
     assert abs((places**2).mean() / exact - 1) < 4 * math.sqrt(2 / (3 * NUMBER))
 

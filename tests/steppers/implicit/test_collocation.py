@@ -1,4 +1,4 @@
-"""The stepper of high order: its coefficients, its order, the error asked for, trouble."""
+"""The high-order stepper: coefficients, order, requested errors, and failures."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ EXACT = np.array(driven(DURATION, W, 4.0, 1.5 * PUSH, 2.0))
 
 
 def equal_steps(dt, stages=5):
-    """Steps of one length whatever their error, each solved to the last digits."""
+    """Steps of one length regardless of their error, each solved to the last digits."""
     return with_error(1e3, stages, first=dt, longest=dt, shortest=dt, part=1e-17, most=1.0)
 
 
@@ -32,13 +32,13 @@ def with_error(error, stages=5, **more):
 
 
 ORDER_5 = (6, 12, 18)
-"""Steps in DURATION for the order of five stages."""
+"""Numbers of steps in DURATION for the order with five stages."""
 ERRORS = 10.0 ** -np.arange(3, 12)
 
 
 @pytest.fixture(scope="module")
 def runs():
-    """One particle in each of many worlds, by five stages."""
+    """One particle in each of many worlds, with five stages."""
     stiff = {"stiffness": 2e6, "constant": 1.5, "flux": 0.0}
     circle = charged(equal_steps(2.0 / W), 2000 * np.pi / W, velocity=(0.6, -0.8, 0.0))
     named = {
@@ -55,12 +55,12 @@ def runs():
 
 
 def off(results):
-    """How far the velocity is from the closed form, relative to it."""
+    """Relative difference between the velocity and the closed form."""
     return np.array([np.linalg.norm(final(r)[:2] - EXACT) for r in results]) / np.linalg.norm(EXACT)
 
 
 def test_coefficients():
-    """Those of E. Hairer, G. Wanner, section IV.5; the trapezoid; the order of the quadrature."""
+    """Values of E. Hairer, G. Wanner, section IV.5, the trapezoidal rule, and the order of the quadrature."""
     np.testing.assert_allclose(nodes(3), [0, 1 / 2, 1], atol=1e-15)
     table = [[0, 0, 0], [5 / 24, 1 / 3, -1 / 24], [1 / 6, 2 / 3, 1 / 6]]
     np.testing.assert_allclose(integrals(3), table, atol=1e-15)
@@ -69,14 +69,14 @@ def test_coefficients():
         weights, c = integrals(stages)[-1], nodes(stages)
         for power in range(2 * stages - 2):
             assert weights @ c**power == pytest.approx(1 / (power + 1), rel=1e-12)
-        # Of a polynomial that one node less would do for there is no error; of the next, what is left out.
+        # The error functional is 0 for polynomials of degree s - 2, and positive for the next degree.
         assert highest(stages) @ c ** (stages - 2) == pytest.approx(0.0, abs=1e-12)
         assert highest(stages) @ c ** (stages - 1) > 0.0
 
 
 @pytest.mark.slow
 def test_order_of_five_stages(runs):
-    """2 s - 2 = 8, of a driven particle in a magnetic field."""
+    """2 s - 2 = 8, for a driven particle in a magnetic field."""
     errors = off(runs[f"steps {n}"] for n in ORDER_5)
     assert order(ORDER_5, errors) == pytest.approx(8.0, abs=0.3)
 
@@ -90,21 +90,23 @@ def test_order_of_fewer_stages(stages, steps):
 
 
 @pytest.mark.slow
-def test_the_error_asked_for_is_met_and_costs_work(runs):
-    """Over nine decades: the error is near or below that asked for, falls with it, and work rises."""
+def test_the_requested_error_is_met_with_more_work(runs):
+    """Over nine decades the error is near or below the requested one and decreases with it, and the work
+    increases."""
     results = [runs[f"error {e}"] for e in ERRORS]
     errors, work = off(results), np.array([r.work["force_evaluations"] for r in results])
     assert (errors < 2 * ERRORS).all()
     assert (errors[2:] < errors[:-2]).all()
     assert (work[2:] > work[:-2]).all()
-    # Relative to the displacement the estimate falls as dt^5: a decade is paid with 10^(1/5) times the steps.
+    # Relative to the displacement the estimate falls as dt^5, so a decade takes 10^(1/5) times the steps.
     assert work[-1] < 10 ** (8 / 5) * work[0]
     assert all(r.work["solver_iterations"] < 2.2 * (r.work["steps"] + r.work["rejections"]) for r in results)
 
 
 @pytest.mark.long
-def test_goes_on_from_a_checkpoint_to_the_same_bits(runs, tmp_path):
-    """What the next step is predicted from is kept too; and steps asked for are steps taken."""
+def test_a_checkpoint_continues_to_the_same_bits(runs, tmp_path):
+    """The data for the prediction of the next step are stored too, and exactly the requested steps are
+    taken."""
     assert runs
     scenes = [charged(with_error(e), DURATION, **DRIVEN) for e in ERRORS[:3]]
     simulation = compiled(scenes[0], worlds=len(runs), capacity=1)
@@ -127,21 +129,22 @@ def test_goes_on_from_a_checkpoint_to_the_same_bits(runs, tmp_path):
 
 
 def test_speed_is_kept_by_a_rotation(runs):
-    """Symmetric: the rotation by B keeps the speed at steps of w dt = 2, over a thousand periods."""
+    """The method is symmetric: with w dt = 2 the rotation by B keeps the speed over a thousand periods."""
     assert np.linalg.norm(final(runs["circle"])) == pytest.approx(1.0, rel=1e-10)
 
 
 def test_a_step_too_long_is_rejected(runs):
-    """A thousand times too long for the spring: attempts are rejected until one converges."""
+    """The first step is a thousand times too long for the spring; attempts are rejected until one
+    converges."""
     result = runs["long"]
     assert result.work["rejections"] >= 3
-    # x = q E/k (1 - cos(sqrt(k/m) t)) of 3 C in 1.5 V/m at 2e6 N/m, 2 kg.
+    # x = q E/k (1 - cos(sqrt(k/m) t)) for 3 C in 1.5 V/m at 2e6 N/m, 2 kg.
     speed = 4.5 / 2e6 * 1e3 * np.sin(1e3 * 1e-2)
     assert final(result)[0] == pytest.approx(speed, rel=1e-6)
 
 
-def test_what_cannot_be_solved_says_when_who_and_which_force(runs):
-    """At the shortest step allowed; the state is that of the last good step."""
+def test_unsolvable_steps_name_time_particle_and_force(runs):
+    """It fails at the shortest step allowed, and the state of the last good step is kept."""
     failed = runs["stuck"]
     assert (
         "cannot be solved even at the shortest step, by effects.tether, at particle 0" in failed.status.reason
@@ -150,20 +153,22 @@ def test_what_cannot_be_solved_says_when_who_and_which_force(runs):
     assert failed.time == 0.0
 
 
-def test_rest_is_no_error(runs):
-    """No velocity and no force, 0/0; and no force on a particle that moves."""
+def test_particles_at_rest_have_no_error(runs):
+    """No velocity and no force would give 0/0; also no force on a moving particle."""
     for name, place in (("rest", 0.0), ("free", 1e-2)):
         assert runs[name].status.ok
         assert runs[name].state["position"][0, 1] == pytest.approx(place, abs=1e-15)
 
 
 SIZE = 14.0
-"""Of a box, m."""
+"""Side of a box, m."""
 
 
 def cloud(error, size=SIZE):
-    """Sixteen particles that attract and repel each other, some across a face of the box; none has another
-    image of a neighbour that is nearly as near, as forces would have jumps."""
+    """Sixteen particles that attract and repel each other, some across a face of the box.
+
+    No particle has two nearly equidistant images of a neighbour, at which the force would jump.
+    """
     rng = np.random.default_rng(5)
     places = np.stack(np.meshgrid([0.5, 1.5], [0.5, 1.5], [0.5, 1.5, 2.5, 3.5]), -1).reshape(-1, 3)
     setup = scene(
@@ -179,7 +184,7 @@ def cloud(error, size=SIZE):
 
 
 def cloud_by_scipy(setup, size=SIZE):
-    """The same by NumPy's arrays and scipy's DOP853."""
+    """The same motion from NumPy and SciPy's DOP853."""
     r, v = np.asarray(setup.particles.position), np.asarray(setup.particles.velocity)
 
     def rates(_, y):
@@ -199,7 +204,7 @@ def cloud_by_scipy(setup, size=SIZE):
 
 @pytest.mark.slow
 def test_pairs_in_a_box():
-    """As by scipy to 1e-6; momentum is kept."""
+    """Agrees with SciPy to 1e-6, and the momentum is conserved."""
     setup = cloud(1e-8)
     (a,) = simulate([setup], capacity=16)
     assert a.status.ok
@@ -212,14 +217,16 @@ def test_pairs_in_a_box():
 
 @pytest.mark.slow
 def test_lists_and_torques():
-    """Short-ranged forces with lists, rejected attempts among them: the same bits on both schedules; and
-    grains that turn."""
+    """Short-ranged forces with lists, including rejected attempts, give the same bits on both schedules.
+
+    Rotating grains with contact history agree with the trapezoidal rule.
+    """
     setup = with_stepper(shells(SoftShell, np.random.default_rng(3), True), with_error(1e-5, first=4e-3))
     a, b = (simulate([setup], capacity=300, schedule=schedule)[0] for schedule in ("world", "particle"))
     assert a.status.ok
     assert a.work == b.work
     np.testing.assert_array_equal(a.state["position"], b.state["position"])
-    # What touching grains remember is brought up to date once a step, an error of first order in it.
+    # The contact history is updated once a step, with an error of first order in the step.
     apart = []
     for dt in (5e-5, 2.5e-5):
         setup = with_stepper(grains(n=60), equal_steps(dt), duration=0.01)

@@ -1,4 +1,4 @@
-"""Particles that do not feel each other: steps of their own, in launches of any length."""
+"""Non-interacting particles with individual steps, in launches of any length."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ DRIVEN = {"stiffness": 8.0, "amplitude": 1.5, "omega": 2.0}
 
 
 class Cliff(Force):
-    """Nothing, and beyond a place along x a spring that is far too stiff."""
+    """No force, but beyond a place along x a spring that is far too stiff."""
 
     place: float = parameter("m", "place")
 
@@ -26,9 +26,12 @@ class Cliff(Force):
 
 
 @pytest.mark.parametrize("chunks", [[], [1, 1, 5]])
-def test_who_gets_stuck_first_is_named_with_the_time_and_the_force(chunks):
-    """Particles fall off the cliff at 0.5 and 0.3 s: the second one first, whatever a launch takes them
-    through; other particles and other worlds do not matter, and what is kept is sound."""
+def test_the_first_stuck_particle_is_named_with_time_and_force(chunks):
+    """Two particles reach the cliff at 0.5 and 0.3 s; the second is named, in whatever order launches reach
+    them.
+
+    Other particles and worlds do not matter, and the kept state is finite.
+    """
     control = IterationControl(first=1e-4, longest=1e-4, shortest=1e-5, tolerance=1e-6)
     start = ([[0.0, 0, 0], [0.2, 1, 0], [0.0, 2, 0]], [[1.0, 0, 0], [1.0, 0, 0], [-1.0, 0, 0]])
     falling, free = (
@@ -52,9 +55,11 @@ def test_who_gets_stuck_first_is_named_with_the_time_and_the_force(chunks):
     assert np.isfinite(stuck.state["position"]).all()
 
 
-def test_a_step_that_time_does_not_tell_is_not_taken():
-    """On the cliff, which needs steps of 3e-7 s, when the time at the end is rounded to 1e-6 s: it stops and
-    says so, where steps of 1e-20 s would never get there."""
+def test_steps_below_the_rounding_of_time_are_not_taken():
+    """At the cliff the particle needs steps of 3e-7 s, but the final time is rounded to 1e-6 s.
+
+    The world stops with a message. With steps of 1e-20 s it would never reach the end.
+    """
     control = IterationControl(first=1e-20, longest=1e-3, shortest=1e-25)
     stepper, start = Trapezoid(control=control), ([[0.0, 0, 0]], [[1.0, 0, 0]])
     setup = scene(*start, (Cliff(place=0.0),), mass=1.0, stepper=stepper, duration=1e10)
@@ -66,8 +71,8 @@ def test_a_step_that_time_does_not_tell_is_not_taken():
     assert result.time == 0.0
 
 
-def test_steps_ahead_are_windows_whatever_a_launch_takes_particles_through():
-    """10000 windows of 1e-4 s, of which two are asked for, and later a thousand."""
+def test_remaining_steps_count_windows_not_launches():
+    """There are 10000 windows of 1e-4 s, of which two are run first, and then a thousand."""
     control = IterationControl(first=1e-4, longest=1e-4, shortest=1e-5, tolerance=1e-6)
     start = ([[0.0, 0, 0]], [[1.0, 0, 0]])
     setup = scene(*start, (Cliff(place=5.0),), mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
@@ -79,8 +84,8 @@ def test_steps_ahead_are_windows_whatever_a_launch_takes_particles_through():
 
 
 @pytest.mark.slow
-def test_steps_asked_for_are_steps_taken_and_a_checkpoint_goes_on_to_the_same_bits(tmp_path):
-    """A step of the world is a window; in one launch, in small ones, and from a checkpoint: the same bits."""
+def test_requested_steps_are_taken_and_checkpoints_keep_all_bits(tmp_path):
+    """A step of the world is a window; one launch, small ones, and a checkpoint give the same bits."""
     setup = charged(accurate(1e-5, longest=1e-2), 2.0, **DRIVEN)
     simulation = compiled(setup, capacity=1)
 

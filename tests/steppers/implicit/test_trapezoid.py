@@ -1,4 +1,4 @@
-"""The adaptive implicit stepper: its iteration, its step control, and what it does when they fail."""
+"""The adaptive implicit stepper: its iteration, its step control, and its failures."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def with_stepper(setup, stepper, **more):
 
 @pytest.mark.slow
 def test_schedules_agree_and_momentum_is_kept():
-    """Rejected attempts and new lists among the iterations: the same bits, momentum to rounding."""
+    """With rejected attempts and list rebuilds: the same bits, and momentum to rounding."""
     setup = with_stepper(
         shells(SoftShell, np.random.default_rng(3), True),
         Trapezoid(
@@ -40,7 +40,8 @@ def test_schedules_agree_and_momentum_is_kept():
 
 @pytest.mark.slow
 def test_acceleration_finds_the_same_solution_in_fewer_iterations():
-    """Anderson's: forces that repel stiffly and torques; less than 0.8 of the work, to 1e-9 m."""
+    """Anderson acceleration with stiff repulsion and torques: less than 0.8 of the work, and agreement to
+    1e-9 m."""
     plain, mixed = (
         simulate(
             [
@@ -61,8 +62,8 @@ def test_acceleration_finds_the_same_solution_in_fewer_iterations():
 
 
 @pytest.mark.slow
-def test_acceleration_of_grains_that_turn():
-    """Torques are mixed along with forces: the solution of plain iteration."""
+def test_acceleration_with_rotating_grains():
+    """Torques are mixed together with forces; the solution equals plain iteration."""
     plain, mixed = (
         simulate(
             [with_stepper(grains(n=60), equal_steps(5e-4, tolerance=1e-12, acceleration=how), duration=0.01)],
@@ -89,7 +90,7 @@ def oscillator(stepper, duration=3.0, stiffness=4.0):
 
 @pytest.mark.slow
 def test_a_step_too_long_is_rejected_not_blown_up():
-    """dt_0 a thousand times too long: attempts are rejected until one converges, and the rest is right."""
+    """dt_0 is a thousand times too long: attempts are rejected until one converges, and the rest is right."""
     control = ErrorControl(first=10.0, longest=10.0, shortest=1e-9, error=1e-5, tolerance=1e-7)
     (result,) = simulate([oscillator(Trapezoid(control=control), stiffness=1e6, duration=1e-2)], worlds=1)
     assert result.status.ok
@@ -98,8 +99,8 @@ def test_a_step_too_long_is_rejected_not_blown_up():
 
 
 @pytest.mark.long
-def test_what_cannot_be_solved_says_when_who_and_which_force():
-    """The shortest step allowed is too long for the spring of one world; the other world goes on."""
+def test_unsolvable_steps_name_time_particle_and_force():
+    """The shortest step allowed is too long for the spring of one world; the other world continues."""
     control = IterationControl(first=1e-2, longest=1e-2, shortest=1e-2)
     stiff, soft = (oscillator(Trapezoid(control=control), stiffness=k) for k in (1e7, 1.0))
     failed, fine = simulate([stiff, soft], worlds=2)
@@ -113,8 +114,8 @@ def test_what_cannot_be_solved_says_when_who_and_which_force():
 
 
 @pytest.mark.slow
-def test_what_cannot_be_solved_together_says_so_too():
-    """The same among particles that feel each other: the state is that of the last good step."""
+def test_unsolvable_coupled_steps_are_named_too():
+    """For interacting particles too, the state of the last good step is kept."""
     setup = with_stepper(
         shells(SoftShell, np.random.default_rng(3), True),
         Trapezoid(control=IterationControl(first=0.05, longest=0.05, shortest=0.05)),
@@ -128,7 +129,7 @@ def test_what_cannot_be_solved_together_says_so_too():
 
 
 class Late(Force):
-    """None up to a time, then one that is not finite."""
+    """No force up to a time, then one that is not finite."""
 
     when: float = parameter("s", "when")
 
@@ -139,8 +140,8 @@ class Late(Force):
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", [Trapezoid, pytest.param(Collocation, marks=pytest.mark.slow)])
-def test_the_force_is_that_of_the_time_at_which_the_step_fails(kind):
-    """Where the last good step ends, another force is the largest."""
+def test_the_named_force_is_evaluated_at_the_failing_step(kind):
+    """At the end of the last good step another force is the largest."""
     control = {Trapezoid: IterationControl(first=0.05, longest=0.05, shortest=0.01),
                Collocation: StageControl(first=0.05, longest=0.05, shortest=0.01)}[kind]  # fmt: skip
     effects = (
@@ -158,8 +159,8 @@ def test_the_force_is_that_of_the_time_at_which_the_step_fails(kind):
 
 
 @pytest.mark.slow
-def test_rest_is_no_error():
-    """No velocity and no force: 0/0 in the error norm; and a world without particles that move at all."""
+def test_particles_at_rest_have_no_error():
+    """No velocity and no force would give 0/0 in the error norm; also a world in which no particle moves."""
     (result,) = simulate([oscillator(Trapezoid(), duration=1e-2, stiffness=0.0)], worlds=1)
     still = scene(
         [[0, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), mass=1.0, stepper=Trapezoid(), duration=1e-2
@@ -171,7 +172,7 @@ def test_rest_is_no_error():
 
 
 def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
-    """Z16's control: from dt_0 the step grows to dt_lim where that is easy, and K stays below K_d."""
+    """Z16's control: from dt_0 the step grows to dt_lim in an easy problem, and K stays below K_d."""
     (result,) = simulate([oscillator(Trapezoid(), duration=0.1)], worlds=1)
     # 0.1 s in steps of dt_lim is 400; growing from 1e-5 s by at most 4 takes three more.
     assert 400 <= result.work["particle_steps"] <= 405
@@ -181,7 +182,7 @@ def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
 
 @pytest.mark.slow
 def test_time_does_not_drift():
-    """A million steps of 1e-6 s end at one second exactly, the place of the oscillator being right."""
+    """A million steps of 1e-6 s end at exactly one second, and the position of the oscillator is right."""
     setup = oscillator(equal_steps(1e-6, tolerance=1e-6), duration=1.0)
     (result,) = simulate([setup], worlds=1)
     assert result.time == 1.0
@@ -191,7 +192,7 @@ def test_time_does_not_drift():
 
 @pytest.mark.long
 def test_linear_terms_in_velocity_are_solved_exactly():
-    """The rotation by B converges at w dt = 20, where plain iteration has no chance, and keeps the speed."""
+    """The rotation by B converges at w dt = 20, where plain iteration diverges, and keeps the speed."""
     setup = charged(equal_steps(20.0 / 3.0, tolerance=1e-12), 20.0, velocity=(0.6, -0.8, 0.0))
     (result,) = simulate([setup], worlds=1, capacity=1)
     assert result.status.ok
@@ -199,9 +200,12 @@ def test_linear_terms_in_velocity_are_solved_exactly():
     assert np.linalg.norm(result.state["velocity"]) == pytest.approx(1.0, rel=1e-12)
 
 
-def test_the_force_of_the_last_iterate_but_one_is_good_enough():
-    """A step begins with the force that its last iterate was made with: at any tolerance the error is that of
-    the solved rule, with down to one force evaluation for a step."""
+def test_the_force_of_the_previous_iterate_suffices():
+    """A step starts with the force from which its last iterate was made.
+
+    At any tolerance the error equals the error of the fully solved rule, with little more than one force
+    evaluation in a step.
+    """
     errors, sums = [], []
     for tolerance in (1e-2, 1e-12):
         setup = charged(
@@ -215,8 +219,9 @@ def test_the_force_of_the_last_iterate_but_one_is_good_enough():
     assert sums[1] > 2.5
 
 
-def test_only_what_is_needed_is_allocated():
-    """Without torques no spins; alone no sums and no iterates; without acceleration no memory of them."""
+def test_only_needed_fields_are_allocated():
+    """No spins without torques; for one particle no sums or iterates; without acceleration no stored
+    iterates."""
     alone = Simulation(oscillator(Trapezoid()))
     fields = {f.name for f in alone.s.fields}
     assert "own_dt" in fields
