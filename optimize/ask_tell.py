@@ -30,7 +30,7 @@ from tisim.optimize.designs_csv import (
 )
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.experiments import Values, known, row_values
-from tisim.optimize.hall_of_fame import Hall
+from tisim.optimize.hall_of_fame import HallOfFame
 from tisim.optimize.methods.base import find
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Design, Outcome
@@ -172,7 +172,7 @@ class AskTell:
 
     def _next(self) -> None:
         """Tell the method the known values, and ask it for the next generation."""
-        hall = Hall(self.settings.hall_of_fame)
+        hall = HallOfFame(self.settings.hall_of_fame)
         hall.update(self._ranked())
         if self._by_method:
             self._method.tell(self._asked, hall.strings)

@@ -10,7 +10,7 @@ from deap import tools
 from tisim.optimize.methods.individual import Individual
 
 
-class Hall:
+class HallOfFame:
     """The hall of fame.
 
     strings : best individuals, best first; a front is sorted by its first cost.

@@ -20,7 +20,7 @@ from tisim.optimize.conclusion import concluded, proven, reserve
 from tisim.optimize.evaluation.ensemble import Ensemble
 from tisim.optimize.evaluation.runs import Evaluator
 from tisim.optimize.generation_log import statistics
-from tisim.optimize.hall_of_fame import Hall
+from tisim.optimize.hall_of_fame import HallOfFame
 from tisim.optimize.methods.base import find
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Outcome, Progress, Stopped
@@ -83,7 +83,7 @@ class _Search:
         self.method = find(settings.method)(
             problem.genome, len(problem.objectives), settings.options, settings.seed
         )
-        self.hall = Hall(settings.hall_of_fame)
+        self.hall = HallOfFame(settings.hall_of_fame)
         self.known: dict[tuple[float, ...], Individual] = {}
         self.ranked: list[Individual] | None = None
         self.tried: set[tuple[float, ...]] = set()  # designs that were checked and did not meet the target

@@ -53,9 +53,9 @@ def test_steps_of_every_control_can_be_kept_short(kind):
     duration = 1e-5
     stepper = Stepper.known()["verlet"].model_construct(control=control(**required))
     scene = oscillator().model_copy(update={"stepper": stepper, "duration": duration})
-    assert scene.stepper.control.fewest(duration) < OBSERVATIONS
+    assert scene.stepper.control.min_steps(duration) < OBSERVATIONS
     short = in_steps_of_at_most(scene, duration / OBSERVATIONS).stepper.control
-    assert short.fewest(duration) >= OBSERVATIONS * (1 - 1e-12)
+    assert short.min_steps(duration) >= OBSERVATIONS * (1 - 1e-12)
     # Its parts still agree with each other, and what is compiled is the same.
     assert control(**short.model_dump()) == short
     assert short.structure() == control(**required).structure()

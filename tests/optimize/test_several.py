@@ -10,7 +10,7 @@ from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
-from tisim.optimize.hall_of_fame import Hall, compromise
+from tisim.optimize.hall_of_fame import HallOfFame, compromise
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.objective import Objective
@@ -91,7 +91,7 @@ def test_compromise_is_nearest_to_the_best_of_each():
 
 
 def test_hall_of_one_objective_keeps_the_best_different_ones():
-    hall = Hall(2)
+    hall = HallOfFame(2)
 
     def string(genes, cost):
         individual = Individual(genes)

@@ -113,10 +113,10 @@ def test_a_very_short_run_with_the_default_stepper():
 def test_growth_of_steps_is_counted():
     """Steps that double from 1 s need ten for 1023 s, and slightly more if limited to 100 s."""
     control = IterationControl(first=1.0, longest=2e3, most=2.0)
-    assert control.fewest(1023.0) == pytest.approx(10.0)
+    assert control.min_steps(1023.0) == pytest.approx(10.0)
     (result,) = short([scene([[0.0] * 3], [[1.0] * 3], stepper=Trapezoid(control=control), duration=1023.0)])
     assert result.work["particle_steps"] == 10
-    assert IterationControl(first=1.0, longest=100.0, most=2.0).fewest(1023.0) == pytest.approx(10.23)
+    assert IterationControl(first=1.0, longest=100.0, most=2.0).min_steps(1023.0) == pytest.approx(10.23)
 
 
 def test_remaining_steps():

@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.domains.domain import Domain
 from tisim.effects.base import PairEvent
 from tisim.pairs.near_list import NearList
-from tisim.program.occasion import Occasion, OnOccasion
+from tisim.program.evaluation_stage import AtStage, EvaluationStage
 from tisim.program.phases import PerParticle, Phase
 from tisim.state.bound import Bound
 from tisim.state.state import State
@@ -81,7 +81,7 @@ class ClearContacts(Phase):
         self.c.overlaps[w] = 0
 
 
-class FindContacts(OnOccasion, PerParticle):
+class FindContacts(AtStage, PerParticle):
     """This phase visits every near pair: it enters pairs in contact, and passes all pairs to the step
     control.
 
@@ -108,7 +108,7 @@ class FindContacts(OnOccasion, PerParticle):
     def run(self, w, i):
         near, s, listed = self.near, self.s, self.near.listed(w)
         soonest, overlaps = ti.cast(ti.math.inf, ti.f64), 0
-        enters = s.occasion[w] != Occasion.AFTER_EVENTS
+        enters = s.evaluation_stage[w] != EvaluationStage.AFTER_EVENTS
         for k in range(near.offered(w, i, listed)):
             j = near.candidate(w, i, k, listed)
             leads = near.leads(w, i, j)

@@ -84,7 +84,7 @@ def explain(scene: Scene) -> Explanation:
         name=scene.name,
         particles=len(scene.particles.masses(scene.seed)),
         capacity=capacity,
-        steps=scene.stepper.fewest(scene.effects, scene.duration),
+        steps=scene.stepper.min_steps(scene.effects, scene.duration),
         schedule=schedule,
         precision=precision,
         effects=tuple(explained(effect) for effect in scene.acting()),

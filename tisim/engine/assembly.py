@@ -34,7 +34,7 @@ from tisim.population import spatial_sort
 from tisim.population.rearrangement import StoreBefore, acting, active, rearrange
 from tisim.population.spatial_sort import SpatialSort
 from tisim.population.vacated_slots import VacatedSlots
-from tisim.program.occasion import Enter, EnterAfterEvents, Occasion
+from tisim.program.evaluation_stage import Enter, EnterAfterEvents, EvaluationStage
 from tisim.program.phases import Item
 from tisim.self_consistent.self_consistent import SelfConsistentSolver, solver
 from tisim.state.bound import Bound, Peers
@@ -160,8 +160,8 @@ class Assembly:
         begin = (*begin_constraints(s, effects.of(Constraint)), *known)
         step, first = [*items, *ends], [*begin, *lists, *derived]
         if known and force_sum.remembers:
-            first += [Enter(s, Occasion.AHEAD), *again]
-        first += [Enter(s, Occasion.START), *again, Enter(s, Occasion.STEP), *ends]
+            first += [Enter(s, EvaluationStage.AHEAD), *again]
+        first += [Enter(s, EvaluationStage.START), *again, Enter(s, EvaluationStage.STEP), *ends]
         if near and contacts:
             survey = FindContacts(near, contacts, control)
             step += [ClearContacts(contacts), survey]
@@ -175,7 +175,7 @@ class Assembly:
             step += rearrange(slots, operators)
             surveys = (survey,) if near and contacts and control.data.watches_pairs else ()
             if anew := (*surveys, *derived, *again):
-                step += [*lists, EnterAfterEvents(s), *anew, Enter(s, Occasion.STEP)]
+                step += [*lists, EnterAfterEvents(s), *anew, Enter(s, EvaluationStage.STEP)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
         # Events tell pairs apart by index, so particles must not move in memory.

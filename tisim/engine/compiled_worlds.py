@@ -18,8 +18,8 @@ from tisim.engine.allocation import Allocation
 from tisim.engine.assembly import Assembly
 from tisim.errors import InputError, RunError, must
 from tisim.pairs.half_list import ListSizes
+from tisim.program.evaluation_stage import EvaluationStage
 from tisim.program.launched_program import LaunchedProgram
-from tisim.program.occasion import Occasion
 from tisim.program.phases import Item, nested
 from tisim.program.program import Program
 from tisim.program.team import Teams
@@ -152,7 +152,7 @@ class CompiledWorlds:
     def put(self, image: Mapping[str, np.ndarray]) -> None:
         """Put all worlds back into the state of an image made by ``s.image()``."""
         # A world that failed may have stopped in the middle of a step.
-        self.s.fill({**image, "occasion": Occasion.STEP})
+        self.s.fill({**image, "evaluation_stage": EvaluationStage.STEP})
         self.forget_lists()
 
     def forget_lists(self) -> None:

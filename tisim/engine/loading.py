@@ -89,13 +89,13 @@ def check_held(scene: Scene, start: Arrays) -> None:
         for effect in scene.effects:
             where = f"quantities of grains of effects.{effect.label}"
             rule = f"without {constraint.mark}, as effects.{constraint.label} does not hold inserted grains"
-            must(constraint.mark not in (effect.newcomers() or ()), where, rule, constraint.mark)
+            must(constraint.mark not in (effect.inserted_quantities() or ()), where, rule, constraint.mark)
 
 
-def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
+def check_inserted(fields: Sequence[Field], effect: Effect) -> None:
     """Raise InputError unless the particles that an effect inserts have the fields that the scene needs and
     no others, with the shape and range required of an initial state."""
-    given = effect.newcomers()
+    given = effect.inserted_quantities()
     if given is None:
         return
     core, where = {f.name for f in CORE}, f"quantities of grains of effects.{effect.label}"
@@ -112,7 +112,7 @@ def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
 
 def radii(scene: Scene, start: Arrays) -> np.ndarray:
     """Return the radii (m) of an initial state, then those of the largest insertable particles."""
-    later = (effect.largest_newcomers()["radius"] for effect in scene.acting())
+    later = (effect.largest_inserted()["radius"] for effect in scene.acting())
     return np.concatenate([start["radius"], *later])
 
 
@@ -147,13 +147,13 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
     laws = ", ".join(law.data.label for law in pairs.half_list.laws)
     known = [radii(scene, start) for scene, start in zip(scenes, starts, strict=True)]
     later = [radius[len(start["radius"]) :] for radius, start in zip(known, starts, strict=True)]
-    outlooks = pairs.half_list.outlooks(later)
-    for scene, radius, outlook in zip(scenes, known, outlooks, strict=True):
+    search_radii = pairs.half_list.search_radii(later)
+    for scene, radius, search_radius in zip(scenes, known, search_radii, strict=True):
         low, high = scene.domain.bounds()
         if low is None or high is None or len(radius) < 2:
             continue
         order = np.argsort(radius, kind="stable")
-        reach = float((outlook[order[1:]] + radius[order[:-1]]).max())
+        reach = float((search_radius[order[1:]] + radius[order[:-1]]).max())
         narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDED_SIDE) < reach)
         rule = f"at least {2 * reach:g} m wide where it is periodic, twice the range over which {laws} acts"
         must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())

@@ -209,7 +209,7 @@ class Monitor:
         if failing_effect < len(scene.effects):
             effect = scene.effects[failing_effect]
             reason += f", by effects.{effect.label}"
-            stops = effect.may_stop(scene.effects, scene.domain) if code == WorldStatus.NOT_FINITE else ""
+            stops = effect.failure_hint(scene.effects, scene.domain) if code == WorldStatus.NOT_FINITE else ""
             where = f" (this happens if {stops})" if stops else ""
             if 0.0 < longest < 0.999 * then["dt"][w]:
                 where += f"; the step is {then['dt'][w]:.4g} s, and the force is finite up to {longest:.3g} s"

@@ -225,8 +225,8 @@ class Simulation(CompiledWorlds):
         n = len(self.scenes)
         running = self.s.read("status")[:n] == WorldStatus.RUNNING
         remaining, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
-        fewest = [scene.stepper.fewest(scene.effects, scene.duration) for scene in self.scenes]
-        steps = np.where(dt > 0, remaining / np.where(dt > 0, dt, 1.0), fewest)
+        min_steps = [scene.stepper.min_steps(scene.effects, scene.duration) for scene in self.scenes]
+        steps = np.where(dt > 0, remaining / np.where(dt > 0, dt, 1.0), min_steps)
         return float(np.where(running, np.ceil(steps), 0.0).max())
 
     def ended(self) -> list[int]:

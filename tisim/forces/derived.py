@@ -4,7 +4,7 @@ from typing import Any
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
-from tisim.program.occasion import OnOccasion
+from tisim.program.evaluation_stage import AtStage
 from tisim.program.phases import Item, PerParticle
 from tisim.state.bound import Bound
 from tisim.state.state import State
@@ -67,7 +67,7 @@ class DerivedSolver:
         self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 
 
-class SetDerived(OnOccasion, PerParticle):
+class SetDerived(AtStage, PerParticle):
     """This phase sets value_i = response(0)."""
 
     def __init__(self, solver: DerivedSolver, trial: bool) -> None:

@@ -10,7 +10,7 @@ from tisim.numerics.ieee import finite
 from tisim.numerics.roots import estimates_roots
 from tisim.numerics.vectors import piece
 from tisim.pairs.pair_sum import ListedLaws, PairSum
-from tisim.program.occasion import Occasion
+from tisim.program.evaluation_stage import EvaluationStage
 from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:
@@ -172,9 +172,9 @@ class SumForces(PairSum):
     @ti.func
     def elapsed_time(self, w):
         """Return the time (s) since contact history and particle memory were last updated."""
-        s, now = self.s, self.s.occasion[w]
-        none = now == Occasion.START or now == Occasion.AFTER_EVENTS
-        step = ti.select(now == Occasion.AHEAD, s.step_ahead[w], s.dt[w])
+        s, now = self.s, self.s.evaluation_stage[w]
+        none = now == EvaluationStage.START or now == EvaluationStage.AFTER_EVENTS
+        step = ti.select(now == EvaluationStage.AHEAD, s.step_ahead[w], s.dt[w])
         return ti.cast(ti.select(none, 0.0, step), s.real)
 
     @ti.func
@@ -182,8 +182,8 @@ class SumForces(PairSum):
         """Return whether this sum updates the contact history."""
         updates = False
         if ti.static(self.commits):
-            occasion = self.s.occasion[w]
-            updates = occasion == Occasion.STEP or occasion == Occasion.START
+            evaluation_stage = self.s.evaluation_stage[w]
+            updates = evaluation_stage == EvaluationStage.STEP or evaluation_stage == EvaluationStage.START
         return updates
 
     @ti.func
@@ -203,7 +203,7 @@ class SumForces(PairSum):
     @ti.func
     def check(self, w, i, total):
         if not finite(total.norm_sqr()):
-            if self.s.occasion[w] == Occasion.AHEAD:
+            if self.s.evaluation_stage[w] == EvaluationStage.AHEAD:
                 # The sum that finds the law at fault uses this step.
                 self.s.dt[w] = self.s.step_ahead[w]
             self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)

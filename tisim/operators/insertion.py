@@ -85,7 +85,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
             return given
         return [{**one, "material": index} for one, index in zip(given, indices, strict=True)]
 
-    def largest_newcomers(self) -> Mapping[str, np.ndarray]:
+    def largest_inserted(self) -> Mapping[str, np.ndarray]:
         indices, of_each = class_materials(self.grains, self._materials), min(self.number, 2)
         material = np.zeros(len(self.grains), int) if indices is None else indices
         return {
@@ -94,7 +94,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
             "length": np.repeat(self.longest(), of_each),
         }
 
-    def newcomers(self) -> Mapping[str, np.ndarray]:
+    def inserted_quantities(self) -> Mapping[str, np.ndarray]:
         every = np.arange(len(self.grains))
         return {name: quantity(self.grains, name, every) for name in self.grains[0].quantities}
 

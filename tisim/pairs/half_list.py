@@ -95,22 +95,22 @@ class HalfList(NeighbourRows):
         return self.sizes.joined(ListSizes(self.wanted_row(), mean))
 
     @in_taichi_thread
-    def outlooks(self, newcomers: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def search_radii(self, inserted: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return the search radii (m) of the particles when the lists were last made, then the radii for
         inserted particles.
 
-        newcomers : radii (m) of the particles that may be inserted, for each world that is asked for.
+        inserted : radii (m) of the particles that may be inserted, for each world that is asked for.
         """
         farthest, counts = self.grid.near.to_numpy(), self.s.count.to_numpy()
-        most = max(map(len, newcomers))
+        most = max(map(len, inserted))
         later = np.zeros((self.s.worlds, most))
-        for row, radius in zip(later, newcomers, strict=False):
+        for row, radius in zip(later, inserted, strict=False):
             row[: len(radius)] = radius
         if most:
             self._look(later)
         return [
             np.concatenate([farthest[w, : counts[w]], later[w, : len(radius)]])
-            for w, radius in enumerate(newcomers)
+            for w, radius in enumerate(inserted)
         ]
 
     @ti.kernel

@@ -15,7 +15,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.pairs.pair_chunks import PairChunks, PerChunk
-from tisim.program.occasion import Occasion
+from tisim.program.evaluation_stage import EvaluationStage
 from tisim.program.phases import Item, PerParticle, Phase
 
 if TYPE_CHECKING:
@@ -224,7 +224,7 @@ class CloseSum(PartOfSum):
                 result += self.total.start(w, i, t)
             self.total.finish(w, i, result, t)
             # After a failure the state stays unchanged, so that the law at fault can be found.
-            if self.s.failed[w] == 0 and self.s.occasion[w] == Occasion.STEP:
+            if self.s.failed[w] == 0 and self.s.evaluation_stage[w] == EvaluationStage.STEP:
                 for phase in ti.static(self.after):
                     phase.run(w, i)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.numerics.roots import inverse_root
-from tisim.program.occasion import OnOccasion
+from tisim.program.evaluation_stage import AtStage
 from tisim.program.phases import PerParticle
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class ListedLaws:
         self.reaching = tuple(law for law in laws if law.data.reaches())
 
 
-class PairSum(OnOccasion, PerParticle):
+class PairSum(AtStage, PerParticle):
     """A pair sum is, for each particle, a sum over all other particles, then over listed pairs.
 
     A subclass defines the initial value in ``start``, the contribution of one other particle in ``term``, and

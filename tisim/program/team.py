@@ -30,7 +30,7 @@ TIMES_LATE = 8
 LINE = 16
 """Numbers of 8 bytes between the counters of two teams, so that each is in cache lines of its own: CPUs fetch
 two lines of 64 bytes."""
-OVER = 2**30
+CLOSED = 2**30
 """The roll of a team exceeds this value once nobody can join any more."""
 
 Member = ti.types.struct(team=ti.i32, seat=ti.i32, members=ti.i32)
@@ -81,25 +81,25 @@ class Teams:
         Exactly one member closes the roll and publishes its length.
         """
         seat, members, looks = ti.atomic_add(self.roll[at], 1), ti.cast(0, ti.i64), 0
-        while seat < OVER and members == 0:
+        while seat < CLOSED and members == 0:
             if seat + 1 == places or looks > self.late:
-                length = ti.atomic_or(self.roll[at], OVER)
-                if length < OVER:
+                length = ti.atomic_or(self.roll[at], CLOSED)
+                if length < CLOSED:
                     ti.atomic_max(self.said[at], length)
             members = self._look(at)
             looks += 1
-        return ti.cast(ti.min(seat, OVER), ti.i32), ti.cast(members, ti.i32)
+        return ti.cast(ti.min(seat, CLOSED), ti.i32), ti.cast(members, ti.i32)
 
     @ti.func
-    def draw(self, me):
+    def next_world(self, me):
         """Return the next world of the team of this member; ``worlds`` if none is left."""
-        came, w = self.come(me), 0
+        came, w = self.barrier(me), 0
         if self.is_last(me, came):
             w = ti.cast(ti.atomic_add(self.drawn[0], 1), ti.i32)
-        return ti.min(self.agree(me, came, w), self.worlds)
+        return ti.min(self.broadcast(me, came, w), self.worlds)
 
     @ti.func
-    def come(self, me):
+    def barrier(self, me):
         """Arrive at a barrier, and return a ticket for it."""
         ticket = ti.cast(0, ti.i64)
         if ti.static(self.shared):
@@ -116,7 +116,7 @@ class Teams:
         return last
 
     @ti.func
-    def agree(self, me, ticket, value):
+    def broadcast(self, me, ticket, value):
         """Wait for the barrier and return the value broadcast by the last member, an integer from 0 on."""
         if ti.static(self.shared):
             # The upper half of the word has the number of the barrier; the lower half has the number of

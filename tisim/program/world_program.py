@@ -109,7 +109,7 @@ class WorldKernel(StepRules):
     def _take_worlds(self, me, most, begin, end):
         going = me.members > 0
         while going:
-            w = self.teams.draw(me)
+            w = self.teams.next_world(me)
             going = w < self.s.worlds
             if going:
                 going = self._take_world(w, me, most, begin, end)
@@ -120,10 +120,10 @@ class WorldKernel(StepRules):
         turn, answer = -1, GOES_ON
         while answer == GOES_ON:
             turn += 1
-            came = self.teams.come(me)
+            came = self.teams.barrier(me)
             if self.teams.is_last(me, came):
                 answer = self._end_turn(w, me, turn, most)
-            answer = self.teams.agree(me, came, answer)
+            answer = self.teams.broadcast(me, came, answer)
             if answer == GOES_ON:
                 for place in range(begin, end):
                     for piece in ti.static(self.pieces):
@@ -162,22 +162,22 @@ class WorldKernel(StepRules):
     def _repeat(self, single: ti.template(), repeat: ti.template(), w, me):  # type: ignore[valid-type]
         first, pending = True, 1
         while pending > 0:
-            came = self.teams.come(me)
+            came = self.teams.barrier(me)
             if self.teams.is_last(me, came):
                 if first:
                     self._run_alone(single, w)
                 pending = ti.cast(self._is_running(w) and repeat.pending(w) > 0, ti.i32)
-            pending, first = self.teams.agree(me, came, pending), False
+            pending, first = self.teams.broadcast(me, came, pending), False
             if pending > 0:
                 self._run(repeat.items, w, me)
 
     @ti.func
     def _share(self, single: ti.template(), phase: ti.template(), w, me):  # type: ignore[valid-type]
-        came, size = self.teams.come(me), 0
+        came, size = self.teams.barrier(me), 0
         if self.teams.is_last(me, came):
             self._run_alone(single, w)
             size = self._size(phase, w)
-        begin, end = self.teams.share(me, self.teams.agree(me, came, size))
+        begin, end = self.teams.share(me, self.teams.broadcast(me, came, size))
         for k in range(begin, end):
             phase.run(w, k)
 

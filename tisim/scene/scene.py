@@ -139,7 +139,7 @@ class Scene(Component):
             )
         self.stepper.check(self)
         self.stepper.resolves(self.effects, lambda: self._unplaced()[2])
-        self.stepper.fewest(self.effects, self.duration)
+        self.stepper.min_steps(self.effects, self.duration)
 
     def _check_materials(self) -> None:
         """Raise InputError unless the materials have the properties that effects need, and all names are

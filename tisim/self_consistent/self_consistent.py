@@ -31,7 +31,7 @@ from tisim.numerics.vectors import piece
 from tisim.pairs.listed_pairs import ExportedTerms, sum_phases
 from tisim.pairs.pair_chunks import PairChunks
 from tisim.pairs.pair_sum import ListedLaws, PairSum
-from tisim.program.occasion import OnOccasion
+from tisim.program.evaluation_stage import AtStage
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.bound import Bound
@@ -93,7 +93,7 @@ class SelfConsistentSolver(DerivedSolver):
         return self.tree.bytes + sum(part.bytes() for part in parts if part)
 
 
-class BeginSweeps(OnOccasion, PerParticle):
+class BeginSweeps(AtStage, PerParticle):
     """This phase requests a sweep from the last values, or from zero if these are not finite."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:

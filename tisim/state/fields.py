@@ -130,13 +130,12 @@ CORE_OF_WORLDS = (
     # Largest number of particles of the scene; the capacity of the memory may be larger.
     WorldField("most", "integer", saved=False),
     # A world waits at the first end of a step at or after ``pause_time``, at ``goal`` steps, and until the
-    # next launches at ``step_limit`` steps. ``place`` is the next launch that it takes, and ``occasion`` the
-    # reason for it.
+    # next launches at ``step_limit`` steps. ``place`` is the next launch that it takes.
     WorldField("pause_time", "real", "s", saved=False),
     WorldField("goal", "sum"),
     WorldField("step_limit", "sum", saved=False),
     WorldField("place", "integer", saved=False),
-    WorldField("occasion", "integer", saved=False),
+    WorldField("evaluation_stage", "integer", saved=False),
     # With more particles than this a world searches pairs in cells.
     WorldField("listed_above", "integer", saved=False),
 )

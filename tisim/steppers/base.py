@@ -87,10 +87,10 @@ class Stepper(Component):
         """Return the number of steps that the stepper can count in a scene of these effects."""
         return MOST_STEPS
 
-    def fewest(self, effects: Sequence[Effect], duration: float) -> float:
+    def min_steps(self, effects: Sequence[Effect], duration: float) -> float:
         """Return the smallest number of steps of a run of this duration (s); raise InputError if it exceeds
         the number that can be counted."""
-        steps, most = min(self.control.fewest(duration), sys.float_info.max), self.countable(effects)
+        steps, most = min(self.control.min_steps(duration), sys.float_info.max), self.countable(effects)
         rule = f"reached in at most {most:.3g} steps, but takes at least {steps:.3g} of {self.control.kind()}"
         must(steps <= most, "scene.duration", rule, duration)
         return max(1.0, steps)

@@ -74,7 +74,7 @@ def choose(
         rule = f"given, because the step length is part of the law of effects.{effect.label}"
         must(not effect.step_dependent, "scene.stepper", rule, Words("none"))
         rule = f"given, because effects.{effect.label} inserts particles later, of sizes unknown here"
-        must(not len(effect.largest_newcomers()["radius"]), "scene.stepper", rule, Words("none"))
+        must(not len(effect.largest_inserted()["radius"]), "scene.stepper", rule, Words("none"))
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
     steps = {effect.label: effect.critical_step(start, speed, effects) for effect in effects}

@@ -63,7 +63,7 @@ class StepControl(Component):
     def note(self, s, w, i, soonest):
         """Record for a particle the least time (s, f64) that its pairs allow."""
 
-    def fewest(self, duration: float) -> float:
+    def min_steps(self, duration: float) -> float:
         """Return the smallest number of steps of a run of this duration (s)."""
         return 1.0
 
@@ -95,7 +95,7 @@ class FixedStep(Controller):
 
     accuracy_parameters = (AccuracyParameter(dt=2),)
 
-    def fewest(self, duration: float) -> float:
+    def min_steps(self, duration: float) -> float:
         return duration / self.dt
 
     @ti.func
@@ -136,7 +136,7 @@ class ApproachTime(Controller):
         must(self.longest >= self.shortest, "approach_time.longest", "at least shortest", self.longest)
         return self
 
-    def fewest(self, duration: float) -> float:
+    def min_steps(self, duration: float) -> float:
         return duration / self.longest
 
     def check_start(self, start: Mapping[str, np.ndarray]) -> None:

@@ -176,7 +176,7 @@ def test_failure_hints_of_walls_follow_the_laws():
         ((Granular(normal=Hooke(), cohesion=SJKR()), bridge), f"{long}, {held}"),
         ((bridge,), ""),
     ):
-        assert FLAT.may_stop((FLAT, *laws), Open()) == words
+        assert FLAT.failure_hint((FLAT, *laws), Open()) == words
 
 
 def test_a_scene_is_checked_before_it_runs():

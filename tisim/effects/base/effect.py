@@ -175,12 +175,12 @@ class Effect(Component):
         constraints that it requires."""
         return type(constraint) in self.required_effects()
 
-    def newcomers(self) -> Mapping[str, np.ndarray] | None:
+    def inserted_quantities(self) -> Mapping[str, np.ndarray] | None:
         """Return the fields that it sets on inserted particles beyond the common ones: SI values by field
         name, one row per class of particles. None if it inserts no particles, or only copies."""
         return None
 
-    def largest_newcomers(self) -> Mapping[str, np.ndarray]:
+    def largest_inserted(self) -> Mapping[str, np.ndarray]:
         """Return the largest particles that it may insert: ``radius`` (m) and ``material`` (index) of the
         largest two of each class, or of one if it inserts only one, and ``length`` (m) of their clumps; empty
         by default. Laws are checked against all pairs of them."""
@@ -216,7 +216,7 @@ class Effect(Component):
         """Set its measures of a world at the end of a step, and once before the first step; serially, before
         events and operators. It is called only for effects with world fields of the kind "measure"."""
 
-    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+    def failure_hint(self, effects: Sequence[Effect], domain: Domain) -> str:
         """Return the condition in which it stops a world on purpose by values that are not a number, given
         the effects and the domain of a scene; worded to continue the message "it is so where". Empty by
         default."""

@@ -27,7 +27,7 @@ class LongRangeSum(ABC):
 
         They read positions, other fields and derived quantities that have been set before; they write only
         the memory of the sum. The result may depend neither on the order of parallel work nor on previous
-        contents: it is computed anew in each force evaluation. The first items are ``OnOccasion``, as for all
+        contents: it is computed anew in each force evaluation. The first items are ``AtStage``, as for all
         sums that appear several times in a step: they run only if there is something to do, and request the
         repeated items. Items must terminate even if positions are not finite; the forces then report the
         error.

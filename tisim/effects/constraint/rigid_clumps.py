@@ -62,7 +62,7 @@ class RigidClumps(Constraint):
         touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
         if low is None or high is None or not imaged.any() or not touching:
             return
-        later = [effect.largest_newcomers() for effect in effects]
+        later = [effect.largest_inserted() for effect in effects]
         own = longest_clump(start) if len(start["mass"]) else 0.0
         lengths = np.concatenate([[own], *(one["length"] for one in later)])
         radii = np.concatenate([start["radius"], *(one["radius"] for one in later)])

@@ -87,7 +87,7 @@ class ParallelBond(PairForce):
             shortest = min(shortest, critical_step(stiffest, 0.5 * mass))
         return shortest
 
-    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+    def failure_hint(self, effects: Sequence[Effect], domain: Domain) -> str:
         return "a step is too long for the springs and dashpots of a bond"
 
     @ti.func

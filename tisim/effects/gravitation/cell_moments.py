@@ -11,7 +11,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.effects.gravitation.cell_tree import FAN, LEAF, CellTree, OfTree, tree_memory
-from tisim.program.occasion import OnOccasion
+from tisim.program.evaluation_stage import AtStage
 from tisim.program.phases import Item, Phase, Repeat
 from tisim.state.bound import Bound
 
@@ -126,7 +126,7 @@ class Gather(Phase):
         self.m.set(w, cell, total, about, diagonal, mixed, extent)
 
 
-class LeafMoments(OnOccasion, Gather):
+class LeafMoments(AtStage, Gather):
     """This phase computes box and moments of each leaf from its particles."""
 
     def __init__(self, moments: CellMoments) -> None:

@@ -12,7 +12,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.numerics.hilbert import CURVE_BITS, hilbert_index
-from tisim.program.occasion import OnOccasion
+from tisim.program.evaluation_stage import AtStage
 from tisim.program.phases import Item, PerParticle, Phase
 from tisim.program.radix_sort import RadixSort
 from tisim.state.state import State
@@ -95,7 +95,7 @@ class CellTree:
         return up, number + 1
 
 
-class OfTree(OnOccasion, PerParticle):
+class OfTree(AtStage, PerParticle):
     """This phase is the base of phases that process each particle of a tree."""
 
     def __init__(self, tree: CellTree) -> None:
@@ -103,7 +103,7 @@ class OfTree(OnOccasion, PerParticle):
         self.t = tree
 
 
-class BeginTree(OnOccasion, Phase):
+class BeginTree(AtStage, Phase):
     """This phase computes the number of cells of each level."""
 
     def __init__(self, tree: CellTree) -> None:
@@ -124,7 +124,7 @@ class BeginTree(OnOccasion, Phase):
         t.levels[w] = level + 1
 
 
-class FindBox(OnOccasion, Phase):
+class FindBox(AtStage, Phase):
     """This phase finds the box around all particles, by blocks of particles."""
 
     light = False

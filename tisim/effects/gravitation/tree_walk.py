@@ -14,7 +14,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
 from tisim.effects.gravitation.cell_moments import CellMoments
 from tisim.effects.gravitation.cell_tree import FAN, LEAF, CellTree
-from tisim.program.occasion import OnOccasion
+from tisim.program.evaluation_stage import AtStage
 from tisim.program.phases import MANY, Item, Phase
 from tisim.state.bound import Bound
 from tisim.state.state import State
@@ -43,7 +43,7 @@ class TreeSum(LongRangeSum):
         return (*self.t.phases(), *self.moments.phases(), WalkTree(self))
 
 
-class WalkTree(OnOccasion, Phase):
+class WalkTree(AtStage, Phase):
     """This phase sums the gravity on the particles of each leaf, on other devices than CPUs on each particle.
 
     All particles of a cell are within ``extent`` of its centre of mass. The cell is used as a whole if the

@@ -111,7 +111,7 @@ class EwaldPairs(LongRange, Dipoles):
         enough = all(there >= need for there, need in zip(self.waves, needed, strict=True))
         must(enough, f"{where}.waves", f"at least {needed} in this box", self.waves)
 
-    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+    def failure_hint(self, effects: Sequence[Effect], domain: Domain) -> str:
         beyond = "the centre of a particle is beyond the box along its open axis"
         return "" if all(domain.imaged()) else beyond
 

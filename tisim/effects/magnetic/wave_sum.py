@@ -12,7 +12,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.effects.base.long_range import LongRangeSum
 from tisim.numerics import elementary
-from tisim.program.occasion import OnOccasion
+from tisim.program.evaluation_stage import AtStage
 from tisim.program.phases import MANY, Item, PerParticle, Phase
 from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.bound import Bound
@@ -116,7 +116,7 @@ def times(a, b):
     return ti.Vector([a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]])
 
 
-class MeasureColumns(OnOccasion, Phase):
+class MeasureColumns(AtStage, Phase):
     """This phase sets the extent of each column within k_max."""
 
     def __init__(self, total: WaveSum) -> None:
@@ -137,7 +137,7 @@ class MeasureColumns(OnOccasion, Phase):
         a.top[w, column] = top
 
 
-class TurnParticles(OnOccasion, PerParticle):
+class TurnParticles(AtStage, PerParticle):
     """This phase sets the phase factor of each wave along an axis at each particle."""
 
     def __init__(self, total: WaveSum) -> None:
@@ -157,7 +157,7 @@ class TurnParticles(OnOccasion, PerParticle):
                 turn = times(turn, one)
 
 
-class SumMoments(OnOccasion, PerBlock):
+class SumMoments(AtStage, PerBlock):
     """This phase sums the moments of all particles, by blocks."""
 
     @ti.func
@@ -165,7 +165,7 @@ class SumMoments(OnOccasion, PerBlock):
         return ti.cast(self.s.moment[w, i], ti.f64)
 
 
-class FieldOfPoles(OnOccasion, Phase):
+class FieldOfPoles(AtStage, Phase):
     """This phase sets the field of the poles of the sample."""
 
     def __init__(self, total: WaveSum) -> None:
@@ -181,7 +181,7 @@ class FieldOfPoles(OnOccasion, Phase):
         a.mean[w] = -mu_0 / a.volume(w) * (factors * total)
 
 
-class StructureFactors(OnOccasion, Phase):
+class StructureFactors(AtStage, Phase):
     """This phase sets the amplitude of each wave, 2 mu_0 / V g S(k)."""
 
     light = False
@@ -211,7 +211,7 @@ class StructureFactors(OnOccasion, Phase):
             a.amplitude[w, item] = 2.0 * mu_0 / a.volume(w) / square * decay * factor
 
 
-class Waves(OnOccasion, PerParticle):
+class Waves(AtStage, PerParticle):
     """This phase sums the waves at each particle, and adds the self and surface terms."""
 
     light = False

@@ -94,7 +94,7 @@ class Walls(WallContacts, UsesMaterials, Force):
         for law in effects:
             if isinstance(law, GranularContact):
                 law.check_wall(start, effects, self.material_index(self._materials), self.label)
-        later = [effect.largest_newcomers()["radius"] for effect in effects]
+        later = [effect.largest_inserted()["radius"] for effect in effects]
         radii = np.concatenate([start["radius"], *later])
         reach = float(radii.max(initial=0.0))
         check_faces(self._named_shapes(), self.motion, scene.domain, reach, scene.duration)
@@ -114,8 +114,8 @@ class Walls(WallContacts, UsesMaterials, Force):
     def reached_speed(self, duration: float, extent: float) -> float:
         return self.motion.top_speed(extent)
 
-    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
-        laws = (law.may_stop(effects, domain) for law in effects if isinstance(law, GranularContact))
+    def failure_hint(self, effects: Sequence[Effect], domain: Domain) -> str:
+        laws = (law.failure_hint(effects, domain) for law in effects if isinstance(law, GranularContact))
         return ", or ".join(filter(None, laws))
 
     def material_index(self, materials: Materials) -> int:

@@ -61,7 +61,7 @@ class DriftLimit(Controller):
         must(self.shortest * LARGEST_DRIFT >= self.longest, "drift_limit.shortest", allowed, self.shortest)
         return self
 
-    def fewest(self, duration: float) -> float:
+    def min_steps(self, duration: float) -> float:
         return duration / self.longest
 
     @ti.func

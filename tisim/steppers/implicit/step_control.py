@@ -53,7 +53,7 @@ class ImplicitControl(StepControl):
         must(self.shortest <= self.first, f"{name}.first", "at least shortest", self.first)
         return self
 
-    def fewest(self, duration: float) -> float:
+    def min_steps(self, duration: float) -> float:
         first = min(self.first, self.longest)
         growing = duration / first
         if self.most > 1:

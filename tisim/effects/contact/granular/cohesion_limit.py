@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from tisim.materials.materials import Materials, Touching
 
 
-def with_newcomers(start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> dict[str, np.ndarray]:
+def with_inserted(start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> dict[str, np.ndarray]:
     """Return radius (m) and material of the grains of a start and of the largest grains that effects
     insert."""
     first = start.get("material", np.zeros(len(start["radius"]), int))
-    all_of_them = ({"radius": start["radius"], "material": first}, *(e.largest_newcomers() for e in effects))
+    all_of_them = ({"radius": start["radius"], "material": first}, *(e.largest_inserted() for e in effects))
     return {name: np.concatenate([one[name] for one in all_of_them]) for name in ("radius", "material")}
 
 

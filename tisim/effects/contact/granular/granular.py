@@ -21,7 +21,7 @@ from tisim.effects.base.critical_step import (
     lagging_contact,
     smallest_grains,
 )
-from tisim.effects.contact.granular.cohesion_limit import check_grains, check_wall, with_newcomers
+from tisim.effects.contact.granular.cohesion_limit import check_grains, check_wall, with_inserted
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.granular.guards import ContactGuards
 from tisim.effects.contact.granular.hertz import HertzMaterial
@@ -136,7 +136,7 @@ class Granular(ContactGuards, GranularContact):
 
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         if self.by_overlap:
-            check_grains(self, self._materials, with_newcomers(start, scene.acting()))
+            check_grains(self, self._materials, with_inserted(start, scene.acting()))
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
@@ -167,9 +167,9 @@ class Granular(ContactGuards, GranularContact):
         self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], material: int, label: str
     ) -> None:
         if self.by_overlap:
-            check_wall(self, self._materials, with_newcomers(start, effects), material, label)
+            check_wall(self, self._materials, with_inserted(start, effects), material, label)
 
-    def may_stop(self, effects: Sequence[Effect], domain: Domain) -> str:
+    def failure_hint(self, effects: Sequence[Effect], domain: Domain) -> str:
         cohesion = ", or no elastic force holds the cohesion there" if self.by_overlap else ""
         long = "a step is too long for the springs and dashpots of a contact, or for how fast surfaces meet"
         return f"{long}{cohesion}"

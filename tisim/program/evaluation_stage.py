@@ -1,5 +1,5 @@
-"""The occasion of a sum is stored by the world, so that phases used several times in a program are compiled
-once."""
+"""Evaluation stages: each world stores the stage in which forces are summed, so that phases used several
+times in a program are compiled once."""
 
 from enum import IntEnum
 
@@ -8,8 +8,8 @@ from tisim.program.phases import Phase
 from tisim.state.state import State
 
 
-class Occasion(IntEnum):
-    """An occasion is the reason why forces are summed and near pairs searched."""
+class EvaluationStage(IntEnum):
+    """The evaluation stage of a world: the reason why forces are summed and near pairs searched."""
 
     STEP = 0
     """The end of a step."""
@@ -25,37 +25,39 @@ class Occasion(IntEnum):
 
 
 class Enter(Phase):
-    """This phase sets the occasion."""
+    """This phase sets the evaluation stage."""
 
-    def __init__(self, s: State, occasion: Occasion) -> None:
-        self.s, self.occasion = s, occasion
+    def __init__(self, s: State, evaluation_stage: EvaluationStage) -> None:
+        self.s, self.evaluation_stage = s, evaluation_stage
 
     @property
     def name(self) -> str:
-        return f"{super().name} {self.occasion.name}"
+        return f"{super().name} {self.evaluation_stage.name}"
 
     @ti.func
     def run(self, w, _k):
-        self.s.occasion[w] = self.occasion
+        self.s.evaluation_stage[w] = self.evaluation_stage
 
 
 class EnterAfterEvents(Phase):
-    """This phase sets the occasion after events: AFTER_EVENTS if there were any, else NONE."""
+    """This phase sets the evaluation stage after events: AFTER_EVENTS if there were any, else NONE."""
 
     def __init__(self, s: State) -> None:
         self.s = s
 
     @ti.func
     def run(self, w, _k):
-        self.s.occasion[w] = ti.select(self.s.events[w] > 0, Occasion.AFTER_EVENTS, Occasion.NONE)
+        self.s.evaluation_stage[w] = ti.select(
+            self.s.events[w] > 0, EvaluationStage.AFTER_EVENTS, EvaluationStage.NONE
+        )
 
 
-class OnOccasion(Phase):
-    """This phase is skipped on the occasion NONE."""
+class AtStage(Phase):
+    """This phase is skipped in the stage NONE."""
 
     conditional = True
     s: State
 
     @ti.func
     def when(self, w):
-        return ti.cast(self.s.occasion[w] != Occasion.NONE, ti.i32)
+        return ti.cast(self.s.evaluation_stage[w] != EvaluationStage.NONE, ti.i32)
