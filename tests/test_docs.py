@@ -21,9 +21,9 @@ PAGES = [
 SCRIPTS = {
     page: re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.M | re.S)
     for page in PAGES
-    if "guides" not in page
+    if "guides" not in page and page != "docs/tutorial.md"
 }
-"""The Python code of each page; files and guides are for test_contributing.py and test_guides.py."""
+"""The Python code of each page; test_contributing.py has files, test_guides.py guides and the tutorial."""
 PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": ["control="]}
 """What they print, among other things."""
 
