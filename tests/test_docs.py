@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,13 @@ def test_what_documents_point_to_is_there(page):
     for name in (*links, *files):
         assert (ROOT / name).exists() or (ROOT / page).parent.joinpath(name).exists(), name
     assert not re.search(r"@[A-Z]+@", text)
+
+
+def test_the_picture_of_the_architecture_is_made_by_its_script_and_names_rooms_that_exist():
+    script = runpy.run_path(str(ROOT / "docs/architecture_diagram.py"))
+    assert script["picture"]() == (ROOT / "docs/architecture.svg").read_text(encoding="utf-8")
+    for title, folder, _ in (*script["WAY"], *script["ROOMS"], *script["ABOVE"]):
+        assert "/" not in folder or (ROOT / folder).is_dir(), title
 
 
 def test_the_citation_is_of_this_version_and_names_all_publications():
