@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -21,9 +22,9 @@ PAGES = [
 SCRIPTS = {
     page: re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.M | re.S)
     for page in PAGES
-    if "guides" not in page
+    if "guides" not in page and page != "docs/tutorial.md"
 }
-"""The Python code of each page; files and guides are for test_contributing.py and test_guides.py."""
+"""The Python code of each page; test_contributing.py has files, test_guides.py guides and the tutorial."""
 PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": ["control="]}
 """Parts of their output."""
 
@@ -54,6 +55,13 @@ def test_links_in_documents_exist(page):
     for name in (*links, *files):
         assert (ROOT / name).exists() or (ROOT / page).parent.joinpath(name).exists(), name
     assert not re.search(r"@[A-Z]+@", text)
+
+
+def test_the_picture_of_the_architecture_is_made_by_its_script_and_names_rooms_that_exist():
+    script = runpy.run_path(str(ROOT / "docs/architecture_diagram.py"))
+    assert script["picture"]() == (ROOT / "docs/architecture.svg").read_text(encoding="utf-8")
+    for title, folder, _ in (*script["WAY"], *script["ROOMS"], *script["ABOVE"]):
+        assert "/" not in folder or (ROOT / folder).is_dir(), title
 
 
 def test_the_citation_is_of_this_version_and_names_all_publications():

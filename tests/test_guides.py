@@ -11,8 +11,21 @@ import pytest
 
 from tisim.cli.main import main
 
-GUIDES = sorted((Path(__file__).parents[1] / "docs/guides").glob("*.md"))
+DOCS = Path(__file__).parents[1] / "docs"
+GUIDES = [DOCS / "tutorial.md", *sorted((DOCS / "guides").glob("*.md"))]
 PRINTED = {
+    "tutorial": r"reached its end after 15 steps\n"
+    r"middle of the jet: x = 22.77 mm, z = 4.53 mm\n"
+    r"400000 V/m: 2.28 mm above the axis\n600000 V/m: 3.40 mm above the axis\n"
+    r"800000 V/m: 4.53 mm above the axis\n"
+    r"11 frames of 12 droplets\n"
+    r"[^@]*?"
+    r"error below 0.01: Boris, FixedStep: dt dt=0.00133, 2 force evaluations\n"
+    r"error below 0.001: Boris, FixedStep: dt dt=0.000421, 5 force evaluations\n"
+    r"error below 0.0001: Boris, FixedStep: dt dt=0.000133, 16 force evaluations\n"
+    r"error below 1e-06: Collocation\(stages=3\), StageControl: error error=0.0133, 30 force evaluations\n"
+    r"\d+ runs: 16.\d\d m/s and 7.\d\de\+05 V/m\n"
+    r"miss 0.\d\d mm, 95 % interval 0.\d\d to 0.\d\d mm\n",
     "simulation": r"(hardness \d{6} Pa: [\d.]+ grains are left\n){3}"
     r"at 0.0004\d* s, 4\d% is done\n"
     r"0%, 200 grains\n(\d+%, \d+ grains\n)*100%, \d+ grains\n"
