@@ -1,4 +1,4 @@
-"""Runs of clouds in one batch, with several magnetisations and starts, sampled at regular times."""
+"""Runs of clouds in one batch, with several magnetisations and starts, and their agglomeration over time."""
 
 from __future__ import annotations
 
@@ -11,11 +11,17 @@ from typing import Any, TypeVar
 import numpy as np
 
 from tisim import Scene, Simulation
+from tisim.accuracy import Quantity
+from tisim.analysis import (
+    cluster_shapes,
+    fraction_in_clusters,
+    head_to_tail,
+)
 from tisim.cases.case import Size
-from tisim.cases.coalescence.measures import Asteroid, Conserved, Gathering
-from tisim.cases.coalescence.published import MAGNETISATIONS, NUMBER
+from tisim.cases.coalescence import published
 from tisim.cases.coalescence.scene import scale_of, scene
-from tisim.cases.runs import sound
+from tisim.cases.common.rubble_pile import Asteroid, Conserved, body, clusters_of, part
+from tisim.cases.common.runs import overlap, sound
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
@@ -25,6 +31,54 @@ CLOUD_LOOKS = 25
 SEEDS = 3
 """Number of random starts of each magnetisation."""
 T = TypeVar("T")
+CLUMP = 11
+"""Least number of grains in a clump: more than ten."""
+
+
+def chain_length(state: Arrays) -> float:
+    """Return the mean number of grains along the chain of each grain, without the seed; NaN without moments.
+
+    A chain consists of grains whose moments bind them head to tail.
+    """
+    radius = state["radius"]
+    grains = part(state, radius == radius.min())
+    if "moment" not in grains or not grains["moment"].any():
+        return float("nan")
+    diameter = 2 * float(radius.min())
+    shapes = cluster_shapes(grains["position"], head_to_tail(grains["position"], grains["moment"], diameter))
+    return float(np.average(shapes.path, weights=shapes.size))
+
+
+@dataclass(frozen=True)
+class Gathering:
+    """The progress of agglomeration in a cloud.
+
+    coalesced : fraction of all grains that are in the asteroid.
+    some, many : fractions of the other grains in clusters of two or more and of more than ten; NaN without
+    other grains.
+    chain : mean length of chains, in grains.
+    """
+
+    coalesced: float
+    some: float
+    many: float
+    chain: float
+
+    @classmethod
+    def of(cls, state: Arrays) -> Gathering:
+        """Return the progress of agglomeration in a state."""
+        cluster = clusters_of(state)
+        inside = body(cluster, state["mass"])
+        # A single grain is not an asteroid.
+        inside &= inside.sum() > 1
+        others = cluster[~inside]
+        some, many = (fraction_in_clusters(others, least) for least in (2, CLUMP))
+        return cls(float(inside.mean()), some, many, chain_length(state))
+
+    @property
+    def bound(self) -> float:
+        """Return the fraction of all grains that are in clusters of two or more."""
+        return self.coalesced + (0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.some)
 
 
 @dataclass(frozen=True)
@@ -85,7 +139,7 @@ def looked_at(
 def clouds(
     seeds: int,
     progress: Progress = lambda part: None,
-    magnetisations: Sequence[float] = MAGNETISATIONS,
+    magnetisations: Sequence[float] = published.MAGNETISATIONS,
     looks: int = CLOUD_LOOKS,
     **settings: Any,
 ) -> list[CloudRun]:
@@ -99,7 +153,7 @@ def clouds(
     seen, states = looked_at(
         scenes, times, lambda state: (Gathering.of(state), Conserved.of(state)), progress
     )
-    scale = scale_of(settings.get("number", NUMBER))
+    scale = scale_of(settings.get("number", published.NUMBER))
     return [
         CloudRun(m, scale, one, times, [a for a, _ in looks_], [c for _, c in looks_], state)
         for (m, _), one, looks_, state in zip(wanted, scenes, seen, states, strict=True)
@@ -117,3 +171,13 @@ def of_all_magnetisations(size: str, sizes: Mapping[str, Size]) -> dict[str, Any
 def of_magnetisation(runs: Sequence[CloudRun], magnetisation: float) -> list[CloudRun]:
     """Return the clouds of a magnetisation, A/m."""
     return [one for one in runs if one.magnetisation == magnetisation]
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``: properties of clusters and asteroid, as paths of grains are
+    chaotic."""
+    return (
+        Quantity("part in clusters", lambda result: Gathering.of(result.state).bound, random=True),
+        Quantity("density", lambda result: Asteroid.of(result.state).density, random=True),
+        Quantity("largest overlap", lambda result: overlap(result, np.min), random=True),
+    )

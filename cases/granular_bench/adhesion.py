@@ -3,8 +3,6 @@
 The spheres are so heavy that the adhesion does not change their speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -12,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tisim import Material, Particles, Scene
+from tisim.cases.common.runs import sound
 from tisim.cases.granular_bench.impacts import by_id, simulation_of
-from tisim.cases.runs import sound
 from tisim.effects import DMT, JKR, CapillaryBridge, Effect, Granular, HertzMaterial
 from tisim.steppers import FixedStep, Verlet
 

@@ -9,8 +9,6 @@ F. da Cruz, S. Emam, M. Prochnow, J.-N. Roux and F. Chevoir, Phys. Rev. E 72 (20
 measured in the middle of the gap, so slip at the walls has no effect on it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -19,8 +17,8 @@ import numpy as np
 
 from tisim import Box, Cloud, GrainClass, Material, Particles, Result, Scene, Simulation
 from tisim.analysis import solid_fraction
+from tisim.cases.common.runs import sound
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, POISSON, SPREAD
-from tisim.cases.runs import sound
 from tisim.effects import (
     Granular,
     HertzMaterial,

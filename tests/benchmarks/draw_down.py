@@ -3,7 +3,7 @@
     python tests/benchmarks/draw_down.py [--size small] [--starts 8] [--design 0.4 0.27 0.6]
     python tests/benchmarks/draw_down.py --valley [--size small] [--starts 2]
 
-First each quantity of cases/granular_bench/measured.py with its mean and half of the 95 % interval of that,
+First each quantity of cases/granular_bench/problem.py with its mean and half of the 95 % interval of that,
 its standard deviation over random starts, which are others than those of a search, and the uncertainty that
 a calibration takes it with; and the misfit of the means, with its 95 % interval. A design is
 friction, rolling friction and restitution. With --valley: of each friction the rolling friction of some with

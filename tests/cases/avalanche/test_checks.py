@@ -8,15 +8,12 @@ import pytest
 from tests.cases.avalanche.slopes import WIDTH, block, leaning
 from tisim import InputError
 from tisim.cases.avalanche import figures as drawing
-from tisim.cases.avalanche.calving import STRIP, strips_of
 from tisim.cases.avalanche.checks import of_avalanches
-from tisim.cases.avalanche.comparison import of, steeper_by
-from tisim.cases.avalanche.figures import figures
+from tisim.cases.avalanche.figures import STRIP, figures, strips_of
 from tisim.cases.avalanche.measures import load_on_walls
 from tisim.cases.avalanche.scaling import CONTRAST, moment_eigenvalues
-from tisim.cases.avalanche.scene import DIAMETERS, FLUX, GRAVITY, RELAXATION
-from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
-from tisim.cases.avalanche.stages import Avalanche, avalanches
+from tisim.cases.avalanche.scene import DEFAULT, DIAMETERS, FLUX, GRAVITY, RELAXATION, SIZES, Cell
+from tisim.cases.avalanche.stages import Avalanche, avalanches, of, steeper_by
 from tisim.cases.case import Size
 
 CELL = Cell(number=0, column=8.0, width=WIDTH, length=40.0, height=20.0)

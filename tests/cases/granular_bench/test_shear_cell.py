@@ -8,6 +8,7 @@ import pytest
 from tisim import RunError
 from tisim.analysis import contacts
 from tisim.cases.granular_bench import shear_cell
+from tisim.cases.granular_bench.figures import shear_figure, shear_table
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER
 from tisim.cases.granular_bench.shear_cell import (
     CELL_AREA,
@@ -24,7 +25,6 @@ from tisim.cases.granular_bench.shear_cell import (
     seen,
     sheared_beds,
 )
-from tisim.cases.granular_bench.shear_figure import shear_figure, shear_table
 from tisim.engine.result import Status
 
 

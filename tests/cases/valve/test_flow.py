@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tisim.cases.runs import overlap
+from tisim.cases.common.runs import overlap
 from tisim.cases.valve.measures import clusters, drag_pressure, held_pressure, unhindered_rate
 from tisim.cases.valve.runs import FLOW_LOOKS, flows
 from tisim.cases.valve.scene import scene

@@ -5,7 +5,7 @@ import pytest
 from scipy.constants import mu_0
 
 from tests.cases.valve.states import at_rest, result_of
-from tisim.cases.runs import overlap
+from tisim.cases.common.runs import overlap
 from tisim.cases.valve.measures import (
     attraction,
     clusters,
@@ -18,8 +18,7 @@ from tisim.cases.valve.measures import (
     unhindered_rate,
 )
 from tisim.cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
-from tisim.cases.valve.scene import scene
-from tisim.cases.valve.sizes import THROATS
+from tisim.cases.valve.scene import THROATS, scene
 
 R, UM = 22e-6, 1e-6
 VALVE = scene(throat=176 * UM, bore=352 * UM, straight=44 * UM, length=440 * UM, flowing=1e-4, lasting=3e-4)
