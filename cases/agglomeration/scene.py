@@ -17,6 +17,8 @@ from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Imp
 from tisim.operators import Cooling, Fragmentation
 from tisim.steppers import ApproachTime, Verlet
 
+TITLE = "Agglomeration in thermochemically reacting granular flow"
+
 KEYS = (
     "relative_velocity", "length_ratio", "density", "hardness", "heat_capacity",
     "friction", "temperature", "activation_energy", "reaction", "surface_energy",
@@ -42,8 +44,6 @@ def designs() -> list[dict[str, float]]:
     """Return the six individuals in SI units, best first."""
     return [dict(zip(KEYS, np.multiply(row, FACTORS).tolist(), strict=True)) for row in PRINTED]
 
-
-TITLE = "Agglomeration in thermochemically reacting granular flow"
 
 HALF_SIDE = 0.01
 """D, half the side of the control volume, m (Z04 section 8)."""

@@ -9,7 +9,7 @@ little more information, because the top of the slope and the run-out distance d
 in different ways.
 
 A measurement is read from a CSV file with a heading. An angle, in degrees, is a line below the heading of
-``cases/common/measured.py``:
+``cases/common/csv_tables.py``:
 
     quantity,value,uncertainty
     angle_of_repose,34.5,1.0
@@ -34,8 +34,7 @@ from tisim import Result, Scene
 from tisim.cases.avalanche.measures import profile, repose
 from tisim.cases.avalanche.scene import IRON_DESIGN, SIZES, TITLE, scene
 from tisim.cases.case import searched_size, size_named
-from tisim.cases.common.csv_tables import read_table
-from tisim.cases.common.measured import HEADING, Measurement, measurements
+from tisim.cases.common.csv_tables import HEADING, Measurement, measurements, read_table
 from tisim.cases.common.runs import OTHER_STARTS
 from tisim.errors import InputError, must
 from tisim.optimize import Gene, Genome, Misfit, Objective, Problem

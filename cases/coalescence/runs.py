@@ -12,11 +12,7 @@ import numpy as np
 
 from tisim import Scene, Simulation
 from tisim.accuracy import Quantity
-from tisim.analysis import (
-    cluster_shapes,
-    fraction_in_clusters,
-    head_to_tail,
-)
+from tisim.analysis import cluster_shapes, fraction_in_clusters, head_to_tail
 from tisim.cases.case import Size
 from tisim.cases.coalescence import published
 from tisim.cases.coalescence.scene import scale_of, scene

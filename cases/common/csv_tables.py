@@ -1,12 +1,25 @@
-"""CSV tables of cases: results as text, and measurements read from a file."""
+"""CSV tables: results of a case as text, and measured quantities that are the target of a calibration.
+
+A file of measurements has a heading and one quantity on each line, in any order:
+
+    quantity,value,uncertainty
+    angle_of_repose,24.5,1.0
+
+The uncertainty is one standard deviation; it includes the measurement error and the scatter of a simulation
+with few grains.
+"""
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from tisim.errors import InputError, Words, must
+from tisim.errors import InputError, Words, did_you_mean, must
 from tisim.files import regular_file
+
+HEADING = ["quantity", "value", "uncertainty"]
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
@@ -37,3 +50,51 @@ def read_table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[li
     for row in rows[1:]:
         must(len(row) == len(rows[0]), f"a line of {path}", "of three cells", ",".join(row))
     return rows[0], rows[1:]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measurement: a value and its uncertainty, one standard deviation, in the unit of the quantity."""
+
+    value: float
+    uncertainty: float
+
+    def __post_init__(self) -> None:
+        must(math.isfinite(self.value) and self.value > 0, "value", "finite and above 0", self.value)
+        sound = math.isfinite(self.uncertainty) and self.uncertainty > 0
+        must(sound, "uncertainty", "finite and above 0", self.uncertainty)
+
+    def misfit(self, simulated: float) -> float:
+        """Return the squared difference between a simulated value and the measurement, in uncertainties."""
+        return ((simulated - self.value) / self.uncertainty) ** 2
+
+
+Measured = Mapping[str, Measurement]
+"""Measurements by the name of their quantity."""
+
+
+def measurements(
+    path: Path, rows: Sequence[Sequence[str]], units: Mapping[str, str]
+) -> dict[str, Measurement]:
+    """Return the measurements in the lines of a file below its HEADING.
+
+    units : by the names of the supported quantities. InputError if a line is not a measurement, or if there
+    is none.
+    """
+    measured: dict[str, Measurement] = {}
+    for name, *numbers in rows:
+        if name not in units:
+            raise InputError(
+                f"quantity of {path} must be one of {', '.join(units)}; received {name}"
+                f"{did_you_mean(name, units)}"
+            )
+        must(name not in measured, f"quantity of {path}", "given once", name)
+        try:
+            value, uncertainty = map(float, numbers)
+        except ValueError:
+            raise InputError(
+                f"{name} of {path} must be a value and an uncertainty; received {','.join(numbers)}"
+            ) from None
+        measured[name] = Measurement(value, uncertainty)
+    must(bool(measured), f"quantities of {path}", "one or more", Words("none"))
+    return measured

@@ -33,7 +33,7 @@ def grouped(scenes: Sequence[Scene], starts: int, progress: Progress | None = No
 def overlap(result: Result, over: Callable[[np.ndarray], float] = np.mean) -> float:
     """Return the largest overlap of two grains at the end, divided by their mean radius.
 
-    over : the function of all radii that is divided by, such as ``np.min``.
+    over : computes the radius to divide by from the radii of all grains.
     """
     position, radius = result.state["position"], result.state["radius"]
     sides = periodic_sides(result.scene.domain, result.time)

@@ -15,8 +15,6 @@ Numbers = np.ndarray | float
 
 HERTZ_DURATION = float(0.8 * beta(0.4, 0.5))
 """The duration of an elastic impact times its speed divided by its depth: 2.943275."""
-HERTZ_MEAN_DEPTH = float(0.5 * beta(1.4, 0.5))
-"""The force-weighted mean overlap in an elastic impact, divided by the largest overlap: 0.817576."""
 
 
 def reduced(a: float, b: float = np.inf) -> float:

@@ -13,13 +13,7 @@ from tisim.cases.common.runs import sound
 from tisim.cases.common.two_spheres import hertz_force
 from tisim.cases.granular_bench import adhesion, beams, closed_forms, motions, particle_tests
 from tisim.cases.granular_bench.checks import rebounds
-from tisim.cases.granular_bench.impacts import (
-    ParticleImpact,
-    Rebound,
-    by_id,
-    force_curves,
-    simulation_of,
-)
+from tisim.cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, force_curves, simulation_of
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
 from tisim.plotting.style import empty, letters, plain
 

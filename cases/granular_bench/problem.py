@@ -9,7 +9,7 @@ sliding angle the friction, and the heap and the discharge rate then the rolling
 measurements, the designs that meet them lie on a line or in a region, and the best design of a search is one
 of them. The spread of the designs that meet the measurements is reported.
 
-Measurements are read from a CSV file, as in ``cases/common/measured.py``:
+Measurements are read from a CSV file, as in ``cases/common/csv_tables.py``:
 
     quantity,value,uncertainty
     angle_of_repose,24.5,1.0
@@ -29,8 +29,7 @@ from pathlib import Path
 
 from tisim import Result, Scene
 from tisim.cases.case import searched_size, size_named
-from tisim.cases.common.csv_tables import read_table
-from tisim.cases.common.measured import HEADING, Measured, Measurement, measurements
+from tisim.cases.common.csv_tables import HEADING, Measured, Measurement, measurements, read_table
 from tisim.cases.common.runs import OTHER_STARTS
 from tisim.cases.granular_bench.measures import discharge, repose
 from tisim.cases.granular_bench.plate import rebound, scene_with_plate, sliding

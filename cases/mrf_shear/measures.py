@@ -7,13 +7,7 @@ from scipy.constants import mu_0
 
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
-from tisim.analysis import (
-    cluster_shapes,
-    contacts,
-    fabric_tensor,
-    mean_coordination,
-    periodic_sides,
-)
+from tisim.analysis import cluster_shapes, contacts, fabric_tensor, mean_coordination, periodic_sides
 from tisim.cases.common.runs import overlap
 from tisim.cases.mrf_shear.scene import LOWER, SUSCEPTIBILITY, UPPER
 from tisim.domains.domain import Domain

@@ -18,15 +18,12 @@ from tisim.cases.case import Size, size_named
 from tisim.cases.common import magnetorheological_fluid as fluid
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct
-from tisim.effects import (
-    CARBONYL_IRON,
-    MutualInducedMoment,
-    StokesDrag,
-    TruncatedDipoleDipole,
-)
+from tisim.effects import CARBONYL_IRON, MutualInducedMoment, StokesDrag, TruncatedDipoleDipole
 from tisim.errors import must
 from tisim.sources import MagneticField
 from tisim.steppers import FixedStep, Verlet
+
+TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"
 
 D = published.LARGEST
 """Diameter of the coarse grains, m, equal to L21's largest."""
@@ -53,9 +50,6 @@ SEARCH_SETTINGS = {
     "generations": 6, "options": {"population": 8, "first": 12}, "ensemble": {"min_starts": 4, "confirm": 8},
 }  # fmt: skip
 """With one start, some valves jam by chance, and a search would select those."""
-
-TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"
-
 FLOWING, LASTING = 0.1e-3, 0.5e-3
 """Durations of the flow without a field and with it, s."""
 CUTOFF = 4.4

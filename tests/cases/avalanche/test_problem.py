@@ -22,7 +22,7 @@ from tisim.cases.avalanche.problem import (
     simulated,
 )
 from tisim.cases.case import every
-from tisim.cases.common.measured import Measurement
+from tisim.cases.common.csv_tables import Measurement
 from tisim.optimize import Misfit
 from tisim.optimize.tables import met_columns
 

@@ -9,7 +9,7 @@ import tisim
 from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
 from tisim import InputError, optimize
 from tisim.cases.case import every
-from tisim.cases.common.measured import Measurement
+from tisim.cases.common.csv_tables import Measurement
 from tisim.cases.granular_bench import problem as calibrating
 from tisim.cases.granular_bench.problem import (
     EXAMPLES,
