@@ -22,7 +22,7 @@ from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 
-CLOUD_LOOKS = 25
+CLOUD_SAMPLES = 25
 """Number of samples of a cloud after the start, at equal intervals."""
 SEEDS = 3
 """Number of random starts of each magnetisation."""
@@ -110,15 +110,15 @@ class CloudRun:
         return self.asteroid.magnetisation / (self.scale * self.magnetisation)
 
 
-def looked_at(
+def sampled(
     scenes: Sequence[Scene],
     times: np.ndarray,
-    look: Callable[[Arrays], T],
+    sample: Callable[[Arrays], T],
     progress: Progress = lambda part: None,
 ) -> tuple[list[list[T]], list[Arrays]]:
     """Run scenes as one batch; return the samples of each at given times (s), and the states at the end.
 
-    look : computes a sample from a state. RunError if a run fails.
+    sample : computes a sample from a state. RunError if a run fails.
     """
     seen: list[list[T]] = [[] for _ in scenes]
     with closing(Simulation(scenes[0], len(scenes))) as simulation:
@@ -126,7 +126,7 @@ def looked_at(
         for time in times:
             simulation.run(until=time)
             for one, result in zip(seen, sound(simulation.results()), strict=True):
-                one.append(look(result.state))
+                one.append(sample(result.state))
             progress(float(time / times[-1]))
         states = [result.state for result in sound(simulation.results())]
     return seen, states
@@ -136,7 +136,7 @@ def clouds(
     seeds: int,
     progress: Progress = lambda part: None,
     magnetisations: Sequence[float] = published.MAGNETISATIONS,
-    looks: int = CLOUD_LOOKS,
+    samples: int = CLOUD_SAMPLES,
     **settings: Any,
 ) -> list[CloudRun]:
     """Return the results of clouds of each magnetisation (A/m), with several starts each.
@@ -145,14 +145,12 @@ def clouds(
     """
     wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
     scenes = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]
-    times = np.linspace(0.0, scenes[0].duration, looks + 1)
-    seen, states = looked_at(
-        scenes, times, lambda state: (Gathering.of(state), Conserved.of(state)), progress
-    )
+    times = np.linspace(0.0, scenes[0].duration, samples + 1)
+    seen, states = sampled(scenes, times, lambda state: (Gathering.of(state), Conserved.of(state)), progress)
     scale = scale_of(settings.get("number", published.NUMBER))
     return [
-        CloudRun(m, scale, one, times, [a for a, _ in looks_], [c for _, c in looks_], state)
-        for (m, _), one, looks_, state in zip(wanted, scenes, seen, states, strict=True)
+        CloudRun(m, scale, one, times, [a for a, _ in of_run], [c for _, c in of_run], state)
+        for (m, _), one, of_run, state in zip(wanted, scenes, seen, states, strict=True)
     ]
 
 

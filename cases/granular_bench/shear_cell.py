@@ -198,7 +198,7 @@ def sheared_beds(
     start, closes = loose(number, wide, seed), CLOSING / SHEAR_RATE
     drives = [(SHEAR_RATE * gap, 0.0, (gap - wide) / closes) for gap in gaps]
     before, lasts = STRAIN_BEFORE / SHEAR_RATE, (STRAIN_BEFORE + STRAIN) / SHEAR_RATE
-    looks: list[list[tuple[np.ndarray, ...]]] = [[] for _ in gaps]
+    samples: list[list[tuple[np.ndarray, ...]]] = [[] for _ in gaps]
     with closing(Simulation(cell(start, drives[0], closes, law), len(gaps))) as simulation:
         simulation.load([cell(start, drive, closes, law) for drive in drives])
         simulation.run()
@@ -208,10 +208,10 @@ def sheared_beds(
         for time in np.linspace(before, lasts, SAMPLES):
             simulation.run(until=time)
             progress(float(time / lasts))
-            for gap, look, result in zip(gaps, looks, sound(simulation.results()), strict=True):
-                look.append(seen(result, gap))
+            for gap, sample, result in zip(gaps, samples, sound(simulation.results()), strict=True):
+                sample.append(seen(result, gap))
         states = [result.state for result in simulation.results()]
-    return [mean_of(*one) for one in zip(gaps, looks, states, strict=True)]
+    return [mean_of(*one) for one in zip(gaps, samples, states, strict=True)]
 
 
 def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
@@ -228,9 +228,9 @@ def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
     return np.array([pressing, dragging, fraction]), sums, numbers
 
 
-def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]], state: Arrays) -> ShearedBed:
+def mean_of(gap: float, samples: Sequence[tuple[np.ndarray, ...]], state: Arrays) -> ShearedBed:
     """Return the means over the samples of a cell with a gap (m), and its state at the end."""
-    scalars, sums, numbers = (np.array(one) for one in zip(*looks, strict=True))
+    scalars, sums, numbers = (np.array(one) for one in zip(*samples, strict=True))
     pressing, dragging, fraction = scalars.mean(axis=0)
     edges = np.linspace(0.0, gap, BINS + 1)
     count = numbers.sum(axis=0)

@@ -53,10 +53,10 @@ def viscosity(result: Result) -> float:
     grains."""
     start = start_of(result)
     diameters = [2 * one.sizes.mean_radius() for one in start.grains]
-    return off_state_viscosity(asked_fraction(result), diameters, [one.share for one in start.grains])
+    return off_state_viscosity(nominal_fraction(result), diameters, [one.share for one in start.grains])
 
 
-def asked_fraction(result: Result) -> float:
+def nominal_fraction(result: Result) -> float:
     """Return the nominal volume fraction of the grains of a run: the mean over all starts."""
     start, volume = start_of(result), float(extent(result.scene.domain).prod())
     each = sum(one.share / one.density for one in start.grains) / sum(one.number() for one in start.grains)

@@ -18,7 +18,7 @@ from tisim.sources import MagneticField
 
 Settings = Mapping[str, Any]
 """Settings of a scene that differ from the defaults."""
-FLOW_LOOKS = 100
+FLOW_SAMPLES = 100
 """Number of samples of the flow rate in a run."""
 LATE = 0.2
 """Fraction at the end of the time without a field, and of the time with it, over which flow rates are
@@ -33,14 +33,14 @@ FLUXES = (published.FLUX, 0.27)
 
 
 class FlowSeries(Observer):
-    """Records the mass flow rate of each world at FLOW_LOOKS equally spaced times.
+    """Records the mass flow rate of each world at FLOW_SAMPLES equally spaced times.
 
     ``rows[w]`` are pairs of time (s) and rate (kg/s) of world w.
     """
 
     def __init__(self, scenes: Sequence[Scene]) -> None:
         self.lengths = [duct_of(one).length for one in scenes]
-        self.intervals = np.array([one.duration / FLOW_LOOKS for one in scenes])
+        self.intervals = np.array([one.duration / FLOW_SAMPLES for one in scenes])
         self.rows: list[list[tuple[float, float]]] = [[] for _ in scenes]
 
     def pause(self, simulation: Simulation) -> np.ndarray:

@@ -116,7 +116,7 @@ def test_the_regime_of_clouds():
 
 @pytest.mark.slow
 def test_a_tiny_cloud_conserves_what_it_should():
-    runs = clouds(1, number=30, seed_diameter=2.0, duration=400.0, looks=2, magnetisations=(0.0, 1190.0))
+    runs = clouds(1, number=30, seed_diameter=2.0, duration=400.0, samples=2, magnetisations=(0.0, 1190.0))
     assert [one.magnetisation for one in runs] == [0.0, 1190.0]
     for check in of_conservation(runs):
         assert check.ok, check

@@ -6,7 +6,7 @@ import pytest
 from tests.cases.valve.states import at_rest
 from tisim.cases.valve import checks, figures, runs
 from tisim.cases.valve.measures import oil_of, unhindered_rate
-from tisim.cases.valve.runs import FLOW_LOOKS, Flow
+from tisim.cases.valve.runs import FLOW_SAMPLES, Flow
 from tisim.cases.valve.scene import FIELD, FINE_DIAMETER, THROATS, D
 
 
@@ -19,7 +19,7 @@ def made_up(scenes, progress):
             [0.0, 0.0, 0.1 * oil_of(one).speed], (len(result.state["mass"]), 1)
         )
         result.measures["valve_force_z"] = 1e-3
-        times = np.linspace(0, one.duration, FLOW_LOOKS)
+        times = np.linspace(0, one.duration, FLOW_SAMPLES)
         field = one.effects[0]
         jams = len(result.state["mass"]) < 200 and field.constant[0] > 0
         end = 0.01 + 1e-4 * k if jams else 0.33 + 1e-3 * k
