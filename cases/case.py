@@ -1,7 +1,9 @@
 """The interface of a case: a package in ``cases`` with a ``CASE``. Cases are discovered; there is no
 registry.
 
-A ``CASE`` names its figures, checks and inverse problem as ``Late``, so that listing the cases is fast.
+A ``CASE`` names its figures, checks and inverse problem as ``Late``, so that listing the cases is fast. Its
+checks yield a ``Check`` for a number, a ``Claim`` for a mean of random runs, and ``Shown`` for a number
+without a verdict.
 """
 
 from __future__ import annotations
@@ -11,14 +13,17 @@ import pkgutil
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from tisim import InputError, Scene, cases
 from tisim.accuracy import Quantity
-from tisim.cases.statistics import Claim, Shown
+from tisim.analysis import Mean
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.io.reader import Frames
+from tisim.numerics.statistics import CONFIDENCE
 from tisim.optimize.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -43,6 +48,44 @@ class Check:
         """Return measured value, expected value, deviation and bound as text for a table."""
         off = abs(self.measured - self.expected)
         return f"{self.measured:.10g}", f"{self.expected:.10g}", f"{off:.1e}", f"{self.bound:.1e}"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement about random runs; it holds if the whole confidence interval is within least..most."""
+
+    name: str
+    mean: Mean
+    least: float = -np.inf
+    most: float = np.inf
+
+    @property
+    def ok(self) -> bool:
+        return (
+            self.least <= self.mean.value - self.mean.half and self.mean.value + self.mean.half <= self.most
+        )
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Return mean, bounds, an empty cell and the confidence level as text for a table."""
+        bounds = [f"above {self.least:.4g}"] * bool(np.isfinite(self.least))
+        bounds += [f"below {self.most:.4g}"] * bool(np.isfinite(self.most))
+        return str(self.mean), ", ".join(bounds), "", f"{CONFIDENCE:.0%} confidence"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A number that is shown with a value from elsewhere, without a verdict."""
+
+    name: str
+    value: float | Mean
+    beside: str = ""
+    ok: ClassVar[None] = None
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Return the number and the value shown beside it as text for a table."""
+        return str(self.value) if isinstance(self.value, Mean) else f"{self.value:.4g}", self.beside, "", ""
 
 
 @dataclass(frozen=True)

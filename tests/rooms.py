@@ -35,7 +35,7 @@ ROOMS = (
     "tisim.optimize.warm_start", "tisim.optimize.ask_tell",
     "tisim.optimize.conclusion", "tisim.optimize.search", "tisim.optimize.analysis",
     "tisim.optimize.report", "tisim.optimize.session", "tisim.optimize",
-    "tisim.cases", "tisim.cases.statistics", "tisim.cases.case", "tisim.cases.runs", "tisim.cases.capture",
+    "tisim.cases", "tisim.cases.case", "tisim.cases.common", "tisim.cases.capture", "tisim.cases.coalescence",
     "tisim.cases.*", "tisim.cli",
     "tisim.__main__",
 )  # fmt: skip

@@ -43,6 +43,22 @@ def test_modules_of_a_case_do_not_import_its_package():
     assert not [m for m, home in homes.items() if home in CASES and home in EARLY[m] | LATE[m]]
 
 
+SEQUELS = {"tisim.cases.cascade": "tisim.cases.capture", "tisim.cases.spin_up": "tisim.cases.coalescence"}
+"""Cases that continue another case, and say so in the docstrings of their scenes."""
+
+
+def test_a_case_imports_only_the_case_that_it_continues():
+    """What several cases need is in ``cases/common``."""
+    imports = {
+        (home, other)
+        for module in EARLY
+        for home in CASES & {module, module.rpartition(".")[0]}
+        for reached in EARLY[module] | LATE[module]
+        for other in CASES & {reached, reached.rpartition(".")[0]} - {home}
+    }
+    assert imports == set(SEQUELS.items())
+
+
 def test_listing_cases_loads_no_figures_checks_or_inverse_problems():
     reached, ahead = set(), set(CASES)
     while ahead:

@@ -1,8 +1,5 @@
 """Agglomeration in thermochemically reacting granular flow (Z04), and its inverse problem."""
 
-from __future__ import annotations
-
-from tisim.cases.agglomeration.accuracy import quantities
 from tisim.cases.agglomeration.scene import SIZES, TITLE, fields_scene_for, scene_for
 from tisim.cases.case import Case, Late
 
@@ -13,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.agglomeration.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.agglomeration.checks", "quantities"),
     problem=Late("tisim.cases.agglomeration.problem", "problem"),
     variants=("paper", "fragmenting", "fields"),
     scenes={"fields": fields_scene_for},

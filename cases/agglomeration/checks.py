@@ -6,14 +6,13 @@ of half its radius at v = sqrt(6 gamma / (rho b_0 (1 - e^2))). At v*, grains lar
 beta) break.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 import tisim
 from tisim import Particles, Result, Scene
+from tisim.accuracy import Quantity
 from tisim.cases.agglomeration import field_checks
 from tisim.cases.agglomeration import scene as agglomeration
 from tisim.cases.case import Check
@@ -183,3 +182,16 @@ def check() -> Iterator[Check]:
     yield from conservation()
     yield from field_checks.closed_forms()
     yield from field_checks.conservation()
+
+
+def mean_radius(result: Result) -> float:
+    """Return the mean radius of the grains at the end, m."""
+    return float(result.state["radius"].mean())
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantity of ``tisim cost``: the mean radius over random starts.
+
+    Impacts are chaotic, so a change in the last digit gives other agglomerates but the same mean.
+    """
+    return (Quantity("mean radius", mean_radius, random=True),)

@@ -16,8 +16,6 @@ One charge in E_0 + E_1 sin(omega t) moves by (q/m) (E_0 t^2/2 + E_1 (omega t - 
 Eq. 16).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

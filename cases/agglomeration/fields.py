@@ -15,15 +15,13 @@ grains of 1 mm and more. This is left out so that a leapfrog, which keeps presse
 integrate all forces.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 
 from scipy.constants import epsilon_0, mu_0
 
 from tisim.effects import CARBONYL_IRON, DipoleDipole, Effect, FroehlichMoment, Lorentz, NearField
-from tisim.optimize.problem.genome import Gene
+from tisim.optimize import Gene
 from tisim.packing import EqualSizes, GrainClass
 from tisim.sources import ElectricField, MagneticField
 from tisim.steppers import ApproachTime, Stepper, Verlet

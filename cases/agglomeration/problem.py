@@ -1,8 +1,6 @@
 """The inverse problem of agglomeration: the flow that grows the largest grains (Z04 section 7), with or
 without charges and fields."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tisim import Result
@@ -10,8 +8,7 @@ from tisim.cases.agglomeration.fields import FIELD_GENES
 from tisim.cases.agglomeration.scene import SIZES, TITLE, scene
 from tisim.cases.case import size_named
 from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.problem import Problem
+from tisim.optimize import Gene, Genome, Problem
 from tisim.plotting.cloud import cloud
 
 GENES = (
@@ -20,7 +17,7 @@ GENES = (
     Gene("density", "kg/m^3", 1e3, 1e4),
     Gene("hardness", "Pa", 1e5, 1e6),
     Gene("heat_capacity", "J/(kg K)", 2e2, 2e3),
-    # The upper end cannot be read in the copy at hand; see FACTORS in published_strings.
+    # The upper end cannot be read in the copy at hand; see FACTORS in ``scene``.
     Gene("friction", "", 0.01, 0.1),
     Gene("temperature", "K", 1e2, 1e3),
     Gene("activation_energy", "J/mol", 1e2, 1e3),

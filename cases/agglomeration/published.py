@@ -5,8 +5,6 @@
 With ``--sensitivity`` the first individual is also run with one assumption changed at a time.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Mapping
 
@@ -17,8 +15,7 @@ from rich.table import Table
 import tisim
 from tisim import Scene
 from tisim.cases.agglomeration.problem import cost
-from tisim.cases.agglomeration.published_strings import PUBLISHED_COSTS, designs
-from tisim.cases.agglomeration.scene import scene
+from tisim.cases.agglomeration.scene import PUBLISHED_COSTS, designs, scene
 from tisim.numerics.statistics import half_width
 from tisim.steppers import ApproachTime, Verlet
 

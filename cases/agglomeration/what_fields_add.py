@@ -13,8 +13,6 @@ With ``--one-flow`` nothing is searched: the best flow of Z04, with the lowest h
 with one kind of field after another, each from the same starts.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import functools
@@ -34,7 +32,7 @@ from tisim.cases.agglomeration import fields
 from tisim.cases.agglomeration.problem import GENES, UNBREAKABLE, cost, problem
 from tisim.cases.agglomeration.scene import BEST, SIZES, scene
 from tisim.cases.case import size_named
-from tisim.cases.runs import OTHER_STARTS, sound
+from tisim.cases.common.runs import OTHER_STARTS, sound
 from tisim.numerics.statistics import CONFIDENCE
 from tisim.optimize import Gene, Genome, Problem
 from tisim.plotting.style import empty, legend_above, plain

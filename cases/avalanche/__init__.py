@@ -1,10 +1,6 @@
 """Avalanches of iron grains, which a magnetic field makes steeper; calibration to a measured slope."""
 
-from __future__ import annotations
-
-from tisim.cases.avalanche.accuracy import quantities
-from tisim.cases.avalanche.scene import TITLE, scene_for
-from tisim.cases.avalanche.sizes import SIZES
+from tisim.cases.avalanche.scene import SIZES, TITLE, scene_for
 from tisim.cases.case import Case, Late
 
 CASE = Case(
@@ -14,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.avalanche.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.avalanche.measures", "quantities"),
     cost_size="small",
     problem=Late("tisim.cases.avalanche.problem", "problem"),
     variants=("calibrate",),

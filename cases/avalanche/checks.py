@@ -1,8 +1,6 @@
 """Checks of the avalanche: findings of L21 that a narrow cell can reproduce, and relations that hold
 exactly."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 
@@ -10,15 +8,11 @@ import numpy as np
 
 from tisim import Particles, Result, Scene, run
 from tisim.analysis import Mean
-from tisim.cases.avalanche.comparison import of, steeper_by
 from tisim.cases.avalanche.measures import load_on_walls
-from tisim.cases.avalanche.published import SLOPES, larger
 from tisim.cases.avalanche.scaling import attraction, moment, moment_eigenvalues, ratio, weight
-from tisim.cases.avalanche.scene import DIAMETERS, FLUX, RELAXATION, magnetism
-from tisim.cases.avalanche.sizes import DEFAULT
-from tisim.cases.avalanche.stages import Avalanche, avalanches
-from tisim.cases.case import Check
-from tisim.cases.statistics import Claim, Shown
+from tisim.cases.avalanche.scene import DEFAULT, DIAMETERS, FLUX, RELAXATION, magnetism
+from tisim.cases.avalanche.stages import SLOPES, Avalanche, avalanches, larger, of, steeper_by
+from tisim.cases.case import Check, Claim, Shown
 from tisim.steppers import FixedStep, Verlet
 
 CHECKED_SEEDS = 6

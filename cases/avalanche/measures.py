@@ -1,13 +1,13 @@
 """Measures of a slope: its angles, the volume of the heap, and the fraction filled by grains."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tisim import InputError, Result
-from tisim.analysis import largest_overlap, slope_angles, surface_profile
+from tisim import InputError, Result, Scene
+from tisim.accuracy import Quantity
+from tisim.analysis import slope_angles, surface_profile
 from tisim.cases.avalanche.scene import GRAVITY
+from tisim.cases.common.runs import overlap
 from tisim.scene.initial_state import Arrays
 
 SAMPLES = 8
@@ -92,13 +92,27 @@ def filled_parts(state: Arrays, width: float, length: float, height: float) -> n
     return np.asarray(inside.reshape(columns, SAMPLES, layers, SAMPLES).mean(axis=(1, 3)))
 
 
-def overlap(state: Arrays, width: float) -> float:
-    """Return the largest overlap of two grains in a cell of a given width (m), divided by a radius."""
-    radius = state["radius"]
-    return largest_overlap(state["position"], radius, (0.0, width, 0.0)) / float(radius.mean())
-
-
 def load_on_walls(result: Result) -> float:
     """Return the downward force of the grains on floor and walls divided by their weight; 1 at rest."""
     down = -(result.measures["box_force_z"] + result.measures["gate_force_z"])
     return down / (float(result.state["mass"].sum()) * GRAVITY)
+
+
+def width(result: Result) -> float:
+    """Return the width of the cell of a result, m."""
+    return float(result.scene.domain.edges(0.0)[1, 1])
+
+
+def volume(result: Result) -> float:
+    """Return the volume of the heap divided by the volume of its grains."""
+    return heap_volume(result.state, width(result)) / grains_volume(result.state)
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``: properties of the final heap and the largest overlap, as paths
+    of grains are chaotic."""
+    return (
+        Quantity("angle of repose", lambda result: repose(result.state), random=True),
+        Quantity("volume of the heap", volume, random=True),
+        Quantity("largest overlap", overlap, random=True),
+    )

@@ -7,31 +7,43 @@ uncertainties; below 1, the measurement is met within them. One angle does not d
 designs that meet it lie on a surface, and the table of the best designs shows some of them. A profile gives a
 little more information, because the top of the slope and the run-out distance depend on friction and cohesion
 in different ways.
-"""
 
-from __future__ import annotations
+A measurement is read from a CSV file with a heading. An angle, in degrees, is a line below the heading of
+``cases/common/csv_tables.py``:
+
+    quantity,value,uncertainty
+    angle_of_repose,34.5,1.0
+
+A profile is the height of the surface against the distance from the end of the cell against which the grains
+rest, from there to beyond the foot, in any one unit of length:
+
+    distance,height,uncertainty
+    0.000,0.050,0.002
+    0.010,0.046,0.002
+"""
 
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from tisim import Result, Scene
-from tisim.cases.avalanche.measured import MeasuredProfile, Target, read
 from tisim.cases.avalanche.measures import profile, repose
-from tisim.cases.avalanche.scene import IRON_DESIGN, TITLE, scene
-from tisim.cases.avalanche.sizes import SIZES
+from tisim.cases.avalanche.scene import IRON_DESIGN, SIZES, TITLE, scene
 from tisim.cases.case import searched_size, size_named
-from tisim.cases.granular_bench.measured import Measurement
-from tisim.cases.runs import OTHER_STARTS
-from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.objective import Objective
-from tisim.optimize.problem.problem import Problem
-from tisim.optimize.problem.statistic import Misfit
+from tisim.cases.common.csv_tables import HEADING, Measurement, measurements, read_table
+from tisim.cases.common.runs import OTHER_STARTS
+from tisim.errors import InputError, must
+from tisim.optimize import Gene, Genome, Misfit, Objective, Problem
 from tisim.plotting.cloud import cloud
+
+ANGLE_UNITS = {"angle_of_repose": "degrees"}
+PROFILE = ["distance", "height", "uncertainty"]
+FEWEST = 4
+"""Least number of points of a profile."""
 
 VARIANTS = ("calibrate",)
 GENES = (
@@ -47,6 +59,64 @@ EXAMPLE = Measurement(27.9, 3.0)
 """The angle of repose of KNOWN without a field, degrees: the mean of 16 starts, and the standard deviation of
 one start, 2.8, rounded up. ``tests/benchmarks/known_slope.py`` prints both."""
 MEANINGS = {"misfit": "mean squared difference from the measurement, in uncertainties"}
+
+
+@dataclass(frozen=True)
+class MeasuredProfile:
+    """A measured profile: heights of a slope at distances from the end of its cell, with uncertainties.
+
+    distance, height, uncertainty : shape (n,) each, all in one unit of length.
+    """
+
+    distance: np.ndarray
+    height: np.ndarray
+    uncertainty: np.ndarray
+
+    def __post_init__(self) -> None:
+        number = len(self.distance)
+        must(number >= FEWEST, "profile", f"of {FEWEST} points or more", number)
+        rises = bool((np.diff(self.distance) > 0).all() and self.distance[0] >= 0)
+        must(rises, "distance", "rising, and not below 0", self.distance.tolist())
+        sound = bool(np.isfinite(self.height).all() and (self.height >= 0).all() and self.height.max() > 0)
+        must(sound, "height", "finite and not below 0, with some value above 0", self.height.tolist())
+        known = bool(np.isfinite(self.uncertainty).all() and (self.uncertainty > 0).all())
+        must(known, "uncertainty", "finite and above 0", self.uncertainty.tolist())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return a name for each height."""
+        return tuple(f"height at {distance:.10g}" for distance in self.distance)
+
+    def compared(self, place: np.ndarray, height: np.ndarray) -> dict[str, float]:
+        """Return the heights of a simulated profile at the distances of this one, in its unit, by name.
+
+        Both profiles are scaled by the square root of the area below them, so that heaps of any size can be
+        compared if their columns had the same shape. place, height : of the simulated profile, in any unit.
+        """
+        scale = np.sqrt(area(place, height) / area(self.distance, self.height))
+        there = np.interp(self.distance * scale, place, height, right=0.0) / scale
+        return dict(zip(self.names, there.tolist(), strict=True))
+
+
+def area(place: np.ndarray, height: np.ndarray) -> float:
+    """Return the area below a profile; the height of its first point is continued back to 0."""
+    return float(np.trapezoid(height, place) + place[0] * height[0])
+
+
+Target = Measurement | MeasuredProfile
+"""The target of a calibration: an angle of repose (degrees) or a profile."""
+
+
+def read(path: Path) -> Target:
+    """Return the target in a CSV file; InputError if the file is not CSV or contains no slope."""
+    heading, rows = read_table(path, HEADING, PROFILE)
+    if heading == HEADING:
+        return measurements(path, rows, ANGLE_UNITS)["angle_of_repose"]
+    try:
+        numbers = np.array([[float(cell) for cell in row] for row in rows]).reshape(-1, len(PROFILE))
+    except ValueError:
+        raise InputError(f"{path} must be of numbers below its heading; received something else") from None
+    return MeasuredProfile(*numbers.T)
 
 
 def simulated(result: Result, target: Target) -> dict[str, float]:
@@ -76,7 +146,7 @@ def problem(size: str = "default", variant: str = "calibrate") -> Problem:
 
 
 def calibration(size: str, variant: str, path: Path) -> Problem:
-    """Return the calibration to a CSV file in the format of ``measured``."""
+    """Return the calibration to the measurement in a CSV file."""
     return _problem(size, variant, read(path))
 
 

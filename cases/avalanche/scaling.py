@@ -1,8 +1,6 @@
 """Scaling of magnetism in a bed: the attraction of two touching grains over their weight (L21 section 4.5),
 and the eigenvalues of mutual magnetisation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -11,7 +9,7 @@ from scipy.linalg import eigvalsh
 
 from tisim.analysis import nearest_image
 from tisim.cases.avalanche.scene import CUTOFF, DENSITY, FLUX, GRAVITY, SUSCEPTIBILITY
-from tisim.cases.dipoles import attraction_in_line
+from tisim.cases.common.two_spheres import attraction_in_line
 from tisim.scene.initial_state import Arrays
 
 CONTRAST = SUSCEPTIBILITY / (3 + SUSCEPTIBILITY)

@@ -1,8 +1,5 @@
 """A blast of charged particles in air and a magnetic field (Z16), and its inverse problem."""
 
-from __future__ import annotations
-
-from tisim.cases.blast.accuracy import quantities
 from tisim.cases.blast.scene import SIZES, TITLE, scene_for
 from tisim.cases.case import Case, Late
 
@@ -13,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.blast.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.blast.shape", "quantities"),
     problem=Late("tisim.cases.blast.problem", "problem"),
     variants=("ellipsoid",),
     pictures=Late("tisim.cases.blast.figures", "pictures"),

@@ -1,15 +1,12 @@
 """Checks of the blast: numbers of Z16, and comparisons of runs with closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
 
 from tisim import Result, run
-from tisim.cases.blast.accuracy import half_axes
 from tisim.cases.blast.scene import AIR, ENERGY, FLUX, MASS, RADIUS, SPECIFIC_CHARGE, SPEED, scene
-from tisim.cases.blast.shape import ellipsoid
+from tisim.cases.blast.shape import ellipsoid, half_axes
 from tisim.cases.case import Check
 
 

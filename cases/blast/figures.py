@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +13,10 @@ from matplotlib.figure import Figure
 
 from tisim import Recording, run
 from tisim.cases.blast import scene as blast
-from tisim.cases.blast.accuracy import half_axes
-from tisim.cases.blast.shape import contacts, extents
+from tisim.cases.blast.shape import contacts, extents, half_axes
 from tisim.cases.case import size_named
-from tisim.cases.runs import sound
+from tisim.cases.common.csv_tables import csv_text
+from tisim.cases.common.runs import sound
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frame, Frames, frames
 from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel
@@ -235,10 +233,10 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
 
 def table(histories: Mapping[str, BlastHistory]) -> str:
     """Return the half axes and contacts of all runs over time as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(["run", "time_s", "half_axis_x_m", "half_axis_y_m", "half_axis_z_m", "pairs_that_touch"])
+    rows: list[list[object]] = [
+        ["run", "time_s", "half_axis_x_m", "half_axis_y_m", "half_axis_z_m", "pairs_that_touch"]
+    ]
     for name, history in histories.items():
         for time, axes, pairs in zip(history.time, history.axes, history.touching, strict=True):
-            writer.writerow([name, float(time), *map(float, axes), int(pairs)])
-    return text.getvalue()
+            rows.append([name, float(time), *map(float, axes), int(pairs)])
+    return csv_text(rows)

@@ -6,8 +6,6 @@ default, the target is the ellipsoid that TARGET_FLUX gives in closed form, and 
 field.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -17,8 +15,7 @@ from tisim.cases.blast import scene as blast
 from tisim.cases.blast.shape import ball, ellipsoid, moments, principal_half_axes
 from tisim.cases.case import size_named
 from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.problem import Problem
+from tisim.optimize import Gene, Genome, Problem
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("ellipsoid",)

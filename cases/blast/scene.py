@@ -9,8 +9,6 @@ Z16 (6.3) gives 56504.7 for the ratio of magnetic force to drag at the start. Wi
 the paper, 1.225 kg/m^3, the ratio is 46126.3 (1 kg/m^3 gives 56504.8).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

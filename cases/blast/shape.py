@@ -11,12 +11,14 @@ d = v t along the field, at psi = 0, and d = (2 v/w) |sin(w t/2)| across it, tur
 Drag reduces the speed by 1 part in 1000 in the second that Z16 shows.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tisim import Result, Scene
+from tisim.accuracy import Quantity
+from tisim.accuracy.quantity import displacement
 from tisim.cases.blast.scene import SPECIFIC_CHARGE, SPEED
+from tisim.effects import PairForce
 from tisim.scene.initial_state import Arrays
 
 
@@ -60,3 +62,23 @@ def contacts(state: Arrays) -> int:
     """Return the number of pairs of equal spheres that touch or overlap."""
     reach = 2.0 * float(state["radius"].max())
     return len(cKDTree(state["position"]).query_pairs(reach))
+
+
+def half_axes(state: Arrays) -> np.ndarray:
+    """Return the half axes, m, of the ellipsoid with the second moments of the cloud: sqrt(5 <r_k^2>) for x,
+    y, z."""
+    r = state["position"] - np.average(state["position"], axis=0, weights=state["mass"])
+    return np.sqrt(5.0 * np.average(r**2, axis=0, weights=state["mass"]))
+
+
+def of_the_end(result: Result) -> np.ndarray:
+    """Return the half axes of the cloud at the end of a run, m."""
+    return half_axes(result.state)
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``: the positions, or the shape over random starts if particles
+    touch, because their paths are then chaotic."""
+    if any(isinstance(effect, PairForce) for effect in scene.effects):
+        return (Quantity("half-axes of the cloud", of_the_end, random=True),)
+    return (Quantity("positions", displacement, returns=True),)

@@ -1,7 +1,5 @@
 """Magnetic colloids that a magnetised fibre captures (B16 chapter 6), and its inverse problem, a filter."""
 
-from __future__ import annotations
-
 from tisim.cases.capture.scene import SIZES, scene_for
 from tisim.cases.case import Case, Late
 
@@ -12,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.capture.statistics", "check"),
-    quantities=Late("tisim.cases.capture.accuracy", "quantities"),
+    quantities=Late("tisim.cases.capture.statistics", "quantities"),
     problem=Late("tisim.cases.capture.problem", "problem"),
     variants=("fraction", "hard", "throughput"),
     pictures=Late("tisim.cases.capture.figures", "pictures"),

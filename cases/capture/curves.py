@@ -1,10 +1,6 @@
 """Captured fractions of the case capture over time and at the end, by angle, particle size and aspect
 ratio."""
 
-from __future__ import annotations
-
-import csv
-import io
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -26,6 +22,8 @@ from tisim.cases.capture.statistics import (
     mean,
     results,
 )
+from tisim.cases.common.csv_tables import csv_text
+from tisim.cases.common.magnetic_fibre import SATURATION_MOMENTS
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.plotting.style import empty, legend_beside, letters, plain
 
@@ -47,7 +45,7 @@ def figures(progress: Progress) -> Mapping[str, Figure | str]:
         for n in (75, 212) for part in ("top", "side") for a in ANGLES
     ]  # fmt: skip
     sizes: list[Settings] = [
-        {"nanometres": n, "angle": a, "aspect": 20.0} for n in capture.SATURATION_MOMENTS for a in ANGLES
+        {"nanometres": n, "angle": a, "aspect": 20.0} for n in SATURATION_MOMENTS for a in ANGLES
     ]
     aspects: list[Settings] = [
         {"nanometres": n, "angle": a, "aspect": r} for n in SOME for r in ASPECTS for a in ANGLES
@@ -114,9 +112,7 @@ def in_time_by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
 
 
 def by_size(axis: Axes, rows: Sequence[Row]) -> None:
-    for n, colour in zip(
-        capture.SATURATION_MOMENTS, _colours("plasma", len(capture.SATURATION_MOMENTS)), strict=True
-    ):
+    for n, colour in zip(SATURATION_MOMENTS, _colours("plasma", len(SATURATION_MOMENTS)), strict=True):
         means = [mean(group) for settings, group in rows if settings["nanometres"] == n]
         bars(axis, ANGLES, means, colour, f"{n} nm")
     axis.set(xlabel="angle of the axis to the field (°)", ylabel="captured fraction after 50 s")
@@ -152,15 +148,15 @@ def bars(
 
 def table(rows: Sequence[Row]) -> str:
     """Return the captured fractions at the end as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(["radius_nm", "angle_deg", "aspect", "part", "repeats", "captured", "half_width_95"])
+    lines: list[list[object]] = [
+        ["radius_nm", "angle_deg", "aspect", "part", "repeats", "captured", "half_width_95"]
+    ]
     for settings, group in rows:
         m = mean(group)
         part = settings.get("part", "all")
-        writer.writerow([settings["nanometres"], settings["angle"], settings["aspect"], part, len(group),
-                         m.value, m.half])  # fmt: skip
-    return text.getvalue()
+        setting = (settings["nanometres"], settings["angle"], settings["aspect"], part)
+        lines.append([*setting, len(group), m.value, m.half])
+    return csv_text(lines)
 
 
 def _colours(name: str, number: int) -> np.ndarray:

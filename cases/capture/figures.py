@@ -1,7 +1,5 @@
 """Figures of the case capture: figures of one run, and of its magnet."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,7 +11,7 @@ from matplotlib.figure import Figure
 from tisim import Scene
 from tisim.cases.capture import curves
 from tisim.cases.capture import scene as capture
-from tisim.cases.capture.statistics import MICRO
+from tisim.cases.common.magnetic_fibre import MICRO
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames
 from tisim.plotting.style import TIME, empty, letters, plain

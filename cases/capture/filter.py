@@ -2,10 +2,9 @@
 
 Fibres of one size lie along z, side by side in successive layers, in a uniform field in any direction of the
 xz plane. The water flows along y. The field determines the magnetisation of fibres of soft steel
-(soft_magnet.py). The flow is uniform, as in B16: its deflection by the fibres is neglected.
+(``tisim/sources/magnetic/soft_magnet.py``). The flow is uniform, as in B16: its deflection by the fibres is
+neglected.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import islice, product
@@ -13,14 +12,8 @@ from itertools import islice, product
 import numpy as np
 
 from tisim import Cloud, RandomInBox, Scene
-from tisim.cases.capture.scene import (
-    DENSITY,
-    DIAMETER,
-    SATURATION_MAGNETISATION,
-    SATURATION_MOMENTS,
-    TEMPERATURE,
-    VISCOSITY,
-)
+from tisim.cases.capture.scene import DENSITY
+from tisim.cases.common import magnetic_fibre as b16
 from tisim.components.component import Vector
 from tisim.effects import LangevinMoment, Magnetophoresis
 from tisim.errors import must
@@ -29,11 +22,11 @@ from tisim.sources import Cylinder, MagneticCylinders, MagneticField, UniformFlo
 from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.steppers import Brownian, DriftLimit
 
-WIRE = 20 * DIAMETER
+WIRE = 20 * b16.FIBRE_DIAMETER
 """Largest total length of the fibres, m: the length of one of B16's longest."""
-CHANNEL_WIDTH, CHANNEL_HEIGHT = 6 * DIAMETER, 20 * DIAMETER
+CHANNEL_WIDTH, CHANNEL_HEIGHT = 6 * b16.FIBRE_DIAMETER, 20 * b16.FIBRE_DIAMETER
 """Width of the channel along x and height along z, m."""
-UPSTREAM, SLAB, DOWNSTREAM = 3 * DIAMETER, DIAMETER, 2 * DIAMETER
+UPSTREAM, SLAB, DOWNSTREAM = 3 * b16.FIBRE_DIAMETER, b16.FIBRE_DIAMETER, 2 * b16.FIBRE_DIAMETER
 """Distance between the starting slab and the first layer, thickness of that slab, and distance behind the
 last layer at which the simulation ends, m."""
 FILTER_PARTICLES = 120
@@ -75,14 +68,16 @@ class Filter:
     @property
     def length(self) -> float:
         """Return the length of a fibre, m."""
-        return self.aspect * DIAMETER
+        return self.aspect * b16.FIBRE_DIAMETER
 
     def magnetisation(self) -> Vector:
         """Return the magnetisation of the fibres, A/m."""
         if self.magnetisation_angle is not None:
-            return _in_plane(SATURATION_MAGNETISATION, self.magnetisation_angle)
+            return _in_plane(b16.SATURATION_MAGNETISATION, self.magnetisation_angle)
         field = _in_plane(self.flux, self.field_angle)
-        return magnetisation((0.0, 0.0, 1.0), DIAMETER / 2, self.length, SATURATION_MAGNETISATION, field)
+        return magnetisation(
+            (0.0, 0.0, 1.0), b16.FIBRE_DIAMETER / 2, self.length, b16.SATURATION_MAGNETISATION, field
+        )
 
     def places(self) -> list[Vector]:
         """Return the centres of the fibres, m: layer after layer, each from its middle outwards.
@@ -92,8 +87,11 @@ class Filter:
         count = round(self.number)
         must(count >= 1, "number of fibres", "at least 1", count)
         must(count * self.length <= WIRE * (1 + 1e-9), "wire", f"at most {WIRE:g} m", count * self.length)
-        across, along = self.spacing * DIAMETER, self.length + (self.spacing - 1) * DIAMETER
-        columns = _row(1 + int((CHANNEL_WIDTH - DIAMETER) / across + 1e-9), across)
+        across, along = (
+            self.spacing * b16.FIBRE_DIAMETER,
+            self.length + (self.spacing - 1) * b16.FIBRE_DIAMETER,
+        )
+        columns = _row(1 + int((CHANNEL_WIDTH - b16.FIBRE_DIAMETER) / across + 1e-9), across)
         rows = _row(1 + int((CHANNEL_HEIGHT - self.length) / along + 1e-9), along)
         layer = sorted(product(columns, rows), key=lambda at: (at[0] ** 2 + at[1] ** 2, at))
         layers = ((x, k * across, z) for k in range(count) for x, z in layer)
@@ -105,9 +103,9 @@ class Filter:
         start = -UPSTREAM - SLAB
         way = places[-1][1] + DOWNSTREAM - start
         half = np.array([CHANNEL_WIDTH, CHANNEL_HEIGHT]) / 2
-        fibre = {"radius": DIAMETER / 2, "length": self.length}
+        fibre = {"radius": b16.FIBRE_DIAMETER / 2, "length": self.length}
         magnetised = self.magnetisation()
-        moment = SATURATION_MOMENTS[LARGEST] * (self.radius / LARGEST) ** 3
+        moment = b16.SATURATION_MOMENTS[LARGEST] * (self.radius / LARGEST) ** 3
         return Scene(
             name="filter",
             particles=Cloud(
@@ -126,13 +124,13 @@ class Filter:
                     table_digits=TABLE_DIGITS,
                 ),
                 UniformFlow(velocity=(0.0, self.speed, 0.0)),
-                LangevinMoment(temperature=TEMPERATURE),
+                LangevinMoment(temperature=b16.WATER_TEMPERATURE),
                 Magnetophoresis(),
                 Capture(),
             ),
             stepper=Brownian(
-                temperature=TEMPERATURE,
-                viscosity=VISCOSITY,
+                temperature=b16.WATER_TEMPERATURE,
+                viscosity=b16.WATER_VISCOSITY,
                 control=DriftLimit(longest=CARRIED / self.speed, shortest=1e-9, drift=PUSHED / radius),
             ),
             duration=way / self.speed,

@@ -9,8 +9,6 @@ axis lies across the field and not along it (section 6.4.2). It is short, becaus
 to its own volume is larger for short cylinders (6.4.1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -19,11 +17,9 @@ from matplotlib.patches import Rectangle
 
 from tisim import Result
 from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
-from tisim.cases.capture.scene import SATURATION_MAGNETISATION
+from tisim.cases.common.magnetic_fibre import SATURATION_MAGNETISATION
 from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.objective import Objective
-from tisim.optimize.problem.problem import Problem
+from tisim.optimize import Gene, Genome, Objective, Problem
 from tisim.plotting.style import empty, letters, plain
 from tisim.sources import MagneticCylinders, UniformFlow
 

@@ -9,33 +9,16 @@ The paper draws its start regions TOP and SIDE but does not give their width. He
 radius wide and together form the layer around the cylinder; ``part`` chooses one of them.
 """
 
-from __future__ import annotations
-
-import numpy as np
-
 from tisim import Cloud, RandomAroundCylinder, Scene
 from tisim.cases.case import Size, size_named
-from tisim.components.component import Vector
+from tisim.cases.common import magnetic_fibre as b16
 from tisim.effects import FixedMoment, Magnetophoresis
 from tisim.operators import Capture
-from tisim.sources import Cylinder, MagneticCylinders, MagneticField
-from tisim.sources.magnetic.stoner_wohlfarth import magnetisation
+from tisim.sources import MagneticCylinders, MagneticField
 from tisim.steppers import Brownian, DriftLimit
 
-DIAMETER, SATURATION_MAGNETISATION, FLUX = 600e-6, 985e3, 1.0
-"""The cylinder's diameter, m, and magnetisation, A/m; the flux density along x, T (B16 section 6.3)."""
-TEMPERATURE, VISCOSITY, DURATION, NUMBER = 298.0, 1e-3, 50.0, 100
-"""The water's temperature, K, and viscosity, Pa s; duration, s, and number of particles of a run (B16 section
-6.3)."""
-SATURATION_MOMENTS = {
-    25: 0.016e-16,
-    50: 0.344e-16,
-    75: 0.870e-16,
-    100: 0.662e-16,
-    125: 5.151e-16,
-    212: 19.35e-16,
-}
-"""The saturation moment of a particle, A m^2, by its hydrodynamic radius in nm (B16 table 6.1)."""
+DURATION, NUMBER = 50.0, 100
+"""Duration, s, and number of particles of a run (B16 section 6.3)."""
 DENSITY = 1500.0
 """The density of particles, kg/m^3. It has no effect without inertia and gravity."""
 LONGEST_MOVE, LONGEST_STEP = 2e-6, 0.05
@@ -54,18 +37,6 @@ SIZES = {
 }
 
 
-def axis(angle: float) -> Vector:
-    """Return the axis of a cylinder at an angle (degrees) to the field, which is along x."""
-    return float(np.cos(np.radians(angle))), 0.0, float(np.sin(np.radians(angle)))
-
-
-def fibre(along: Vector, aspect: float, flux: Vector = (FLUX, 0.0, 0.0)) -> Cylinder:
-    """Return a saturated cylinder of length over diameter ``aspect`` at the origin, in a field (T)."""
-    radius, length = DIAMETER / 2, aspect * DIAMETER
-    m = magnetisation(along, radius, length, SATURATION_MAGNETISATION, flux)
-    return Cylinder(axis=along, radius=radius, length=length, magnetisation=m)
-
-
 def scene(
     nanometres: int = 125,
     angle: float = 90.0,
@@ -81,7 +52,7 @@ def scene(
     part : of the layer in which particles start: "top", beyond both ends; "side", beside the rest; or "all".
     duration : s.
     """
-    body = fibre(axis(angle), aspect)
+    body = b16.fibre(angle, aspect)
     radius = nanometres * 1e-9
     return Scene(
         name="capture",
@@ -92,18 +63,18 @@ def scene(
             placement=RandomAroundCylinder(
                 axis=body.axis, radius=body.radius, length=body.length, thickness=body.radius, part=part
             ),
-            quantities={"saturation_moment": SATURATION_MOMENTS[nanometres]},
+            quantities={"saturation_moment": b16.SATURATION_MOMENTS[nanometres]},
         ),
         effects=(
-            MagneticField(constant=(FLUX, 0.0, 0.0)),
+            MagneticField(constant=(b16.APPLIED_FLUX, 0.0, 0.0)),
             MagneticCylinders(cylinders=(body,)),
             FixedMoment(),
             Magnetophoresis(),
             Capture(),
         ),
         stepper=Brownian(
-            temperature=TEMPERATURE,
-            viscosity=VISCOSITY,
+            temperature=b16.WATER_TEMPERATURE,
+            viscosity=b16.WATER_VISCOSITY,
             control=DriftLimit(longest=LONGEST_STEP, shortest=1e-9, drift=LONGEST_MOVE / radius),
         ),
         duration=duration,

@@ -6,19 +6,18 @@ changes that a setting makes. Fractions of one start are therefore not independe
 and averaged start by start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from tisim import Result, Scene, run
+from tisim import Result, Scene
+from tisim.accuracy import Quantity
 from tisim.analysis import Mean
 from tisim.cases.capture import scene as capture
-from tisim.cases.case import Check
-from tisim.cases.runs import sound
-from tisim.cases.statistics import Claim
+from tisim.cases.case import Check, Claim
+from tisim.cases.common.magnetic_fibre import SATURATION_MOMENTS
+from tisim.cases.common.runs import grouped
 from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
 
@@ -28,8 +27,6 @@ ASPECTS = (5 / 3, 10 / 3, 20 / 3, 20.0)
 """The swept ratios of the cylinder's length to its diameter (B16 section 6.4.3)."""
 CHECK_REPEATS = 30
 """Number of starts of each setting in the checks, as in B16 section 6.3."""
-MICRO = 1e-6
-"""A micrometre, m."""
 
 Settings = Mapping[str, Any]
 
@@ -41,12 +38,6 @@ def results(
     fails."""
     scenes = [capture.scene(**setting, seed=seed) for setting in settings for seed in range(repeats)]
     return grouped(scenes, repeats, progress)
-
-
-def grouped(scenes: Sequence[Scene], repeats: int, progress: Progress | None = None) -> list[list[Result]]:
-    """Return results of scenes in groups of ``repeats``; RunError if one fails."""
-    runs = sound(run(scenes, progress))
-    return [runs[k : k + repeats] for k in range(0, len(runs), repeats)]
 
 
 def fraction(state: Arrays, time: float = np.inf) -> float:
@@ -132,7 +123,7 @@ def of_aspect(repeats: int) -> Iterator[Claim]:
 def of_size(repeats: int) -> Iterator[Claim]:
     """Sections 6.4.2 and 6.4.4: particles of 50 nm and more are captured within 50 s, particles of 25 nm are
     not."""
-    sizes = tuple(capture.SATURATION_MOMENTS)
+    sizes = tuple(SATURATION_MOMENTS)
     settings = [{"nanometres": size, "angle": 90.0, "aspect": 5 / 3} for size in sizes]
     by_size = dict(zip(sizes, results(settings, repeats), strict=True))
     for size in sizes[1:]:
@@ -140,3 +131,8 @@ def of_size(repeats: int) -> Iterator[Claim]:
     yield Claim("25 nm captured within 50 s, transverse, L/D 5/3", mean(by_size[25]), most=0.5)
     late = Mean.of([fraction(r.state) - fraction(r.state, 25.0) for r in by_size[25]])
     yield Claim("25 nm: fraction captured in the second half of the time", late, least=0.05)
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantity of ``tisim cost``: the captured fraction, as paths of particles are random."""
+    return (Quantity("captured fraction", lambda result: fraction(result.state), random=True),)

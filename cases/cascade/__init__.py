@@ -1,7 +1,5 @@
 """Capture by successive fibres: the cascade of B16 section 6.4.5."""
 
-from __future__ import annotations
-
 from tisim.cases.capture import CASE as CAPTURE
 from tisim.cases.cascade.scene import SIZES, scene_for
 from tisim.cases.case import Case, Late

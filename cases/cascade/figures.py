@@ -1,10 +1,6 @@
 """Figures of the case cascade: captured fractions over time, and a comparison of random and optimal
 cascades."""
 
-from __future__ import annotations
-
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
@@ -14,9 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tisim.analysis import Mean
-from tisim.cases.cascade.capture_times import CAPTURED_SHARE, captured_at, time_to
 from tisim.cases.cascade.scene import STAGE, Cascade, Orientation
-from tisim.cases.cascade.statistics import OFF, ORIENTATIONS, PUBLISHED_TIMES, RANDOM
+from tisim.cases.cascade.statistics import (
+    CAPTURED_SHARE,
+    OFF,
+    ORIENTATIONS,
+    PUBLISHED_TIMES,
+    RANDOM,
+    captured_at,
+    time_to,
+)
+from tisim.cases.common.csv_tables import csv_text
 from tisim.engine.batches import Progress
 from tisim.plotting.style import empty, legend_beside, letters, plain
 
@@ -135,11 +139,9 @@ def ratio(times_of: Times, one: Cascade) -> Mean:
 
 def table(times_of: Times) -> str:
     """Return the time to 90 % of each cascade, as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
     names = [field.name for field in fields(Cascade)]
-    writer.writerow([*names, "repeats", "s_to_90_percent", "half_width_95"])
+    rows: list[list[object]] = [[*names, "repeats", "s_to_90_percent", "half_width_95"]]
     for one, times in times_of.items():
         m = Mean.of(time_to(CAPTURED_SHARE, times))
-        writer.writerow([*(getattr(one, name) for name in names), len(times), m.value, m.half])
-    return text.getvalue()
+        rows.append([*(getattr(one, name) for name in names), len(times), m.value, m.half])
+    return csv_text(rows)

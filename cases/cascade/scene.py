@@ -1,5 +1,7 @@
 """Capture by successive fibres: the cascade of B16 section 6.4.5.
 
+It continues the case capture: every stage of a cascade is a run of that case.
+
 N particles spend ``stage`` seconds about one cylinder. The particles that it has not captured are then placed
 at random around a cylinder of another orientation, and so on. "optimal": every cylinder lies across the
 field. "directions": each has a random direction, with a uniform distribution over all directions. "angles":
@@ -9,8 +11,6 @@ B16 uses elsewhere (section 6.4.3).
 B16 does not say which of the two its random orientation is, nor gives L/D or the start positions. Here
 particles start in a layer ``thickness`` wide and ``gap`` away from the cylinder, both in units of its radius.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal

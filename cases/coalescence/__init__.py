@@ -1,9 +1,6 @@
 """Magnetised grains coalesce into a rubble pile."""
 
-from __future__ import annotations
-
 from tisim.cases.case import Case, Late
-from tisim.cases.coalescence.accuracy import quantities
 from tisim.cases.coalescence.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
@@ -13,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.coalescence.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.coalescence.runs", "quantities"),
     cost_size="small",
     figures=Late("tisim.cases.coalescence.figures", "figures"),
 )

@@ -1,29 +1,17 @@
 """Checks of coalescing clouds: findings of L21 that a copy with few grains reproduces, and relations that
 hold exactly."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from tisim.analysis import Mean
-from tisim.cases.case import Check
-from tisim.cases.coalescence.published import (
-    AXES,
-    BOUND,
-    DENSITY,
-    DIAMETERS,
-    GASPRA,
-    MAGNETISATIONS,
-    ROTATIONS,
-    SPACING,
-)
+from tisim.cases.case import Check, Claim, Shown
+from tisim.cases.coalescence import published
 from tisim.cases.coalescence.regime import COMPARED, regime
 from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
-from tisim.cases.coalescence.scaling import critical_spin, mean_density
 from tisim.cases.coalescence.scene import DEFAULT, scene
-from tisim.cases.statistics import Claim, Shown
+from tisim.cases.common.rubble_pile import critical_spin, mean_density
 
 ROUNDING = 1e-11
 """Largest change of a momentum, relative to the sum of its magnitudes over the grains."""
@@ -46,14 +34,14 @@ def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
 
 def of_the_cloud() -> Iterator[Check]:
     """Yield the critical rotation of L21's cloud from its second moments, and from a ball of its density."""
-    for d in DIAMETERS:
-        start = scene(diameter=d, rotation=ROTATIONS[1], magnetisation=0.0).start()
+    for d in published.DIAMETERS:
+        start = scene(diameter=d, rotation=published.ROTATIONS[1], magnetisation=0.0).start()
         mass, place = start["mass"][1:], start["position"][1:]
         # The radius of the ball with the second moments of the lattice.
         radius = np.sqrt(5 / 3 * np.average((place**2).sum(axis=1), weights=mass))
         density = mass.sum() / (4 / 3 * np.pi * radius**3)
         turns = critical_spin(density)
-        expected = critical_spin(mean_density(d, SPACING, DENSITY))
+        expected = critical_spin(mean_density(d, published.SPACING, published.DENSITY))
         yield Check(f"{1e2 * d:g} cm: critical spin of the cloud, urad/s", 1e6 * turns, 1e6 * expected, 2.0)
 
 
@@ -81,8 +69,8 @@ def _gained(run: CloudRun) -> float:
 
 def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
     """Yield the rate of agglomeration, which increases with magnetisation (L21 section 4.2.2.1)."""
-    for m in MAGNETISATIONS:
-        group, theirs = of_magnetisation(runs, m), BOUND[m]
+    for m in published.MAGNETISATIONS:
+        group, theirs = of_magnetisation(runs, m), published.BOUND[m]
         for name, least, part in (("two or more", "some", theirs.some), ("over ten", "many", theirs.many)):
             mean = Mean.of([getattr(one.at(COMPARED), least) for one in group])
             beside = f"L21, 50 cm: {part:.3g}"
@@ -108,7 +96,7 @@ def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
         of=119.0,
     )
     yield Shown(weak.name, weak.mean)
-    for m in MAGNETISATIONS[1:]:
+    for m in published.MAGNETISATIONS[1:]:
         group = of_magnetisation(runs, m)
         for when, chains in (
             (f"at {COMPARED:.0f} s", [one.at(COMPARED).chain for one in group]),
@@ -123,26 +111,28 @@ def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
     The bulk magnetisation is compared with the magnetisation of the grains (L21 sections 4.2.2.2, 4.2.2.3,
     4.6).
     """
-    for m in MAGNETISATIONS:
+    for m in published.MAGNETISATIONS:
         asteroids = [one.asteroid for one in of_magnetisation(runs, m)]
         yield Shown(f"{m:g} A/m: density, kg/m^3", Mean.of([one.density for one in asteroids]))
-        axes = AXES[DIAMETERS[1], ROTATIONS[1], m]
+        axes = published.AXES[published.DIAMETERS[1], published.ROTATIONS[1], m]
         beside = f"L21: {axes[0] / axes[2]:.2f}"
         name = f"{m:g} A/m: longest axis over shortest"
         yield Shown(name, Mean.of([one.elongation for one in asteroids]), beside)
     yield _difference(
         "density, 1190 minus 0 A/m, kg/m^3", runs, lambda one: one.asteroid.density, most=-LOOSER
     )
-    strong = of_magnetisation(runs, MAGNETISATIONS[-1])
-    bulk = [MAGNETISATIONS[-1] * one.magnetised_part for one in strong]
-    yield Claim("1190 A/m: bulk magnetisation, A/m (L21: below Gaspra's)", Mean.of(bulk), most=GASPRA)
+    strong = of_magnetisation(runs, published.MAGNETISATIONS[-1])
+    bulk = [published.MAGNETISATIONS[-1] * one.magnetised_part for one in strong]
+    yield Claim(
+        "1190 A/m: bulk magnetisation, A/m (L21: below Gaspra's)", Mean.of(bulk), most=published.GASPRA
+    )
 
 
 def _difference(
     name: str,
     runs: Sequence[CloudRun],
     value: Callable[[CloudRun], float],
-    of: float = MAGNETISATIONS[-1],
+    of: float = published.MAGNETISATIONS[-1],
     **bounds: float,
 ) -> Claim:
     """Return the claim on the difference between magnetised and unmagnetised clouds from the same starts."""

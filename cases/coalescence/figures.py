@@ -1,10 +1,6 @@
 """Figures of the case coalescence: agglomeration over time, final asteroids side by side, and forces by grain
 size."""
 
-from __future__ import annotations
-
-import csv
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,23 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tisim.analysis import voronoi_by_shell
-from tisim.cases.coalescence.measures import clusters_of, part
-from tisim.cases.coalescence.published import (
-    DENSITY,
-    DIAMETERS,
-    MAGNETISATIONS,
-    SURFACE_ENERGY,
-)
-from tisim.cases.coalescence.regime import ACCELERATION
+from tisim.cases.coalescence import published, regime
 from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_all_magnetisations, of_magnetisation
-from tisim.cases.coalescence.scaling import (
-    attraction,
-    dmt_cohesion,
-    mutual_gravity,
-    surface_cohesion,
-    surface_weight,
-)
 from tisim.cases.coalescence.scene import SIZES
+from tisim.cases.common.csv_tables import csv_text
+from tisim.cases.common.rubble_pile import clusters_of, part
+from tisim.cases.common.two_spheres import attraction
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, directions, panel, project
 from tisim.plotting.clusters import cluster_colours
@@ -50,7 +35,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     runs = clouds(SEEDS, progress, **of_all_magnetisations(size, SIZES))
     return {
         "coalescence.png": growth(runs),
-        "asteroids.png": asteroids([of_magnetisation(runs, m)[0] for m in MAGNETISATIONS]),
+        "asteroids.png": asteroids([of_magnetisation(runs, m)[0] for m in published.MAGNETISATIONS]),
         "forces.png": forces(),
         "coalescence.csv": table(runs),
     }
@@ -64,7 +49,7 @@ def growth(runs: Sequence[CloudRun]) -> Figure:
     """
     figure = empty(11.6, 3.6)
     left, middle, right = figure.subplots(1, 3)
-    for m, colour in zip(MAGNETISATIONS, AXIS_COLOURS, strict=True):
+    for m, colour in zip(published.MAGNETISATIONS, AXIS_COLOURS, strict=True):
         group = of_magnetisation(runs, m)
         for axis, name in ((left, "bound"), (middle, "coalesced")):
             values = np.array([[getattr(a, name) for a in one.agglomerations] for one in group])
@@ -132,16 +117,19 @@ def forces() -> Figure:
     figure = empty(5.8, 4.2)
     axis = figure.subplots()
     line = np.geomspace(1e-4, 1e2, 60)
-    for m, colour in zip(MAGNETISATIONS[1:], AXIS_COLOURS[1:], strict=True):
+    for m, colour in zip(published.MAGNETISATIONS[1:], AXIS_COLOURS[1:], strict=True):
         axis.plot(line, [attraction(d, m) for d in line], color=colour, label=f"dipoles, {m:g} A/m")
-    weight = [surface_weight(d, DENSITY, ACCELERATION) for d in line]
-    axis.plot(line, weight, color=AXIS_COLOURS[0], label="weight at 5e-6 m/s²")
-    axis.plot(
-        line, [mutual_gravity(d, DENSITY) for d in line], ":", color=AXIS_COLOURS[0], label="self-gravity"
+    density, energy = published.DENSITY, published.SURFACE_ENERGY
+    laws = (
+        ("weight at 5e-6 m/s²", "-", lambda d: regime.surface_weight(d, density, regime.ACCELERATION)),
+        ("self-gravity", ":", lambda d: regime.mutual_gravity(d, density)),
+        ("cohesion, S = 0.1", "--", lambda d: regime.surface_cohesion(d, 0.1)),
+        ("cohesion, DMT", "-", lambda d: regime.dmt_cohesion(d, energy)),
     )
-    axis.plot(line, [surface_cohesion(d, 0.1) for d in line], "--", color="0.4", label="cohesion, S = 0.1")
-    axis.plot(line, [dmt_cohesion(d, SURFACE_ENERGY) for d in line], color="0.4", label="cohesion, DMT")
-    for d in DIAMETERS:
+    for k, (name, style, force) in enumerate(laws):
+        colour = AXIS_COLOURS[0] if k < 2 else "0.4"
+        axis.plot(line, [force(d) for d in line], style, color=colour, label=name)
+    for d in published.DIAMETERS:
         axis.axvline(d, color="0.8", lw=0.8, zorder=0)
     axis.set(xscale="log", yscale="log", xlabel="diameter of the grains (m)", ylabel="force (N)")
     axis.set(xlim=(1e-4, 1e2), ylim=(1e-12, 1e6))
@@ -152,19 +140,17 @@ def forces() -> Figure:
 
 def table(runs: Sequence[CloudRun]) -> str:
     """Return the measures of each cloud at the end as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(
+    rows: list[list[object]] = [
         [
             "magnetisation_A_per_m", "seed", "part_in_asteroid", "part_in_clusters", "grains",
             *SEMI_AXES, "density_kg_per_m3", "bulk_over_grain_magnetisation", "chain_length_grains",
         ]
-    )  # fmt: skip
+    ]  # fmt: skip
     for one in runs:
         asteroid, last = one.asteroid, one.agglomerations[-1]
         bulk = one.magnetised_part if one.magnetisation else float("nan")
         values = (last.coalesced, last.bound, asteroid.number, *asteroid.ellipsoid.semi_axes)
         more = (asteroid.density, bulk, last.chain)
         numbers = [f"{value:.4g}" for value in (*values, *more)]
-        writer.writerow([one.magnetisation, one.scene.seed, *numbers])
-    return text.getvalue()
+        rows.append([one.magnetisation, one.scene.seed, *numbers])
+    return csv_text(rows)

@@ -1,7 +1,5 @@
 """Published values of L21 for its clouds and asteroids: section 4.2, each number once."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 NUMBER, SPACING, SEED_DIAMETER = 32_662, 2.0, 5.0

@@ -3,12 +3,15 @@
 Grains start on a lattice in a ball around a seed particle. They have thermal velocities, spins, a common
 rotation, and moments in random directions. Gravity, DMT cohesion and dipole forces hold the pile together.
 
-Departures from L21: fewer grains, in a scaled copy of L21's cloud (``scaling.py``); a smaller seed; dipoles
-over all pairs, without a cut-off; and a slower rotation, because a cloud with the printed rotation flies
-apart.
-"""
+Departures from L21: fewer grains, in a scaled copy of L21's cloud; a smaller seed; dipoles over all pairs,
+without a cut-off; and a slower rotation, because a cloud with the printed rotation flies apart.
 
-from __future__ import annotations
+The collapse time of a cloud depends only on its density, so a cloud of fewer grains on the same lattice
+collapses in the same time, but with weaker gravity. A cloud whose radius is s times as large is a scaled copy
+if all velocities are multiplied by s and all stresses by s^2: Young's modulus, the stresses of cohesion and
+magnetism, and the central pressure (L21 section 4.5). Magnetisations are then multiplied by s, and steps by
+1/s. Only the number of grains across the cloud is not preserved.
+"""
 
 import math
 from collections.abc import Mapping
@@ -20,9 +23,7 @@ from scipy.constants import Boltzmann
 from tisim import Material, Particles, Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.coalescence import published
-from tisim.cases.coalescence.published import DENSITY, DIAMETERS, POISSON, SPACING
-from tisim.cases.coalescence.scaling import sphere_mass
-from tisim.cases.granular_bench.closed_forms import hertz_duration, reduced
+from tisim.cases.common.two_spheres import hertz_duration, reduced, sphere_mass
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import (
     DMT,
@@ -74,7 +75,7 @@ SIZES = {
     "l21_50cm": Size(
         "the same with grains of 50 cm",
         {
-            "diameter": DIAMETERS[0], "rotation": published.ROTATIONS[1], "tree": True,
+            "diameter": published.DIAMETERS[0], "rotation": published.ROTATIONS[1], "tree": True,
             "duration": published.DURATION,
         },
     ),
@@ -120,7 +121,7 @@ def grain_cloud(
     if seed_diameter:
         position = np.vstack([np.zeros(3), position])
         radius = np.append(seed_diameter / 2, radius)
-    mass = sphere_mass(1.0, DENSITY) * (2 * radius) ** 3
+    mass = sphere_mass(1.0, published.DENSITY) * (2 * radius) ** 3
     draw = np.random.default_rng(seed)
     velocity = scale * thermal_speed(diameter, mass)[:, None] * draw.normal(size=position.shape)
     spin = scale * draw.normal(published.SPIN_MEAN, published.SPIN_DEVIATION, position.shape)
@@ -144,7 +145,7 @@ def rubble(scale: float, softened: float = 1.0) -> Material:
     stress = scale * scale
     return Material(
         young=young(scale, softened),
-        poisson=POISSON,
+        poisson=published.POISSON,
         restitution=published.RESTITUTION,
         friction=published.FRICTION,
         rolling_friction=published.ROLLING_FRICTION,
@@ -156,8 +157,8 @@ def rubble(scale: float, softened: float = 1.0) -> Material:
 
 def step(diameter: float, scale: float, softened: float = 1.0, parts: float = STEPS_OF_IMPACT) -> float:
     """Return a step (s): the duration of an impact of two grains at scale * IMPACT, divided by ``parts``."""
-    mass = sphere_mass(diameter, DENSITY)
-    modulus = young(scale, softened) / (2 * (1 - POISSON**2))
+    mass = sphere_mass(diameter, published.DENSITY)
+    modulus = young(scale, softened) / (2 * (1 - published.POISSON**2))
     lasts = hertz_duration(scale * IMPACT, diameter / 4, reduced(mass, mass), modulus)
     return three_digits(float(lasts) / parts)
 
@@ -178,11 +179,11 @@ def rubble_laws(magnetisation: float, tree: bool) -> tuple[Effect, ...]:
 
 def scene(
     number: int = published.NUMBER,
-    diameter: float = DIAMETERS[1],
+    diameter: float = published.DIAMETERS[1],
     magnetisation: float = published.MAGNETISATIONS[-1],
     rotation: float = ROTATION,
     seed_diameter: float = published.SEED_DIAMETER,
-    spacing: float = SPACING,
+    spacing: float = published.SPACING,
     of: int = published.NUMBER,
     duration: float = 10_000.0,
     tree: bool = False,

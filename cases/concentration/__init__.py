@@ -1,8 +1,6 @@
 """Magnetic colloids in a concentration at which they form chains, attracted to a fibre (B16 section
 6.4.6)."""
 
-from __future__ import annotations
-
 from tisim.cases.case import Case, Late
 from tisim.cases.concentration.scene import SIZES, scene_for
 
@@ -13,7 +11,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.concentration.statistics", "check"),
-    quantities=Late("tisim.cases.concentration.accuracy", "quantities"),
+    quantities=Late("tisim.cases.concentration.statistics", "quantities"),
     pictures=Late("tisim.cases.concentration.figures", "pictures"),
     figures=Late("tisim.cases.concentration.figures", "figures"),
 )

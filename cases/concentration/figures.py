@@ -1,9 +1,5 @@
 """Figures of the case concentration: chains, and captured fractions over time."""
 
-from __future__ import annotations
-
-import csv
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +13,8 @@ from matplotlib.figure import Figure
 
 from tisim import Recording, run
 from tisim.analysis import head_to_tail, labels
-from tisim.cases.capture.statistics import MICRO
+from tisim.cases.common.csv_tables import csv_text
+from tisim.cases.common.magnetic_fibre import MICRO
 from tisim.cases.concentration import scene as concentration
 from tisim.cases.concentration.scene import coupling
 from tisim.cases.concentration.statistics import CAPTURE, chain, held_fraction
@@ -140,9 +137,7 @@ def captured_figure(curves: Curves) -> Figure:
 
 def table(curves: Curves) -> str:
     """Return the captured fractions over time as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(["angle_deg", "g_per_mL", "time_s", "touched", "held"])
+    rows: list[list[object]] = [["angle_deg", "g_per_mL", "time_s", "touched", "held"]]
     for (angle, c), parts in curves.items():
-        writer.writerows([angle, c, *row] for row in zip(*parts, strict=True))
-    return text.getvalue()
+        rows.extend([angle, c, *row] for row in zip(*parts, strict=True))
+    return csv_text(rows)

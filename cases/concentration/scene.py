@@ -15,14 +15,12 @@ of a third it fluctuates by 0.008. With three times the step it is 0.09; the cha
 are captured no later (``coarse``).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.constants import Boltzmann, mu_0
 
 from tisim import Cloud, RandomInBox, Scene
-from tisim.cases.capture import scene as capture
 from tisim.cases.case import Size, size_named
+from tisim.cases.common import magnetic_fibre as b16
 from tisim.effects import FixedMoment, Magnetophoresis, Mie, TruncatedDipoleDipole
 from tisim.operators import Capture
 from tisim.sources import MagneticCylinders, MagneticField
@@ -32,7 +30,7 @@ DENSITY = 5000.0
 """The density of particles, kg/m^3 (B16 section 6.4.6)."""
 ASPECT, DISTANCE, CUTOFF = 20.0, 100e-6, 30.0
 """The cylinder's L/D; the distance from its end to the cube, m; the cut-off of dipole forces, radii."""
-WELL = 100 * Boltzmann * capture.TEMPERATURE
+WELL = 100 * Boltzmann * b16.WATER_TEMPERATURE
 """The depth eps of the Mie potential, J."""
 DRIFT, DIFFUSION = 0.05, 0.03
 """Largest displacement of a particle in a step, in radii: by forces, and by noise (standard deviation)."""
@@ -62,8 +60,8 @@ def side(number: int, radius: float, concentration: float) -> float:
 
 def coupling(nanometres: int) -> float:
     """Return Gamma = mu_0 mu^2 / (2 pi d^3 k T), d the diameter (B16 Eq. 6.25)."""
-    moment, diameter = capture.SATURATION_MOMENTS[nanometres], 2e-9 * nanometres
-    return float(mu_0 * moment**2 / (2 * np.pi * diameter**3 * Boltzmann * capture.TEMPERATURE))
+    moment, diameter = b16.SATURATION_MOMENTS[nanometres], 2e-9 * nanometres
+    return float(mu_0 * moment**2 / (2 * np.pi * diameter**3 * Boltzmann * b16.WATER_TEMPERATURE))
 
 
 def chain_length(nanometres: int, concentration: float) -> float:
@@ -78,8 +76,8 @@ def longest(radius: float, coarse: float = 1.0) -> float:
     A longer step can push particles far into each other before the repulsion acts. With ``coarse`` of 5,
     particles of 25 nm at 2 g/mL soon overlap so deeply that no step is short enough; with 3 they do not.
     """
-    drag = 6 * np.pi * capture.VISCOSITY * radius
-    return float((coarse * DIFFUSION * radius) ** 2 * drag / (2 * Boltzmann * capture.TEMPERATURE))
+    drag = 6 * np.pi * b16.WATER_VISCOSITY * radius
+    return float((coarse * DIFFUSION * radius) ** 2 * drag / (2 * Boltzmann * b16.WATER_TEMPERATURE))
 
 
 def scene(
@@ -98,7 +96,7 @@ def scene(
     distance : between the cube and the end, m. coarse : factor on the displacements in a step by noise and
     forces.
     """
-    body = capture.fibre(capture.axis(angle), ASPECT)
+    body = b16.fibre(angle, ASPECT)
     radius = nanometres * 1e-9
     half = side(number, radius, concentration) / 2
     axis = np.asarray(body.direction)
@@ -113,10 +111,10 @@ def scene(
             radius=radius,
             density=DENSITY,
             placement=RandomInBox(low=tuple(low.tolist()), high=tuple(high.tolist())),
-            quantities={"saturation_moment": capture.SATURATION_MOMENTS[nanometres]},
+            quantities={"saturation_moment": b16.SATURATION_MOMENTS[nanometres]},
         ),
         effects=(
-            MagneticField(constant=(capture.FLUX, 0.0, 0.0)),
+            MagneticField(constant=(b16.APPLIED_FLUX, 0.0, 0.0)),
             MagneticCylinders(cylinders=(body,), table_digits=FIELD_DIGITS),
             FixedMoment(),
             Magnetophoresis(),
@@ -125,8 +123,8 @@ def scene(
             Capture(),
         ),
         stepper=Brownian(
-            temperature=capture.TEMPERATURE,
-            viscosity=capture.VISCOSITY,
+            temperature=b16.WATER_TEMPERATURE,
+            viscosity=b16.WATER_VISCOSITY,
             hydrodynamics=hydrodynamics,
             noise="exact" if hydrodynamics == "none" else "fast",
             control=DriftLimit(longest=longest(radius, coarse), shortest=1e-12, drift=coarse * DRIFT),

@@ -1,20 +1,19 @@
 """Chains of magnetic colloids, and the times at which the first of them reach the fibre: B16 section
 6.4.6."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from tisim import Result, RunError
+from tisim import Result, RunError, Scene
+from tisim.accuracy import Quantity
+from tisim.accuracy.quantity import usual
 from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
-from tisim.cases.capture.statistics import grouped
-from tisim.cases.case import Check
+from tisim.cases.case import Check, Claim
+from tisim.cases.common.runs import grouped
 from tisim.cases.concentration import scene as concentration
 from tisim.cases.concentration.scene import chain_length, coupling
-from tisim.cases.statistics import Claim
 from tisim.scene.initial_state import Arrays
 
 GAMMA = {25: 1.0, 125: 825.0}
@@ -152,3 +151,14 @@ def without_interaction(repeats: int) -> list[np.ndarray]:
         for angle in ORIENTATIONS for seed in range(repeats)
     ]  # fmt: skip
     return [firsts(group) for group in grouped(scenes, repeats)]
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``: chain length and displacements of the particles.
+
+    Capture begins only after some tenths of a second.
+    """
+    return (
+        Quantity("mean chain", lambda result: chain(result.state, result.state["moment"]), random=True),
+        *usual(scene),
+    )

@@ -1,11 +1,7 @@
 """Standard tests of contacts in discrete element codes; a heap from a silo; calibration."""
 
-from __future__ import annotations
-
 from tisim.cases.case import Case, Late
-from tisim.cases.granular_bench.accuracy import quantities
-from tisim.cases.granular_bench.scene import BED, SIZES, TITLE
-from tisim.cases.granular_bench.sizes import scene_for
+from tisim.cases.granular_bench.scene import BED, SIZES, TITLE, scene_for
 
 CASE = Case(
     name="granular_bench",
@@ -14,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.granular_bench.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.granular_bench.measures", "quantities"),
     cost_size=BED,
     problem=Late("tisim.cases.granular_bench.problem", "problem"),
     variants=("calibrate",),

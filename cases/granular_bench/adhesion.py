@@ -3,8 +3,6 @@
 The spheres are so heavy that the adhesion does not change their speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -12,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tisim import Material, Particles, Scene
+from tisim.cases.common.runs import sound
 from tisim.cases.granular_bench.impacts import by_id, simulation_of
-from tisim.cases.runs import sound
 from tisim.effects import DMT, JKR, CapillaryBridge, Effect, Granular, HertzMaterial
 from tisim.steppers import FixedStep, Verlet
 
@@ -26,7 +24,7 @@ TENSION, ANGLE, VOLUME = 0.072, 0.4, 1e-12
 """The liquid's surface tension, N/m, contact angle, rad, and volume, m^3."""
 HELD_MASS = 1e9
 """Mass of each sphere, kg."""
-PULL_LOOKS = 400
+PULL_SAMPLES = 400
 """Number of steps; the force is sampled after each."""
 EFFECTS: dict[str, tuple[Effect, ...]] = {
     "dmt": (
@@ -81,7 +79,7 @@ def drawn(name: str, begins: float, ends: float) -> Scene:
             )
         },
         effects=EFFECTS[name],
-        stepper=Verlet(control=FixedStep(dt=1 / PULL_LOOKS)),
+        stepper=Verlet(control=FixedStep(dt=1 / PULL_SAMPLES)),
         duration=1.0,
     )
 
@@ -90,7 +88,7 @@ def pulls(scenes: Sequence[Scene]) -> list[Pull]:
     """Return the pulls of several scenes of one structure, sampled after each step."""
     seen: list[list[tuple[float, float]]] = [[] for _ in scenes]
     with closing(simulation_of(scenes)) as simulation:
-        for _ in range(PULL_LOOKS):
+        for _ in range(PULL_SAMPLES):
             simulation.run(steps=1)
             for rows, result in zip(seen, sound(simulation.results()), strict=True):
                 state = by_id(result)

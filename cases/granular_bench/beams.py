@@ -1,7 +1,5 @@
 """A row of cemented spheres, held at one end and loaded at the other: a beam that bends and breaks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tisim import Particles, Scene

@@ -4,10 +4,6 @@ Each is run from several random starts. The rate of discharge is compared with B
 sqrt(g) (D - k d)^(5/2), by a straight line through W^(2/5): its slope gives C and its zero gives k.
 """
 
-from __future__ import annotations
-
-import csv
-import io
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,9 +16,10 @@ from scipy.constants import g as STANDARD_GRAVITY
 
 from tisim import Result, run
 from tisim.analysis import Mean
+from tisim.cases.common.csv_tables import csv_text
+from tisim.cases.common.runs import sound
 from tisim.cases.granular_bench.measures import discharge, heap, repose
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
-from tisim.cases.runs import sound
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, panel, walls_at
 from tisim.plotting.style import empty, letters, plain
@@ -184,13 +181,11 @@ def table(found: Sequence[Bed]) -> str:
     Columns are the varied property, the angle of repose, the discharge rate of the starts that flow and the
     number of grains in the heap, each with half of its 95 % interval, and the number of starts that flow.
     """
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
     measured = ("angle_of_repose_degrees", "discharge_rate_kg_s", "grains_of_the_heap")
     headings = [name for one in measured for name in (one, f"{one}_95")]
-    writer.writerow(["varied", "value", *headings, "starts_that_flow"])
+    rows: list[list[object]] = [["varied", "value", *headings, "starts_that_flow"]]
     for one in found:
         means = (one.angle, one.mean_rate(), one.kept)
         numbers = [x for mean in means for x in (mean.value, mean.half)]
-        writer.writerow([one.what, one.value, *numbers, one.flowing])
-    return text.getvalue()
+        rows.append([one.what, one.value, *numbers, one.flowing])
+    return csv_text(rows)

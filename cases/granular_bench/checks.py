@@ -1,7 +1,5 @@
 """Standard tests of single contacts in discrete element codes, each compared with its expected value."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -9,23 +7,12 @@ import numpy as np
 
 from tisim import Scene, run
 from tisim.cases.case import Check
-from tisim.cases.granular_bench import adhesion, beams, motions, particle_tests
-from tisim.cases.granular_bench.closed_forms import (
-    bridge_force,
-    bridge_rupture,
-    dmt_pull_off,
-    hertz_depth,
-    hertz_force,
-    jkr_force,
-    jkr_pull_off,
-    jkr_stretch,
-    sliding_impact,
-    sliding_limit,
-)
+from tisim.cases.common.runs import sound
+from tisim.cases.common.two_spheres import hertz_depth, hertz_force
+from tisim.cases.granular_bench import adhesion, beams, closed_forms, motions, particle_tests
 from tisim.cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, force_curves, rebound
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
 from tisim.cases.granular_bench.shear_cell import expected_ratio, sheared_beds
-from tisim.cases.runs import sound
 
 BOUND = 1e-3
 """Largest error of an impact in 800 steps, relative to the approach speed."""
@@ -84,7 +71,7 @@ def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
 def slides_throughout(impact: ParticleImpact) -> bool:
     """Return whether the surface slides throughout an impact, with a margin for an elastic sphere."""
     speed = abs(impact.sideways - impact.radius * impact.spin) / impact.speed
-    return bool(speed > 1.15 * sliding_limit(impact.friction, impact.restitution))
+    return bool(speed > 1.15 * closed_forms.sliding_limit(impact.friction, impact.restitution))
 
 
 def oblique_checks(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
@@ -118,7 +105,7 @@ def sliding_checks(number: int, sliding: Sequence[Rebound]) -> Iterator[Check]:
     for one in sliding:
         impact = one.impact
         args = (impact.approach, impact.friction, impact.restitution, impact.radius, impact.share)
-        change, turn = sliding_impact(*args)
+        change, turn = closed_forms.sliding_impact(*args)
         pushed, turned = abs(one.velocity[0] - impact.sideways), abs(one.spin[1] - impact.spin)
         gains.append((pushed / change, turned / turn))
     (pushed, turned), impact = np.mean(gains, axis=0), sliding[0].impact
@@ -137,7 +124,7 @@ def friction_excess(restitution: float) -> float:
     """
     one = ParticleImpact("glass", 1.0, 1e-3, restitution, 0.01, sideways=1.0)
     ((velocity,), _) = oblique_impacts([one], COARSE)
-    return float((1.0 - velocity) / sliding_impact(1e-3, 0.01, restitution, 1.0)[0])
+    return float((1.0 - velocity) / closed_forms.sliding_impact(1e-3, 0.01, restitution, 1.0)[0])
 
 
 def last_states(*scenes: Scene) -> list[dict[str, np.ndarray]]:
@@ -224,19 +211,21 @@ def sliding_way(lever: float) -> float:
 def pull_offs() -> Iterator[Check]:
     """Yield the adhesion of two spheres that are drawn apart: DMT and a liquid bridge, then JKR."""
     a = adhesion
-    radius, rupture = a.STICKY_RADIUS / 2, bridge_rupture(a.ANGLE, a.VOLUME)
-    stretch = jkr_stretch(a.ENERGY, radius, a.STICKY_MODULUS)
+    radius, rupture = a.STICKY_RADIUS / 2, closed_forms.bridge_rupture(a.ANGLE, a.VOLUME)
+    stretch = closed_forms.jkr_stretch(a.ENERGY, radius, a.STICKY_MODULUS)
     touching, bridge = a.pulls([a.drawn("dmt", 1e-6, 1e-6), a.drawn("bridge", 1e-6, 1.2 * rupture)])
     (jkr,) = a.pulls([a.drawn("jkr", stretch, 1.2 * stretch)])
-    expected = dmt_pull_off(a.ENERGY, radius)
+    expected = closed_forms.dmt_pull_off(a.ENERGY, radius)
     yield Check("pull-off, DMT: 4 pi gamma R* (N)", touching.largest, expected, BOUND * expected)
-    expected = jkr_pull_off(a.ENERGY, radius)
+    expected = closed_forms.jkr_pull_off(a.ENERGY, radius)
     yield Check("pull-off, JKR: 3 pi gamma R* (N)", jkr.largest, expected, BOUND * expected)
     yield Check("JKR: gap at which the contact ends (m)", jkr.ends, stretch, 5e-3 * stretch)
-    curve = np.array([jkr_force(x, a.ENERGY, radius, a.STICKY_MODULUS) for x in jkr.overlap[jkr.force != 0]])
+    curve = np.array(
+        [closed_forms.jkr_force(x, a.ENERGY, radius, a.STICKY_MODULUS) for x in jkr.overlap[jkr.force != 0]]
+    )
     off = float(np.abs(jkr.force[jkr.force != 0] - curve).max() / expected)
     yield Check("JKR: force against overlap: largest deviation", off, 0.0, 1e-6)
-    wet = bridge_force(-bridge.overlap, 2 * radius, a.TENSION, a.ANGLE, a.VOLUME)
+    wet = closed_forms.bridge_force(-bridge.overlap, 2 * radius, a.TENSION, a.ANGLE, a.VOLUME)
     gaps = (bridge.overlap < 0) & (bridge.force != 0)
     off = float(np.abs(bridge.force[gaps] + wet[gaps]).max() / wet.max())
     yield Check("liquid bridge: force against gap, Willett et al.: deviation", off, 0.0, 1e-9)

@@ -1,50 +1,13 @@
-"""Closed forms of single contacts, with only NumPy and SciPy: impacts, friction, adhesion, bridges and beams.
+"""Closed forms of single contacts, with only NumPy and SciPy: sliding, adhesion, liquid bridges and beams.
 
-E* is 1 / ((1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2). R* and m* are 1/(1/R_1 + 1/R_2) and 1/(1/m_1 + 1/m_2); at a
-plane they are R and m of the sphere. Unless a type says float, arguments may be arrays that broadcast; SI
-units.
+R*, m* and E* are as in ``cases/common/two_spheres.py``. Unless a type says float, arguments may be arrays
+that broadcast; SI units.
 """
-
-from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import beta
 
-Numbers = np.ndarray | float
-
-HERTZ_DURATION = float(0.8 * beta(0.4, 0.5))
-"""The duration of an elastic impact times its speed divided by its depth: 2.943275."""
-HERTZ_MEAN_DEPTH = float(0.5 * beta(1.4, 0.5))
-"""The force-weighted mean overlap in an elastic impact, divided by the largest overlap: 0.817576."""
-
-
-def reduced(a: float, b: float = np.inf) -> float:
-    """Return 1 / (1/a + 1/b), such as R* and m*; a if b is infinite, as for a plane."""
-    return 1.0 / (1.0 / a + 1.0 / b)
-
-
-def hertz_force(overlap: Numbers, radius: Numbers, modulus: Numbers) -> np.ndarray:
-    """Return the force 4/3 E* sqrt(R*) delta^(3/2) (N) at an overlap (m); 0 without overlap."""
-    return np.asarray(4 / 3 * modulus * np.sqrt(radius) * np.maximum(overlap, 0.0) ** 1.5)
-
-
-def hertz_overlap(force: Numbers, radius: Numbers, modulus: Numbers) -> np.ndarray:
-    """Return the overlap (m) at which the repulsion is a given force (N)."""
-    return np.asarray((3 * np.asarray(force) / (4 * modulus * np.sqrt(radius))) ** (2 / 3))
-
-
-def hertz_depth(speed: Numbers, radius: Numbers, mass: Numbers, modulus: Numbers) -> np.ndarray:
-    """Return the largest overlap (m) of an elastic impact of R* and m* at a relative speed (m/s).
-
-    All of m* v^2 / 2 is then stored in the contact: delta = (15 m* v^2 / (16 E* sqrt(R*)))^(2/5).
-    """
-    return np.asarray((15 * mass * np.asarray(speed) ** 2 / (16 * modulus * np.sqrt(radius))) ** 0.4)
-
-
-def hertz_duration(speed: Numbers, radius: Numbers, mass: Numbers, modulus: Numbers) -> np.ndarray:
-    """Return the duration (s) of an elastic impact of R* and m* at a relative speed (m/s)."""
-    return HERTZ_DURATION * hertz_depth(speed, radius, mass, modulus) / speed
+from tisim.cases.common.two_spheres import Numbers
 
 
 def sliding_impact(

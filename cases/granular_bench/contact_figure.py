@@ -1,7 +1,5 @@
 """The figure of the tests of single contacts: runs as points, expected values as lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from contextlib import closing
 from typing import Any
@@ -11,25 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tisim import run
-from tisim.cases.granular_bench import adhesion, beams, motions, particle_tests
+from tisim.cases.common.runs import sound
+from tisim.cases.common.two_spheres import hertz_force
+from tisim.cases.granular_bench import adhesion, beams, closed_forms, motions, particle_tests
 from tisim.cases.granular_bench.checks import rebounds
-from tisim.cases.granular_bench.closed_forms import (
-    bridge_force,
-    bridge_rupture,
-    dmt_pull_off,
-    hertz_force,
-    jkr_force,
-    jkr_stretch,
-)
-from tisim.cases.granular_bench.impacts import (
-    ParticleImpact,
-    Rebound,
-    by_id,
-    force_curves,
-    simulation_of,
-)
+from tisim.cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, force_curves, simulation_of
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
-from tisim.cases.runs import sound
 from tisim.plotting.style import empty, letters, plain
 
 PANEL_COLOURS = ("#4477aa", "#cc6677", "#228833", "#aa7733", "#882255")
@@ -192,19 +177,19 @@ def slide_to_roll(axis: Axes) -> None:
 def pull_against_gap(axis: Axes) -> None:
     """Draw the forces between two spheres that are drawn apart."""
     a = adhesion
-    radius, rupture = a.STICKY_RADIUS / 2, bridge_rupture(a.ANGLE, a.VOLUME)
-    stretch = jkr_stretch(a.ENERGY, radius, a.STICKY_MODULUS)
+    radius, rupture = a.STICKY_RADIUS / 2, closed_forms.bridge_rupture(a.ANGLE, a.VOLUME)
+    stretch = closed_forms.jkr_stretch(a.ENERGY, radius, a.STICKY_MODULUS)
     seen = a.pulls([a.drawn("dmt", 2 * stretch, 2 * stretch), a.drawn("bridge", 2 * stretch, 2 * stretch)])
     found = dict(zip(("DMT", "liquid bridge"), seen, strict=True))
     (found["JKR"],) = a.pulls([a.drawn("jkr", 2 * stretch, 2 * stretch)])
     gap = np.linspace(-2 * stretch, 2 * stretch, 400)
     push = hertz_force(-gap, radius, a.STICKY_MODULUS)
-    wet = bridge_force(gap, 2 * radius, a.TENSION, a.ANGLE, a.VOLUME) * (gap < rupture)
+    wet = closed_forms.bridge_force(gap, 2 * radius, a.TENSION, a.ANGLE, a.VOLUME) * (gap < rupture)
     bound = gap[gap < stretch]
     curves = (
-        (gap, push - dmt_pull_off(a.ENERGY, radius) * (gap <= 0)),
+        (gap, push - closed_forms.dmt_pull_off(a.ENERGY, radius) * (gap <= 0)),
         (gap, push - wet),
-        (bound, np.array([jkr_force(-x, a.ENERGY, radius, a.STICKY_MODULUS) for x in bound])),
+        (bound, np.array([closed_forms.jkr_force(-x, a.ENERGY, radius, a.STICKY_MODULUS) for x in bound])),
     )
     for x, y in curves:
         axis.plot(1e6 * x, 1e3 * y, **LAW_LINE)

@@ -1,11 +1,12 @@
-"""Measures of a draw-down test: the angle of repose of the heap and the discharge rate."""
-
-from __future__ import annotations
+"""Measures of a draw-down test, its angle of repose and discharge rate, and of a bed in a cup."""
 
 import numpy as np
+from scipy.constants import g as STANDARD_GRAVITY
 from scipy.spatial import cKDTree
 
-from tisim import Result
+from tisim import Result, Scene
+from tisim.accuracy import Quantity
+from tisim.cases.common.runs import overlap
 from tisim.effects import Walls
 from tisim.geometry import Disc
 from tisim.operators import Passage
@@ -91,3 +92,34 @@ def flowed(result: Result) -> bool:
         return bool(rate > 0)
     last = first_time + (passed - first_mass) / rate
     return bool(last > (1 - CLOSED) * result.scene.duration)
+
+
+def side_load(result: Result) -> float:
+    """Return the outward force of the grains on the side of the cup at the end, divided by their weight."""
+    state = result.state
+    outward = state["position"][:, :2] / np.linalg.norm(state["position"][:, :2], axis=1, keepdims=True)
+    push = -float((state["side_loads"][:, :2] * outward).sum())
+    return push / (float(state["mass"].sum()) * STANDARD_GRAVITY)
+
+
+def centre_height(result: Result) -> float:
+    """Return the height of the centre of mass at the end, m; it measures the density of the bed."""
+    return float(np.average(result.state["position"][:, 2], weights=result.state["mass"]))
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``, over random starts, as paths of grains are chaotic.
+
+    They are the angle of repose and the discharge rate of a draw-down test, or height, load on the side and
+    largest overlap of a bed.
+    """
+    if any(isinstance(effect, Passage) for effect in scene.effects):
+        return (
+            Quantity("discharge rate", discharge, random=True),
+            Quantity("angle of repose", repose, random=True),
+        )
+    return (
+        Quantity("height of the bed", centre_height, random=True),
+        Quantity("load on the side", side_load, random=True),
+        Quantity("largest overlap", overlap, random=True),
+    )

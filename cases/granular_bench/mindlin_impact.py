@@ -9,14 +9,11 @@ are formed:
     m du/dt = -(F / share) (1 + 5 L^2 / (2 R^2)),    L = R - delta / 2
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 
-from tisim.cases.granular_bench.impacts import ParticleImpact
-from tisim.cases.granular_bench.substances import SUBSTANCES
+from tisim.cases.granular_bench.impacts import SUBSTANCES, ParticleImpact
 
 PROFILE_POINTS = 20_000
 """Number of steps in the duration of an elastic impact."""

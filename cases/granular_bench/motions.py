@@ -4,15 +4,13 @@ All are worlds of one structure under gravity: planes, Hertz and Mindlin contact
 resistance (``rolling_epsd``), which may be 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tisim import Material, Particles, Scene
-from tisim.cases.granular_bench.closed_forms import hertz_force, hertz_overlap
+from tisim.cases.common.two_spheres import hertz_force, hertz_overlap
 from tisim.effects import (
     Granular,
     Gravity,

@@ -7,8 +7,6 @@ surfaces slide past each other. 8 a spinning sphere and one at rest that is five
 times as dense, rigid or of the same stiffness.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

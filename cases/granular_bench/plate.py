@@ -7,8 +7,6 @@ a block begins to slide, because Coulomb's law here has one coefficient. Both gr
 of the silo and add no computing time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

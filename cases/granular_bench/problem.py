@@ -8,9 +8,19 @@ Each of the three parameters needs a quantity that determines it: the rebound de
 sliding angle the friction, and the heap and the discharge rate then the rolling friction. With fewer
 measurements, the designs that meet them lie on a line or in a region, and the best design of a search is one
 of them. The spread of the designs that meet the measurements is reported.
-"""
 
-from __future__ import annotations
+Measurements are read from a CSV file, as in ``cases/common/csv_tables.py``:
+
+    quantity,value,uncertainty
+    angle_of_repose,24.5,1.0
+    discharge_rate,0.150,0.005
+    rebound_ratio,0.36,0.02
+    sliding_angle,22.0,1.0
+
+Angles are in degrees, a discharge rate is in kg/s. A rebound ratio is the height to which a grain rebounds
+from a plate divided by the height of its fall. A sliding angle is the slope of a plate at which a block of
+grains begins to slide.
+"""
 
 import hashlib
 import json
@@ -19,16 +29,13 @@ from pathlib import Path
 
 from tisim import Result, Scene
 from tisim.cases.case import searched_size, size_named
-from tisim.cases.granular_bench.measured import QUANTITY_UNITS, Measured, Measurement, read
+from tisim.cases.common.csv_tables import HEADING, Measured, Measurement, measurements, read_table
+from tisim.cases.common.runs import OTHER_STARTS
 from tisim.cases.granular_bench.measures import discharge, repose
 from tisim.cases.granular_bench.plate import rebound, scene_with_plate, sliding
 from tisim.cases.granular_bench.scene import SIZES, TITLE
-from tisim.cases.runs import OTHER_STARTS
 from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.objective import Objective
-from tisim.optimize.problem.problem import Problem
-from tisim.optimize.problem.statistic import Misfit
+from tisim.optimize import Gene, Genome, Misfit, Objective, Problem
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("calibrate",)
@@ -76,6 +83,11 @@ EXAMPLES: Mapping[str, Measured] = {
 """The target if no file is given."""
 MEANINGS = {"misfit": "mean squared difference from the measurements, in uncertainties"}
 
+QUANTITY_UNITS = {
+    "angle_of_repose": "degrees", "discharge_rate": "kg/s", "rebound_ratio": "", "sliding_angle": "degrees",
+}  # fmt: skip
+"""The supported quantities and their units."""
+
 
 def other_runs(design: Mapping[str, float], size: str, starts: int) -> list[Scene]:
     """Return runs of a design from a number of held-out starts."""
@@ -90,7 +102,7 @@ def problem(size: str = "default", variant: str = "calibrate") -> Problem:
 
 
 def calibration(size: str, variant: str, path: Path) -> Problem:
-    """Return the calibration to the measurements in a CSV file; ``measured`` describes its format."""
+    """Return the calibration to the measurements in a CSV file."""
     return calibration_to(read(path), size, variant)
 
 
@@ -132,3 +144,8 @@ def calibration_to(measured: Measured, size: str = "default", variant: str = "ca
         version=3,
         code=hashlib.sha256(json.dumps(plain).encode()).hexdigest()[:12],
     )
+
+
+def read(path: Path) -> dict[str, Measurement]:
+    """Return the measurements of a CSV file; InputError if it is not CSV or contains none."""
+    return measurements(path, read_table(path, HEADING)[1], QUANTITY_UNITS)

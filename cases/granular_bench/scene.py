@@ -1,20 +1,24 @@
 """A draw-down test: grains flow out of a silo through an orifice onto a disc, where they form a heap.
 
-One test gives an angle of repose and a discharge rate. Neither quantity alone separates sliding from rolling
-friction (T. Roessler, C. Richter, A. Katterfeld and F. Will, Powder Technol. 343 (2019) 803, for tests of
-this kind). Grains start loose in the silo and fall on its flat bottom; the rate is measured once they have
-formed a bed. Grains that fall off the disc are removed. As usual, the grains are softer than real ones;
-``tisim cost granular_bench`` shows the effect of softening on a bed.
-"""
+One draw-down test gives an angle of repose and a discharge rate. Neither quantity alone separates sliding
+from rolling friction (T. Roessler, C. Richter, A. Katterfeld and F. Will, Powder Technol. 343 (2019) 803, for
+tests of this kind). Grains start loose in the silo and fall on its flat bottom; the rate is measured once
+they have formed a bed. Grains that fall off the disc are removed. As usual, the grains are softer than real
+ones.
 
-from __future__ import annotations
+The size "bed" shows the effect of softening by ``tisim cost``: stiff grains fall into a cup and come to rest.
+Its measured quantities are the density of the bed, the load on the side of the cup, which depends on the
+friction model, and the largest overlap of grains.
+"""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 from tisim import Cloud, GrainClass, Material, RandomInCylinder, Scene
-from tisim.cases.case import Size
+from tisim.cases.case import Size, size_named
+from tisim.cases.common.two_spheres import hertz_duration, reduced
+from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import (
     Granular,
     Gravity,
@@ -63,7 +67,7 @@ SMALL_SEARCH_SETTINGS = {
 }  # fmt: skip
 
 BED = "bed"
-"""The size that is not a draw-down test, but a bed of stiff grains in a cup (``bed.py``)."""
+"""The size that is not a draw-down test, but a bed of stiff grains in a cup."""
 SIZES = {
     "default": Size("a draw-down test of 1500 grains; a heap on a disc of 16 diameters", {}, SEARCH_SETTINGS),
     "large": Size(
@@ -86,6 +90,19 @@ SIZES = {
     ),
     BED: Size("a bed of 120 stiff grains that have fallen into a cup", {}),
 }
+
+STIFF = 2e8
+"""Young's modulus of the grains of the bed, Pa; glass has 5e10."""
+GRAINS = {"friction": 0.5, "rolling_friction": 0.1, "restitution": 0.5}
+"""Their other properties."""
+IMPACT = 0.5
+"""Speed, m/s, of the impact whose duration sets the step: the speed of a fall from 13 mm."""
+SPARSE = 0.2
+"""Fraction of the space above the cup that is filled by grains at the start, before they fall."""
+STEPS_OF_IMPACT = 20.0
+"""Number of steps in that duration."""
+MASS = DENSITY * np.pi / 6 * DIAMETER**3
+"""Mass of a grain of the mean size, kg."""
 
 
 def grain_material(design: Mapping[str, float], young: float = YOUNG) -> Material:
@@ -150,3 +167,55 @@ def scene(
         duration=duration,
         seed=seed,
     )
+
+
+def impact_time(young: float) -> float:
+    """Return the duration of an elastic impact of two mean grains of a Young's modulus (Pa) at IMPACT, s."""
+    modulus = young / (2 * (1 - POISSON**2))
+    return float(hertz_duration(IMPACT, DIAMETER / 4, reduced(MASS, MASS), modulus))
+
+
+def linear_stiffness(young: float) -> float:
+    """Return the stiffness (N/m) of a linear spring with the same duration of impact."""
+    return reduced(MASS, MASS) * (np.pi / impact_time(young)) ** 2
+
+
+def bed(
+    seed: int = 0,
+    number: int = 120,
+    cup: float = 2.5,
+    duration: float = 0.2,
+    young: float = STIFF,
+    parts: float = STEPS_OF_IMPACT,
+) -> Scene:
+    """Return the scene of a bed.
+
+    number : of grains. cup : its radius, in diameters of a grain. duration : s. young : Pa.
+    parts : number of steps in the duration of an impact.
+    """
+    radius, height = cup * DIAMETER, number * DIAMETER / (6 * SPARSE * cup**2)
+    material = grain_material(GRAINS, young)
+    return Scene(
+        name="granular_bench",
+        particles=grains(number, radius, height),
+        # With a stiffness too, so that Hooke's law can be compared with Hertz's.
+        materials={"grain": material.model_copy(update={"stiffness": three_digits(linear_stiffness(young))})},
+        effects=(
+            LAW,
+            Walls(name="floor", planes=[Plane(point=ORIGIN, normal=(0.0, 0.0, 1.0))]),
+            Walls(
+                name="side",
+                cylinders=[CylindricalSurface(start=ORIGIN, end=(0.0, 0.0, 1.2 * height), radius=radius)],
+            ),
+            Gravity(),
+        ),
+        stepper=Verlet(control=FixedStep(dt=three_digits(impact_time(young) / parts))),
+        duration=duration,
+        seed=seed,
+    )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """Return the scene of a size."""
+    settings = size_named(size, SIZES).scene
+    return bed(seed=seed, **settings) if size == BED else scene(seed=seed, **settings)

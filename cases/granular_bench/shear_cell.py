@@ -9,8 +9,6 @@ F. da Cruz, S. Emam, M. Prochnow, J.-N. Roux and F. Chevoir, Phys. Rev. E 72 (20
 measured in the middle of the gap, so slip at the walls has no effect on it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -19,8 +17,8 @@ import numpy as np
 
 from tisim import Box, Cloud, GrainClass, Material, Particles, Result, Scene, Simulation
 from tisim.analysis import solid_fraction
+from tisim.cases.common.runs import sound
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, POISSON, SPREAD
-from tisim.cases.runs import sound
 from tisim.effects import (
     Granular,
     HertzMaterial,
@@ -200,7 +198,7 @@ def sheared_beds(
     start, closes = loose(number, wide, seed), CLOSING / SHEAR_RATE
     drives = [(SHEAR_RATE * gap, 0.0, (gap - wide) / closes) for gap in gaps]
     before, lasts = STRAIN_BEFORE / SHEAR_RATE, (STRAIN_BEFORE + STRAIN) / SHEAR_RATE
-    looks: list[list[tuple[np.ndarray, ...]]] = [[] for _ in gaps]
+    samples: list[list[tuple[np.ndarray, ...]]] = [[] for _ in gaps]
     with closing(Simulation(cell(start, drives[0], closes, law), len(gaps))) as simulation:
         simulation.load([cell(start, drive, closes, law) for drive in drives])
         simulation.run()
@@ -210,10 +208,10 @@ def sheared_beds(
         for time in np.linspace(before, lasts, SAMPLES):
             simulation.run(until=time)
             progress(float(time / lasts))
-            for gap, look, result in zip(gaps, looks, sound(simulation.results()), strict=True):
-                look.append(seen(result, gap))
+            for gap, sample, result in zip(gaps, samples, sound(simulation.results()), strict=True):
+                sample.append(seen(result, gap))
         states = [result.state for result in simulation.results()]
-    return [mean_of(*one) for one in zip(gaps, looks, states, strict=True)]
+    return [mean_of(*one) for one in zip(gaps, samples, states, strict=True)]
 
 
 def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
@@ -230,9 +228,9 @@ def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
     return np.array([pressing, dragging, fraction]), sums, numbers
 
 
-def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]], state: Arrays) -> ShearedBed:
+def mean_of(gap: float, samples: Sequence[tuple[np.ndarray, ...]], state: Arrays) -> ShearedBed:
     """Return the means over the samples of a cell with a gap (m), and its state at the end."""
-    scalars, sums, numbers = (np.array(one) for one in zip(*looks, strict=True))
+    scalars, sums, numbers = (np.array(one) for one in zip(*samples, strict=True))
     pressing, dragging, fraction = scalars.mean(axis=0)
     edges = np.linspace(0.0, gap, BINS + 1)
     count = numbers.sum(axis=0)

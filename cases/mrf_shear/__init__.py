@@ -1,9 +1,6 @@
 """A magnetorheological fluid in a shear cell (L21 chapter 2)."""
 
-from __future__ import annotations
-
 from tisim.cases.case import Case, Late
-from tisim.cases.mrf_shear.accuracy import quantities
 from tisim.cases.mrf_shear.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
@@ -13,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.mrf_shear.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.mrf_shear.measures", "quantities"),
     cost_size="small",
     problem=Late("tisim.cases.mrf_shear.problem", "problem"),
     variants=("front", "bounded", "field"),

@@ -1,7 +1,5 @@
 """Figures of the case mrf_shear: flow curve, stress by field and by part of the model, grains and chains."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,9 +10,8 @@ from matplotlib.figure import Figure
 from tisim import Result, run
 from tisim.cases.case import size_named
 from tisim.cases.mrf_shear import published
-from tisim.cases.mrf_shear.flow_curve import Curve, by_field, by_part, flow_curve, table
+from tisim.cases.mrf_shear.flow_curve import Curve, by_field, by_part, flow_curve, magnetised, paired, table
 from tisim.cases.mrf_shear.measures import order
-from tisim.cases.mrf_shear.runs import magnetised, paired
 from tisim.cases.mrf_shear.scene import RATES, SIZES
 from tisim.engine.batches import Progress
 from tisim.errors import must

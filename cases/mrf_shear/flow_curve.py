@@ -1,28 +1,27 @@
-"""The flow curve of a cell, the stress by field and by part of the model, and fits to them.
+"""Runs of cells: the flow curve, the stress by field and by part of the model, and fits to them.
 
 They are drawn with the measured and simulated yield stresses of L21. L21's curves are only available as
 figures.
 """
 
-from __future__ import annotations
-
-import csv
-import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from tisim import Result
+from tisim import Result, Scene
 from tisim.analysis import BinghamFit, Estimate, Mean, fit_bingham
-from tisim.cases.mrf_shear.grains import mixture
+from tisim.cases.common.csv_tables import csv_text
+from tisim.cases.common.runs import grouped
 from tisim.cases.mrf_shear.measures import flux, shear_rate, shear_stress
-from tisim.cases.mrf_shear.runs import Settings, cells
-from tisim.cases.mrf_shear.scene import RATES
+from tisim.cases.mrf_shear.scene import MAGNETISING_TIME, RATES, mixture, scene
 from tisim.effects import CARBONYL_IRON
 from tisim.engine.batches import Progress
 
+Settings = Mapping[str, Any]
+"""Settings of ``scene`` that differ from the defaults."""
 COMPARED = {"rate": RATES[-1]}
 """Variants and fields are compared at the highest shear rate, which takes the shortest time to run."""
 FLUXES = (0.1, 0.2, 0.3, 0.45, 0.6)
@@ -119,10 +118,25 @@ def by_part(
 
 def table(curve: Curve, heading: str) -> str:
     """Return a curve as CSV: varied quantity, stress, half of its interval, and the stress of each start."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow([heading, "shear_stress_Pa", "half_interval_Pa", "of_each_start_Pa"])
+    rows: list[list[object]] = [[heading, "shear_stress_Pa", "half_interval_Pa", "of_each_start_Pa"]]
     for x, mean, starts in zip(curve.x, curve.stresses, curve.of_starts, strict=True):
         each = " ".join(f"{one:.5g}" for one in starts)
-        writer.writerow([f"{x:.6g}", f"{mean.value:.5g}", f"{mean.half:.3g}", each])
-    return text.getvalue()
+        rows.append([f"{x:.6g}", f"{mean.value:.5g}", f"{mean.half:.3g}", each])
+    return csv_text(rows)
+
+
+def cells(settings: Sequence[Settings], starts: int, progress: Progress | None = None) -> list[list[Result]]:
+    """Return the results of cells for each setting, from a number of starts each; RunError if a run fails."""
+    return grouped([scene(**one, seed=seed) for one in settings for seed in range(starts)], starts, progress)
+
+
+def magnetised(settings: Settings, seed: int) -> Scene:
+    """Return a cell that ends at the time at which its rafts are frozen."""
+    until = settings.get("magnetising", MAGNETISING_TIME)
+    return scene(**settings, seed=seed).model_copy(update={"duration": until})
+
+
+def paired(one: Sequence[Result], other: Sequence[Result]) -> Mean:
+    """Return the ratio of the shear stresses of two settings, a mean over their common starts."""
+    ratio = [shear_stress(a) / shear_stress(b) for a, b in zip(one, other, strict=True)]
+    return Mean.of(np.array(ratio))

@@ -1,21 +1,15 @@
 """Measures of a sheared cell: shear stress, order of the grains, and their magnetisation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.constants import mu_0
 
-from tisim import Result
-from tisim.analysis import (
-    cluster_shapes,
-    contacts,
-    fabric_tensor,
-    mean_coordination,
-    periodic_sides,
-)
-from tisim.cases.mrf_shear.regime import magnetisation
-from tisim.cases.mrf_shear.scene import LOWER, UPPER
+from tisim import Result, Scene
+from tisim.accuracy import Quantity
+from tisim.analysis import cluster_shapes, contacts, fabric_tensor, mean_coordination, periodic_sides
+from tisim.cases.common.runs import overlap
+from tisim.cases.mrf_shear.scene import LOWER, SUSCEPTIBILITY, UPPER
 from tisim.domains.domain import Domain
 from tisim.effects import PrescribedMotion, StokesDrag, Translation
 from tisim.operators import JoinGroup
@@ -120,3 +114,16 @@ def flux(result: Result) -> float:
 def volume_fraction(result: Result) -> float:
     """Return the volume fraction of the grains in the cell."""
     return float((4 / 3 * np.pi * result.state["radius"] ** 3).sum() / extent(result.scene.domain).prod())
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``: stress and largest overlap, as paths of grains are chaotic."""
+    return (
+        Quantity("shear stress", shear_stress, random=True),
+        Quantity("largest overlap", overlap, random=True),
+    )
+
+
+def magnetisation(flux: float) -> float:
+    """Return the magnetisation (A/m) of a single grain in a field (T): 3 chi / (3 + chi) B / mu_0."""
+    return 3 * SUSCEPTIBILITY / (3 + SUSCEPTIBILITY) * flux / mu_0

@@ -4,25 +4,21 @@ without it.
 A design is the volume share of the small grains, the volume fraction of all grains, and the field. More
 grains increase the stress, and also the viscosity when the field is off; small grains fill the holes among
 large ones. The stress is simulated at one shear rate, at which drag is small compared with magnetic forces,
-so it is close to the yield stress. The viscosity without field is computed by ``off_state``, not simulated.
+so it is close to the yield stress. The viscosity without field is computed, not simulated.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from tisim import Cloud, Result, Scene
 from tisim.cases.case import searched_size
-from tisim.cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS, mixture
+from tisim.cases.common.magnetorheological_fluid import SWEPT, closest_packing, relative_viscosity
+from tisim.cases.mrf_shear import published
 from tisim.cases.mrf_shear.measures import extent, flux, shear_stress, volume_fraction
-from tisim.cases.mrf_shear.off_state import off_state_viscosity
-from tisim.cases.mrf_shear.scene import SEARCHED, SIZES, SWEPT, TITLE, scene
+from tisim.cases.mrf_shear.scene import LARGE_RADIUS, SEARCHED, SIZES, SMALL_RADIUS, TITLE, mixture, scene
 from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.objective import Objective
-from tisim.optimize.problem.problem import Problem
+from tisim.optimize import Gene, Genome, Objective, Problem
 from tisim.plotting.cloud import cloud
 
 VARIANTS = ("front", "bounded", "field")
@@ -57,10 +53,10 @@ def viscosity(result: Result) -> float:
     grains."""
     start = start_of(result)
     diameters = [2 * one.sizes.mean_radius() for one in start.grains]
-    return off_state_viscosity(asked_fraction(result), diameters, [one.share for one in start.grains])
+    return off_state_viscosity(nominal_fraction(result), diameters, [one.share for one in start.grains])
 
 
-def asked_fraction(result: Result) -> float:
+def nominal_fraction(result: Result) -> float:
     """Return the nominal volume fraction of the grains of a run: the mean over all starts."""
     start, volume = start_of(result), float(extent(result.scene.domain).prod())
     each = sum(one.share / one.density for one in start.grains) / sum(one.number() for one in start.grains)
@@ -122,3 +118,8 @@ def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
         "shear stress, kPa": 1e-3 * shear_stress(result),
         "viscosity without field, mPa s": 1e3 * viscosity(result),
     }
+
+
+def off_state_viscosity(fraction: float, diameters: Sequence[float], parts: Sequence[float]) -> float:
+    """Return the viscosity of the fluid without a field, Pa s."""
+    return published.OIL_VISCOSITY * relative_viscosity(fraction, closest_packing(diameters, parts))

@@ -5,19 +5,11 @@ does not print density and permeability of the grains; its +77.78 % and -20.99 %
 imply a permeability much larger than 1.
 """
 
-from __future__ import annotations
+from tisim.cases.common.magnetorheological_fluid import MICRO
 
-MICRO = 1e-6
-"""A micrometre, m."""
-
-# Table 2.1: particle properties.
+# Table 2.1: particle properties; TABLE_2_1 of ``cases/common/magnetorheological_fluid.py`` has the others.
 YOUNG = 1e9
 """Young's modulus, Pa; L21 says that it is about 1 % of the value of iron."""
-POISSON, RESTITUTION = 0.278, 0.1
-"""Poisson's ratio and coefficient of restitution."""
-FRICTION, ROLLING_FRICTION, ROLLING_DAMPING = 0.1, 0.1, 0.1
-"""Coefficients of sliding and of rolling friction, and the rolling damping as a fraction of critical
-damping."""
 COHESION = 60e3
 """Cohesion energy density k_c, J/m^3."""
 

@@ -8,8 +8,6 @@ It is the simulation of L21 chapter 2. SIZES and the page of the case list the d
 laptop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,24 +15,18 @@ import numpy as np
 
 from tisim import Box, Cloud, GrainClass, Material, RandomInDomain, Scene
 from tisim.cases.case import Size, size_named
-from tisim.cases.mixtures import magnetorheological
+from tisim.cases.common import magnetorheological_fluid as fluid
+from tisim.cases.common.magnetorheological_fluid import MICRO, magnetorheological
 from tisim.cases.mrf_shear import published
-from tisim.cases.mrf_shear.grains import DENSITY, MONODISPERSE, number_of, smallest
-from tisim.cases.mrf_shear.published import MICRO
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import Vector
 from tisim.effects import (
     CARBONYL_IRON,
     SJKR,
     Effect,
-    Granular,
-    HertzMaterial,
-    MindlinForce,
     MutualFroehlichMoment,
     MutualInducedMoment,
     PrescribedMotion,
-    RestitutionDamping,
-    RollingEPSD,
     StokesDrag,
     Translation,
     TruncatedDipoleDipole,
@@ -50,6 +42,12 @@ TITLE = "A magnetorheological fluid in a shear cell: flow curve and yield stress
 SUSCEPTIBILITY = CARBONYL_IRON.parameters()["susceptibility"]
 """Susceptibility of carbonyl iron; the magnetisation of a sphere is within 0.3 % of the limit of infinite
 susceptibility."""
+DENSITY = CARBONYL_IRON.density
+"""Density of the grains, kg/m^3."""
+LARGE_RADIUS, SMALL_RADIUS = published.MEAN_LARGE / 2, published.MEAN_LARGE / 4
+"""The radius of the large grains, and of the small grains of a mixture at sizes for a laptop, m. The small
+ones are half as large; L21's are a quarter, which would be 25 small grains for each large one in a mixture of
+33:67."""
 SIDES: Vector = (40 * MICRO, 40 * MICRO, 60 * MICRO)
 RAFT = 8 * MICRO
 """The sides of the cell, and the thickness of its bottom and top layers that become rafts, m."""
@@ -71,15 +69,19 @@ IMPACT = 1.0
 """Speed of that impact, m/s: about the speed at which grains of 6.7 um collide in fields of 0.6 T."""
 
 
+def mixture(share: float) -> tuple[GrainClass, ...]:
+    """Return a mixture of large and small grains of one size each; share : of the small grains, 0 to 1."""
+    return (*fluid.equal(LARGE_RADIUS, 1 - share), *fluid.equal(SMALL_RADIUS, share))
+
+
+MONODISPERSE = mixture(0.0)
+"""Grains of one size, the mean of L21's large grains."""
+
 SEARCHED: dict[str, Any] = {
     "rate": RATES[-1], "sides": (32 * MICRO, 32 * MICRO, 48 * MICRO), "raft": 7 * MICRO, "strain": 0.7,
     "before": 0.35,
 }  # fmt: skip
 """Settings of the runs in a search: a smaller cell, for a shorter time."""
-SWEPT = {"effects.mutual_induced_moment.largest_change": 0.1}
-"""In a search, sweeps of the moments in a step continue only if moments change by more than a tenth of the
-largest. This halves the time and has no effect on the quantities that `tisim cost` shows over eight
-starts."""
 SEARCH_SETTINGS = {
     "generations": 9, "options": {"population": 8, "first": 12}, "ensemble": {"min_starts": 1, "confirm": 4},
 }  # fmt: skip
@@ -116,44 +118,16 @@ SIZES = {
 def impact_step(radius: float, young: float) -> float:
     """Return a step (s) for grains of a radius (m) and a Young's modulus (Pa): a fraction of their impact at
     IMPACT, by Hertz."""
-    modulus = young / (2 * (1 - published.POISSON**2))
+    modulus = young / (2 * (1 - fluid.TABLE_2_1["poisson"] ** 2))
     mass = DENSITY * 2 / 3 * np.pi * radius**3
     lasts = 2.94 * (15 * mass / (16 * modulus * np.sqrt(radius / 2 * IMPACT))) ** 0.4
     return float(three_digits(lasts / STEPS_OF_IMPACT))
 
 
-CONTACT = Granular(
-    normal=HertzMaterial(),
-    damping=RestitutionDamping(),
-    tangential=MindlinForce(),
-    rolling=RollingEPSD(damping_ratio=published.ROLLING_DAMPING),
-    cohesion=SJKR(),
-)
-"""The contact law of L21 section 2.2.1."""
-
-
-def iron(
-    young: float, rolling: float, cohesion: float | None, friction: float = published.FRICTION
-) -> Material:
-    """Return the material of grains, with table 2.1 for the other properties.
-
-    young : Pa. rolling, friction : coefficients of rolling and of sliding friction.
-    cohesion : energy density, J/m^3; None for a law without cohesion.
-    """
-    return Material(
-        young=young,
-        poisson=published.POISSON,
-        restitution=published.RESTITUTION,
-        friction=friction,
-        rolling_friction=rolling,
-        cohesion_energy_density=cohesion,
-    )
-
-
 def smooth(young: float) -> Material:
     """Return the material of the plates below and above, on which grains slide without friction; young :
     Pa."""
-    return iron(young, 0.0, 0.0, friction=0.0)
+    return fluid.iron(young, 0.0, friction=0.0, rolling_friction=0.0)
 
 
 def scene(
@@ -169,7 +143,7 @@ def scene(
     before: float = BEFORE,
     young: float = published.YOUNG,
     dt: float | None = None,
-    rolling: float = published.ROLLING_FRICTION,
+    rolling: float = fluid.TABLE_2_1["rolling_friction"],
     cohesion: float = published.COHESION,
     saturation: float | None = None,
     still: bool = False,
@@ -195,22 +169,24 @@ def scene(
     return Scene(
         name="mrf_shear",
         particles=Cloud(
-            number=number_of(grains, fraction, float(np.prod(sides))),
+            number=fluid.number_of(grains, fraction, float(np.prod(sides))),
             grains=tuple(grains),
             placement=RandomInDomain(),
         ),
-        materials={"iron": iron(young, rolling, cohesion), **plate},
+        materials={"iron": fluid.iron(young, cohesion, rolling_friction=rolling), **plate},
         domain=Box(low=(0.0, 0.0, 0.0), high=sides, periodic=(True, True, False)),
         effects=(
             MagneticField(constant=(0.0, 0.0, flux)),
             induced(saturation),
             TruncatedDipoleDipole(**CUT),
-            CONTACT,
+            fluid.contact_law(cohesion=SJKR()),
             *((Walls(name="plates", planes=ends, material="plate"),) if plates else ()),
             StokesDrag(viscosity=published.OIL_VISCOSITY),
             *sheared(rate, sides[2], raft, magnetising, before, still),
         ),
-        stepper=Verlet(control=FixedStep(dt=impact_step(smallest(grains), young) if dt is None else dt)),
+        stepper=Verlet(
+            control=FixedStep(dt=impact_step(fluid.smallest(grains), young) if dt is None else dt)
+        ),
         duration=magnetising + strain / rate,
         seed=seed,
     )

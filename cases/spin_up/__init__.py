@@ -1,9 +1,6 @@
 """A rubble pile of magnetised grains is spun up until it breaks."""
 
-from __future__ import annotations
-
 from tisim.cases.case import Case, Late
-from tisim.cases.spin_up.accuracy import quantities
 from tisim.cases.spin_up.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
@@ -13,6 +10,6 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.spin_up.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.spin_up.stages", "quantities"),
     figures=Late("tisim.cases.spin_up.figures", "figures"),
 )

@@ -1,22 +1,18 @@
 """Checks of spun-up piles: findings of L21 that piles of few grains reproduce, and relations that hold
 exactly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from tisim.analysis import Mean
-from tisim.cases.case import Check
-from tisim.cases.coalescence.measures import Conserved
-from tisim.cases.coalescence.published import MAGNETISATIONS
-from tisim.cases.coalescence.scaling import critical_spin
-from tisim.cases.spin_up.published import DEFORMATION, DISRUPTION
-from tisim.cases.spin_up.regime import regime
-from tisim.cases.spin_up.scene import DEFAULT
-from tisim.cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
-from tisim.cases.statistics import Claim, Shown
+from tisim.cases.case import Check, Claim, Shown
+from tisim.cases.coalescence import published
+from tisim.cases.coalescence.regime import impact_depth, magnetic_depth
+from tisim.cases.coalescence.scene import scale_of, step
+from tisim.cases.common.rubble_pile import Conserved, critical_spin, free_fall, mean_density
+from tisim.cases.spin_up.scene import DEFAULT, NUMBERS
+from tisim.cases.spin_up.stages import DEFORMATION, DISRUPTION, RATES, SEEDS, SpinUp, spin_ups
 
 ROUNDING = 1e-11
 """Largest change of a momentum, relative to the sum of its magnitudes over the grains."""
@@ -45,7 +41,7 @@ def of_conservation(runs: Sequence[SpinUp]) -> Iterator[Check]:
 
 def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
     """Yield the spins at which piles deform and break, and their density before."""
-    for m in MAGNETISATIONS:
+    for m in published.MAGNETISATIONS:
         group = [one for one in runs if one.magnetisation == m]
         density = Mean.of([one.steps[0].asteroid.density for one in group])
         yield Shown(f"{m:g} A/m: density at rest, kg/m^3", density)
@@ -58,7 +54,7 @@ def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
             yield Shown(f"{m:g} A/m: spin at which it {name}, urad/s", mean, f"L21: {1e6 * theirs:.0f}")
     plain, strong = (
         at_least([one.disruption for one in runs if one.magnetisation == m])
-        for m in (MAGNETISATIONS[0], MAGNETISATIONS[-1])
+        for m in (published.MAGNETISATIONS[0], published.MAGNETISATIONS[-1])
     )
     yield Claim(
         "spin at which it breaks, 1190 minus 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=LATER
@@ -71,3 +67,15 @@ def at_least(rates: Sequence[float]) -> np.ndarray:
     Means of these values are therefore lower bounds.
     """
     return 1e6 * np.nan_to_num(np.asarray(rates), nan=RATES[-1] + RATES[0])
+
+
+def regime() -> Iterator[Shown]:
+    """Yield the governing numbers of the copy of the default size, in closed form."""
+    d, softened = published.DIAMETERS[1], DEFAULT["softened"]
+    scale = scale_of(DEFAULT["number"], NUMBERS[d])
+    yield Shown("scale of the copy", scale)
+    yield Shown("free-fall time, s", free_fall(mean_density(d, DEFAULT["spacing"], published.DENSITY)))
+    yield Shown("step, s", step(d, scale, softened))
+    yield Shown("overlap of an impact over a radius", impact_depth(d, scale, softened))
+    depth = magnetic_depth(d, scale, published.MAGNETISATIONS[-1], softened)
+    yield Shown("overlap of two grains in line over a radius, 1190 A/m", depth)

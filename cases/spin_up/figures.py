@@ -1,22 +1,18 @@
 """Figures of the case spin_up: shape, density and mass of piles against their spin, and pictures of the
 piles."""
 
-from __future__ import annotations
-
-import csv
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from tisim.cases.coalescence import published
 from tisim.cases.coalescence.figures import NO_BOX, NO_GRAVITY, SEMI_AXES, close_up, moved
-from tisim.cases.coalescence.published import MAGNETISATIONS
 from tisim.cases.coalescence.runs import of_all_magnetisations
-from tisim.cases.coalescence.scaling import critical_spin
-from tisim.cases.spin_up.published import DISRUPTION
+from tisim.cases.common.csv_tables import csv_text
+from tisim.cases.common.rubble_pile import critical_spin
 from tisim.cases.spin_up.scene import SIZES
-from tisim.cases.spin_up.stages import SEEDS, SpinStep, SpinUp, spin_ups
+from tisim.cases.spin_up.stages import DISRUPTION, SEEDS, SpinStep, SpinUp, spin_ups
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import directions, view
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
@@ -48,7 +44,7 @@ def against_spin(runs: Sequence[SpinUp]) -> Figure:
     """
     figure = empty(11.6, 3.6)
     axes = figure.subplots(1, 3)
-    for m, colour in zip(MAGNETISATIONS, AXIS_COLOURS, strict=True):
+    for m, colour in zip(published.MAGNETISATIONS, AXIS_COLOURS, strict=True):
         group = [one for one in runs if one.magnetisation == m]
         rates = 1e6 * np.array([step.rate for step in group[0].steps])
         values = np.array([[measured(step) for step in one.steps] for one in group])
@@ -76,8 +72,8 @@ def against_spin(runs: Sequence[SpinUp]) -> Figure:
 def piles(runs: Sequence[SpinUp]) -> Figure:
     """Draw one pile of each magnetisation at several spins, coloured by cluster (L21 Figs 4.7, 4.8, 4.10)."""
     figure = empty(9.6, 9.6)
-    axes = figure.subplots(len(MAGNETISATIONS), len(SHOWN))
-    for row, m in zip(axes, MAGNETISATIONS, strict=True):
+    axes = figure.subplots(len(published.MAGNETISATIONS), len(SHOWN))
+    for row, m in zip(axes, published.MAGNETISATIONS, strict=True):
         run = next(one for one in runs if one.magnetisation == m)
         pile = run.steps[0].asteroid.grains
         left, bottom, side = view(moved(pile, pile), NO_BOX)
@@ -95,19 +91,17 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
 
 def table(runs: Sequence[SpinUp]) -> str:
     """Return the measures after each step of each pile as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(
+    rows: list[list[object]] = [
         [
             "magnetisation_A_per_m", "seed", "spin_given_rad_per_s", *SEMI_AXES,
             "width_over_height", "density_kg_per_m3", "part_of_mass", "angular_momentum_kg_m2_per_s",
         ]
-    )  # fmt: skip
+    ]  # fmt: skip
     for one in runs:
         for step in one.steps:
             axes = step.asteroid.ellipsoid.semi_axes
             values = (*axes, *measured(step), step.angular_momentum)
-            writer.writerow(
+            rows.append(
                 [one.magnetisation, one.seed, f"{step.rate:.4g}", *(f"{value:.5g}" for value in values)]
             )
-    return text.getvalue()
+    return csv_text(rows)

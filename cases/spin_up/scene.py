@@ -1,27 +1,26 @@
 """A rubble pile is spun up until it deforms and sheds grains (L21 section 4.3).
 
-A cloud without rotation and without a seed particle collapses; then its angular velocity is increased in
-steps (``stages.py``). The spin at which gravity alone no longer holds a pile depends on its density, not on
-the number of its grains. The contribution of magnetism depends on stresses, which are as in a scaled
-copy of L21's pile (``cases/coalescence/scaling.py``).
+It continues the case coalescence, as section 4.3 of L21 continues section 4.2: a cloud of that case, without
+rotation and without a seed particle, collapses, and the angular velocity of its pile is increased in steps
+(``stages.py``). Grains, laws and the scaling of the copy are therefore as in coalescence. The spin at which
+gravity alone no longer holds a pile depends on its density, not on the number of its grains. The contribution
+of magnetism depends on stresses, which are as in a scaled copy of L21's pile.
 
-Departures from L21: fewer grains, softer grains, and a closer lattice, from which the collapse is earlier and
-slower.
+Departures from L21: fewer grains, softer grains, and a denser lattice, from which the cloud collapses sooner
+and at a lower speed.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
 from tisim import Scene
 from tisim.cases.case import Size, size_named
+from tisim.cases.coalescence import published
 from tisim.cases.coalescence import scene as coalescence
-from tisim.cases.coalescence.published import DIAMETERS, MAGNETISATIONS
 
 TITLE = "A rubble pile of magnetised grains is spun up until it breaks"
 
-NUMBERS = {DIAMETERS[0]: 33_220, DIAMETERS[1]: 4_088}
+NUMBERS = {published.DIAMETERS[0]: 33_220, published.DIAMETERS[1]: 4_088}
 """Numbers of L21's grains by their diameter (m), with the same total mass; section 4.3.1."""
 SETTLED = 7500.0
 """Time at which the pile of the default size is at rest, s: three free-fall times."""
@@ -31,14 +30,14 @@ SIZES = {
     "default": Size("80 grains of 100 cm, magnetised to 1190 A/m, in a scaled copy of L21's pile", DEFAULT),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
     "l21": Size("L21's 4088 grains of 100 cm, gravity by a tree", {"tree": True}),
-    "l21_50cm": Size("L21's 33,220 grains of 50 cm", {"diameter": DIAMETERS[0], "tree": True}),
+    "l21_50cm": Size("L21's 33,220 grains of 50 cm", {"diameter": published.DIAMETERS[0], "tree": True}),
 }
 
 
 def scene(
     number: int | None = None,
-    diameter: float = DIAMETERS[1],
-    magnetisation: float = MAGNETISATIONS[-1],
+    diameter: float = published.DIAMETERS[1],
+    magnetisation: float = published.MAGNETISATIONS[-1],
     duration: float = 15_000.0,
     **settings: Any,
 ) -> Scene:

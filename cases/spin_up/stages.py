@@ -1,7 +1,5 @@
 """The stages of a spin-up: a pile settles, and its spin is then increased in steps, each held for a while."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -10,15 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from tisim import Simulation
-from tisim.cases.coalescence.measures import Asteroid, Conserved, body, clusters_of, part
-from tisim.cases.coalescence.published import MAGNETISATIONS
-from tisim.cases.runs import sound
+from tisim import Result, Scene, Simulation
+from tisim.accuracy import Quantity
+from tisim.cases.coalescence import published
+from tisim.cases.common.rubble_pile import Asteroid, Conserved, body, clusters_of, part
+from tisim.cases.common.runs import overlap, sound
 from tisim.cases.spin_up.scene import scene
 from tisim.engine.batches import Progress
 from tisim.engine.particle_state import ParticleState
 from tisim.scene.initial_state import Arrays
 
+DEFORMATION = {0.0: 600e-6, 119.0: 600e-6, 1190.0: 700e-6}
+"""L21's angular velocity (rad/s) of the first significant deformation by magnetisation (A/m); section
+4.3.2."""
+DISRUPTION = {0.0: 700e-6, 119.0: 700e-6, 1190.0: 800e-6}
+"""L21's angular velocity (rad/s) at which grains were shed, by magnetisation (A/m); section 4.3.2."""
 RATES = tuple(1e-4 * k for k in range(1, 10))
 """Successive angular velocities of the pile, rad/s; section 4.3.1 of L21."""
 QUICK = 4e-4
@@ -131,7 +135,7 @@ def stage_ends(
 def spin_ups(
     seeds: int,
     progress: Progress = lambda part: None,
-    magnetisations: Sequence[float] = MAGNETISATIONS,
+    magnetisations: Sequence[float] = published.MAGNETISATIONS,
     rates: Sequence[float] = RATES,
     holds: tuple[float, float] = HOLDS,
     **settings: Any,
@@ -159,3 +163,20 @@ def spin_ups(
                 steps.append(SpinStep(rate, result.state))
             progress(float(end / ends[-1]))
     return [SpinUp(*one, steps) for one, steps in zip(wanted, seen, strict=True)]
+
+
+def density(result: Result) -> float:
+    """Return the density of the pile at the end, kg/m^3; its critical spin is proportional to the square
+    root."""
+    return Asteroid.of(result.state).density
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost`` in a pile before it is spun up: density and largest overlap.
+
+    Paths of single grains are chaotic.
+    """
+    return (
+        Quantity("density", density, random=True),
+        Quantity("largest overlap", lambda result: overlap(result, np.min), random=True),
+    )

@@ -1,11 +1,7 @@
 """A valve that a magnetorheological fluid jams in a field (L21 section 3.4.4), and its inverse problem."""
 
-from __future__ import annotations
-
 from tisim.cases.case import Case, Late
-from tisim.cases.valve.accuracy import quantities
-from tisim.cases.valve.scene import TITLE, scene_for
-from tisim.cases.valve.sizes import SIZES
+from tisim.cases.valve.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
     name="valve",
@@ -14,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.valve.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.valve.measures", "quantities"),
     problem=Late("tisim.cases.valve.problem", "problem"),
     variants=("front", "field", "never"),
     figures=Late("tisim.cases.valve.figures", "figures"),

@@ -1,19 +1,15 @@
 """Checks of a valve: the walls balance the drag on grains, and L21's findings on jams are compared with the
 results."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from tisim.analysis import Mean
-from tisim.cases.case import Check
-from tisim.cases.statistics import Claim, Shown
+from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.valve.measures import drag_pressure, held_pressure, unhindered_rate
-from tisim.cases.valve.runs import ARRESTED, Flow, left, left_of
-from tisim.cases.valve.sizes import GRADIENT, LENGTH
-from tisim.cases.valve.studies import ValveRuns, by_throat
+from tisim.cases.valve.runs import ARRESTED, Flow, ValveRuns, by_throat, left, left_of
+from tisim.cases.valve.scene import GRADIENT, LENGTH
 
 STARTS = 6
 """Number of starts of each valve. The narrow one has twice this number, with and without a field, and the one

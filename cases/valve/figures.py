@@ -1,10 +1,6 @@
 """Figures of the case valve: flow rate over time, its remaining part by field, and a cut through the
 grains."""
 
-from __future__ import annotations
-
-import csv
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
+from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.valve.measures import clusters, drag_pressure, duct_of, held_pressure, oil_of
-from tisim.cases.valve.runs import ARRESTED, Flow, left
-from tisim.cases.valve.sizes import THROATS, D
-from tisim.cases.valve.studies import ValveRuns, by_field, by_throat
+from tisim.cases.valve.runs import ARRESTED, Flow, ValveRuns, by_field, by_throat, left
+from tisim.cases.valve.scene import THROATS, D
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain
@@ -113,21 +109,19 @@ def cut(axis: Axes, flow: Flow) -> EllipseCollection:
 
 def table(valves: Sequence[ValveRuns]) -> str:
     """Return the results of each start of each valve as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(
+    rows: list[list[object]] = [
         [
             "throat_m", "grain_diameter_m", "flux_density_T", "seed", "open_rate_kg_per_s", "part_left",
             "drag_pressure_Pa", "held_pressure_Pa", "largest_cluster", "bridged",
         ]
-    )  # fmt: skip
+    ]  # fmt: skip
     for valve in valves:
         for flow in valve.flows:
             found = clusters(flow.result.state, flow.result.scene)
             numbers = (flow.open_rate, flow.left, drag_pressure(flow.result), held_pressure(flow.result))
-            writer.writerow(
+            rows.append(
                 [f"{valve.throat:.4g}", f"{valve.diameter:.4g}", valve.flux, flow.result.scene.seed]
                 + [f"{one:.4g}" for one in (*numbers, found.largest)]
                 + [int(found.bridged)]
             )
-    return text.getvalue()
+    return csv_text(rows)

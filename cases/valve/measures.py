@@ -1,15 +1,15 @@
 """Measures of a valve: its mass flow rate, the pressure on its walls, and clusters of grains."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.constants import mu_0
 
 from tisim import Cloud, Result, Scene
+from tisim.accuracy import Quantity
 from tisim.analysis import contacts, labels, periodic_sides
-from tisim.cases.dipoles import attraction_in_line
+from tisim.cases.common.runs import overlap
+from tisim.cases.common.two_spheres import attraction_in_line
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct
 from tisim.cases.valve.scene import mean_radius
@@ -136,3 +136,12 @@ def mason_number(scene: Scene, radius: float, flux: float) -> float:
     duct = duct_of(scene)
     speed = oil_of(scene).speed * (duct.bore / duct.throat) ** 2
     return float(6 * np.pi * published.OIL_VISCOSITY * radius * speed / attraction(radius, flux))
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``: flow rate and largest overlap, as paths of grains are
+    chaotic."""
+    return (
+        Quantity("mass flow rate at the end", flow_rate, random=True),
+        Quantity("largest overlap", overlap, random=True),
+    )

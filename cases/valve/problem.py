@@ -2,32 +2,26 @@
 
 A design is the diameter of the constriction, the diameter of the grains, and the field. A wide constriction
 has a larger flow without a field, and needs a stronger field to jam. The jam is simulated from several
-starts, in a field that is on from the beginning. The flow without a field is computed by ``open_flow``, not
-simulated.
+starts, in a field that is on from the beginning. The flow without a field is computed by ``duct.open_flow``,
+not simulated.
 
 A valve may jam from some starts and not from others. A start that misses the goal counts as MISSED times the
 worst possible value. A design whose four starts include such a start is therefore worse than all designs
 without one, and a search sees how many starts miss the goal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from tisim import Result, Scene
 from tisim.cases.case import searched_size
-from tisim.cases.mrf_shear.grains import equal
-from tisim.cases.mrf_shear.scene import SWEPT
+from tisim.cases.common.magnetorheological_fluid import SWEPT, equal
 from tisim.cases.valve import published
+from tisim.cases.valve.duct import open_flow
 from tisim.cases.valve.measures import duct_of, flow_rate, held_pressure, unhindered_rate
-from tisim.cases.valve.open_flow import open_flow
 from tisim.cases.valve.runs import ARRESTED
-from tisim.cases.valve.scene import TITLE, scene
-from tisim.cases.valve.sizes import GRADIENT, SEARCHED, SIZES, D
+from tisim.cases.valve.scene import GRADIENT, SEARCHED, SIZES, TITLE, D, scene
 from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.objective import Objective
-from tisim.optimize.problem.problem import Problem
+from tisim.optimize import Gene, Genome, Objective, Problem
 from tisim.plotting.cloud import cloud
 from tisim.sources import MagneticField
 

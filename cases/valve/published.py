@@ -6,10 +6,7 @@ its table 2.1 are used, because it says that the module is the same. It also doe
 which is left out, or the cut-off of the magnetic forces ("close neighbors").
 """
 
-from __future__ import annotations
-
-MICRO = 1e-6
-"""A micrometre, m."""
+from tisim.cases.common.magnetorheological_fluid import MICRO
 
 LARGEST, FINE_LARGEST = 44 * MICRO, 10 * MICRO
 """Diameters of the largest grains of the coarse and of the fine mixture, m."""

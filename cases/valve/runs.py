@@ -1,6 +1,4 @@
-"""Runs of valves, with their flow rates over time."""
-
-from __future__ import annotations
+"""Runs of valves, with their flow rates over time; comparisons of constrictions, grain sizes and fields."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +8,17 @@ import numpy as np
 
 from tisim import Observer, Result, Scene, Simulation
 from tisim.analysis import Mean
-from tisim.cases.runs import sound
+from tisim.cases.common.magnetorheological_fluid import equal
+from tisim.cases.common.runs import sound
+from tisim.cases.valve import published
 from tisim.cases.valve.measures import duct_of, rate
+from tisim.cases.valve.scene import FIELD, FINE_DIAMETER, THROATS, D, scene
 from tisim.engine.batches import Progress
 from tisim.sources import MagneticField
 
 Settings = Mapping[str, Any]
 """Settings of a scene that differ from the defaults."""
-FLOW_LOOKS = 100
+FLOW_SAMPLES = 100
 """Number of samples of the flow rate in a run."""
 LATE = 0.2
 """Fraction at the end of the time without a field, and of the time with it, over which flow rates are
@@ -27,16 +28,19 @@ ARRESTED = 0.05
 relative to the mean rate before the field. In a search, which has no time without a field, it is relative to
 the rate of grains that move with the oil, at the end (``problem.part_left``)."""
 
+FLUXES = (published.FLUX, 0.27)
+"""Flux densities in addition to FIELD, T."""
+
 
 class FlowSeries(Observer):
-    """Records the mass flow rate of each world at FLOW_LOOKS equally spaced times.
+    """Records the mass flow rate of each world at FLOW_SAMPLES equally spaced times.
 
     ``rows[w]`` are pairs of time (s) and rate (kg/s) of world w.
     """
 
     def __init__(self, scenes: Sequence[Scene]) -> None:
         self.lengths = [duct_of(one).length for one in scenes]
-        self.intervals = np.array([one.duration / FLOW_LOOKS for one in scenes])
+        self.intervals = np.array([one.duration / FLOW_SAMPLES for one in scenes])
         self.rows: list[list[tuple[float, float]]] = [[] for _ in scenes]
 
     def pause(self, simulation: Simulation) -> np.ndarray:
@@ -113,3 +117,77 @@ def left_of(group: Sequence[Flow], without: Sequence[Flow]) -> Mean:
     It excludes slowing of the flow that is not caused by the field.
     """
     return Mean.of([one.closed_rate / other.closed_rate for one, other in zip(group, without, strict=True)])
+
+
+@dataclass(frozen=True)
+class ValveRuns:
+    """The runs of a valve: flows from several starts.
+
+    throat, diameter : of the constriction and of the grains, m. flux : flux density, T.
+    """
+
+    throat: float
+    diameter: float
+    flux: float
+    flows: Sequence[Flow]
+
+    @property
+    def width(self) -> float:
+        """Return the number of grains side by side in the constriction."""
+        return self.throat / self.diameter
+
+    @property
+    def name(self) -> str:
+        """Return a readable name."""
+        name = f"{self.width:.3g} grains of {1e6 * self.diameter:.3g} µm"
+        return name if self.flux > 0 else f"{name}, no field"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A valve to run: diameters of the constriction and of the grains, m, flux density, T, and number of
+    starts."""
+
+    throat: float
+    diameter: float
+    flux: float
+    starts: int
+
+    def settings(self) -> list[Settings]:
+        """Return the settings of its scenes, one for each start."""
+        grains = equal(self.diameter / 2, 1.0)
+        one = {"throat": self.throat, "grains": grains, "flux": self.flux}
+        return [{**one, "seed": seed} for seed in range(self.starts)]
+
+
+def run_all(wanted: Sequence[Wanted], progress: Progress = lambda part: None) -> list[ValveRuns]:
+    """Return the runs of valves, all in one batch."""
+    done = flows([scene(**one) for each in wanted for one in each.settings()], progress)
+    ends = np.cumsum([each.starts for each in wanted])
+    return [
+        ValveRuns(each.throat, each.diameter, each.flux, done[end - each.starts : end])
+        for each, end in zip(wanted, ends, strict=True)
+    ]
+
+
+def by_throat(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
+    """Return the runs of the compared constrictions and grains.
+
+    They are, with the number of starts:
+    - coarse grains in the narrow constriction, 2 ``starts``, with a field and without one;
+    - coarse grains in the wide constriction, ``starts``;
+    - fine grains, with eight times the number, in the narrow constriction, ``starts`` / 2.
+    """
+    narrow, wide = THROATS
+    wanted = [
+        Wanted(narrow, D, FIELD, 2 * starts),
+        Wanted(wide, D, FIELD, starts),
+        Wanted(narrow, FINE_DIAMETER, FIELD, starts // 2),
+        Wanted(narrow, D, 0.0, 2 * starts),
+    ]
+    return run_all(wanted, progress)
+
+
+def by_field(starts: int, progress: Progress = lambda part: None) -> list[ValveRuns]:
+    """Return coarse grains in each constriction, in other fields."""
+    return run_all([Wanted(throat, D, flux, starts) for throat in THROATS for flux in FLUXES], progress)

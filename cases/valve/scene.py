@@ -4,41 +4,52 @@ Oil with a prescribed velocity drags grains through a constriction of a round du
 across the duct is switched on, and the grains form chains, which either arrest the flow or yield and flow on.
 The duct is periodic along the flow: grains that leave it below enter it above.
 
-It is the simulation of L21 section 3.4.4. ``sizes`` and the page of the case list the differences at the
-sizes for a laptop.
+It is the simulation of L21 section 3.4.4. SIZES and the page of the case list the differences at the sizes
+for a laptop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from tisim import Box, Cloud, GrainClass, Scene
-from tisim.cases.case import size_named
-from tisim.cases.mixtures import VALVE_GRAINS
-from tisim.cases.mrf_shear import published as shear
-from tisim.cases.mrf_shear.grains import number_of, smallest
-from tisim.cases.mrf_shear.scene import SUSCEPTIBILITY, iron
+from tisim.cases.case import Size, size_named
+from tisim.cases.common import magnetorheological_fluid as fluid
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct
-from tisim.cases.valve.sizes import BORE, COARSE, GRADIENT, LENGTH, SIZES, THROATS
-from tisim.effects import (
-    Granular,
-    HertzMaterial,
-    MindlinForce,
-    MutualInducedMoment,
-    RestitutionDamping,
-    RollingEPSD,
-    StokesDrag,
-    TruncatedDipoleDipole,
-)
+from tisim.effects import CARBONYL_IRON, MutualInducedMoment, StokesDrag, TruncatedDipoleDipole
 from tisim.errors import must
 from tisim.sources import MagneticField
 from tisim.steppers import FixedStep, Verlet
 
 TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"
 
+D = published.LARGEST
+"""Diameter of the coarse grains, m, equal to L21's largest."""
+FINE_DIAMETER = D / 2
+"""Diameter of the fine grains, m."""
+COARSE, FINE_GRAINS = fluid.equal(D / 2, 1.0), fluid.equal(FINE_DIAMETER / 2, 1.0)
+"""Grains of one size: the largest of L21, and half as large."""
+THROATS = (4 * D, 6.5 * D)
+"""Diameters of the constrictions, m."""
+BORE, LENGTH = 8 * D, 8 * D
+"""Diameter and length of the duct, m."""
+
+L21_BORE, L21_LENGTH = 3.2e-3, 0.9e-3
+"""Diameter of the duct of L21, m, and its length. L21 does not state the diameter; here it is an eighth of an
+inch, which leaves 0.4 mm of wall in a valve that is 4 mm wide (its table 3.1). With this length, its oil
+drags grains at rest with 90, 117 and 141 kPa in constrictions 20, 30 and 40 grains wide, close to its 100
+kPa."""
+GRADIENT = published.PRESSURE / L21_LENGTH
+"""The drag on grains at rest per volume of the duct, Pa/m: L21's 100 kPa over that length."""
+
+SEARCHED: dict[str, Any] = {"flowing": 0.0, "lasting": 4e-4}
+"""Settings of the runs in a search: the field is on from the beginning."""
+SEARCH_SETTINGS = {
+    "generations": 6, "options": {"population": 8, "first": 12}, "ensemble": {"min_starts": 4, "confirm": 8},
+}  # fmt: skip
+"""With one start, some valves jam by chance, and a search would select those."""
 FLOWING, LASTING = 0.1e-3, 0.5e-3
 """Durations of the flow without a field and with it, s."""
 CUTOFF = 4.4
@@ -46,15 +57,42 @@ CUTOFF = 4.4
 cell (section 2.4.3), a gap of 8 um between grains of 6.7 um."""
 FIELD = 0.3
 """Flux density of the field, T."""
+SUSCEPTIBILITY = CARBONYL_IRON.parameters()["susceptibility"]
+"""Susceptibility of carbonyl iron."""
 SLOPE = 1.0
 """Length of a cone divided by the decrease of the radius along it."""
-CONTACT = Granular(
-    normal=HertzMaterial(),
-    damping=RestitutionDamping(),
-    tangential=MindlinForce(),
-    rolling=RollingEPSD(damping_ratio=shear.ROLLING_DAMPING),
-)
-"""The contact law of L21 section 2.2.1, without cohesion."""
+
+
+def l21(ratio: int, **more: Any) -> dict[str, Any]:
+    """Return the settings of L21's valve with a constriction ``ratio`` grains wide."""
+    throat = published.CONSTRICTIONS[ratio]
+    return {
+        "throat": throat, "bore": L21_BORE, "straight": throat / 4, "slope": 0.25, "length": L21_LENGTH,
+        "grains": fluid.classes(fluid.VALVE_GRAINS, "mass"), "speed": published.OIL_SPEED,
+        "dt": published.STEP, "flux": published.FLUX, "flowing": published.UNMAGNETISED, "lasting": 4e-3,
+        **more,
+    }  # fmt: skip
+
+
+SIZES = {
+    "default": Size(
+        "185 grains of 44 um, a constriction of 4 diameters in a duct of 8 by 8", {}, SEARCH_SETTINGS
+    ),
+    "l21_20": Size("L21's numbers: a constriction of 0.88 mm, 44,668 grains of its coarse mixture", l21(20)),
+    "l21_30": Size("the same, 1.32 mm, 47,782 grains", l21(30)),
+    "l21_40": Size("the same, 1.76 mm, 53,848 grains", l21(40)),
+    "l21_fine": Size(
+        "1.32 mm, 1,498,645 grains of L21's fine mixture, in a shorter duct with a shorter constriction",
+        l21(
+            30,
+            grains=fluid.classes(fluid.FINE_VALVE_GRAINS, "mass"),
+            dt=published.FINE_STEP,
+            straight=0.1e-3,
+            slope=0.1,
+            length=0.4e-3,
+        ),
+    ),
+}
 
 
 def duct(throat: float, bore: float, straight: float, slope: float, length: float) -> Duct:
@@ -75,7 +113,7 @@ def step(radius: float, young: float) -> float:
 
     It is L21's step, scaled like the duration of an impact by Hertz.
     """
-    smaller = 2 * radius / (VALVE_GRAINS[-1][0] * published.MICRO)
+    smaller = 2 * radius / (fluid.VALVE_GRAINS[-1][0] * published.MICRO)
     return float(f"{published.STEP * smaller * (published.YOUNG / young) ** 0.4:.2g}")
 
 
@@ -86,7 +124,7 @@ def speed_of(pressure: float, duct: Duct, grains: Sequence[GrainClass], fraction
     The drag is that on grains at rest, evenly distributed over the duct.
     """
     volume = duct.filling().volume()
-    density = number_of(grains, fraction, volume) / volume
+    density = fluid.number_of(grains, fraction, volume) / volume
     drag = 6 * np.pi * published.OIL_VISCOSITY * mean_radius(grains) * density * duct.oil_through()
     return float(pressure * duct.area / drag)
 
@@ -132,23 +170,23 @@ def scene(
     return Scene(
         name="valve",
         particles=Cloud(
-            number=number_of(grains, fraction, shape.filling().volume()),
+            number=fluid.number_of(grains, fraction, shape.filling().volume()),
             grains=tuple(grains),
             placement=shape.filling(),
         ),
-        materials={"iron": iron(young, shear.ROLLING_FRICTION, None, friction)},
+        materials={"iron": fluid.iron(young, friction=friction)},
         domain=Box(low=(-half[0], -half[1], -half[2]), high=half, periodic=(False, False, True)),
         effects=(
             MagneticField(constant=(flux, 0.0, 0.0), begin=flowing),
             # One sweep a step, as in L21 (section 2.2.3).
             MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, cutoff=CUTOFF),
             TruncatedDipoleDipole(cutoff=CUTOFF),
-            CONTACT,
+            fluid.contact_law(),
             shape.walls(),
             shape.oil(speed),
             StokesDrag(viscosity=published.OIL_VISCOSITY),
         ),
-        stepper=Verlet(control=FixedStep(dt=step(smallest(grains), young) if dt is None else dt)),
+        stepper=Verlet(control=FixedStep(dt=step(fluid.smallest(grains), young) if dt is None else dt)),
         duration=flowing + lasting,
         seed=seed,
     )

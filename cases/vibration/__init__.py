@@ -1,9 +1,6 @@
 """Electromagnetically induced vibration of particles in a binder (Z13 section 4), and its inverse problem."""
 
-from __future__ import annotations
-
 from tisim.cases.case import Case, Late
-from tisim.cases.vibration.accuracy import quantities
 from tisim.cases.vibration.scene import SIZES, TITLE, scene_for
 
 CASE = Case(
@@ -13,7 +10,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=Late("tisim.cases.vibration.checks", "check"),
-    quantities=quantities,
+    quantities=Late("tisim.cases.vibration.closed_forms", "quantities"),
     pictures=Late("tisim.cases.vibration.figures", "pictures"),
     figures=Late("tisim.cases.vibration.figures", "figures"),
     problem=Late("tisim.cases.vibration.problem", "problem"),

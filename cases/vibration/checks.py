@@ -1,15 +1,12 @@
 """Checks of Z13: its numbers, and comparisons of runs with the closed forms of the centre of gravity."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
 
 from tisim import Result, run
 from tisim.cases.case import Check
-from tisim.cases.vibration.accuracy import centre, exact
-from tisim.cases.vibration.closed_forms import resonances
+from tisim.cases.vibration.closed_forms import centre, exact, resonances
 from tisim.cases.vibration.response import BEAT_DRIVE, FAST, SLOW, Sweep, beats, fast_scenes, slow_scenes
 from tisim.cases.vibration.scene import ATTRACTION, CYCLOTRON, MASS, RATIOS, REPULSION, STIFFNESS, scene
 from tisim.steppers import Collocation, StageControl

@@ -1,9 +1,5 @@
 """Figures of the case vibration: figures of one run, and of many runs."""
 
-from __future__ import annotations
-
-import csv
-import io
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tisim.cases.case import size_named
+from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.vibration import scene as vibration
-from tisim.cases.vibration.accuracy import constants
-from tisim.cases.vibration.closed_forms import resonances, response
+from tisim.cases.vibration.closed_forms import constants, resonances, response
 from tisim.cases.vibration.response import (
     BEAT_DRIVE,
     FAST,
@@ -113,13 +109,13 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 def table(*sweeps: tuple[str, Sweep]) -> str:
     """Return the largest displacements of all sweeps as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(["particles", "duration_s", "omega_1_s", "omega_over_w", "peak_m", "closed_form_m"])
+    rows: list[list[object]] = [
+        ["particles", "duration_s", "omega_1_s", "omega_over_w", "peak_m", "closed_form_m"]
+    ]
     for what, sweep in sweeps:
         for row in zip(sweep.omega, sweep.omega / vibration.CYCLOTRON, sweep.peaks, sweep.exact, strict=True):
-            writer.writerow([what, sweep.duration, *map(float, row)])
-    return text.getvalue()
+            rows.append([what, sweep.duration, *map(float, row)])
+    return csv_text(rows)
 
 
 def resonance_figure(

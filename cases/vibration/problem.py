@@ -6,8 +6,6 @@ known: a drive at Omega is in resonance with the fast or the slow motion if k/m 
 best designs lie on these two lines of the plane of B and k.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -18,8 +16,7 @@ from tisim.cases.vibration.closed_forms import resonances
 from tisim.cases.vibration.response import peak
 from tisim.cases.vibration.scene import CHARGE, FIELD, MASS
 from tisim.errors import must
-from tisim.optimize.problem.genome import Gene, Genome
-from tisim.optimize.problem.problem import Problem
+from tisim.optimize import Gene, Genome, Problem
 
 VARIANTS = ("resonate", "avoid")
 """The inverse problems: the largest and the smallest response to a given drive."""

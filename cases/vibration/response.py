@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal.windows import blackmanharris
 
 from tisim import Recording, Scene, run
-from tisim.cases.runs import sound
+from tisim.cases.common.runs import sound
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.closed_forms import resonances, response
 from tisim.cases.vibration.scene import CHARGE, CYCLOTRON, FIELD, MASS, STIFFNESS

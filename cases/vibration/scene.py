@@ -14,8 +14,6 @@ move together, so this near field has no effect unless the start is disturbed: t
 field that the paper discusses do not occur in the centre of gravity.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from tisim import Cloud, Lattice, Scene

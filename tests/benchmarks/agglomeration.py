@@ -31,8 +31,7 @@ from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 from tisim.cases.agglomeration.problem import cost
-from tisim.cases.agglomeration.published_strings import designs
-from tisim.cases.agglomeration.scene import DURATION, scene
+from tisim.cases.agglomeration.scene import DURATION, designs, scene
 from tisim.scene.initial_state import Arrays
 
 DESIGNS = designs()

@@ -37,12 +37,12 @@ from tisim.cases.avalanche.scene import (  # noqa: E402
     POISSON,
     RESTITUTION,
     STIFFNESS,
+    Cell,
     scene,
     step,
     time_unit,
     young,
 )
-from tisim.cases.avalanche.sizes import Cell  # noqa: E402
 
 if TYPE_CHECKING:
     from tisim import Scene

@@ -34,8 +34,9 @@ from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 from tisim import Scene, Simulation  # noqa: E402
 from tisim.cases.coalescence import scene as cloud  # noqa: E402
-from tisim.cases.coalescence.measures import Asteroid, Conserved, Gathering  # noqa: E402
-from tisim.cases.runs import sound  # noqa: E402
+from tisim.cases.coalescence.runs import Gathering  # noqa: E402
+from tisim.cases.common.rubble_pile import Asteroid, Conserved  # noqa: E402
+from tisim.cases.common.runs import sound  # noqa: E402
 from tisim.effects import SelfGravity  # noqa: E402
 
 LOOKS = (5000.0, 10_000.0)

@@ -3,7 +3,7 @@
     python tests/benchmarks/draw_down.py [--size small] [--starts 8] [--design 0.4 0.27 0.6]
     python tests/benchmarks/draw_down.py --valley [--size small] [--starts 2]
 
-The first form prints each quantity of cases/granular_bench/measured.py: its mean with the half width of the
+The first form prints each quantity of cases/granular_bench/problem.py: its mean with the half width of the
 95 % interval, its standard deviation over held-out random starts (seeds), and its uncertainty in a
 calibration; and the misfit of the means, with its 95 % interval. A design is friction, rolling friction and
 restitution. With --valley, for each friction it prints the rolling friction whose angle of repose and

@@ -36,12 +36,23 @@ from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tisim.cases.common.magnetorheological_fluid import TABLE_2_1  # noqa: E402
+from tisim.cases.common.runs import sound  # noqa: E402
 from tisim.cases.mrf_shear import published  # noqa: E402
-from tisim.cases.mrf_shear.grains import LARGE_RADIUS  # noqa: E402
-from tisim.cases.mrf_shear.measures import order, shear_stress  # noqa: E402
-from tisim.cases.mrf_shear.regime import magnetisation  # noqa: E402
-from tisim.cases.mrf_shear.scene import BEFORE, CUT, SEARCHED, STRAIN, SUSCEPTIBILITY, scene  # noqa: E402
-from tisim.cases.runs import sound  # noqa: E402
+from tisim.cases.mrf_shear.measures import (  # noqa: E402
+    magnetisation,
+    order,
+    shear_stress,
+)
+from tisim.cases.mrf_shear.scene import (  # noqa: E402
+    BEFORE,
+    CUT,
+    LARGE_RADIUS,
+    SEARCHED,
+    STRAIN,
+    SUSCEPTIBILITY,
+    scene,
+)
 
 if TYPE_CHECKING:
     from tisim import Scene
@@ -55,8 +66,8 @@ LAW = TwinLaw(
     (
         {
             "young": published.YOUNG,
-            "poisson": published.POISSON,
-            "restitution": published.RESTITUTION,
+            "poisson": TABLE_2_1["poisson"],
+            "restitution": TABLE_2_1["restitution"],
         },
     ),
     tangential=None,

@@ -18,9 +18,10 @@ import numpy as np
 
 import tisim
 from tisim.analysis import Mean
+from tisim.cases.common.magnetorheological_fluid import SWEPT
+from tisim.cases.common.runs import grouped
 from tisim.cases.mrf_shear.flow_curve import AS_PUBLISHED, MIXED, VARIATIONS, Curve
-from tisim.cases.mrf_shear.runs import grouped
-from tisim.cases.mrf_shear.scene import RATES, SEARCHED, SWEPT, scene
+from tisim.cases.mrf_shear.scene import RATES, SEARCHED, scene
 
 
 def main() -> None:

@@ -17,11 +17,10 @@ import numpy as np
 
 import tisim
 from tisim.analysis import Mean
+from tisim.cases.common.runs import overlap, sound
 from tisim.cases.mrf_shear import published
-from tisim.cases.mrf_shear.grains import LARGE_RADIUS
 from tisim.cases.mrf_shear.measures import shear_stress
-from tisim.cases.mrf_shear.scene import SEARCHED, impact_step, scene
-from tisim.cases.runs import overlap, sound
+from tisim.cases.mrf_shear.scene import LARGE_RADIUS, SEARCHED, impact_step, scene
 
 
 def main() -> None:

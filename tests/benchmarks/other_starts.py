@@ -21,7 +21,7 @@ import tisim
 from tisim import Result
 from tisim.analysis import Mean
 from tisim.cases.case import every
-from tisim.cases.runs import OTHER_STARTS
+from tisim.cases.common.runs import OTHER_STARTS
 from tisim.optimize import Problem
 
 

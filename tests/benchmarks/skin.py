@@ -20,7 +20,7 @@ from tests.benchmarks.turns import spread
 from tisim import Scene, Simulation
 from tisim.backend import runtime
 from tisim.cases.avalanche import scene as avalanche
-from tisim.cases.avalanche.sizes import DEFAULT
+from tisim.cases.avalanche.scene import DEFAULT
 from tisim.cases.mrf_shear import scene as mrf_shear
 
 SCENES = {

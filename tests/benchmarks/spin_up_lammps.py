@@ -34,7 +34,7 @@ from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 from tisim import Scene, Simulation  # noqa: E402
 from tisim.cases.coalescence import scene as cloud  # noqa: E402
 from tisim.cases.coalescence.published import DIAMETERS  # noqa: E402
-from tisim.cases.runs import sound  # noqa: E402
+from tisim.cases.common.runs import sound  # noqa: E402
 from tisim.cases.spin_up.checks import at_least  # noqa: E402
 from tisim.cases.spin_up.scene import DEFAULT, NUMBERS, SETTLED, scene  # noqa: E402
 from tisim.cases.spin_up.stages import RATES, SpinStep, SpinUp, stage_ends, turn  # noqa: E402

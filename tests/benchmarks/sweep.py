@@ -24,7 +24,7 @@ from tests.benchmarks.turns import spread
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 from tisim.cases.agglomeration import scene as agglomeration
-from tisim.cases.agglomeration.published_strings import designs
+from tisim.cases.agglomeration.scene import designs
 from tisim.cases.capture import scene as capture
 from tisim.cases.vibration import scene as vibration
 

@@ -1,11 +1,12 @@
-"""The contract of a case."""
+"""The contract of a case, and what its checks hold."""
 
 import inspect
 
 import pytest
 
 from tisim import InputError
-from tisim.cases.case import Late, every
+from tisim.analysis import Mean
+from tisim.cases.case import Check, Claim, Late, Shown, every
 
 INVERSE = [name for name, case in every().items() if case.problem]
 
@@ -59,3 +60,21 @@ def test_every_scene_of_a_moderate_size_may_begin(name):
                     effect.check_start(start, scene)
                 begun += 1
     assert begun > 0
+
+
+def test_claim_holds_when_all_of_the_interval_does():
+    assert Claim("", Mean(0.5, 0.1), least=0.39).ok
+    assert not Claim("", Mean(0.5, 0.1), least=0.41).ok
+    assert Claim("", Mean(0.5, 0.1), most=0.61).ok
+    assert not Claim("", Mean(0.5, 0.1), most=0.59).ok
+    assert Claim("", Mean(0.5, 0.1), most=0.6).cells[:2] == ("0.50 ± 0.10", "below 0.6")
+
+
+def test_what_is_shown_is_not_judged():
+    assert Shown("", Mean(1.0, 0.5), "2").cells == ("1.00 ± 0.50", "2", "", "")
+    assert Shown("", 1.23456).cells[0] == "1.235"
+    assert Shown("", 1.0).ok is None
+
+
+def test_checks_are_checks():
+    assert Check("", 1.0, 1.0, 0.0).cells[3] == "0.0e+00"

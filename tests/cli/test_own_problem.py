@@ -90,7 +90,7 @@ CASE = Case(
 def test_shown_values_are_not_checked(tisim, own_file):
     more = "Shown('three', 3.0, 'more')", "Check('one', 1.0, 2.0, 0.0)"
     wrong = CASE.replace("4.0, 0.0)", "\n    yield ".join(("4.0, 0.0)", *more)))
-    own_file("my_case.py", PROBLEM + "from tisim.cases.statistics import Shown\n" + wrong)
+    own_file("my_case.py", PROBLEM + "from tisim.cases.case import Shown\n" + wrong)
     code, out, err = tisim("check", "my_case.py")
     assert code == 1
     assert "1 of 2 checks failed" in err

@@ -5,7 +5,7 @@ import pytest
 
 from tests.hard.granular_scenes import ELASTIC, LAWS, ends, grains, kinetic, loaded, lossy, stored
 from tests.scenes import roundoff
-from tisim.cases.granular_bench.closed_forms import hertz_duration
+from tisim.cases.common.two_spheres import hertz_duration
 
 pytestmark = pytest.mark.slow
 

@@ -242,7 +242,7 @@ def _measurements(folder: Path) -> Path:
 
 
 def _calibration(path: Path) -> list[str]:
-    from tisim.cases.granular_bench.measured import read
+    from tisim.cases.granular_bench.problem import read
 
     return [repr(sorted(read(path).items()))]
 

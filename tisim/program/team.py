@@ -30,7 +30,7 @@ TIMES_LATE = 8
 LINE = 16
 """Numbers of 8 bytes between the counters of two teams, so that each is in cache lines of its own: CPUs fetch
 two lines of 64 bytes."""
-CLOSED = 2**30
+ROLL_CLOSED = 2**30
 """The roll of a team exceeds this value once nobody can join any more."""
 
 Member = ti.types.struct(team=ti.i32, seat=ti.i32, members=ti.i32)
@@ -81,14 +81,14 @@ class Teams:
         Exactly one member closes the roll and publishes its length.
         """
         seat, members, looks = ti.atomic_add(self.roll[at], 1), ti.cast(0, ti.i64), 0
-        while seat < CLOSED and members == 0:
+        while seat < ROLL_CLOSED and members == 0:
             if seat + 1 == places or looks > self.late:
-                length = ti.atomic_or(self.roll[at], CLOSED)
-                if length < CLOSED:
+                length = ti.atomic_or(self.roll[at], ROLL_CLOSED)
+                if length < ROLL_CLOSED:
                     ti.atomic_max(self.said[at], length)
             members = self._look(at)
             looks += 1
-        return ti.cast(ti.min(seat, CLOSED), ti.i32), ti.cast(members, ti.i32)
+        return ti.cast(ti.min(seat, ROLL_CLOSED), ti.i32), ti.cast(members, ti.i32)
 
     @ti.func
     def next_world(self, me):

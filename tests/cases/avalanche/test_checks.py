@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 
 from tests.cases.avalanche.slopes import WIDTH, block, leaning
-from tisim import InputError
+from tisim import Box, InputError
 from tisim.cases.avalanche import figures as drawing
-from tisim.cases.avalanche.calving import STRIP, strips_of
 from tisim.cases.avalanche.checks import of_avalanches
-from tisim.cases.avalanche.comparison import of, steeper_by
-from tisim.cases.avalanche.figures import figures
+from tisim.cases.avalanche.figures import STRIP, figures, strips_of
 from tisim.cases.avalanche.measures import load_on_walls
 from tisim.cases.avalanche.scaling import CONTRAST, moment_eigenvalues
-from tisim.cases.avalanche.scene import DIAMETERS, FLUX, GRAVITY, RELAXATION
-from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
-from tisim.cases.avalanche.stages import Avalanche, avalanches
+from tisim.cases.avalanche.scene import DEFAULT, DIAMETERS, FLUX, GRAVITY, RELAXATION, SIZES, Cell
+from tisim.cases.avalanche.stages import Avalanche, avalanches, of, steeper_by
 from tisim.cases.case import Size
 
 CELL = Cell(number=0, column=8.0, width=WIDTH, length=40.0, height=20.0)
@@ -26,7 +23,9 @@ def avalanche(d, field, seed, run, top=16):
     """An avalanche that has left a staircase."""
     state = leaning(top + seed % 2, run, d)
     measures = {"box_force_z": -GRAVITY * state["mass"].sum(), "gate_force_z": 0.0, "kinetic_ratio": 1e-5}
-    end = SimpleNamespace(state=state, measures=measures)
+    sides = (CELL.length * d, CELL.width * d, CELL.height * d)
+    cell = Box(low=(0.0, 0.0, 0.0), high=sides, periodic=(False, True, False))
+    end = SimpleNamespace(state=state, measures=measures, time=0.0, scene=SimpleNamespace(domain=cell))
     # Magnetised columns are half as high again, those of small grains alone.
     high = 6 if field and d == DIAMETERS[0] else 4
     return Avalanche(CELL, d, field, seed, block([4] * 8, d), block([high + seed % 2] * 8, d), end)

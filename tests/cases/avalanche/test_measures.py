@@ -11,7 +11,6 @@ from tisim.cases.avalanche.measures import (
     grains_volume,
     heap_volume,
     load_on_walls,
-    overlap,
     repose,
     two_slopes,
 )
@@ -54,12 +53,6 @@ def test_a_lattice_fills_pi_over_six():
     # Shifted by half a diameter across, over the periodic face.
     state["position"][:, 1] += D / 2
     np.testing.assert_allclose(filled_parts(state, WIDTH * D, 7 * D, 6 * D), parts, atol=1e-12)
-
-
-def test_the_largest_overlap_is_found_across_the_periodic_face():
-    state = block([1])
-    assert overlap(state, WIDTH * D) < 1e-12
-    assert overlap(state, (WIDTH - 0.1) * D) == pytest.approx(0.2)
 
 
 def test_the_load_on_walls_is_counted_in_weights():

@@ -9,11 +9,20 @@ import tisim
 from tests.cases.avalanche.slopes import leaning
 from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
 from tisim import InputError, optimize
-from tisim.cases.avalanche.measured import MeasuredProfile, area, read
 from tisim.cases.avalanche.measures import profile, repose
-from tisim.cases.avalanche.problem import EXAMPLE, KNOWN, calibration, measured, other_runs, simulated
+from tisim.cases.avalanche.problem import (
+    EXAMPLE,
+    KNOWN,
+    MeasuredProfile,
+    area,
+    calibration,
+    measured,
+    other_runs,
+    read,
+    simulated,
+)
 from tisim.cases.case import every
-from tisim.cases.granular_bench.measured import Measurement
+from tisim.cases.common.csv_tables import Measurement
 from tisim.optimize import Misfit
 from tisim.optimize.tables import met_columns
 

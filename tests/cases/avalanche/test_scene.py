@@ -6,13 +6,15 @@ from scipy.constants import mu_0
 
 from tests.cases.avalanche.slopes import block
 from tisim.analysis import contacts
-from tisim.cases.avalanche.calving import pictures
-from tisim.cases.avalanche.published import SLOPES, larger
+from tisim.cases.avalanche.figures import pictures
 from tisim.cases.avalanche.scaling import attraction, moment, ratio, weight
 from tisim.cases.avalanche.scene import (
+    DEFAULT,
     DIAMETERS,
     FLUX,
     GRAVITY,
+    SIZES,
+    Cell,
     handed_on,
     scene,
     scene_for,
@@ -20,7 +22,7 @@ from tisim.cases.avalanche.scene import (
     time_unit,
     young,
 )
-from tisim.cases.avalanche.sizes import DEFAULT, SIZES, Cell
+from tisim.cases.avalanche.stages import SLOPES, larger
 from tisim.effects import Walls
 
 TINY = Cell(number=40, column=6.0, width=5.25, length=12.0, height=8.0)

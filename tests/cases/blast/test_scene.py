@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from tests.scenes import simulate
-from tisim.cases.blast.accuracy import half_axes
 from tisim.cases.blast.scene import ENERGY, FLUX, NEIGHBOURS, NUMBER, SPECIFIC_CHARGE, SPEED, scene
-from tisim.cases.blast.shape import contacts
+from tisim.cases.blast.shape import contacts, half_axes
 
 SMALL = 200
 

@@ -9,6 +9,7 @@ from tisim.cases.capture import curves, figures
 from tisim.cases.capture import scene as capture
 from tisim.cases.capture.curves import TIMES
 from tisim.cases.capture.statistics import ANGLES, ASPECTS
+from tisim.cases.common.magnetic_fibre import APPLIED_FLUX, SATURATION_MOMENTS
 
 
 def mean_of(n):
@@ -37,13 +38,13 @@ def test_captured_fraction_in_time_and_at_the_end():
         ]  # fmt: skip
 
     angles = rows(swept((75, 212), (20.0,), ("top", "side")))
-    sizes, aspects = rows(swept(capture.SATURATION_MOMENTS, (20.0,))), rows(swept(curves.SOME, ASPECTS))
+    sizes, aspects = rows(swept(SATURATION_MOMENTS, (20.0,))), rows(swept(curves.SOME, ASPECTS))
     axes = curves.captured(angles, sizes, aspects).axes
     for axis, n in zip(axes[:4], (75, 75, 212, 212), strict=True):
         assert len(axis.lines) == len(ANGLES)
         np.testing.assert_allclose(axis.lines[-1].get_ydata(), mean_of(n))
     by_size = {line.get_label(): line.get_ydata() for line in axes[4].lines}
-    assert list(by_size) == [f"{n} nm" for n in capture.SATURATION_MOMENTS]
+    assert list(by_size) == [f"{n} nm" for n in SATURATION_MOMENTS]
     np.testing.assert_allclose(by_size["50 nm"], mean_of(50))
     assert [line.get_label() for line in axes[5].lines] == [f"L/D = {r:.3g}" for r in ASPECTS]
     np.testing.assert_allclose(axes[5].lines[0].get_ydata(), mean_of(125))
@@ -69,4 +70,4 @@ def test_pictures_of_the_magnet(monkeypatch):
     assert titles[2] == f"(c) L/D = 1.67, 90°:\n{short[1]:.1f} times its own volume"
     field = figures.field().axes[2].collections[0]
     # |B| at the edge of the picture is hardly that of the magnet, 1 T along x.
-    assert field.get_array().reshape(41, 41)[0, 0] == pytest.approx(capture.FLUX, rel=0.1)
+    assert field.get_array().reshape(41, 41)[0, 0] == pytest.approx(APPLIED_FLUX, rel=0.1)

@@ -7,8 +7,10 @@ from tisim import InputError, Result, Status, run
 from tisim.analysis import Mean
 from tisim.cases.capture import problem as filters
 from tisim.cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
-from tisim.cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
-from tisim.cases.statistics import Claim
+from tisim.cases.capture.scene import SEARCH_SETTINGS
+from tisim.cases.case import Claim
+from tisim.cases.common.magnetic_fibre import FIBRE_DIAMETER as DIAMETER
+from tisim.cases.common.magnetic_fibre import SATURATION_MAGNETISATION
 from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.report.comparison import FRESH

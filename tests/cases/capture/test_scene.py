@@ -10,21 +10,20 @@ from tisim import Recording, run
 from tisim.analysis import Mean
 from tisim.cases.capture import CASE, curves, figures, statistics
 from tisim.cases.capture import scene as capture
-from tisim.cases.statistics import Claim
+from tisim.cases.case import Claim
+from tisim.cases.common.magnetic_fibre import SATURATION_MAGNETISATION, fibre
 from tisim.io.reader import frames
 
 
 def test_cylinder_lies_at_its_angle_and_is_saturated_along_the_field():
-    body = capture.fibre(capture.axis(30.0), 20.0)
+    body = fibre(30.0, 20.0)
     assert np.degrees(np.arccos(body.axis[0])) == pytest.approx(30.0)
-    assert np.linalg.norm(body.magnetisation) == pytest.approx(capture.SATURATION_MAGNETISATION)
+    assert np.linalg.norm(body.magnetisation) == pytest.approx(SATURATION_MAGNETISATION)
     # Between the axis of a long cylinder and the field.
-    turned = np.degrees(np.arccos(np.dot(body.axis, body.magnetisation) / capture.SATURATION_MAGNETISATION))
+    turned = np.degrees(np.arccos(np.dot(body.axis, body.magnetisation) / SATURATION_MAGNETISATION))
     assert 0.0 < turned < 30.0
-    across = capture.fibre(capture.axis(90.0), 5 / 3).magnetisation
-    np.testing.assert_allclose(
-        across, (capture.SATURATION_MAGNETISATION, 0, 0), atol=1e-6 * capture.SATURATION_MAGNETISATION
-    )
+    across = fibre(90.0, 5 / 3).magnetisation
+    np.testing.assert_allclose(across, (SATURATION_MAGNETISATION, 0, 0), atol=1e-6 * SATURATION_MAGNETISATION)
 
 
 @pytest.mark.slow
@@ -60,7 +59,7 @@ def test_a_scene_of_its_own_placement_is_read_where_nothing_else_is_imported(tmp
 
 
 def test_force_towards_a_cylinder():
-    body = capture.fibre(capture.axis(90.0), 2.0)
+    body = fibre(90.0, 2.0)
     r, half = body.radius, body.length / 2
     points = np.array([[2 * r, 0, 0], [0, 0, 2 * half], [2 * r, 0, 2 * half], [0.0, 0.0, 0.0]])
     force = np.array([[-3.0, 1, 0], [1.0, 0, 2], [-1.0, 0, -1], [1.0, 0, 0]])

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.constants import G
 
-from tests.cases.coalescence.test_measures import row, state_of
+from tests.cases.common.test_rubble_pile import row, state_of
 from tisim import InputError
 from tisim.cases.case import Check
 from tisim.cases.coalescence.checks import of_agglomeration, of_conservation, of_structure, of_the_cloud
 from tisim.cases.coalescence.figures import asteroids, figures, forces, growth, shells, table
-from tisim.cases.coalescence.measures import Conserved, Gathering
 from tisim.cases.coalescence.published import MAGNETISATIONS
 from tisim.cases.coalescence.regime import COMPARED, regime, rotation_over_gravity
-from tisim.cases.coalescence.runs import CloudRun, clouds, of_magnetisation
+from tisim.cases.coalescence.runs import CloudRun, Gathering, chain_length, clouds, of_magnetisation
 from tisim.cases.coalescence.scene import scene
+from tisim.cases.common.rubble_pile import Conserved
 
 
 def made(magnetisation, bound, seed=0, lost=0):
@@ -116,9 +116,34 @@ def test_the_regime_of_clouds():
 
 @pytest.mark.slow
 def test_a_tiny_cloud_conserves_what_it_should():
-    runs = clouds(1, number=30, seed_diameter=2.0, duration=400.0, looks=2, magnetisations=(0.0, 1190.0))
+    runs = clouds(1, number=30, seed_diameter=2.0, duration=400.0, samples=2, magnetisations=(0.0, 1190.0))
     assert [one.magnetisation for one in runs] == [0.0, 1190.0]
     for check in of_conservation(runs):
         assert check.ok, check
     # Magnets pull; the others only fall.
     assert runs[1].conserved[-1].kinetic > 1.05 * runs[0].conserved[-1].kinetic
+
+
+def test_how_far_a_cloud_has_agglomerated():
+    """A row of 20 is the asteroid; a row of 12, a pair and 6 single grains are outside."""
+    single = row(6, 5.0, (0.0, 40.0, 0.0))
+    place = np.vstack([row(20), row(12, at=(0, 10, 0)), row(2, at=(0, 20, 0)), single])
+    seen = Gathering.of(state_of(place))
+    assert (seen.coalesced, seen.some, seen.many) == pytest.approx((20 / 40, 14 / 20, 12 / 20))
+    assert seen.bound == pytest.approx(34 / 40)
+
+
+def test_the_ends_of_agglomeration():
+    apart, whole = Gathering.of(state_of(row(4, 3.0))), Gathering.of(state_of(row(4)))
+    assert (apart.coalesced, apart.some, apart.bound) == (0.0, 0.0, 0.0)
+    assert (whole.coalesced, whole.bound) == (1.0, 1.0)
+    assert np.isnan(whole.some)
+
+
+def test_chains_are_of_grains_head_to_tail():
+    """A row of three along its moments, one of two across them, and a seed that counts in none."""
+    place = np.vstack([row(3), row(2, at=(0, 9, 0)), row(1, at=(0, 30, 0))])
+    moment = np.array([[1.0, 0, 0]] * 3 + [[0, 1.0, 0]] * 2 + [[1.0, 0, 0]])
+    state = state_of(place, moment=moment, radius=np.array([0.5] * 5 + [2.0]))
+    assert chain_length(state) == pytest.approx((3 * 3 + 1 + 1) / 5)
+    assert np.isnan(chain_length(state | {"moment": 0 * moment}))

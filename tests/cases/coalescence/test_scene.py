@@ -6,17 +6,7 @@ from scipy.constants import Boltzmann, G, mu_0
 
 from tisim.analysis import contacts
 from tisim.cases.coalescence import published
-from tisim.cases.coalescence.scaling import (
-    attraction,
-    critical_spin,
-    dmt_cohesion,
-    free_fall,
-    mean_density,
-    mutual_gravity,
-    sphere_mass,
-    spin_when_packed,
-    surface_weight,
-)
+from tisim.cases.coalescence.regime import dmt_cohesion, mutual_gravity, spin_when_packed, surface_weight
 from tisim.cases.coalescence.scene import (
     DEFAULT,
     ROTATION,
@@ -28,6 +18,8 @@ from tisim.cases.coalescence.scene import (
     step,
     thermal_speed,
 )
+from tisim.cases.common.rubble_pile import critical_spin, free_fall, mean_density
+from tisim.cases.common.two_spheres import attraction, sphere_mass
 from tisim.effects import PermanentMoment, SelfGravity, TreeGravity, TruncatedDipoleDipole
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from tisim import Particles, RunError, Simulation, run
 from tisim.analysis import Mean, head_to_tail, labels, mean_size, near
-from tisim.cases.capture.scene import SATURATION_MOMENTS
+from tisim.cases.case import Claim
+from tisim.cases.common.magnetic_fibre import SATURATION_MOMENTS
 from tisim.cases.concentration import CASE
 from tisim.cases.concentration.scene import (
     DENSITY,
@@ -30,7 +31,6 @@ from tisim.cases.concentration.statistics import (
     held_fraction,
     results,
 )
-from tisim.cases.statistics import Claim
 
 
 @pytest.mark.parametrize("angle", [0.0, 90.0])

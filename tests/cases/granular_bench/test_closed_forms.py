@@ -1,40 +1,14 @@
-"""The closed forms of single contacts against quadrature, bisection and each other."""
+"""The closed forms of single contacts against each other and against known limits."""
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
-from tisim.cases.granular_bench.closed_forms import (
-    HERTZ_DURATION,
-    HERTZ_MEAN_DEPTH,
-    bridge_force,
-    hertz_depth,
+from tisim.cases.common.two_spheres import (
     hertz_force,
-    hertz_overlap,
-    jkr_force,
-    jkr_pull_off,
-    jkr_stretch,
-    reduced,
 )
+from tisim.cases.granular_bench.closed_forms import bridge_force, jkr_force, jkr_pull_off, jkr_stretch
 from tisim.cases.granular_bench.impacts import ParticleImpact
 from tisim.cases.granular_bench.mindlin_impact import oblique_impacts
-
-
-def test_hertz():
-    """Energy in the contact, the time and the mean depth by quadrature, and the overlap of a force."""
-    radius, mass, modulus, speed = 2e-3, 3e-4, 5e8, 0.7
-    depth = hertz_depth(speed, radius, mass, modulus)
-    work = quad(lambda x: hertz_force(x, radius, modulus), 0, depth)[0]
-    assert work == pytest.approx(mass * speed**2 / 2, rel=1e-12)
-    # In x = 1 - y^2 the root at the turn is no pole.
-    slow = [quad(lambda y, k=k: 2 * y * (1 - y**2) ** k / np.sqrt(1 - (1 - y**2) ** 2.5), 0, 1)[0]
-            for k in (0, 1.5, 2.5)]  # fmt: skip
-    assert pytest.approx(2 * slow[0], rel=1e-9) == HERTZ_DURATION
-    assert pytest.approx(slow[2] / slow[1], rel=1e-9) == HERTZ_MEAN_DEPTH
-    assert hertz_overlap(hertz_force(1e-5, radius, modulus), radius, modulus) == pytest.approx(1e-5)
-    assert hertz_force(-1.0, radius, modulus) == 0
-    assert reduced(3.0) == 3.0
-    assert reduced(3.0, 6.0) == pytest.approx(2.0)
 
 
 def test_jkr_pulls_most_at_its_pull_off_and_ends_at_its_stretch():

@@ -9,8 +9,8 @@ import tisim
 from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
 from tisim import InputError, optimize
 from tisim.cases.case import every
+from tisim.cases.common.csv_tables import Measurement
 from tisim.cases.granular_bench import problem as calibrating
-from tisim.cases.granular_bench.measured import Measurement, read
 from tisim.cases.granular_bench.problem import (
     EXAMPLES,
     KNOWN,
@@ -20,6 +20,7 @@ from tisim.cases.granular_bench.problem import (
     calibration_to,
     other_runs,
     problem,
+    read,
 )
 
 INTERVALS = {"friction": 0.05, "rolling_friction": 0.05, "restitution": 0.02}

@@ -8,6 +8,7 @@ import pytest
 from tisim import RunError
 from tisim.analysis import contacts
 from tisim.cases.granular_bench import shear_cell
+from tisim.cases.granular_bench.figures import shear_figure, shear_table
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER
 from tisim.cases.granular_bench.shear_cell import (
     CELL_AREA,
@@ -24,7 +25,6 @@ from tisim.cases.granular_bench.shear_cell import (
     seen,
     sheared_beds,
 )
-from tisim.cases.granular_bench.shear_figure import shear_figure, shear_table
 from tisim.engine.result import Status
 
 
@@ -55,7 +55,7 @@ def test_inertial_number_goes_by_the_middle_of_the_gap():
 
 
 def test_stresses_are_means_over_both_walls_and_over_time():
-    """Two looks at three grains; the walls are pushed apart, and dragged along and back."""
+    """Two samples at three grains; the walls are pushed apart, and dragged along and back."""
     gap = 10 * DIAMETER
     state = {
         "group": np.array([0, 0, 1]), "radius": np.full(3, DIAMETER / 2),
@@ -63,11 +63,11 @@ def test_stresses_are_means_over_both_walls_and_over_time():
         "velocity": np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [9.0, 0.0, 0.0]]),
     }  # fmt: skip
     names = ("upper_force_z", "lower_force_z", "upper_force_x", "lower_force_x")
-    looks = [
+    samples = [
         seen(SimpleNamespace(state=state, measures=dict(zip(names, forces, strict=True))), gap)
         for forces in ((3.0, -1.0, -0.5, 0.7), (5.0, -3.0, -1.5, 1.3))
     ]
-    found = mean_of(gap, looks, state)
+    found = mean_of(gap, samples, state)
     assert found.state is state
     assert found.pressure == pytest.approx(3.0 / CELL_AREA)
     assert found.shear_stress == pytest.approx(1.0 / CELL_AREA)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.scenes import simulate
+from tisim.cases.common.runs import overlap
 from tisim.cases.mrf_shear.measures import order, raft_force, shear_rate, shear_stress
 from tisim.cases.mrf_shear.scene import LOWER, UPPER, scene
-from tisim.cases.runs import overlap
 
 UM = 1e-6
 SMALL_CELL = {"sides": (30 * UM, 30 * UM, 36 * UM), "raft": 7 * UM, "rate": 1e4, "magnetising": 10e-6,

@@ -7,11 +7,13 @@ import pytest
 from scipy.constants import mu_0
 
 from tisim.analysis import Mean
+from tisim.cases.common.runs import overlap
 from tisim.cases.mrf_shear import checks, published
-from tisim.cases.mrf_shear.flow_curve import Curve, table
-from tisim.cases.mrf_shear.grains import LARGE_RADIUS
+from tisim.cases.mrf_shear.checks import approach_time, mason_number, regime, stokes_time
+from tisim.cases.mrf_shear.flow_curve import Curve, paired, table
 from tisim.cases.mrf_shear.measures import (
     area,
+    magnetisation,
     magnetised_part,
     order,
     raft_force,
@@ -19,10 +21,7 @@ from tisim.cases.mrf_shear.measures import (
     shear_stress,
     volume_fraction,
 )
-from tisim.cases.mrf_shear.regime import approach_time, magnetisation, mason_number, regime, stokes_time
-from tisim.cases.mrf_shear.runs import paired
-from tisim.cases.mrf_shear.scene import LOWER, UPPER, scene
-from tisim.cases.runs import overlap
+from tisim.cases.mrf_shear.scene import LARGE_RADIUS, LOWER, UPPER, scene
 
 R, UM = LARGE_RADIUS, 1e-6
 CELL = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0)

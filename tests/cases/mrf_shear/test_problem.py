@@ -8,13 +8,20 @@ import pytest
 import tisim
 from tisim import InputError
 from tisim.cases.case import every
-from tisim.cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS
+from tisim.cases.common.magnetorheological_fluid import RANDOM_PACKING, relative_viscosity
+from tisim.cases.common.runs import OTHER_STARTS, sound
 from tisim.cases.mrf_shear.measures import flux, shear_stress
-from tisim.cases.mrf_shear.off_state import off_state_viscosity
-from tisim.cases.mrf_shear.problem import BOUND, design_viscosity, problem, viscosity
-from tisim.cases.runs import OTHER_STARTS, sound
+from tisim.cases.mrf_shear.problem import BOUND, design_viscosity, off_state_viscosity, problem, viscosity
+from tisim.cases.mrf_shear.published import OIL_VISCOSITY
+from tisim.cases.mrf_shear.scene import LARGE_RADIUS, SMALL_RADIUS
 
 DESIGN = {"small": 0.25, "fraction": 0.2, "flux": 0.5}
+
+
+def test_small_grains_lower_the_viscosity_without_field():
+    thick = off_state_viscosity(0.3, [1.0, 0.25], [1.0, 0.0])
+    assert thick == pytest.approx(OIL_VISCOSITY * relative_viscosity(0.3, RANDOM_PACKING))
+    assert off_state_viscosity(0.3, [1.0, 0.25], [0.67, 0.33]) < thick
 
 
 def test_a_design_is_the_fluid_it_says():

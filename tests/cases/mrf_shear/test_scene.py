@@ -5,18 +5,21 @@ import pytest
 
 from tisim import InputError
 from tisim.cases.case import every
+from tisim.cases.common.magnetorheological_fluid import number_of
 from tisim.cases.mrf_shear import published
-from tisim.cases.mrf_shear.flow_curve import COMPARED, VARIATIONS
-from tisim.cases.mrf_shear.grains import (
+from tisim.cases.mrf_shear.flow_curve import COMPARED, VARIATIONS, magnetised
+from tisim.cases.mrf_shear.scene import (
     DENSITY,
     LARGE_RADIUS,
+    MAGNETISING_TIME,
     MONODISPERSE,
+    RATES,
+    SIDES,
     SMALL_RADIUS,
+    impact_step,
     mixture,
-    number_of,
+    scene,
 )
-from tisim.cases.mrf_shear.runs import magnetised
-from tisim.cases.mrf_shear.scene import MAGNETISING_TIME, RATES, SIDES, impact_step, scene
 from tisim.effects import PrescribedMotion
 from tisim.operators import JoinGroup
 from tisim.sources import CouetteFlow, MagneticField

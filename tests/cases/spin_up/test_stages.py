@@ -5,16 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.cases.coalescence.test_measures import block, state_of
+from tests.cases.common.test_rubble_pile import block, state_of
 from tisim import InputError
-from tisim.cases.coalescence.measures import Asteroid, Conserved
+from tisim.cases.common.rubble_pile import Asteroid, Conserved
 from tisim.cases.spin_up import stages
-from tisim.cases.spin_up.checks import at_least, of_conservation, of_spins
+from tisim.cases.spin_up.checks import at_least, of_conservation, of_spins, regime
 from tisim.cases.spin_up.figures import against_spin, figures, piles, table
-from tisim.cases.spin_up.published import DEFORMATION, DISRUPTION
-from tisim.cases.spin_up.regime import regime
 from tisim.cases.spin_up.scene import NUMBERS, SIZES, scene_for
-from tisim.cases.spin_up.stages import RATES, SpinStep, SpinUp, spin_ups, turn
+from tisim.cases.spin_up.stages import DEFORMATION, DISRUPTION, RATES, SpinStep, SpinUp, spin_ups, turn
 
 
 def test_a_size_without_a_duration_settles_for_that_of_the_scene(monkeypatch):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tisim.cases.runs import overlap
+from tisim.cases.common.runs import overlap
 from tisim.cases.valve.measures import clusters, drag_pressure, held_pressure, unhindered_rate
-from tisim.cases.valve.runs import FLOW_LOOKS, flows
+from tisim.cases.valve.runs import FLOW_SAMPLES, flows
 from tisim.cases.valve.scene import scene
 
 UM = 1e-6
@@ -23,7 +23,7 @@ def test_grains_flow_without_a_field(three):
     for flow in three:
         mass = flow.result.state["mass"].sum()
         assert 0.5 < flow.open_rate / unhindered_rate(flow.result.scene, mass) < 1.1
-        assert len(flow.times) in (FLOW_LOOKS, FLOW_LOOKS + 1)
+        assert len(flow.times) in (FLOW_SAMPLES, FLOW_SAMPLES + 1)
         np.testing.assert_array_equal(flow.rates[:16], three[0].rates[:16])
     assert three[0].left > 0.5
 

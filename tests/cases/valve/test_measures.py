@@ -5,7 +5,7 @@ import pytest
 from scipy.constants import mu_0
 
 from tests.cases.valve.states import at_rest, result_of
-from tisim.cases.runs import overlap
+from tisim.cases.common.runs import overlap
 from tisim.cases.valve.measures import (
     attraction,
     clusters,
@@ -17,9 +17,8 @@ from tisim.cases.valve.measures import (
     oil_of,
     unhindered_rate,
 )
-from tisim.cases.valve.runs import ARRESTED, FLOW_LOOKS, Flow, left
-from tisim.cases.valve.scene import scene
-from tisim.cases.valve.sizes import THROATS
+from tisim.cases.valve.runs import ARRESTED, FLOW_SAMPLES, Flow, left
+from tisim.cases.valve.scene import THROATS, scene
 
 R, UM = 22e-6, 1e-6
 VALVE = scene(throat=176 * UM, bore=352 * UM, straight=44 * UM, length=440 * UM, flowing=1e-4, lasting=3e-4)
@@ -129,7 +128,7 @@ def test_attraction_and_mason_number():
 
 def flow_of(before, after):
     """A flow at one rate, and in the field at another at last."""
-    times = np.arange(FLOW_LOOKS) * 4e-4 / FLOW_LOOKS
+    times = np.arange(FLOW_SAMPLES) * 4e-4 / FLOW_SAMPLES
     rates = np.where(times <= 1e-4, before, np.where(times > 3.2e-4, after, 9.0))
     return Flow(result_of(VALVE, np.zeros((1, 3))), times, rates)
 

@@ -7,10 +7,10 @@ import tisim
 from tests.cases.valve.states import result_of
 from tisim import InputError
 from tisim.cases.case import every
-from tisim.cases.runs import OTHER_STARTS, sound
+from tisim.cases.common.runs import OTHER_STARTS, sound
 from tisim.cases.valve import published
+from tisim.cases.valve.duct import open_flow
 from tisim.cases.valve.measures import duct_of, pressure_at_rest, unhindered_rate
-from tisim.cases.valve.open_flow import open_flow
 from tisim.cases.valve.problem import (
     BOUND,
     MISSED,

@@ -10,12 +10,11 @@ from scipy.spatial import cKDTree
 from tests.cases.valve.states import at_rest
 from tisim import GrainClass, InputError
 from tisim.cases.case import every
-from tisim.cases.mrf_shear.grains import equal
+from tisim.cases.common.magnetorheological_fluid import equal
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct
 from tisim.cases.valve.measures import drag_pressure, duct_of, oil_of, pressure_at_rest
-from tisim.cases.valve.scene import mean_radius, scene, speed_of
-from tisim.cases.valve.sizes import COARSE, FINE_GRAINS, SIZES, THROATS
+from tisim.cases.valve.scene import COARSE, FINE_GRAINS, SIZES, THROATS, mean_radius, scene, speed_of
 from tisim.effects import MutualInducedMoment, StokesDrag, TruncatedDipoleDipole
 from tisim.packing import EqualSizes, UniformSizes
 from tisim.sources import MagneticField, sample

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tisim.cases.vibration import scene as vibration
-from tisim.cases.vibration.accuracy import constants
-from tisim.cases.vibration.closed_forms import response
+from tisim.cases.vibration.closed_forms import constants, response
 from tisim.cases.vibration.figures import FLOOR, resonance_figure, table
 from tisim.cases.vibration.response import (
     FAST,

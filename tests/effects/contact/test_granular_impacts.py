@@ -7,7 +7,7 @@ from scipy.integrate import quad
 from tests.effects.contact.grains import AWAY, CAPACITY, FLOOR, USUAL, WORLDS, grains, run
 from tests.scenes import by_id, compiled, fixed
 from tisim import Simulation
-from tisim.cases.granular_bench.closed_forms import hertz_depth, hertz_duration
+from tisim.cases.common.two_spheres import hertz_depth, hertz_duration
 from tisim.steppers import Boris, FixedStep, IterationControl, Trapezoid
 
 E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))

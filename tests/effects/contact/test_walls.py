@@ -5,7 +5,7 @@ import pytest
 
 from tests.effects.contact.grains import CAPACITY, FLOOR, USUAL, WORLDS, grains, run
 from tests.scenes import compiled
-from tisim.cases.granular_bench.closed_forms import hertz_overlap
+from tisim.cases.common.two_spheres import hertz_overlap
 
 E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
 G_STAR = USUAL["young"] / (4 * (2 - USUAL["poisson"]) * (1 + USUAL["poisson"]))

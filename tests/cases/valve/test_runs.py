@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from tests.cases.valve.states import at_rest
-from tisim.cases.valve import checks, figures, studies
+from tisim.cases.valve import checks, figures, runs
 from tisim.cases.valve.measures import oil_of, unhindered_rate
-from tisim.cases.valve.runs import FLOW_LOOKS, Flow
-from tisim.cases.valve.scene import FIELD
-from tisim.cases.valve.sizes import FINE_DIAMETER, THROATS, D
+from tisim.cases.valve.runs import FLOW_SAMPLES, Flow
+from tisim.cases.valve.scene import FIELD, FINE_DIAMETER, THROATS, D
 
 
 def made_up(scenes, progress):
@@ -20,7 +19,7 @@ def made_up(scenes, progress):
             [0.0, 0.0, 0.1 * oil_of(one).speed], (len(result.state["mass"]), 1)
         )
         result.measures["valve_force_z"] = 1e-3
-        times = np.linspace(0, one.duration, FLOW_LOOKS)
+        times = np.linspace(0, one.duration, FLOW_SAMPLES)
         field = one.effects[0]
         jams = len(result.state["mass"]) < 200 and field.constant[0] > 0
         end = 0.01 + 1e-4 * k if jams else 0.33 + 1e-3 * k
@@ -32,11 +31,11 @@ def made_up(scenes, progress):
 
 @pytest.fixture(autouse=True)
 def _without_runs(monkeypatch):
-    monkeypatch.setattr(studies, "flows", made_up)
+    monkeypatch.setattr(runs, "flows", made_up)
 
 
 def test_each_valve_has_its_starts():
-    valves = studies.by_throat(4)
+    valves = runs.by_throat(4)
     asked = [(one.throat, one.diameter, one.flux, len(one.flows)) for one in valves]
     narrow, wide = THROATS
     assert asked == [
@@ -68,9 +67,7 @@ def test_claims_are_of_the_valves_they_name(monkeypatch):
     without = next(one for name, one in found.items() if "no field" in name and "at the end" in name)
     assert without.value.value == pytest.approx(0.33 + 1e-3 * 17.5)
     # Two that are alike show nothing.
-    monkeypatch.setattr(
-        checks, "by_throat", lambda starts: [studies.by_throat(starts)[k] for k in (0, 0, 2, 3)]
-    )
+    monkeypatch.setattr(checks, "by_throat", lambda starts: [runs.by_throat(starts)[k] for k in (0, 0, 2, 3)])
     assert not next(one for one in checks.check(4) if "minus flow left" in one.name).ok
 
 
@@ -85,7 +82,7 @@ def test_the_start_farthest_from_balance_is_judged(monkeypatch):
 
 
 def test_figures_are_of_all_valves():
-    throats, fields = studies.by_throat(2), studies.by_field(2)
+    throats, fields = runs.by_throat(2), runs.by_field(2)
     rows = figures.table([*throats, *fields]).splitlines()
     assert len(rows) == 1 + 2 * 4 + 2 + 1 + 2 * 4
     _, sweep = figures.flow_figure(throats, fields).axes

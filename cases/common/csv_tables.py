@@ -1,59 +1,35 @@
-"""Measured quantities with their uncertainties, read from a file as the target of a calibration.
+"""CSV tables: results of a case as text, and measured quantities that are the target of a calibration.
 
-The file is CSV with a heading and one quantity on each line, in any order:
+A file of measurements has a heading and one quantity on each line, in any order:
 
     quantity,value,uncertainty
     angle_of_repose,24.5,1.0
-    discharge_rate,0.150,0.005
-    rebound_ratio,0.36,0.02
-    sliding_angle,22.0,1.0
 
-Angles are in degrees, a discharge rate is in kg/s. A rebound ratio is the height to which a grain rebounds
-from a plate divided by the height of its fall. A sliding angle is the slope of a plate at which a block of
-grains begins to slide. The uncertainty is one standard deviation; it includes the measurement error and the
-scatter of a simulation with few grains.
+The uncertainty is one standard deviation; it includes the measurement error and the scatter of a simulation
+with few grains.
 """
 
-from __future__ import annotations
-
 import csv
+import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from tisim.errors import InputError, Words, did_you_mean, must
 from tisim.files import regular_file
 
-QUANTITY_UNITS = {
-    "angle_of_repose": "degrees", "discharge_rate": "kg/s", "rebound_ratio": "", "sliding_angle": "degrees",
-}  # fmt: skip
-"""The supported quantities and their units."""
 HEADING = ["quantity", "value", "uncertainty"]
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """A measurement: a value and its uncertainty, one standard deviation, in the unit of the quantity."""
-
-    value: float
-    uncertainty: float
-
-    def __post_init__(self) -> None:
-        must(math.isfinite(self.value) and self.value > 0, "value", "finite and above 0", self.value)
-        sound = math.isfinite(self.uncertainty) and self.uncertainty > 0
-        must(sound, "uncertainty", "finite and above 0", self.uncertainty)
-
-    def misfit(self, simulated: float) -> float:
-        """Return the squared difference between a simulated value and the measurement, in uncertainties."""
-        return ((simulated - self.value) / self.uncertainty) ** 2
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as CSV; the first is the heading."""
+    text = io.StringIO(newline="")
+    csv.writer(text).writerows(rows)
+    return text.getvalue()
 
 
-Measured = Mapping[str, Measurement]
-"""Measurements by the name of their quantity."""
-
-
-def table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[str]]]:
+def read_table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[str]]]:
     """Return the heading of a CSV file, which must be one of ``headings``, and its lines of three cells each.
 
     InputError if it is not such a file.
@@ -76,9 +52,25 @@ def table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[st
     return rows[0], rows[1:]
 
 
-def read(path: Path) -> dict[str, Measurement]:
-    """Return the measurements of a CSV file; InputError if it is not CSV or contains none."""
-    return measurements(path, table(path, HEADING)[1], QUANTITY_UNITS)
+@dataclass(frozen=True)
+class Measurement:
+    """A measurement: a value and its uncertainty, one standard deviation, in the unit of the quantity."""
+
+    value: float
+    uncertainty: float
+
+    def __post_init__(self) -> None:
+        must(math.isfinite(self.value) and self.value > 0, "value", "finite and above 0", self.value)
+        sound = math.isfinite(self.uncertainty) and self.uncertainty > 0
+        must(sound, "uncertainty", "finite and above 0", self.uncertainty)
+
+    def misfit(self, simulated: float) -> float:
+        """Return the squared difference between a simulated value and the measurement, in uncertainties."""
+        return ((simulated - self.value) / self.uncertainty) ** 2
+
+
+Measured = Mapping[str, Measurement]
+"""Measurements by the name of their quantity."""
 
 
 def measurements(

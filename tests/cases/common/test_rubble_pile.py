@@ -1,17 +1,9 @@
-"""What is measured of grains, where it is known."""
+"""Measures of a rubble pile, of arrangements for which they are known."""
 
 import numpy as np
 import pytest
 
-from tisim.cases.coalescence.measures import (
-    Asteroid,
-    Conserved,
-    Gathering,
-    body,
-    chain_length,
-    clusters_of,
-    inertia,
-)
+from tisim.cases.common.rubble_pile import Asteroid, Conserved, body, clusters_of, inertia
 
 
 def row(number, apart=1.0, at=(0.0, 0.0, 0.0)):
@@ -29,35 +21,10 @@ def state_of(position, **more):
     return state | more
 
 
-def test_how_far_a_cloud_has_agglomerated():
-    """A row of 20 is the asteroid; a row of 12, a pair and 6 single grains are outside."""
-    single = row(6, 5.0, (0.0, 40.0, 0.0))
-    place = np.vstack([row(20), row(12, at=(0, 10, 0)), row(2, at=(0, 20, 0)), single])
-    seen = Gathering.of(state_of(place))
-    assert (seen.coalesced, seen.some, seen.many) == pytest.approx((20 / 40, 14 / 20, 12 / 20))
-    assert seen.bound == pytest.approx(34 / 40)
-
-
-def test_the_ends_of_agglomeration():
-    apart, whole = Gathering.of(state_of(row(4, 3.0))), Gathering.of(state_of(row(4)))
-    assert (apart.coalesced, apart.some, apart.bound) == (0.0, 0.0, 0.0)
-    assert (whole.coalesced, whole.bound) == (1.0, 1.0)
-    assert np.isnan(whole.some)
-
-
 def test_grains_within_a_hundredth_of_a_diameter_are_bound():
     assert len(set(clusters_of(state_of(row(3, 1.009))))) == 1
     assert len(set(clusters_of(state_of(row(3, 1.011))))) == 3
     assert body(np.array([0, 1, 1]), np.array([5.0, 1.0, 1.0])).tolist() == [True, False, False]
-
-
-def test_chains_are_of_grains_head_to_tail():
-    """A row of three along its moments, one of two across them, and a seed that counts in none."""
-    place = np.vstack([row(3), row(2, at=(0, 9, 0)), row(1, at=(0, 30, 0))])
-    moment = np.array([[1.0, 0, 0]] * 3 + [[0, 1.0, 0]] * 2 + [[1.0, 0, 0]])
-    state = state_of(place, moment=moment, radius=np.array([0.5] * 5 + [2.0]))
-    assert chain_length(state) == pytest.approx((3 * 3 + 1 + 1) / 5)
-    assert np.isnan(chain_length(state | {"moment": 0 * moment}))
 
 
 def block(spin, centre=(30.0, 0.0, 4.0), drift=(1.0, 2.0, 3.0)):

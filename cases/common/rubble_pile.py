@@ -1,37 +1,30 @@
-"""Measures of a cloud of grains and of the asteroid in it."""
+"""Measures of a rubble pile: clusters of its grains, the asteroid that they form, and conserved quantities.
+
+Free-fall times and critical spins of clouds and piles are in closed form.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.constants import G
 
-from tisim.analysis import (
-    Ellipsoid,
-    angular_momentum,
-    bounding_ellipsoid,
-    cluster_shapes,
-    contacts,
-    fraction_in_clusters,
-    gravitational_energy,
-    head_to_tail,
-    hull_volume,
-    labels,
-)
+from tisim import analysis
+from tisim.cases.common.two_spheres import sphere_mass
 from tisim.scene.initial_state import Arrays
 
 GAP = 0.01
 """Largest gap between the surfaces of bound grains, in units of the smallest diameter."""
-CLUMP = 11
-"""Least number of grains in a clump: more than ten."""
 
 
 def clusters_of(state: Arrays) -> np.ndarray:
     """Return the cluster of each grain, as connected by contacts; shape (n,)."""
     radius = state["radius"]
     gap = GAP * 2 * float(radius.min())
-    return labels(len(radius), contacts(state["position"], radius, gap))
+    return analysis.labels(len(radius), analysis.contacts(state["position"], radius, gap))
 
 
 def body(cluster: np.ndarray, mass: np.ndarray) -> np.ndarray:
@@ -44,64 +37,18 @@ def part(state: Arrays, some: np.ndarray) -> Arrays:
     return {name: values[some] for name, values in state.items()}
 
 
-def chain_length(state: Arrays) -> float:
-    """Return the mean number of grains along the chain of each grain, without the seed; NaN without moments.
-
-    A chain consists of grains whose moments bind them head to tail.
-    """
-    radius = state["radius"]
-    grains = part(state, radius == radius.min())
-    if "moment" not in grains or not grains["moment"].any():
-        return float("nan")
-    diameter = 2 * float(radius.min())
-    shapes = cluster_shapes(grains["position"], head_to_tail(grains["position"], grains["moment"], diameter))
-    return float(np.average(shapes.path, weights=shapes.size))
-
-
-@dataclass(frozen=True)
-class Gathering:
-    """The progress of agglomeration in a cloud.
-
-    coalesced : fraction of all grains that are in the asteroid.
-    some, many : fractions of the other grains in clusters of two or more and of more than ten; NaN without
-    other grains.
-    chain : mean length of chains, in grains.
-    """
-
-    coalesced: float
-    some: float
-    many: float
-    chain: float
-
-    @classmethod
-    def of(cls, state: Arrays) -> Gathering:
-        """Return the progress of agglomeration in a state."""
-        cluster = clusters_of(state)
-        inside = body(cluster, state["mass"])
-        # A single grain is not an asteroid.
-        inside &= inside.sum() > 1
-        others = cluster[~inside]
-        some, many = (fraction_in_clusters(others, least) for least in (2, CLUMP))
-        return cls(float(inside.mean()), some, many, chain_length(state))
-
-    @property
-    def bound(self) -> float:
-        """Return the fraction of all grains that are in clusters of two or more."""
-        return self.coalesced + (0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.some)
-
-
 @dataclass(frozen=True)
 class Asteroid:
     """The grains of an asteroid, and its bounding ellipsoid."""
 
     grains: Arrays
-    ellipsoid: Ellipsoid
+    ellipsoid: analysis.Ellipsoid
 
     @classmethod
     def of(cls, state: Arrays) -> Asteroid:
         """Return the asteroid in a state; it must have at least two grains."""
         grains = part(state, body(clusters_of(state), state["mass"]))
-        return cls(grains, bounding_ellipsoid(grains["position"], grains["radius"]))
+        return cls(grains, analysis.bounding_ellipsoid(grains["position"], grains["radius"]))
 
     @property
     def number(self) -> int:
@@ -124,7 +71,7 @@ class Asteroid:
     @cached_property
     def volume(self) -> float:
         """Return the volume of the convex hull of its grains, m^3."""
-        return hull_volume(self.grains["position"], self.grains["radius"])
+        return analysis.hull_volume(self.grains["position"], self.grains["radius"])
 
     @property
     def density(self) -> float:
@@ -152,7 +99,9 @@ def inertia(grains: Arrays) -> np.ndarray:
 
 
 def _momentum(grains: Arrays) -> np.ndarray:
-    return angular_momentum(*(grains[name] for name in ("position", "velocity", "mass", "radius", "spin")))
+    return analysis.angular_momentum(
+        *(grains[name] for name in ("position", "velocity", "mass", "radius", "spin"))
+    )
 
 
 @dataclass(frozen=True)
@@ -184,10 +133,29 @@ class Conserved:
             momentum_sum=float(mass @ np.linalg.norm(velocity, axis=1)),
             angular_sum=float(mass @ arms + inside @ np.sqrt(spins)),
             kinetic=0.5 * float(mass @ (velocity**2).sum(axis=1) + inside @ spins),
-            gravity=gravitational_energy(state["position"], mass),
+            gravity=analysis.gravitational_energy(state["position"], mass),
         )
 
     @property
     def energy(self) -> float:
         """Return the sum of kinetic and gravitational energy, J."""
         return self.kinetic + self.gravity
+
+
+def mean_density(diameter: float, spacing: float, density: float) -> float:
+    """Return the density of grains on a simple cubic lattice, kg/m^3."""
+    return sphere_mass(diameter, density) / spacing**3
+
+
+def free_fall(density: float) -> float:
+    """Return the free-fall time (s) of a ball at rest of some density (kg/m^3): sqrt(3 pi / (32 G rho))."""
+    return math.sqrt(3 * math.pi / (32 * G * density))
+
+
+def critical_spin(density: float) -> float:
+    """Return the angular velocity (rad/s) at which a ball of some density (kg/m^3) has no weight at its
+    equator.
+
+    It is sqrt(4 pi G rho / 3), with rho the mean density of the ball. A ball that turns faster flies apart.
+    """
+    return math.sqrt(4 * math.pi * G * density / 3)

@@ -7,9 +7,9 @@ import pytest
 
 from tisim import RandomAroundCylinder, run
 from tisim.cases.capture.statistics import fraction
-from tisim.cases.cascade import CASE, capture_times
-from tisim.cases.cascade.capture_times import captured_at, time_to
+from tisim.cases.cascade import CASE, statistics
 from tisim.cases.cascade.scene import Cascade
+from tisim.cases.cascade.statistics import captured_at, time_to
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def stages(monkeypatch):
             at[:3] = scene.duration * np.array([0.3, 0.1, 0.2])[: len(at)]
             yield SimpleNamespace(status=SimpleNamespace(ok=True), state={"captured_at": at})
 
-    monkeypatch.setattr(capture_times, "run", lambda scenes: list(captured(scenes)))
+    monkeypatch.setattr(statistics, "run", lambda scenes: list(captured(scenes)))
     return stages_seen
 
 
@@ -44,7 +44,7 @@ def test_cascades_that_are_done_wait_for_none(stages):
 
 
 def test_a_cascade_that_captures_too_little_is_given_up(stages, monkeypatch):
-    monkeypatch.setattr(capture_times, "MAX_STAGES", 2)
+    monkeypatch.setattr(statistics, "MAX_STAGES", 2)
     (times,) = captured_at([Cascade(number=10)], 1)
     assert np.isfinite(times).sum() == 6
     assert time_to(0.9, times) == np.inf

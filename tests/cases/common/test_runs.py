@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tisim import Box, RunError, ShearedBox
-from tisim.cases.runs import overlap, sound
+from tisim.cases.common.runs import overlap, sound
 from tisim.domains.domain import Open
 from tisim.engine.result import Status
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import tisim
-from tisim.cases.granular_bench.accuracy import quantities
-from tisim.cases.granular_bench.bed import bed, centre_height, impact_time, linear_stiffness, side_load
-from tisim.cases.granular_bench.sizes import scene_for
-from tisim.cases.runs import overlap
+from tisim.cases.common.runs import overlap
+from tisim.cases.granular_bench.measures import centre_height, quantities, side_load
+from tisim.cases.granular_bench.scene import bed, impact_time, linear_stiffness, scene_for
 
 
 def test_quantities_of_a_bed():

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from tisim.cases.mrf_shear.off_state import RANDOM_PACKING, relative_viscosity
-from tisim.cases.valve.duct import Duct
-from tisim.cases.valve.open_flow import open_flow, resistance, suspension_viscosity
+from tisim.cases.common.magnetorheological_fluid import RANDOM_PACKING, relative_viscosity
+from tisim.cases.valve.duct import Duct, open_flow, resistance, suspension_viscosity
 
 
 def test_a_pipe_is_that_of_poiseuille():
