@@ -12,8 +12,7 @@ import tisim
 from tests.accuracy.scenes import oscillator
 from tests.scenes import compiled, flow, scene
 from tisim import InputError, Recording, Result, Scene, Status
-from tisim.accuracy import Study, storage
-from tisim.accuracy.row import Row
+from tisim.accuracy import Row, Study, storage
 from tisim.effects import Contact, ContactFriction
 from tisim.io import checkpoint, run_folder
 from tisim.io import read as reading

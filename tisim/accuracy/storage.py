@@ -20,10 +20,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tisim.accuracy.cost_study import Study
-from tisim.accuracy.quantity import QuantityEstimate
-from tisim.accuracy.reference import Truth
-from tisim.accuracy.row import Row
+from tisim.accuracy.cost_study import Row, Study
+from tisim.accuracy.quantity import QuantityEstimate, Truth
 from tisim.backend import runtime
 from tisim.errors import must
 from tisim.files import checksum, lock, regular_file, resuming
@@ -38,9 +36,10 @@ _TEXTS = ("method", "setting", "python", "options", "precision", "arithmetic", "
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
 
-def write(study: Study, folder: Path) -> list[Path]:
-    """Write cost.csv and cost.h5, replacing earlier ones; return their paths. RunError if the disk is
-    full."""
+def write(study: Study, folder: str | Path) -> list[Path]:
+    """Write cost.csv and cost.h5 into a folder, created if missing; return their paths. Earlier ones are
+    replaced. RunError if the disk is full."""
+    folder = Path(folder)
     ensure_writable(folder)
     replace_file(folder / COST_CSV, as_csv(study).encode())
     _write_rows(study, folder / HDF5)
