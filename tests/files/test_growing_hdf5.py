@@ -14,9 +14,7 @@ from tests.files.full_disk import files_of_at_most
 from tests.scenes import scene
 from tisim import InputError, Recording, RunError
 from tisim.files import atomic
-from tisim.files.growing_hdf5 import GrowingFile
-from tisim.files.shared_hdf5 import SharedFile
-from tisim.files.superblock import SIZE, is_valid, lookup3, superblock
+from tisim.files.hdf5 import SIZE, GrowingFile, SharedFile, is_valid, lookup3, superblock
 from tisim.io.reader import Frame, frames
 from tisim.io.trajectory import LIBVER, Trajectory
 

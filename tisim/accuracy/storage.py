@@ -24,14 +24,14 @@ from tisim.accuracy.cost_study import Row, Study
 from tisim.accuracy.quantity import QuantityEstimate, Truth
 from tisim.backend import runtime
 from tisim.errors import must
-from tisim.files import checksum, lock, regular_file, resuming
+from tisim.files import checksum, output_folder, regular_file
 from tisim.files.atomic import replace_file
-from tisim.files.ownership import ensure_writable
+from tisim.files.output_folder import ensure_writable
 from tisim.io.run_folder import versions
 
 COST_FORMAT = "tisim cost 3"
 COST_CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
-COST_FILES = (COST_CSV, HDF5, PICTURE, lock.LOCK)
+COST_FILES = (COST_CSV, HDF5, PICTURE, output_folder.LOCK)
 _TEXTS = ("method", "setting", "python", "options", "precision", "arithmetic", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
@@ -107,9 +107,9 @@ def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
 
 
 def resumes(folder: Path, fresh: bool | None, overwrite: bool) -> bool:
-    """Return whether a study continues from the files in the folder; see ``resuming.resumes``."""
+    """Return whether a study continues from the files in the folder; see ``output_folder.resumes``."""
     begun = regular_file.exists(folder / HDF5)
-    return resuming.resumes(folder, "measurement", begun, "measured costs" * begun, fresh, overwrite)
+    return output_folder.resumes(folder, "measurement", begun, "measured costs" * begun, fresh, overwrite)
 
 
 def clear(folder: Path) -> None:

@@ -26,8 +26,8 @@ from tisim.cli.options import (
 )
 from tisim.console import err, out, print_stopping
 from tisim.errors import must
-from tisim.files import lock, ownership, pictures
-from tisim.files.resuming import resume_hint
+from tisim.files import output_folder, pictures
+from tisim.files.output_folder import resume_hint
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
@@ -140,8 +140,8 @@ def cost(
     quantity_index = study.index(quantity)
     out_folder = folder or Path("out") / f"{name}-cost"
     storage.resumes(out_folder, fresh, overwrite)
-    ownership.claim(out_folder, storage.COST_FILES, overwrite)
-    with lock.acquire(out_folder):
+    output_folder.claim(out_folder, storage.COST_FILES, overwrite)
+    with output_folder.lock(out_folder):
         if storage.resumes(out_folder, fresh, overwrite):
             storage.resume(study, out_folder)
             err().print(f"going on with {out_folder / storage.HDF5}, which has {len(study.rows)} settings")

@@ -35,7 +35,7 @@ from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.resuming import resume_hint
+from tisim.files.output_folder import resume_hint
 from tisim.interrupt import Interrupt
 
 

@@ -93,7 +93,7 @@ def snapshot(path: str | Path) -> Snapshot:
         fits = bool(((counts >= 0) & (counts <= shape[1])).all())
         must(fits, "checkpoint's count", f"between 0 and {shape[1]}", counts.tolist())
         # Particles may be sorted by position in memory; a snapshot is in the order of ids.
-        by_id = bool(file.attrs.get("sorted", False))
+        by_id = bool(file.attrs["sorted"])
         orders = [np.argsort(arrays["id"][w, :n]) if by_id else np.arange(n) for w, n in enumerate(counts)]
         states = tuple({k: v[w, order] for k, v in arrays.items()} for w, order in enumerate(orders))
         return Snapshot(times, steps, states)

@@ -14,7 +14,7 @@ import h5py
 from tisim.components import serialization
 from tisim.errors import InputError, Words, must
 from tisim.files import checksum, regular_file
-from tisim.files.superblock import SIGNATURE, SIZE, is_valid
+from tisim.files.hdf5 import SIGNATURE, SIZE, is_valid
 from tisim.io import checkpoint, recorded_trajectory, run_folder
 from tisim.io.reader import RESULT
 from tisim.scene.scene import Scene

@@ -18,8 +18,7 @@ import numpy as np
 
 from tisim.errors import InputError, Words, must
 from tisim.files import checksum, regular_file
-from tisim.files.shared_hdf5 import SharedFile
-from tisim.files.superblock import SIGNATURE, SIZE, is_valid
+from tisim.files.hdf5 import SIGNATURE, SIZE, SharedFile, is_valid
 from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.scene.initial_state import Arrays
@@ -230,9 +229,7 @@ def _check_creator(file: h5py.File, path: Path, rule: str) -> None:
     """Raise InputError unless the file is a trajectory written by tisim, with checksums."""
     creator = file.get("h5md/creator")
     must(creator is not None and creator.attrs.get("name") == b"tisim", "file", rule, str(path))
-    if h5md.CHECKSUMS not in file:
-        rule = f"{rule}, with checksums"
-        raise InputError(f"file must be {rule}; received {str(path)!r}, without: {checksum.OLDER_VERSION}")
+    must(h5md.CHECKSUMS in file, "file", f"{rule}, with checksums", str(path))
 
 
 def _world_groups(file: h5py.File) -> list[str | None]:

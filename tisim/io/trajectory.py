@@ -31,7 +31,7 @@ from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, Words, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file, temporary_name
-from tisim.files.growing_hdf5 import GrowingFile
+from tisim.files.hdf5 import GrowingFile
 from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.io.reader import Frame, frames, world_count
