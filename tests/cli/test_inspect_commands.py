@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tests.files.full_disk import files_of_at_most
 from tests.files.test_growing_hdf5 import STILL
-from tisim import Recording, Simulation
+from tisim import Simulation
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
 from tisim.files import atomic, checksum
@@ -136,7 +136,7 @@ def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
 
 @pytest.mark.parametrize("command", ["plot", "movie", "export"])
 def test_damaged_trajectories_are_refused_in_a_line(tisim, tmp_path, command):
-    Trajectory(Recording(tmp_path / "trajectory.h5", frames=3), [STILL]).close()
+    Trajectory(tmp_path / "trajectory.h5", [STILL]).close()
     code, out, err = tisim(command, "trajectory.h5")
     assert (code, out) == (2, "")
     assert "file must be one with" in err  # so many frames

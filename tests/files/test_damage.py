@@ -11,7 +11,7 @@ import pytest
 
 from tests.files.test_growing_hdf5 import STILL, frame, same
 from tests.soak import damage
-from tisim import InputError, Recording
+from tisim import InputError
 from tisim.accuracy import storage
 from tisim.files import checksum
 from tisim.files.hdf5 import SIGNATURE
@@ -88,9 +88,8 @@ def test_damage_to_a_frame_is_damage_to_that_frame(tmp_path):
             same(sequence[k], k)
         with pytest.raises(InputError, match="file must be undamaged; received"):
             sequence[3]
-    recording = Recording(path, frames=99)
     with pytest.raises(InputError, match="file must be undamaged; received"):
-        Trajectory.resume(recording, STILL, 1.0)
+        Trajectory.resume(path, STILL, 1.0)
     assert [file.name for file in tmp_path.iterdir()] == ["trajectory.h5"]
 
 
@@ -108,7 +107,7 @@ def test_numbers_that_hdf5_does_not_check_are_checked(tmp_path):
 def test_a_lost_last_step_leaves_a_run_that_has_not_ended(tmp_path):
     """As a killed run does, whose last row is none yet; the frames before are read."""
     path, short = tmp_path / "t.h5", STILL.model_copy(update={"duration": frame(3).time})
-    with Trajectory(Recording(path, frames=9), [short]) as trajectory:
+    with Trajectory(path, [short]) as trajectory:
         for k in range(4):
             trajectory.write(0, frame(k))
     with frames(path) as sequence:

@@ -12,8 +12,8 @@ from tisim import InputError, RunError, Scene, read
 from tisim.backend import runtime
 from tisim.files import output_folder
 from tisim.files.output_folder import MARKER, ensure_writable
-from tisim.io.recording import Recording
 from tisim.io.run_folder import DATA, RUN_FILES, RunFolder, write
+from tisim.io.trajectory import Trajectory
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]
@@ -26,14 +26,13 @@ def result():
 
 
 @pytest.mark.parametrize("failure", [ValueError("Key backend: 'x' is not\na valid value"), MemoryError()])
-def test_a_picture_that_cannot_be_drawn_costs_no_data(result, tmp_path, monkeypatch, capsys, failure):
+def test_a_picture_that_cannot_be_drawn_costs_no_data(result, tmp_path, capsys, failure):
     def fails(result):
         assert read(tmp_path / "result.h5").time == result.time, "the data are there before anything is drawn"
         raise failure
 
     (tmp_path / "cloud.png").write_bytes(b"of an earlier run")
-    monkeypatch.setattr("tisim.plotting.cloud.cloud", fails)
-    paths = write(result, RunFolder(tmp_path))
+    paths = write(result, RunFolder(tmp_path), fails)
     names = {"result.h5", "scene.toml", "versions.json"}
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths} == names
     (line,) = capsys.readouterr().err.splitlines()
@@ -44,7 +43,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_data(result, tmp_path, monkeypa
 def test_whole_run_is_in_the_folder(result, tmp_path):
     folder = RunFolder(tmp_path)
     folder.checkpoint.write_bytes(b"of before")
-    paths = write(result, folder)
+    paths = write(result, folder, cloud)
     names = {"result.h5", "scene.toml", "versions.json", "cloud.png"}
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths} == names
     with h5py.File(folder.result) as file:
@@ -144,7 +143,7 @@ def test_frames_of_a_run_that_was_killed_before_its_first_checkpoint_are_made_ag
     """The same command begins anew by itself; frames of another scene, or damaged ones, are kept."""
     folder = RunFolder(tmp_path)
     output_folder.claim(tmp_path, RUN_FILES)
-    Recording(folder.trajectory, frames=3).create([SCENE], "f64").close()
+    Trajectory(folder.trajectory, [SCENE]).close()
     assert not folder.check(SCENE)
     other = SCENE.model_copy(update={"seed": 7})
     for scene_, damage in ((other, b""), (SCENE, b"damage")):

@@ -123,7 +123,7 @@ def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
 def test_pictures_of_an_interrupted_run_say_what_is_missing(file, tmp_path):
     """The same frames of a run that was to last twice as long."""
     longer = scene(**{**MOVING, "steps": 8})
-    with frames(file) as trajectory, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
+    with frames(file) as trajectory, Trajectory(tmp_path / "t.h5", [longer]) as begun:
         assert mark_missing(quantities(trajectory), trajectory).get_supxlabel() == ""
         for frame in trajectory:
             begun.write(0, frame)

@@ -131,20 +131,16 @@ def resume(study: Study, folder: Path) -> None:
         same = json.loads(file.attrs["identity"]) == study.identity()
         rule = "without the study of another scene, version, machine or depth (or give --out or --overwrite)"
         must(same, "output folder", rule, str(folder))
-        stored = _rows(file["rows"])
+        stored = rows_in(file)
         study.rows = [row for row in stored if row.stopped_after >= study.limit]
         study.truths = _truths(file["truths"], study)
         complete = file.attrs["complete"] == json.dumps(study.sweep_settings())
         study.complete = complete and len(study.rows) == len(stored)
 
 
-def rows(path: Path) -> list[Row]:
-    """Return the rows in a cost.h5. InputError if the file is not of a study, is truncated or damaged."""
-    with checksum.open_file(path, "cost", COST_FORMAT) as file:
-        return _rows(file["rows"])
-
-
-def _rows(group: Any) -> list[Row]:
+def rows_in(file: h5py.File) -> list[Row]:
+    """Return the rows in an open cost.h5."""
+    group = file["rows"]
     columns: dict[str, list[Any]] = {name: list(group[name].asstr()) for name in _TEXTS}
     columns |= {name: [kind(value) for value in group[name]] for name, kind in _NUMBERS.items()}
     columns["seconds"] = [tuple(map(float, times[~np.isnan(times)])) for times in group["seconds"][:]]

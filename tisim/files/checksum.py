@@ -98,8 +98,15 @@ def open_file(path: Path, what: str, kind: str, rule: str = "a file of tisim") -
     kind : value of its attribute ``format``.
     what, rule : its name in messages, and the rule that it must satisfy.
     """
-    with h5py.File(io.BytesIO(read_image(path, what, rule)), "r") as file:
+    with open_any(path, what, rule) as file:
         must(file.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
+        yield file
+
+
+@contextlib.contextmanager
+def open_any(path: Path, what: str, rule: str) -> Iterator[h5py.File]:
+    """Yield a file written by ``create_file``, of any kind; see ``open_file``."""
+    with h5py.File(io.BytesIO(read_image(path, what, rule)), "r") as file:
         yield file
 
 

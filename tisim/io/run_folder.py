@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,11 +121,12 @@ def versions() -> dict[str, str]:
     }
 
 
-def write(result: Result, folder: RunFolder) -> list[Path]:
+def write(result: Result, folder: RunFolder, draw: Callable[[Result], Figure] | None = None) -> list[Path]:
     """Write all files of a run, replacing earlier ones; return their paths. Raise RunError if the disk is
     full.
 
-    The picture is written last; if drawing fails, a message is printed on standard error and it is left out.
+    draw : draws cloud.png, which is written last; no picture if None. If drawing fails, a message is printed
+        on standard error and the picture is left out.
     """
     # The folder may have been removed during the run.
     folder.path.mkdir(parents=True, exist_ok=True)
@@ -137,14 +138,10 @@ def write(result: Result, folder: RunFolder) -> list[Path]:
     )
     write_result(result, folder.result)
     folder.checkpoint.unlink(missing_ok=True)
-    picture = pictures.write_beside_data(folder.path / "cloud.png", lambda: _cloud(result))
-    return [folder.result, *paths.values(), *picture]
-
-
-def _cloud(result: Result) -> Figure:
-    from tisim.plotting import cloud
-
-    return cloud.cloud(result)
+    written = [folder.result, *paths.values()]
+    if draw is None:
+        return written
+    return written + pictures.write_beside_data(folder.path / "cloud.png", lambda: draw(result))
 
 
 def write_result(result: Result, path: Path) -> None:
@@ -162,10 +159,10 @@ def write_result(result: Result, path: Path) -> None:
         file.create_group("measures").attrs.update(result.measures)
 
 
-def read_result(path: Path) -> Result:
-    """Return the Result written by ``write_result``, bitwise equal. Raise InputError unless the file is
-    intact."""
-    with checksum.open_file(path, "result", RESULT) as file, refuse_damage():
+def result_in(file: h5py.File) -> Result:
+    """Return the Result in an open file written by ``write_result``, bitwise equal. Raise InputError if its
+    content is damaged."""
+    with refuse_damage():
         arrays = {
             group: {name: np.asarray(values) for name, values in file[group].items()}
             for group in ("start", "end")
