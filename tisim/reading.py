@@ -10,7 +10,6 @@ from typing import Any
 
 import h5py
 
-from tisim.accuracy import storage
 from tisim.components import serialization
 from tisim.errors import InputError, Words, must
 from tisim.files import checksum, regular_file
@@ -23,12 +22,6 @@ READABLE = (
     "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
 )
 """The files that ``read`` can read, as listed in messages."""
-READERS: dict[str, Callable[[h5py.File], Any]] = {
-    RESULT: run_folder.result_in,
-    checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot_in,
-    storage.COST_FORMAT: storage.rows_in,
-}
-"""Functions that return the content of an open file, by its format."""
 SEARCH_FORMAT = "tisim evaluations"
 """Start of the format attribute of a search.h5. It is defined in the package of searches; a test checks that
 both agree."""
@@ -64,12 +57,20 @@ def read(path: str | Path) -> Any:
 
 def _read_hdf5(path: Path) -> Any:
     """Return the content of an HDF5 file that is written at once."""
+    # Cost studies load SciPy, which takes a second and is not needed for trajectories and scenes.
+    from tisim.accuracy import storage
+
+    readers: dict[str, Callable[[h5py.File], Any]] = {
+        RESULT: run_folder.result_in,
+        checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot_in,
+        storage.COST_FORMAT: storage.rows_in,
+    }
     rule = f"{READABLE}; a search is read by `tisim.optimize.read`, and listed by `tisim cache`"
     with checksum.open_any(path, "file to read", READABLE) as file:
         kind = str(file.attrs.get("format", "none"))
         must(not kind.startswith(SEARCH_FORMAT), "file to read", rule, Words(f"{path}, of a search"))
-        must(kind in READERS, "file to read", READABLE, Words(f"{path}, of the format {kind}"))
-        return READERS[kind](file)
+        must(kind in readers, "file to read", READABLE, Words(f"{path}, of the format {kind}"))
+        return readers[kind](file)
 
 
 def _read_text(path: Path) -> Any:

@@ -6,9 +6,9 @@ in the order of their ids; frames with fewer particles are padded (see h5md.py).
 are the measures of its world, such as forces on walls.
 
 The file can be read after every single write by any reader, so also after the run was killed (see
-tisim/files/hdf5.py). A reader that meets an unfinished write must retry, as reader.py does. ``step`` is extended
-last, so all frames that it counts are complete. The file is created under a temporary name, with all datasets
-but no frames, and then renamed.
+tisim/files/hdf5.py). A reader that meets an unfinished write must retry, as reader.py does. ``step`` is
+extended last, so all frames that it counts are complete. The file is created under a temporary name, with all
+datasets but no frames, and then renamed.
 """
 
 from __future__ import annotations
