@@ -140,7 +140,7 @@ def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:
 
 
 class Study:
-    """A study measures the run time and the error of the settings of a scene.
+    """The run time and the error of the settings of a scene, as far as ``run`` has measured them.
 
     quantities : quantities whose errors are measured; by default ``quantity.usual``.
     coarser, finer : decades of error to scan above and below the scene's own setting.
@@ -154,9 +154,6 @@ class Study:
         settings apart.
     rows, truths : the results so far, in order; one truth for each quantity.
     complete : whether all settings are measured.
-
-    To measure another precision or arithmetic, tisim is initialised again: simulations made before must not
-    be used afterwards.
     """
 
     def __init__(

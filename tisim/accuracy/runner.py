@@ -55,7 +55,8 @@ def run(study: Study, progress: Progress | None = None, finished: Callable[[], o
     finished : called after each new row, and after the truths.
 
     InputError if the scene cannot be run or has no setting to vary. If an error is raised, finished rows are
-    kept. Other threads that call ``tisim.run`` wait until the study ends.
+    kept. Other threads that call ``tisim.run`` wait until the study ends. To measure another precision or
+    arithmetic, tisim is initialised again: simulations made before must not be used afterwards.
     """
     if study.complete:
         return
