@@ -46,7 +46,7 @@ TYPES = (
 )
 INNER = "|".join(
     (
-        r"tisim\.(io\.(recording|trajectory|recorder)|packing\.(clump|region|tried_places)|engine\.particle_state|backend\.runtime)\.\w+",
+        r"tisim\.(io\.(recording|trajectory)|packing\.(clump|region|tried_places)|engine\.particle_state|backend\.runtime)\.\w+",
         r"tisim\.(materials\.materials|components\.component|steppers\.context|state\.(bound|state)|program\.phases|pairs\.(lists|half_list)|engine\.assembly|forces\.force_sum|effects\.contact\.granular\.parts)\.\w+",
         r"(tisim\.)?optimize\.(methods\.\w+|problem\.(function|constraint|statistic)|storage\.cache|analysis\.\w+)\.\w+",
     )

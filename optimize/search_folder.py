@@ -28,10 +28,10 @@ from typing import Any
 
 from tisim import InputError
 from tisim.errors import abbreviated, must
-from tisim.files import lock, ownership, regular_file
+from tisim.files import output_folder, regular_file
 from tisim.files.atomic import locked, replace_file
+from tisim.files.output_folder import resumes
 from tisim.files.regular_file import file_status
-from tisim.files.resuming import resumes
 from tisim.optimize.search_records import searches
 from tisim.optimize.settings import IDENTITY_FORMAT, of_the_problem, search_name
 from tisim.optimize.storage.cache import Cache
@@ -60,7 +60,8 @@ RESULT_FILES = (
 SHOWN_FILE = "shown.json"
 """Name of the file with the name of the search that the result files belong to."""
 SEARCH_FILES = (
-    SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", SHOWN_FILE, *RESULT_FILES, lock.LOCK,
+    SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", SHOWN_FILE, *RESULT_FILES,
+    output_folder.LOCK,
 )  # fmt: skip
 """Names of all files that a search writes into its folder."""
 
@@ -70,8 +71,8 @@ def resume_or_clear(
     command: str = "search", file: str = SEARCH_FILE,
     result_files: Sequence[str] = (SHOWN_FILE, *RESULT_FILES),
 ) -> bool:  # fmt: skip
-    """Return whether a command resumes the evaluations in its folder (``resuming.resumes``); if not, delete
-    them.
+    """Return whether a command resumes the evaluations in its folder (``output_folder.resumes``); if not,
+    delete them.
 
     command : "search", or the name of another command that stores evaluations.
     file : its cache file. result_files : its other files.
@@ -82,10 +83,10 @@ def resume_or_clear(
     resumable = any(file_status(folder / name) is not None for name in (file, journal))
     results = f"results of a {command}" if resumable else ""
     resume = resumes(folder, command, resumable, results, fresh, overwrite)
-    ownership.check(folder, (file, journal, lock_file, *result_files, lock.LOCK), overwrite)
+    output_folder.check(folder, (file, journal, lock_file, *result_files, output_folder.LOCK), overwrite)
     if resumable and not resume:
         # The lock file stays: without it two processes could lock two different files.
-        with lock.acquire(folder), locked(folder / lock_file, exclusive=True) as handle:
+        with output_folder.lock(folder), locked(folder / lock_file, exclusive=True) as handle:
             for name in (file, journal, *result_files):
                 (folder / name).unlink(missing_ok=True)
             os.ftruncate(handle, 0)
@@ -139,7 +140,7 @@ def results_of(folder: Path, name: str) -> Iterator[None]:
     full.
     """
     content = (json.dumps({"search": name.removeprefix("searches/")}) + "\n").encode()
-    with locked(folder / ownership.MARKER, exclusive=True):
+    with locked(folder / output_folder.MARKER, exclusive=True):
         if regular_file.content(folder / SHOWN_FILE) != content:
             for file in RESULT_FILES:
                 (folder / file).unlink(missing_ok=True)

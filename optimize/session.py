@@ -16,9 +16,9 @@ from tisim.backend import runtime
 from tisim.console import err, print_stopping
 from tisim.console import out as standard_output
 from tisim.errors import must
-from tisim.files import lock, pictures
+from tisim.files import output_folder, pictures
 from tisim.files.atomic import replace_file
-from tisim.files.ownership import claim
+from tisim.files.output_folder import claim
 from tisim.interrupt import Interrupt
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.designs_csv import Given
@@ -137,7 +137,7 @@ def session(
     clear the folder.
     """
     claim(folder, SEARCH_FILES, overwrite)
-    with lock.acquire(folder, exclusive=False):
+    with output_folder.lock(folder, exclusive=False):
         with Cache(folder / SEARCH_FILE) as cache:
             check_problem(folder, "search", cache, identity(problem, settings, evaluator.settings))
             beginning = warmed(cache, problem, settings, evaluator.settings, beginning)

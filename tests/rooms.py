@@ -24,7 +24,7 @@ ROOMS = (
     "tisim.self_consistent", "tisim.population", "tisim.sources",
     "tisim.effects", "tisim.operators", "tisim.steppers", "tisim.scene",
     "tisim.engine", "tisim.describe", "tisim.testing", "tisim.io", "tisim.analysis",
-    "tisim.plotting", "tisim", "tisim.accuracy",
+    "tisim.plotting", "tisim", "tisim.accuracy", "tisim.reading",
     "tisim.optimize.problem", "tisim.optimize.storage", "tisim.optimize.evaluation",
     "tisim.optimize.methods.individual", "tisim.optimize.surrogate", "tisim.optimize.methods",
     "tisim.optimize.fitness_record", "tisim.optimize.frames", "tisim.optimize.hall_of_fame",
@@ -41,8 +41,6 @@ ROOMS = (
 )  # fmt: skip
 """In order. ``tisim.cases.*`` is every other case: each is a room of its own beside the others."""
 LATE = {
-    ("tisim.io.run_folder", "tisim.plotting.cloud"),
-    ("tisim.io.read", "tisim.accuracy.storage"),
     ("tisim.engine.simulation", "tisim.io.checkpoint"),
 }
 """A module, and a module of a later room that one of its functions imports."""

@@ -41,7 +41,6 @@ from .errors import RunError as RunError
 from .errors import RunWarning as RunWarning
 from .errors import StartWarning as StartWarning
 from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
-from .io.read import read as read
 from .io.recording import Recording as Recording
 from .materials.materials import Material as Material
 from .materials.materials import MaterialPair as MaterialPair
@@ -63,6 +62,7 @@ from .packing.placement import (
 from .packing.placement import (
     RandomInDomain as RandomInDomain,
 )
+from .reading import read as read
 from .scene.cloud import Cloud as Cloud
 from .scene.initial_state import Particles as Particles
 from .scene.initial_velocity import Blast as Blast

@@ -16,7 +16,7 @@ from rich.table import Table
 from tisim import RunError
 from tisim.console import plain_table
 from tisim.errors import must
-from tisim.files import lock, ownership
+from tisim.files import output_folder
 from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.evaluation.runs import Evaluator
@@ -28,7 +28,13 @@ from tisim.optimize.settings import Settings, fit, identity, proposed
 from tisim.optimize.storage.cache import Cache
 
 COMPARISON_FILE, CSV = "compare.h5", "compare.csv"
-COMPARISON_FILES = (COMPARISON_FILE, f"{COMPARISON_FILE}.journal", f"{COMPARISON_FILE}.lock", CSV, lock.LOCK)
+COMPARISON_FILES = (
+    COMPARISON_FILE,
+    f"{COMPARISON_FILE}.journal",
+    f"{COMPARISON_FILE}.lock",
+    CSV,
+    output_folder.LOCK,
+)
 FRESH = 10**6
 """The seed of the starts from which the best designs are run again; no search uses it."""
 NOTE = (
@@ -54,8 +60,8 @@ def claim(folder: Path, fresh: bool | None, overwrite: bool) -> Iterator[bool]:
     """Hold the folder of a comparison, and yield whether an existing one is resumed; otherwise it is
     deleted."""
     resume = resume_or_clear(folder, fresh, overwrite, "comparison", COMPARISON_FILE, (CSV,))
-    ownership.claim(folder, COMPARISON_FILES, overwrite)
-    with lock.acquire(folder, exclusive=False):
+    output_folder.claim(folder, COMPARISON_FILES, overwrite)
+    with output_folder.lock(folder, exclusive=False):
         yield resume
 
 

@@ -21,7 +21,7 @@ from typing import Any
 
 from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
-from tisim.files.ownership import ensure_writable
+from tisim.files.output_folder import ensure_writable
 from tisim.files.regular_file import file_status, is_folder, open_descriptor
 from tisim.optimize.storage import hdf5_store
 from tisim.optimize.storage.hdf5_store import Content

@@ -24,7 +24,7 @@ from tisim import InputError
 from tisim.errors import must
 from tisim.files import regular_file
 from tisim.files.checksum import verified, with_checksum
-from tisim.files.superblock import SIGNATURE
+from tisim.files.hdf5 import SIGNATURE
 from tisim.optimize.storage import older
 from tisim.optimize.storage.runs_table import KINDS, RunsTable, tabulated
 from tisim.optimize.storage.table import (

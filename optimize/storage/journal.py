@@ -1,4 +1,4 @@
-"""The write-ahead journal: a file of framed, checksummed payloads (see tisim/files/framing.py).
+"""The write-ahead journal: a file of framed, checksummed payloads (see tisim/files/checksum.py).
 
 The payloads are evaluations and rows of tables. The lock file beside it stores the length up to which the
 journal was written; if the journal is shorter, the difference was lost.
@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from tisim.files.atomic import append_at
-from tisim.files.framing import Scan, frame, scan
+from tisim.files.checksum import Scan, frame, scan
 from tisim.files.regular_file import content, file_status, open_descriptor
 from tisim.optimize.storage import older
 from tisim.optimize.storage.record import Record, plain

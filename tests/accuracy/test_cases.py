@@ -5,8 +5,7 @@ import pytest
 
 from tests.scenes import simulate
 from tisim import Box, Particles
-from tisim.accuracy.quantity import estimate
-from tisim.accuracy.reference import closed_form
+from tisim.accuracy.quantity import estimate, truth_in_closed_form
 from tisim.cases.agglomeration import scene as agglomeration
 from tisim.cases.blast import scene as blast
 from tisim.cases.case import every
@@ -39,7 +38,7 @@ def test_the_array_follows_its_closed_form():
     positions, centre = every()["vibration"].quantities(scene)
     (result,) = simulate([scene], capacity=8)
     for quantity in (positions, centre):
-        truth = closed_form(quantity, result)
+        truth = truth_in_closed_form(quantity, result)
         error, off = estimate(quantity, [result]).error(truth.estimate, truth.size)
         assert error < 1e-5
         assert off == 0.0

@@ -13,15 +13,12 @@ from tests.scenes import scene
 from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
 from tisim import Box, InputError, Material, MaterialPair, RunError, Scene
-from tisim.accuracy import Quantity, Row, Study
-from tisim.accuracy.formatting import expression, options
-from tisim.accuracy.plot import picture
-from tisim.accuracy.reference import attempts, compared
-from tisim.accuracy.row import decades, tied
-from tisim.accuracy.scene_parts import exchanged, finest, parts
-from tisim.accuracy.softening import softened, softening
+from tisim.accuracy import Quantity, Row, Study, plot, table
+from tisim.accuracy.cost_study import decades, tied
+from tisim.accuracy.quantity import reference_runs, truth_by_reference
+from tisim.accuracy.report import notes
+from tisim.accuracy.scene_changes import exchanged, expression, finest, options, parts, softened, softening
 from tisim.accuracy.sweep import methods, rivals
-from tisim.accuracy.table import notes
 from tisim.cli.scene_arguments import assignments
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
@@ -101,7 +98,7 @@ def test_a_new_stepper_and_its_control_say_themselves_what_to_turn(monkeypatch):
     assert [s.scene.stepper.control.dt for s in line.settings] == [0.1] * 3
     assert [s.description for s in line.settings] == ["error=0.0001", "error=1e-05", "error=1e-06"]
     # It is the reference then, being of the highest order, and the scene's own is its check.
-    references = attempts(list(methods_of(oscillator()).values()), 0.0)
+    references = reference_runs(list(methods_of(oscillator()).values()), 0.0)
     assert [attempt.name for attempt in references] == ["Sharp, Pace"] * 2 + ["Verlet, FixedStep"] * 2
     assert [attempt.scene.stepper.control.error for attempt in references[:2]] == [1e-8, 1e-7]
     assert references[2].scene.stepper.control.dt == pytest.approx(oscillator().stepper.control.dt / 10)
@@ -114,7 +111,7 @@ def test_a_new_effect_says_so_too_and_is_as_fine_as_can_be_in_the_reference():
     assert not line.converges
     assert finest(scene, -2).effects[0].grain == pytest.approx(1e-4)
     assert finest(scene, -2).stepper == scene.stepper
-    reference, *_ = attempts(list(methods_of(scene).values()), 0.0)
+    reference, *_ = reference_runs(list(methods_of(scene).values()), 0.0)
     assert reference.scene.effects[0].grain == pytest.approx(1e-4)
     assert reference.scene.stepper == reference.method.at(-2).stepper
 
@@ -383,11 +380,11 @@ def test_wrong_settings_are_refused_before_anything_runs(settings, message):
 
 def test_a_reference_that_another_stepper_contradicts_is_not_believed(monkeypatch):
     monkeypatch.setattr(Sharp, "is_alternative", True)
-    references = attempts(list(methods_of(oscillator()).values()), 0.0)
+    references = reference_runs(list(methods_of(oscillator()).values()), 0.0)
     number = Quantity("number", lambda result: result)
 
     def own(*values):
-        return compared(number, [[value] for value in values], references[: len(values)]).error
+        return truth_by_reference(number, [[value] for value in values], references[: len(values)]).error
 
     assert own(1.0, 1.01) == pytest.approx(0.01)
     # The other one is as far off as its own two settings are apart.
@@ -446,7 +443,7 @@ def pictured(*rows):
     """Labels of the legend, and the limits of the errors, of a study that has found this."""
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = list(rows)
-    figure = picture(cost_study)
+    figure = plot(cost_study)
     (legend,) = figure.legends
     return [" ".join(text.get_text().split()) for text in legend.get_texts()], figure.axes[0].get_ylim()
 
@@ -475,7 +472,7 @@ def test_a_method_has_one_colour_in_all_precisions_and_arithmetics():
         rows.append(replace(row(name, 1.0, 1e-3), precision=precision, arithmetic=arithmetic))
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = rows
-    lines = {line.get_label(): line for line in picture(cost_study).axes[0].get_lines()}
+    lines = {line.get_label(): line for line in plot(cost_study).axes[0].get_lines()}
     own = [lines[one.method] for one in rows[1:]]
     assert {line.get_color() for line in own}.isdisjoint({lines["other"].get_color()})
     assert len({line.get_color() for line in own}) == 1
@@ -495,7 +492,7 @@ def test_values_of_one_parameter_are_joined_and_laws_are_not():
     ]
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = turned + softer + laws
-    lines = {line.get_label(): line for line in picture(cost_study).axes[0].get_lines()}
+    lines = {line.get_label(): line for line in plot(cost_study).axes[0].get_lines()}
     styles = [lines[name].get_linestyle() for name in ("Verlet: dt", "softer", "Law", "Spring")]
     assert styles == ["-", "-", "None", "None"]
 
@@ -532,7 +529,7 @@ def test_the_table_fits_80_columns_and_cuts_no_number():
     )
     cost_study.rows = [long, limits, failed]
     console = Console(width=80, file=io.StringIO())
-    console.print(cost_study.table())
+    console.print(table(cost_study))
     lines = console.file.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
     assert any(line.startswith(" longest=6.51e-05,") for line in lines)

@@ -8,10 +8,10 @@ import pytest
 
 from tests.accuracy.scenes import RATE, SPEED, STEP, only, oscillator, place
 from tisim import RunError
-from tisim.accuracy import Quantity, Study, reference, storage, study
+from tisim.accuracy import Quantity, Study, quantity, run, storage, study, table, write
 from tisim.accuracy.quantity import displacement
+from tisim.accuracy.report import error_texts, notes
 from tisim.accuracy.runner import StudyRunner
-from tisim.accuracy.table import error_texts, notes
 from tisim.accuracy.timing import OBSERVATIONS, SimulationCache
 from tisim.backend import runtime
 from tisim.effects import Tether
@@ -47,10 +47,9 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
     # The clock decides which of the finer rows is cheapest, but the coarsest is not accurate enough.
     assert cost_study.cheapest(1e-4).errors[0][0] <= 1e-4 < cost_study.rows[0].errors[0][0]
     assert (
-        "displacement: relative to its largest value during the run"
-        in cost_study.table().renderables[0].plain
+        "displacement: relative to its largest value during the run" in table(cost_study).renderables[0].plain
     )
-    cost_study.write(tmp_path)
+    write(cost_study, tmp_path)
     again = Study(closed(), **FEW)
     storage.resume(again, tmp_path)
     assert again.truths[0].size == truth.size
@@ -89,7 +88,7 @@ def test_other_threads_wait_while_a_study_starts_taichi_anew(verlet_only):
     outcomes = []
     with ThreadPoolExecutor(1) as other:
         cost_study = Study(closed(), (RETURNING,), **{**FEW, "coarser": 0})
-        cost_study.run(progress=lambda fraction, what: outcomes.append(other.submit(free).result()))
+        run(cost_study, progress=lambda fraction, what: outcomes.append(other.submit(free).result()))
         assert outcomes
         assert not any(outcomes)
         assert other.submit(free).result()
@@ -129,13 +128,13 @@ def test_a_setting_over_the_limit_is_a_row_that_says_so(verlet_only, monkeypatch
     ]
     assert cost_study.complete
     assert cost_study.cheapest(1.0) in cost_study.rows[1:]
-    assert "  dt=0.01: over the limit of 3000 s" in map(str, cost_study.table().renderables)
-    cost_study.write(tmp_path)
+    assert "  dt=0.01: over the limit of 3000 s" in map(str, table(cost_study).renderables)
+    write(cost_study, tmp_path)
     for limit, known in ((3e3, 3), (1e3, 3), (4e3, 2), (np.inf, 2)):
         again = Study(closed(), **FEW, limit=limit)
         storage.resume(again, tmp_path)
         assert (len(again.rows), again.complete) == (known, known == 3)
-    again.run()
+    run(again)
     assert sorted(len(row.errors) for row in again.rows) == [1, 1, 1]
 
 
@@ -168,12 +167,12 @@ def test_what_does_not_fit_the_budget_is_not_begun_in_a_later_repeat(verlet_only
 
 def test_a_reference_that_tells_nothing_apart_ends_a_study_that_needs_one(verlet_only, monkeypatch):
     """Before any setting is run; its truth is kept."""
-    monkeypatch.setattr(reference, "LARGEST_REFERENCE_ERROR", 1e-12)
+    monkeypatch.setattr(quantity, "LARGEST_REFERENCE_ERROR", 1e-12)
     cost_study = Study(closed(), **FEW, require_reference=True)
     refusal = r"^displacement must be known by the reference to 1e-12 of the motion; received .* are chaotic"
     for _ in range(2):
         with pytest.raises(RunError, match=refusal):
-            cost_study.run()
+            run(cost_study)
     assert cost_study.rows == []
     assert len(cost_study.truths) == 1
     assert len(study(closed(), **FEW).rows) == 3

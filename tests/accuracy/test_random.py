@@ -6,10 +6,17 @@ import pytest
 from tests.accuracy.scenes import DEVIATION, ENERGY, GRAIN, GRAINS, MEAN, drift, energy
 from tests.scenes import head_on, simulate
 from tisim import Box, InputError
-from tisim.accuracy import Quantity, Study
-from tisim.accuracy.quantity import displacement, estimate, kinetic_energy, mean, usual
-from tisim.accuracy.reference import attempts, compared
-from tisim.accuracy.row import TRUSTED
+from tisim.accuracy import Quantity, Study, run
+from tisim.accuracy.cost_study import TRUSTED
+from tisim.accuracy.quantity import (
+    displacement,
+    estimate,
+    kinetic_energy,
+    mean,
+    reference_runs,
+    truth_by_reference,
+    usual,
+)
 from tisim.accuracy.sweep import methods
 from tisim.effects import Impact
 
@@ -46,7 +53,7 @@ def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
 def test_more_starts_buy_a_smaller_error(drifts):
     """The error that is certain falls as the square root of the starts, and bounds the true one."""
     cost_study = Study(drift(), (ENERGY,), precisions=("f64",), repeats=1, starts=(8, len(drifts)), coarser=0)
-    cost_study.run()
+    run(cost_study)
     few, many = cost_study.line("random starts")
     assert (few.starts, many.starts) == (8, len(drifts))
     for row in (few, many):
@@ -63,12 +70,15 @@ def test_more_starts_buy_a_smaller_error(drifts):
 def test_a_random_reference_is_no_better_than_its_starts(drifts):
     """The interval of its own mean counts, though the runs that check it agree to the last digit."""
     unknown = Quantity("kinetic energy", kinetic_energy, random=True)
-    references = attempts(methods(drift(), 0.05, 1.0, (0.0,), (), 1), 0.0)
-    truth = compared(unknown, [drifts, drifts], references[:2])
+    references = reference_runs(methods(drift(), 0.05, 1.0, (0.0,), (), 1), 0.0)
+    truth = truth_by_reference(unknown, [drifts, drifts], references[:2])
     assert truth.estimate.uncertainty == estimate(unknown, drifts).uncertainty > 0
     # A stepper that errs, the same in every start, is not hidden by that interval.
     half = drifts[: len(drifts) // 2]
-    bias = compared(unknown, [drifts, half], references[:2]).estimate.uncertainty - truth.estimate.uncertainty
+    bias = (
+        truth_by_reference(unknown, [drifts, half], references[:2]).estimate.uncertainty
+        - truth.estimate.uncertainty
+    )
     apart = estimate(unknown, half).value - truth.estimate.value
     assert bias == pytest.approx(np.linalg.norm(apart))
     assert bias > 0

@@ -14,7 +14,7 @@ from rich.console import Console
 from tests.accuracy.scenes import DURATION, KNOWN, STEP, UNKNOWN, only, oscillator
 from tests.steppers.charged import charged
 from tisim import InputError, Result, RunError, Status
-from tisim.accuracy import Quantity, Study, storage, study
+from tisim.accuracy import Quantity, Study, plot, run, storage, study, table, write
 from tisim.accuracy.quantity import displacement
 from tisim.accuracy.timing import SimulationCache, Timed
 from tisim.backend import runtime
@@ -37,7 +37,7 @@ def measured():
     with pytest.MonkeyPatch.context() as patch:
         only(patch, Verlet, Trapezoid)
         cost_study = Study(oscillator(), (KNOWN, UNKNOWN), precisions=("f64",), repeats=2)
-        cost_study.run()
+        run(cost_study)
     return cost_study
 
 
@@ -114,7 +114,7 @@ def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypat
 
     known_quantity = type(KNOWN)("known", displacement, exact)
     cost_study = Study(circle, (known_quantity, UNKNOWN), precisions=("f64",), repeats=1, coarser=1)
-    cost_study.run()
+    run(cost_study)
     off = np.linalg.norm(cost_study.truths[1].estimate.value - cost_study.truths[0].estimate.value)
     off /= np.linalg.norm(cost_study.truths[0].estimate.value)
     assert off <= cost_study.truths[1].error < 100 * off
@@ -159,8 +159,8 @@ def test_words_and_python_of_a_row_make_its_scene(measured):
 
 
 def test_files_are_read_back(measured, tmp_path, monkeypatch):
-    measured.write(tmp_path)
-    measured.picture(tmp_path / "cost.png")
+    write(measured, tmp_path)
+    plot(measured).savefig(tmp_path / "cost.png")
     with (tmp_path / "cost.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [(row["method"], row["setting"]) for row in rows] == [row.key for row in measured.rows]
@@ -221,14 +221,14 @@ def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
     monkeypatch.setattr(SimulationCache, "run", stopped)
     cost_study = Study(oscillator(), (KNOWN,), precisions=("f64",))
     with pytest.raises(KeyboardInterrupt):
-        cost_study.run()
+        run(cost_study)
     assert [(row.setting, len(row.seconds)) for row in cost_study.rows] == [("dt=0.0316", 3), ("dt=0.01", 1)]
     assert not cost_study.complete
 
 
 def printed_table(cost_study):
     console = Console(width=120, file=io.StringIO())
-    console.print(cost_study.table())
+    console.print(table(cost_study))
     return console.file.getvalue()
 
 

@@ -6,7 +6,7 @@ import pytest
 from tests.accuracy.scenes import oscillator
 from tisim import Result, Status, steppers
 from tisim.accuracy import timing
-from tisim.accuracy.scene_parts import in_steps_of_at_most
+from tisim.accuracy.scene_changes import in_steps_of_at_most
 from tisim.accuracy.timing import OBSERVATIONS, ROOM, ResultObserver, SimulationCache
 from tisim.backend import memory
 from tisim.backend.layout import Builder

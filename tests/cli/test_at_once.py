@@ -9,7 +9,7 @@ import pytest
 from tests.accuracy.scenes import only, oscillator
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
-from tisim.files import lock
+from tisim.files import output_folder
 
 STOPPED = """
 import os, signal
@@ -71,7 +71,7 @@ def test_a_run_locks_its_folder_until_it_ends(tisim, toml, tmp_path, under_way):
 def at_work(tmp_path):
     """A folder in which another process is running."""
     (tmp_path / "out").mkdir()
-    with lock.acquire(tmp_path / "out"):
+    with output_folder.lock(tmp_path / "out"):
         yield "out"
 
 

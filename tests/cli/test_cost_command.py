@@ -13,8 +13,8 @@ from typer.main import get_command
 from tests.accuracy.scenes import only, oscillator
 from tests.own_files import LAW
 from tisim import InputError
-from tisim.accuracy import Row, Study, reference, storage
-from tisim.accuracy.formatting import options, shell_line
+from tisim.accuracy import Row, quantity, runner, storage
+from tisim.accuracy.scene_changes import options, shell_line
 from tisim.accuracy.sweep import methods
 from tisim.cases.case import every
 from tisim.cli import cost, scene_arguments
@@ -95,7 +95,7 @@ def rows(folder):
 def test_cost_answers_and_stores_its_measurements(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--no-fast", "--quick", "--error")
     with monkeypatch.context() as patch:
-        patch.setattr(reference, "LARGEST_REFERENCE_ERROR", 1e-12)
+        patch.setattr(quantity, "LARGEST_REFERENCE_ERROR", 1e-12)
         code, out, err = tisim(*command, "1e-3")
         assert (code, out) == (1, "")
         assert "displacement must be known by the reference to 1e-12 of the motion; received" in err
@@ -219,7 +219,7 @@ def test_ctrl_c_keeps_measurements(tisim, swing, tmp_path, monkeypatch):
     assert rows(tmp_path / "cut")[:2] == cut
     assert len(rows(tmp_path / "cut")) == 4
     with monkeypatch.context() as patch:
-        patch.setattr(Study, "run", stopped)
+        patch.setattr(runner, "run", stopped)
         code, _, err = tisim(*command, "--set", "duration=1.0", "--overwrite")
     assert code == 130
     assert "give the same command again, without --overwrite." in " ".join(err.split())

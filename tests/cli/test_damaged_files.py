@@ -10,8 +10,8 @@ import pytest
 from tests.accuracy.scenes import only, oscillator
 from tests.soak import damage
 from tisim import Simulation
-from tisim.files import checksum, lock
-from tisim.files.ownership import MARKER
+from tisim.files import checksum, output_folder
+from tisim.files.output_folder import MARKER
 from tisim.interrupt import Interrupt
 from tisim.plotting.style import empty
 
@@ -137,7 +137,12 @@ def test_cost(tisim, tmp_path, monkeypatch):
     (path.parent / MARKER).write_text("cost.h5\ncost.csv\n")
     for mishap, _ in damages(path, whole):
         is_refusal(tisim("cost", "swing.toml", "--out", "c"), must=True, what=mishap)
-        assert {one.name for one in path.parent.iterdir()} == {MARKER, lock.LOCK, "cost.h5", "cost.csv"}
+        assert {one.name for one in path.parent.iterdir()} == {
+            MARKER,
+            output_folder.LOCK,
+            "cost.h5",
+            "cost.csv",
+        }
 
 
 @pytest.mark.parametrize("name", ["result.h5", "trajectory.h5"])
@@ -169,7 +174,7 @@ def test_drawing_and_copying_commands(tisim, tmp_path, monkeypatch, command, nam
             assert list(tmp_path.rglob("*.new*")) == [], mishap
 
 
-@pytest.mark.parametrize("name", [MARKER, lock.LOCK])
+@pytest.mark.parametrize("name", [MARKER, output_folder.LOCK])
 def test_obstacles_in_place_of_tisims_files(tisim, impacts, tmp_path, name):
     folder = tmp_path / "out"
     folder.mkdir()

@@ -9,11 +9,10 @@ from matplotlib.figure import Figure
 
 from tests.files.full_disk import files_of_at_most
 from tests.files.test_growing_hdf5 import STILL
-from tests.files.test_growing_hdf5 import frame as grown
-from tisim import Recording, Simulation
+from tisim import Simulation
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
-from tisim.files import atomic, checksum, ownership
+from tisim.files import atomic, checksum
 from tisim.io.reader import frames
 from tisim.io.trajectory import Trajectory
 
@@ -60,30 +59,6 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
     (folder / "trajectory.h5").unlink()
     code, out, _ = tisim("export", folder, "--format", "xyz")
     assert (code, out.strip()) == (0, str(folder / "result.xyz"))
-
-
-@pytest.mark.parametrize(
-    "first",
-    [("export", "out", "--format", "xyz"), ("movie", "out", "--rate", 5), ("figures", "toy", "--out", "out")],
-    ids=lambda words: words[0],
-)
-def test_pictures_of_a_version_without_markers_are_replaced(tisim, tmp_path, first, monkeypatch):
-    """A folder as version 0.1.0 left it, with pictures whose names have since changed."""
-    monkeypatch.setattr("tisim.plotting.movie.movie", lambda *arguments: None)  # drawing is slow
-    sizes = {"default": Size("", {})}
-    parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
-    toy = Case(*parts, figures=lambda size, progress: {"many.csv": "1\n"})
-    monkeypatch.setattr(catalogue, "every", lambda: {"toy": toy})
-    folder = tmp_path / "out"
-    folder.mkdir()
-    with Trajectory(Recording(folder / "trajectory.h5", frames=1), [STILL]) as trajectory:
-        trajectory.write(0, grown(0))
-        trajectory.write(0, grown(1))
-    pictures = ("cloud.png", "courses.png", "sequence.png")
-    for name in pictures:
-        (folder / name).touch()
-    assert tisim(*first)[0] == 0
-    ownership.check(folder, pictures)  # as tisim plot does
 
 
 def test_a_folder_without_data_to_draw_is_refused(tisim, tmp_path):
@@ -159,7 +134,7 @@ def test_a_full_disk_keeps_earlier_frames_and_a_checkpoint(tisim, toml, tmp_path
 
 @pytest.mark.parametrize("command", ["plot", "movie", "export"])
 def test_damaged_trajectories_are_refused_in_a_line(tisim, tmp_path, command):
-    Trajectory(Recording(tmp_path / "trajectory.h5", frames=3), [STILL]).close()
+    Trajectory(tmp_path / "trajectory.h5", [STILL]).close()
     code, out, err = tisim(command, "trajectory.h5")
     assert (code, out) == (2, "")
     assert "file must be one with" in err  # followed by the number of frames

@@ -11,10 +11,10 @@ import pytest
 
 from tests.files.test_growing_hdf5 import STILL, frame, same
 from tests.soak import damage
-from tisim import InputError, Recording
+from tisim import InputError
 from tisim.accuracy import storage
-from tisim.files import checksum, framing
-from tisim.files.superblock import SIGNATURE
+from tisim.files import checksum
+from tisim.files.hdf5 import SIGNATURE
 from tisim.io import checkpoint, h5md
 from tisim.io.export import export
 from tisim.io.reader import frames, world_count
@@ -88,9 +88,8 @@ def test_damage_to_a_frame_is_damage_to_that_frame(tmp_path):
             same(sequence[k], k)
         with pytest.raises(InputError, match="file must be undamaged; received"):
             sequence[3]
-    recording = Recording(path, frames=99)
     with pytest.raises(InputError, match="file must be undamaged; received"):
-        Trajectory.resume(recording, STILL, 1.0)
+        Trajectory.resume(path, STILL, 1.0)
     assert [file.name for file in tmp_path.iterdir()] == ["trajectory.h5"]
 
 
@@ -108,7 +107,7 @@ def test_numbers_that_hdf5_does_not_check_are_checked(tmp_path):
 def test_a_lost_last_step_leaves_a_run_that_has_not_ended(tmp_path):
     """As a killed run does, whose last row is none yet; the frames before are read."""
     path, short = tmp_path / "t.h5", STILL.model_copy(update={"duration": frame(3).time})
-    with Trajectory(Recording(path, frames=9), [short]) as trajectory:
+    with Trajectory(path, [short]) as trajectory:
         for k in range(4):
             trajectory.write(0, frame(k))
     with frames(path) as sequence:
@@ -166,24 +165,27 @@ def test_what_is_no_file_of_ours_is_refused(no_file, read):
     assert {path.name for path in no_file.parent.iterdir()} <= {no_file.name, "fifo"}
 
 
-@pytest.mark.parametrize("name", ["result.h5", "trajectory.h5", "an older trajectory.h5"])
-def test_files_of_versions_without_checksums_are_distinguished_from_those_of_others(tmp_path, name):
-    """As they were: a result without its checksum; trajectories of HDF5's first and third superblock."""
+@pytest.mark.parametrize("libver", ["earliest", LIBVER])
+def test_a_trajectory_without_checksums_is_refused(tmp_path, libver):
+    """With HDF5's first superblock, and with its third, the one that tisim writes."""
     path = tmp_path / "t.h5"
-    if name == "result.h5":
-        path.write_bytes(checksum.verified(damage._result(tmp_path).read_bytes()))
-    else:
-        with h5py.File(path, "w", libver="earliest" if "older" in name else LIBVER) as file:
-            h5md.write_metadata(file, "0.1.0")
-            file["particles/all/position/step"] = [0, 10]
-    message = "it was written by an older version, and h5py can read it$"
-    with pytest.raises(InputError, match=message), frames(path):
+    with h5py.File(path, "w", libver=libver) as file:
+        h5md.write_metadata(file, "0.1.0")
+        file["particles/all/position/step"] = [0, 10]
+    with (
+        pytest.raises(InputError, match=r"^file must be a trajectory.h5 or .* with (its )?checksum"),
+        frames(path),
+    ):
         pass
-    with h5py.File(path, "r"):
+
+
+def test_a_result_without_its_checksum_is_refused(tmp_path):
+    path = tmp_path / "r.h5"
+    path.write_bytes(checksum.verified(damage._result(tmp_path).read_bytes()))
+    with pytest.raises(InputError, match=r"^file must be .*, whole and with its checksum"), frames(path):
         pass
-    if name == "result.h5":
-        with pytest.raises(InputError, match=message):
-            checkpoint.restore(_Loaded(), path)
+    with pytest.raises(InputError, match=r"^checkpoint must be .*, whole and with its checksum"):
+        checkpoint.restore(_Loaded(), path)
 
 
 class _Loaded:
@@ -200,7 +202,7 @@ class _Loaded:
 )
 def test_a_frame_that_is_no_checksum_is_none(trailer):
     image = SIGNATURE + b"x"
-    assert checksum.verified(image + framing.frame(json.dumps(trailer).encode())) is None
+    assert checksum.verified(image + checksum.frame(json.dumps(trailer).encode())) is None
     assert checksum.verified(checksum.with_checksum(image)) == image
 
 

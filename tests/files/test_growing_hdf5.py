@@ -12,11 +12,9 @@ import pytest
 
 from tests.files.full_disk import files_of_at_most
 from tests.scenes import scene
-from tisim import InputError, Recording, RunError
+from tisim import InputError, RunError
 from tisim.files import atomic
-from tisim.files.growing_hdf5 import GrowingFile
-from tisim.files.shared_hdf5 import SharedFile
-from tisim.files.superblock import SIZE, is_valid, lookup3, superblock
+from tisim.files.hdf5 import SIZE, GrowingFile, SharedFile, is_valid, lookup3, superblock
 from tisim.io.reader import Frame, frames
 from tisim.io.trajectory import LIBVER, Trajectory
 
@@ -63,7 +61,7 @@ def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows)
 
     monkeypatch.setattr(GrowingFile, "_write_piece", note)
     count = 0
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+    with Trajectory(path, [STILL]) as trajectory:
         for count in range(rows):
             trajectory.write(0, frame(count))
     assert len(contents) > 8 * rows
@@ -76,7 +74,7 @@ def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows)
 
 def test_it_can_be_read_while_it_is_written(tmp_path):
     path = tmp_path / "t.h5"
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+    with Trajectory(path, [STILL]) as trajectory:
         for k in range(5):
             trajectory.write(0, frame(k))
             assert whole_frames(path, k + 1) == k + 1
@@ -87,7 +85,7 @@ def test_it_can_be_read_while_it_is_written(tmp_path):
 def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
     """HDF5 itself would refuse them: they lie behind the end of the file that it has found."""
     path = tmp_path / "t.h5"
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory, frames(path) as sequence:
+    with Trajectory(path, [STILL]) as trajectory, frames(path) as sequence:
         for k in range(5):
             trajectory.write(0, frame(k))
         assert len(sequence) == 5
@@ -98,7 +96,7 @@ def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
 def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
     """At whatever block of the file that is: HDF5 alone would call it damaged."""
     path = tmp_path / "t.h5"
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+    with Trajectory(path, [STILL]) as trajectory:
         trajectory.write(0, frame(0))
     calls, at = 0, 0
 
@@ -117,7 +115,7 @@ def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
 
 def test_a_trajectory_that_is_cut_short_is_refused(tmp_path):
     path = tmp_path / "t.h5"
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+    with Trajectory(path, [STILL]) as trajectory:
         trajectory.write(0, frame(0))
     os.truncate(path, path.stat().st_size - 1)
     with pytest.raises(InputError, match="file must be whole; received"), frames(path):
@@ -133,7 +131,7 @@ def test_full_disk_says_so_and_keeps_what_is_there(tmp_path, part):
 
     def write():
         nonlocal count
-        with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        with Trajectory(path, [STILL]) as trajectory:
             for count in range(10):
                 trajectory.write(0, frame(count))
 
@@ -155,26 +153,24 @@ def test_full_disk_says_so_and_keeps_what_is_there(tmp_path, part):
 @pytest.mark.parametrize("last", [3, 9])
 def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, last):
     path = tmp_path / "t.h5"
-    recording = Recording(path, frames=99)
-    with Trajectory(recording, [STILL]) as trajectory:
+    with Trajectory(path, [STILL]) as trajectory:
         for k in range(10):
             trajectory.write(0, frame(k))
     content = path.read_bytes()
     with files_of_at_most(len(content) // 4), pytest.raises(RunError, match="could not be written"):
-        Trajectory.resume(recording, STILL, frame(last).time)
+        Trajectory.resume(path, STILL, frame(last).time)
     assert path.read_bytes() == content
     assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
-    with Trajectory.resume(recording, STILL, frame(last).time):
+    with Trajectory.resume(path, STILL, frame(last).time):
         assert whole_frames(path, last + 1) == last + 1
 
 
 def test_killed_before_its_first_frame_it_can_be_opened_and_gone_on_with(tmp_path):
     path = tmp_path / "t.h5"
-    recording = Recording(path, frames=99)
-    trajectory = Trajectory(recording, [STILL])
+    trajectory = Trajectory(path, [STILL])
     assert whole_frames(path, 0) == 0
     trajectory.close()
-    with Trajectory.resume(recording, STILL, 1.0) as trajectory:
+    with Trajectory.resume(path, STILL, 1.0) as trajectory:
         trajectory.write(0, frame(0))
     assert whole_frames(path, 1) == 1
 
@@ -188,14 +184,14 @@ def test_killed_while_it_is_made_it_is_not_there(tmp_path, monkeypatch):
 
     monkeypatch.setattr("tisim.files.atomic.os.fsync", killed)
     with pytest.raises(Killed):
-        Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+        Trajectory(tmp_path / "t.h5", [STILL])
     assert not (tmp_path / "t.h5").exists()
 
 
 def test_a_folder_that_takes_no_file_is_reported_before_anything_runs(tmp_path):
     (tmp_path / "t.h5").mkdir()
     with pytest.raises(InputError, match="trajectory must be a file that can be written; received"):
-        Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+        Trajectory(tmp_path / "t.h5", [STILL])
 
 
 def interrupted(monkeypatch, owner, name, act, stride):
@@ -229,7 +225,7 @@ def test_ctrl_c_while_hdf5_writes_waits_for_the_frame(tmp_path, monkeypatch, nam
     def write():
         count = 0
         try:
-            with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+            with Trajectory(path, [STILL]) as trajectory:
                 for k in range(2):
                     trajectory.write(0, frame(k))
                     count = k + 1
@@ -243,7 +239,7 @@ def test_ctrl_c_while_hdf5_writes_waits_for_the_frame(tmp_path, monkeypatch, nam
 @pytest.mark.parametrize("name", ["readinto", "seek"])
 def test_ctrl_c_while_hdf5_reads_waits_for_the_frame(tmp_path, monkeypatch, name):
     path = tmp_path / "t.h5"
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+    with Trajectory(path, [STILL]) as trajectory:
         for k in range(2):
             trajectory.write(0, frame(k))
     assert interrupted(monkeypatch, SharedFile, name, lambda: whole_frames(path, 2), 3) > 1
@@ -251,14 +247,13 @@ def test_ctrl_c_while_hdf5_reads_waits_for_the_frame(tmp_path, monkeypatch, name
 
 def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypatch):
     path = tmp_path / "t.h5"
-    recording = Recording(path, frames=99)
-    with Trajectory(recording, [STILL]) as trajectory:
+    with Trajectory(path, [STILL]) as trajectory:
         for k in range(3):
             trajectory.write(0, frame(k))
 
     def go_on():
         try:
-            Trajectory.resume(recording, STILL, 1.0).close()
+            Trajectory.resume(path, STILL, 1.0).close()
         finally:
             whole_frames(path, 3)
             assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
@@ -272,7 +267,7 @@ def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypat
         atomic.locked(tmp_path / "t.h5.new", exclusive=True),
         pytest.raises(RunError, match=r"t\.h5\.new has been locked by another process for 0\.01 s$"),
     ):
-        Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+        Trajectory(tmp_path / "t.h5", [STILL])
 
 
 @pytest.mark.parametrize("size", [0, 1, 1000])

@@ -1,4 +1,4 @@
-"""Whose files are whose: the marker of a folder, and folders of before there was one."""
+"""Whose files are whose: the marker of a folder."""
 
 import multiprocessing
 
@@ -6,16 +6,7 @@ import h5py
 import pytest
 
 from tisim import InputError
-from tisim.files import ownership
-from tisim.files.framing import MAGIC
-from tisim.files.ownership import MARKER, LegacyFiles, check, check_all, claim
-
-
-@pytest.fixture(autouse=True)
-def before(monkeypatch):
-    """What a version without markers is said to have left."""
-    legacy = (LegacyFiles(("all.h5",), ("all.csv",)), LegacyFiles(("more.h5",), ("more.csv",)))
-    monkeypatch.setattr(ownership, "LEGACY_FILES", legacy)
+from tisim.files.output_folder import MARKER, check, check_all, claim
 
 
 def write_file(folder, name, text="theirs"):
@@ -59,38 +50,6 @@ def test_links_and_folders_are_refused_even_where_all_may_be_replaced(tmp_path, 
             claim(tmp_path, [name], overwrite)
 
 
-def hdf5(path, creator):
-    with h5py.File(path, "w") as file:
-        file.attrs["format"] = f"{creator} something 1"
-        file["values"] = range(10)
-
-
-@pytest.mark.parametrize(
-    ("make", "ours"),
-    [
-        (lambda path: hdf5(path, "tisim"), True),
-        (lambda path: hdf5(path, "another"), False),
-        (lambda path: path.write_bytes(MAGIC + b"..."), True),
-        (lambda path: path.write_text("tisim"), False),
-        (lambda path: None, False),
-    ],
-)
-def test_a_folder_without_a_marker_is_known_by_what_is_in_its_main_files(tmp_path, make, ours):
-    make(tmp_path / "all.h5")
-    write_file(tmp_path, "all.csv")
-    write_file(tmp_path, "other.csv")
-    if ours:
-        claim(tmp_path, ["new.csv"])
-        assert (tmp_path / MARKER).read_text() == ".tisim.lock\nall.csv\nall.h5\nnew.csv\n"
-        claim(tmp_path, ["all.csv"])
-    else:
-        with pytest.raises(InputError, match=r"with all\.csv"):
-            claim(tmp_path, ["all.csv"])
-        assert not (tmp_path / MARKER).exists()
-    with pytest.raises(InputError, match=r"with other\.csv"):
-        check(tmp_path, ["other.csv"])
-
-
 def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
     check_all(tmp_path / "none")
     check_all(tmp_path)
@@ -128,13 +87,10 @@ def test_processes_that_take_one_folder_lose_no_name(tmp_path):
     assert sorted(names) == sorted(["shared", *(f"{w}-{k}" for w in range(2) for k in range(20))])
 
 
-def test_nothing_is_taken_for_granted(tmp_path):
-    """Of what such a version has not left there, nothing is ours."""
-    hdf5(tmp_path / "all.h5", "tisim")
-    hdf5(tmp_path / "another.h5", "tisim")
-    write_file(tmp_path, "more.csv")
-    for name in ("another.h5", "more.csv"):
-        with pytest.raises(InputError, match=f"with {name}"):
-            check(tmp_path, [name])
-    with pytest.raises(InputError, match=r"with another\.h5, more\.csv"):
+def test_files_in_a_folder_without_a_marker_are_foreign_even_if_they_look_like_our_own(tmp_path):
+    with h5py.File(tmp_path / "result.h5", "w") as file:
+        file.attrs["format"] = "tisim run 1"
+    with pytest.raises(InputError, match=r"has not written and would replace .* with result\.h5"):
+        check(tmp_path, ["result.h5"])
+    with pytest.raises(InputError, match=r"has not written and might replace .* with result\.h5"):
         check_all(tmp_path)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tisim import InputError
-from tisim.files.resuming import resume_hint, resumes
+from tisim.files.output_folder import resume_hint, resumes
 
 LEFT, KEPT = "one that an interrupted run has left", r"without a finished run \(or give --overwrite\)"
 BOTH = "--overwrite must be given without --resume"

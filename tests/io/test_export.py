@@ -129,7 +129,7 @@ def test_each_world_has_its_own_files(tmp_path):
 @pytest.fixture
 def growing(tmp_path):
     """A trajectory of three worlds in single precision, of which only the second has come to a frame."""
-    with Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL] * 3, "f32") as trajectory:
+    with Trajectory(tmp_path / "t.h5", [STILL] * 3, "f32") as trajectory:
         trajectory.write(1, grown(4))
     return tmp_path / "t.h5"
 

@@ -9,7 +9,7 @@ import pytest
 import tisim
 from tests.effects.contact.grains import USUAL
 from tests.scenes import scene
-from tisim import InputError, Material, Recording
+from tisim import InputError, Material
 from tisim.effects import Granular, Gravity, Servo, Walls
 from tisim.engine.assembly import measured
 from tisim.geometry import Plane
@@ -49,7 +49,7 @@ def frame(k):
 
 def write(path, *more):
     """Four frames by hand; nothing is run."""
-    with Trajectory(Recording(path, frames=3), [PRESSED, *more]) as trajectory:
+    with Trajectory(path, [PRESSED, *more]) as trajectory:
         for w in range(1 + len(more)):
             for k in range(4):
                 trajectory.write(w, frame(k))
@@ -86,7 +86,7 @@ def test_the_layout_is_that_of_h5md(tmp_path):
 
 
 def test_a_scene_in_which_nothing_is_measured_has_none(tmp_path):
-    with Trajectory(Recording(tmp_path / "t.h5", 1), [scene([(0, 0, 0)], [(0, 0, 0)])]):
+    with Trajectory(tmp_path / "t.h5", [scene([(0, 0, 0)], [(0, 0, 0)])]):
         pass
     with h5py.File(tmp_path / "t.h5") as read, frames(tmp_path / "t.h5") as sequence:
         assert "observables" not in read
@@ -102,7 +102,7 @@ def test_a_number_that_is_damaged_is_refused(file):
 
 def test_they_go_along_into_a_copy_and_a_resumed_file(file, tmp_path):
     copied = export(file, "h5md", tmp_path)
-    Trajectory.resume(Recording(file, frames=3), PRESSED, float(TIMES[1])).close()
+    Trajectory.resume(file, PRESSED, float(TIMES[1])).close()
     for path, count in ((copied, 4), (file, 2)):
         with frames(path) as sequence:
             assert [one.measures for one in sequence] == [frame(k).measures for k in range(count)]
@@ -110,7 +110,7 @@ def test_they_go_along_into_a_copy_and_a_resumed_file(file, tmp_path):
 
 def test_a_file_that_lacks_them_is_copied_without(tmp_path):
     """Such as one of a version that did not know of a measure."""
-    with Trajectory(Recording(tmp_path / "t.h5", frames=3), [PRESSED]) as trajectory:
+    with Trajectory(tmp_path / "t.h5", [PRESSED]) as trajectory:
         trajectory.write(0, Frame(0.0, 0, frame(0).arrays))
     with frames(tmp_path / "t.h5") as sequence:
         assert all(np.isnan(list(sequence[0].measures.values())))

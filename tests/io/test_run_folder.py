@@ -10,10 +10,10 @@ import pytest
 from tests.scenes import scene, simulate
 from tisim import InputError, RunError, Scene, read
 from tisim.backend import runtime
-from tisim.files import lock, ownership
-from tisim.files.ownership import MARKER, ensure_writable
-from tisim.io.recording import Recording
+from tisim.files import output_folder
+from tisim.files.output_folder import MARKER, ensure_writable
 from tisim.io.run_folder import DATA, RUN_FILES, RunFolder, write
+from tisim.io.trajectory import Trajectory
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]
@@ -26,14 +26,13 @@ def result():
 
 
 @pytest.mark.parametrize("failure", [ValueError("Key backend: 'x' is not\na valid value"), MemoryError()])
-def test_a_picture_that_cannot_be_drawn_costs_no_data(result, tmp_path, monkeypatch, capsys, failure):
+def test_a_picture_that_cannot_be_drawn_costs_no_data(result, tmp_path, capsys, failure):
     def fails(result):
         assert read(tmp_path / "result.h5").time == result.time, "the data are there before anything is drawn"
         raise failure
 
     (tmp_path / "cloud.png").write_bytes(b"of an earlier run")
-    monkeypatch.setattr("tisim.plotting.cloud.cloud", fails)
-    paths = write(result, RunFolder(tmp_path))
+    paths = write(result, RunFolder(tmp_path), fails)
     names = {"result.h5", "scene.toml", "versions.json"}
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths} == names
     (line,) = capsys.readouterr().err.splitlines()
@@ -44,7 +43,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_data(result, tmp_path, monkeypa
 def test_whole_run_is_in_the_folder(result, tmp_path):
     folder = RunFolder(tmp_path)
     folder.checkpoint.write_bytes(b"of before")
-    paths = write(result, folder)
+    paths = write(result, folder, cloud)
     names = {"result.h5", "scene.toml", "versions.json", "cloud.png"}
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths} == names
     with h5py.File(folder.result) as file:
@@ -74,7 +73,7 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
     assert not folder.path.exists()
     with pytest.raises(InputError, match="one that an interrupted run has left"):
         folder.check(SCENE, fresh=False)
-    ownership.claim(folder.path, RUN_FILES)
+    output_folder.claim(folder.path, RUN_FILES)
     folder.checkpoint.touch()
     assert folder.check(SCENE)
     assert folder.check(SCENE, fresh=False)
@@ -111,13 +110,13 @@ def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp
     folder = RunFolder(tmp_path)
     for name in (*DATA, "notes.txt"):
         (tmp_path / name).touch()
-    ownership.claim(tmp_path, RUN_FILES, overwrite=True)
+    output_folder.claim(tmp_path, RUN_FILES, overwrite=True)
     folder.result.unlink()
     with folder.claim(SCENE) as goes_on:
         assert (goes_on, folder.checkpoint.exists()) == (True, True)
     with folder.claim(SCENE, **options) as goes_on:
         assert not goes_on
-        assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, lock.LOCK}
+        assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, output_folder.LOCK}
 
 
 def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):
@@ -143,8 +142,8 @@ def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
 def test_frames_of_a_run_that_was_killed_before_its_first_checkpoint_are_made_again(tmp_path):
     """The same command begins anew by itself; frames of another scene, or damaged ones, are kept."""
     folder = RunFolder(tmp_path)
-    ownership.claim(tmp_path, RUN_FILES)
-    Recording(folder.trajectory, frames=3).create([SCENE], "f64").close()
+    output_folder.claim(tmp_path, RUN_FILES)
+    Trajectory(folder.trajectory, [SCENE]).close()
     assert not folder.check(SCENE)
     other = SCENE.model_copy(update={"seed": 7})
     for scene_, damage in ((other, b""), (SCENE, b"damage")):

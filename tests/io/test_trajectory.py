@@ -264,12 +264,11 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
 def test_it_does_not_go_on_with_the_frames_of_another_scene(tmp_path, worlds):
     """Here of as many particles and other velocities, or of several worlds."""
     path, mine, other = tmp_path / "t.h5", *(scene([(0, 0, 0)], [(v, 0, 0)]) for v in (1.0, 2.0))
-    recording = Recording(path, frames=9)
-    Trajectory(recording, [mine, other][-worlds:]).close()
+    Trajectory(path, [mine, other][-worlds:]).close()
     content = path.read_bytes()
     rule = r"trajectory to go on with must be of the same scene; received .*t\.h5, of another one"
     with pytest.raises(InputError, match=rule):
-        Trajectory.resume(recording, mine, 1.0)
+        Trajectory.resume(path, mine, 1.0)
     assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("t.h5", content)]
 
 
@@ -281,7 +280,7 @@ from tisim.io.reader import Frame
 from tisim import Recording
 from tisim.io.trajectory import Trajectory
 scene = t.scene([(0, 0, 0)] * 3000, [(0.0, 0, 0)] * 3000)
-with Trajectory(Recording(sys.argv[1], frames=10**6), [scene]) as trajectory:
+with Trajectory(sys.argv[1], [scene]) as trajectory:
     for k in range(10**6):
         trajectory.write(0, t.synthetic(k))
 """
@@ -330,7 +329,7 @@ def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
         (lambda path: Recording(path, every="1 s"), "every must be above 0 s, and finite; received '1 s'"),
         (lambda path: Recording(path, every=0.0), "every must be above 0 s, and finite; received 0.0"),
         (lambda path: Recording(path, every=float("nan")), "every must be above 0 s, and finite"),
-        (lambda path: Trajectory(Recording(path / "no/t.h5", 1), []), "a file that can be written; received"),
+        (lambda path: Trajectory(path / "no/t.h5", []), "a file that can be written; received"),
         (lambda path: every_frame(path / "none.h5"), "file must be a trajectory.h5 or result.h5 of a run"),
         (lambda path: every_frame(Path(__file__)), "file must be a trajectory.h5 or result.h5 of a run"),
     ],

@@ -8,7 +8,7 @@ import pytest
 
 from tests.optimize.cache_files import PIPE, worker
 from tisim import InputError
-from tisim.files import lock
+from tisim.files import output_folder
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import verify
 
@@ -41,10 +41,10 @@ def kill(search, folder, rng):
 
 def at_work(folder):
     """Whether a search holds the lock of its folder, which it creates itself."""
-    if not (folder / lock.LOCK).exists():
+    if not (folder / output_folder.LOCK).exists():
         return False
     try:
-        with lock.acquire(folder, timeout=0.0):
+        with output_folder.lock(folder, timeout=0.0):
             return False
     except InputError:
         return True

@@ -124,7 +124,7 @@ def test_the_velocity_is_drawn_if_grains_reenter(tmp_path):
 def test_pictures_of_an_interrupted_run_state_the_missing_time(file, tmp_path):
     """The same frames, for a run with twice the duration."""
     longer = scene(**{**MOVING, "steps": 8})
-    with frames(file) as trajectory, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
+    with frames(file) as trajectory, Trajectory(tmp_path / "t.h5", [longer]) as begun:
         assert mark_missing(quantities(trajectory), trajectory).get_supxlabel() == ""
         for frame in trajectory:
             begun.write(0, frame)

@@ -56,10 +56,9 @@ def _still():
 
 def _trajectory(folder: Path) -> Path:
     from tests.files.test_growing_hdf5 import frame
-    from tisim import Recording
     from tisim.io.trajectory import Trajectory
 
-    with Trajectory(Recording(folder / "trajectory.h5", frames=9), [_still()]) as trajectory:
+    with Trajectory(folder / "trajectory.h5", [_still()]) as trajectory:
         for k in range(40):
             trajectory.write(0, frame(k))
     return folder / "trajectory.h5"

@@ -1,28 +1,146 @@
-"""A cost study measures the error and the run time of many settings of a scene."""
+"""A cost study: the error and the run time of many settings of a scene, and the choice of the cheapest.
+
+Timings that overlap within their uncertainty are treated as equal. Among such settings the one with the
+fewest force evaluations, which is independent of the machine, is chosen, unless another setting is both
+faster and more accurate.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from tisim import version
-from tisim.accuracy.quantity import Quantity, usual
-from tisim.accuracy.reference import Truth
-from tisim.accuracy.row import Row, decades, tied
-from tisim.accuracy.runner import Progress, StudyRunner
+from tisim.accuracy.quantity import Quantity, Truth, usual
 from tisim.backend import runtime
 from tisim.errors import RunError, is_whole, must
-from tisim.files import pictures
 from tisim.scene.scene import Scene
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
+TRUSTED = 3.0
+"""An error counts as known if it is at least this many times its uncertainty."""
+TIMED_ONCE, TIMED_OFTEN = 0.15, 0.05
+"""Relative uncertainty of a time that was measured once, and more than once."""
+CLOCK_RESOLUTION = 1e-3
+"""Smallest uncertainty of a time, s."""
+ROUNDING = 1e-11
+"""Two relative errors that differ by at most this are equal up to rounding; such laws give the same
+result."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a study: the cost and the error of one setting.
+
+    method : name of its sweep, which is one line in the picture.
+    setting : description of the setting.
+    python : stepper, and exchanged laws and materials, as Python.
+    options : options of ``tisim run`` that produce the setting, as a shell line.
+    starts : number of random starts of each run.
+    seconds : wall seconds of each repeat; the limit if the run was stopped for taking too long.
+    steps, sums, rejections : steps, force evaluations and rejected steps per particle, averaged over
+        particles and starts.
+    errors : for each quantity its relative error, and the uncertainty of that error.
+    failed : the reason for a missing result, otherwise empty.
+    same : whether this is a cheaper law that gives the same errors here as the law it approximates.
+    """
+
+    method: str
+    setting: str
+    python: str
+    options: str
+    precision: str
+    starts: int
+    seconds: tuple[float, ...] = ()
+    steps: float = math.nan
+    sums: float = math.nan
+    rejections: float = math.nan
+    errors: tuple[tuple[float, float], ...] = ()
+    failed: str = ""
+    same: bool = False
+    arithmetic: str = "strict"
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """The method and the setting, which identify a row."""
+        return self.method, self.setting
+
+    @property
+    def median(self) -> float:
+        """The median of the wall seconds of all repeats, s; NaN if there are none."""
+        return float(np.median(self.seconds)) if self.seconds else math.nan
+
+    @property
+    def spread(self) -> float:
+        """The longest minus the shortest of the wall seconds of all repeats, s."""
+        return max(self.seconds) - min(self.seconds) if self.seconds else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The shortest and the longest plausible wall time of the setting, s: the measured range, widened by
+        the uncertainty of timing."""
+        uncertainty = max(
+            CLOCK_RESOLUTION, (TIMED_OFTEN if len(self.seconds) > 1 else TIMED_ONCE) * self.median
+        )
+        return min(*self.seconds, self.median - uncertainty), max(*self.seconds, self.median + uncertainty)
+
+    @property
+    def stopped_after(self) -> float:
+        """The time limit at which the run was stopped, wall seconds; infinite for all other rows."""
+        return max(self.seconds) if self.failed and self.seconds else math.inf
+
+    def same_errors(self, other: Row) -> bool:
+        """Return whether another row has the same errors up to rounding."""
+        if other is self or not (self.errors and other.errors):
+            return False
+        return all(abs(a[0] - b[0]) <= ROUNDING for a, b in zip(self.errors, other.errors, strict=True))
+
+    def at_most(self, quantity: int = 0) -> float:
+        """Return the relative error of a quantity plus its uncertainty; infinite if the run has failed."""
+        return sum(self.errors[quantity]) if self.errors else math.inf
+
+    def trusted(self, quantity: int = 0) -> bool:
+        """Return whether the error of a quantity is well above its uncertainty."""
+        return bool(self.errors) and self.errors[quantity][0] >= TRUSTED * self.errors[quantity][1]
+
+
+def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
+    """Return the fastest rows, within the timing uncertainty, among rows whose error of a quantity is at most
+    ``error``. The first is the recommended one: of the rows that no other row beats in both time and error,
+    it takes the least work."""
+    good = [row for row in rows if row.at_most(quantity) <= error and not row.same]
+    if not good:
+        return []
+    _, latest = min((row.interval for row in good), key=lambda interval: interval[1])
+    fast = [row for row in good if row.interval[0] <= latest]
+
+    def beaten(row: Row) -> bool:
+        return any(
+            other.median < row.median and other.at_most(quantity) < row.at_most(quantity) for other in good
+        )
+
+    return sorted(fast, key=lambda row: (beaten(row), row.sums * row.starts, row.median))
+
+
+def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:
+    """Return ``tied`` for each power of ten of the error, from the largest error down to the smallest
+    reached."""
+    reached = [row.at_most(quantity) for row in rows if 0 < row.at_most(quantity) < math.inf]
+    if not reached:
+        return {}
+    highest, lowest = math.ceil(math.log10(max(reached))), math.ceil(math.log10(min(reached)))
+    by_error = {}
+    for power in range(min(highest, 0), lowest - 1, -1):
+        if best := tied(rows, 10.0**power, quantity):
+            by_error[10.0**power] = best
+    return by_error
 
 
 class Study:
-    """A study measures the run time and the error of the settings of a scene.
+    """The run time and the error of the settings of a scene, as far as ``run`` has measured them.
 
     quantities : quantities whose errors are measured; by default ``quantity.usual``.
     coarser, finer : decades of error to scan above and below the scene's own setting.
@@ -36,9 +154,6 @@ class Study:
         settings apart.
     rows, truths : the results so far, in order; one truth for each quantity.
     complete : whether all settings are measured.
-
-    To measure another precision or arithmetic, tisim is initialised again: simulations made before must not
-    be used afterwards.
     """
 
     def __init__(
@@ -112,21 +227,6 @@ class Study:
             "backend": runtime.backend(),
         }
 
-    def run(self, progress: Progress | None = None, finished: Callable[[], object] | None = None) -> None:
-        """Measure all missing rows. finished : called after each new row, and after the truths.
-
-        InputError if the scene cannot be run or has no setting to vary. If an error is raised, finished rows
-        are kept. Other threads that call ``tisim.run`` wait until the study ends.
-        """
-        if self.complete:
-            return
-        with runtime.turn:
-            before = runtime.current()
-            try:
-                StudyRunner(self, progress or (lambda fraction, what: None), finished or (lambda: None)).run()
-            finally:
-                runtime.init(before.device, before.precision, before.threads, before.arithmetic)
-
     def cheapest(self, error: float, quantity: str | None = None) -> Row:
         """Return the cheapest setting whose error in a quantity (by default the first) is at most ``error``.
         Among settings with indistinguishable timings, the one with the least work is returned.
@@ -159,32 +259,6 @@ class Study:
         must(quantity is None or quantity in names, "quantity", f"one of {', '.join(names)}", quantity)
         return names.index(quantity) if quantity is not None else 0
 
-    def table(self) -> RenderableType:
-        """Return a table of the time, work and errors of every setting, for printing with rich."""
-        from tisim.accuracy.table import table
-
-        return table(self)
-
-    def write(self, folder: str | Path) -> list[Path]:
-        """Write cost.csv and cost.h5 (see storage.py) into a folder, created if missing; return their
-        paths."""
-        from tisim.accuracy.storage import write
-
-        return write(self, Path(folder))
-
-    def picture(self, path: str | Path) -> Path:
-        """Draw error against time, one line per method; the suffix, such as .png, gives the format."""
-        from tisim.accuracy.plot import picture
-
-        return pictures.write(Path(path), lambda: picture(self))
-
     def line(self, method: str) -> list[Row]:
         """Return the rows of a method, in the order of its settings."""
         return [row for row in self.rows if row.method == method]
-
-
-def study(scene: Scene, quantities: Sequence[Quantity] = (), **settings: Any) -> Study:
-    """Return a completed ``Study`` of a scene with these settings."""
-    cost_study = Study(scene, quantities, **settings)
-    cost_study.run()
-    return cost_study

@@ -9,24 +9,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from tisim.accuracy import reference
-from tisim.accuracy.scene_parts import in_steps_of_at_most
-from tisim.accuracy.sweep import SettingSweep, ensembles, methods
+from tisim.accuracy.cost_study import Row, Study
+from tisim.accuracy.quantity import (
+    Quantity,
+    estimate,
+    reference_runs,
+    require_known,
+    truth_by_reference,
+    truth_in_closed_form,
+)
+from tisim.accuracy.scene_changes import expression, in_steps_of_at_most, options, shell_line
+from tisim.accuracy.sweep import Setting, SettingSweep, ensembles, methods
 from tisim.accuracy.timing import OBSERVATIONS, Limit, OutOfTime, ResultCallback, SimulationCache, Timed
-from tisim.accuracy.trial import Trial
 from tisim.backend import runtime
 from tisim.components.accuracy_parameter import three_digits
 from tisim.engine.result import Result
 from tisim.errors import InputError, RunError, must
 from tisim.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from tisim.accuracy.cost_study import Study
 
 Progress = Callable[[float, str], None]
 """Called with the fraction of the study that is done, 0..1, and a description of the current run."""
@@ -35,6 +39,89 @@ REFERENCE_SEED_OFFSET = 1_000_000
 REFERENCE_STARTS = 4
 """The reference of a random quantity has this many times the largest number of starts; its confidence
 interval is half as wide."""
+
+
+def study(scene: Scene, quantities: Sequence[Quantity] = (), **settings: Any) -> Study:
+    """Return a completed ``Study`` of a scene with these settings."""
+    cost_study = Study(scene, quantities, **settings)
+    run(cost_study)
+    return cost_study
+
+
+def run(study: Study, progress: Progress | None = None, finished: Callable[[], object] | None = None) -> None:
+    """Measure all missing rows of a study.
+
+    progress : called with the fraction of the study that is done, 0..1, and a description of the current run.
+    finished : called after each new row, and after the truths.
+
+    InputError if the scene cannot be run or has no setting to vary. If an error is raised, finished rows are
+    kept. Other threads that call ``tisim.run`` wait until the study ends. To measure another precision or
+    arithmetic, tisim is initialised again: simulations made before must not be used afterwards.
+    """
+    if study.complete:
+        return
+    with runtime.turn:
+        before = runtime.current()
+        try:
+            StudyRunner(study, progress or (lambda fraction, what: None), finished or (lambda: None)).run()
+        finally:
+            runtime.init(before.device, before.precision, before.threads, before.arithmetic)
+
+
+@dataclass
+class Trial:
+    """A setting that is being run: the k-th of its method.
+
+    cost : planned wall seconds of a repeat.
+    runs : repeats so far.
+    failed : the reason for not running it again.
+    stopped_after : the time limit at which it was stopped (s), if it was.
+    left_out : whether it does not fit the budget.
+    in_rows : whether its row was added to the study.
+    """
+
+    method: SettingSweep
+    k: int
+    cost: float
+    runs: list[Timed] = field(default_factory=list)
+    failed: str = ""
+    stopped_after: tuple[float, ...] = ()
+    left_out: bool = False
+    in_rows: bool = False
+
+    @property
+    def setting(self) -> Setting:
+        """The setting."""
+        return self.method.settings[self.k]
+
+    def row(self, study: Study) -> Row:
+        """Return its row: time and errors, or the reason for failure."""
+        setting = self.setting
+        steps, sums, rejections = math.nan, math.nan, math.nan
+        errors: tuple[tuple[float, float], ...] = ()
+        if not self.failed:
+            steps, sums, rejections = self.runs[0].work
+            errors = tuple(
+                estimate(q, self.runs[0].results).error(truth.estimate, truth.size)
+                for q, truth in zip(study.quantities, study.truths, strict=True)
+            )
+        laws = [effect for effect in setting.scene.effects if effect not in study.scene.effects]
+        softer = [m for name, m in setting.scene.materials.items() if m != study.scene.materials[name]]
+        return Row(
+            method=self.method.name,
+            setting=setting.description,
+            python="; ".join(expression(part) for part in (setting.scene.stepper, *laws, *softer)),
+            options=shell_line(options(study.scene, setting.scene, setting.precision, setting.arithmetic)),
+            precision=setting.precision,
+            arithmetic=setting.arithmetic,
+            starts=setting.starts,
+            seconds=self.stopped_after if self.failed else tuple(run.seconds for run in self.runs),
+            steps=steps,
+            sums=sums,
+            rejections=rejections,
+            errors=errors,
+            failed=self.failed,
+        )
 
 
 class StudyRunner:
@@ -70,7 +157,9 @@ class StudyRunner:
         ]
         rest = sum(self._cost(m, k) for items in plan for m, k in items)
         self._truths(base, sweeps, rest)
-        self._check_truths()
+        if study.require_reference:
+            for quantity, truth in zip(study.quantities, study.truths, strict=True):
+                require_known(quantity, truth)
         for precision, arithmetic in study.numbers:
             now = runtime.current()
             if (now.precision, now.arithmetic) != (precision, arithmetic):
@@ -127,7 +216,7 @@ class StudyRunner:
             return
         runs, references = [], []
         if any(quantity.exact is None for quantity in study.quantities):
-            references = reference.attempts(sweeps, study.levels[-1])
+            references = reference_runs(sweeps, study.levels[-1])
             n = REFERENCE_STARTS * study.starts[-1] if study.random else 1
             costs = [n * self.base * 10.0 ** (-a.decades / a.method.base.stepper.order) for a in references]
             self.planned += sum(costs)
@@ -147,23 +236,12 @@ class StudyRunner:
                     raise RunError(f"the {self.what}: takes more running than the budget has") from None
         largest = self._largest()
         study.truths = tuple(
-            reference.compared(q, runs, references, most)
+            truth_by_reference(q, runs, references, most)
             if q.exact is None
-            else reference.closed_form(q, base.results[0], most)
+            else truth_in_closed_form(q, base.results[0], most)
             for q, most in zip(study.quantities, largest, strict=True)
         )
         self.finished()
-
-    def _check_truths(self) -> None:
-        """Raise RunError if ``require_reference`` is set and the truth of a quantity cannot tell settings
-        apart."""
-        for quantity, truth in zip(self.study.quantities, self.study.truths, strict=True):
-            if self.study.require_reference and not reference.tells_apart(quantity, truth):
-                rule = f"known by the reference to {reference.LARGEST_REFERENCE_ERROR:g} of the motion"
-                raise RunError(
-                    f"{quantity.name} must be {rule}; received {truth.error:.1g}: {reference.ADVICE}. "
-                    "To go on: --anyway, or a Study with require_reference=False"
-                )
 
     def _starts(self, scene: Scene, n: int, first: int = 0) -> list[Scene]:
         seed = scene.seed + first

@@ -20,27 +20,26 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tisim.accuracy.cost_study import Study
-from tisim.accuracy.quantity import QuantityEstimate
-from tisim.accuracy.reference import Truth
-from tisim.accuracy.row import Row
+from tisim.accuracy.cost_study import Row, Study
+from tisim.accuracy.quantity import QuantityEstimate, Truth
 from tisim.backend import runtime
 from tisim.errors import must
-from tisim.files import checksum, lock, regular_file, resuming
+from tisim.files import checksum, output_folder, regular_file
 from tisim.files.atomic import replace_file
-from tisim.files.ownership import ensure_writable
+from tisim.files.output_folder import ensure_writable
 from tisim.io.run_folder import versions
 
 COST_FORMAT = "tisim cost 3"
 COST_CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
-COST_FILES = (COST_CSV, HDF5, PICTURE, lock.LOCK)
+COST_FILES = (COST_CSV, HDF5, PICTURE, output_folder.LOCK)
 _TEXTS = ("method", "setting", "python", "options", "precision", "arithmetic", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
 
-def write(study: Study, folder: Path) -> list[Path]:
-    """Write cost.csv and cost.h5, replacing earlier ones; return their paths. RunError if the disk is
-    full."""
+def write(study: Study, folder: str | Path) -> list[Path]:
+    """Write cost.csv and cost.h5 into a folder, created if missing; return their paths. Earlier ones are
+    replaced. RunError if the disk is full."""
+    folder = Path(folder)
     ensure_writable(folder)
     replace_file(folder / COST_CSV, as_csv(study).encode())
     _write_rows(study, folder / HDF5)
@@ -108,9 +107,9 @@ def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
 
 
 def resumes(folder: Path, fresh: bool | None, overwrite: bool) -> bool:
-    """Return whether a study continues from the files in the folder; see ``resuming.resumes``."""
+    """Return whether a study continues from the files in the folder; see ``output_folder.resumes``."""
     begun = regular_file.exists(folder / HDF5)
-    return resuming.resumes(folder, "measurement", begun, "measured costs" * begun, fresh, overwrite)
+    return output_folder.resumes(folder, "measurement", begun, "measured costs" * begun, fresh, overwrite)
 
 
 def clear(folder: Path) -> None:
@@ -132,20 +131,16 @@ def resume(study: Study, folder: Path) -> None:
         same = json.loads(file.attrs["identity"]) == study.identity()
         rule = "without the study of another scene, version, machine or depth (or give --out or --overwrite)"
         must(same, "output folder", rule, str(folder))
-        stored = _rows(file["rows"])
+        stored = rows_in(file)
         study.rows = [row for row in stored if row.stopped_after >= study.limit]
         study.truths = _truths(file["truths"], study)
         complete = file.attrs["complete"] == json.dumps(study.sweep_settings())
         study.complete = complete and len(study.rows) == len(stored)
 
 
-def rows(path: Path) -> list[Row]:
-    """Return the rows in a cost.h5. InputError if the file is not of a study, is truncated or damaged."""
-    with checksum.open_file(path, "cost", COST_FORMAT) as file:
-        return _rows(file["rows"])
-
-
-def _rows(group: Any) -> list[Row]:
+def rows_in(file: h5py.File) -> list[Row]:
+    """Return the rows in an open cost.h5."""
+    group = file["rows"]
     columns: dict[str, list[Any]] = {name: list(group[name].asstr()) for name in _TEXTS}
     columns |= {name: [kind(value) for value in group[name]] for name, kind in _NUMBERS.items()}
     columns["seconds"] = [tuple(map(float, times[~np.isnan(times)])) for times in group["seconds"][:]]

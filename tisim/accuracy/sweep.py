@@ -7,9 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from tisim import steppers
-from tisim.accuracy.formatting import non_default_settings, text_of_setting
-from tisim.accuracy.scene_parts import exchanged, parts, turned, within
-from tisim.accuracy.softening import SOFTER, softened, softening
+from tisim.accuracy.scene_changes import (
+    SOFTER,
+    exchanged,
+    non_default_settings,
+    parts,
+    softened,
+    softening,
+    text_of_setting,
+    turned,
+    within,
+)
 from tisim.components import serialization
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.effects.base import Effect

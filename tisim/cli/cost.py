@@ -26,8 +26,8 @@ from tisim.cli.options import (
 )
 from tisim.console import err, out, print_stopping
 from tisim.errors import must
-from tisim.files import lock, ownership, pictures
-from tisim.files.resuming import resume_hint
+from tisim.files import output_folder, pictures
+from tisim.files.output_folder import resume_hint
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def cost(
     The same command, given again, resumes where it was stopped, and answers --error from the stored
     measurements.
     """
-    from tisim.accuracy import Study, storage, table
+    from tisim.accuracy import Study, report, storage
 
     must(error is None or error > 0, "--error", "greater than 0", error)
     runtime.init(device, "f64", threads)
@@ -140,8 +140,8 @@ def cost(
     quantity_index = study.index(quantity)
     out_folder = folder or Path("out") / f"{name}-cost"
     storage.resumes(out_folder, fresh, overwrite)
-    ownership.claim(out_folder, storage.COST_FILES, overwrite)
-    with lock.acquire(out_folder):
+    output_folder.claim(out_folder, storage.COST_FILES, overwrite)
+    with output_folder.lock(out_folder):
         if storage.resumes(out_folder, fresh, overwrite):
             storage.resume(study, out_folder)
             err().print(f"going on with {out_folder / storage.HDF5}, which has {len(study.rows)} settings")
@@ -150,9 +150,9 @@ def cost(
         finished = _measure(study, out_folder)
         if study.truths and study.rows:
             paths = storage.write(study, out_folder)
-            paths += pictures.write_beside_data(out_folder / storage.PICTURE, lambda: _picture(study))
-            out().print(table.table(study))
-            out().print("\n".join([*table.notes(study), *map(str, paths)]))
+            paths += pictures.write_beside_data(out_folder / storage.PICTURE, lambda: _plot(study))
+            out().print(report.table(study))
+            out().print("\n".join([*report.notes(study), *map(str, paths)]))
     if not finished:
         err().print(
             f"stopped; {out_folder / storage.HDF5} has all measurements. {resume_hint(fresh, overwrite)}"
@@ -164,10 +164,10 @@ def cost(
         print(f"cheapest with an error of at most {error:g}:\n{commands}")
 
 
-def _picture(study: Study) -> Figure:
-    from tisim.accuracy.plot import picture
+def _plot(study: Study) -> Figure:
+    from tisim.accuracy import plot
 
-    return picture(study)
+    return plot(study)
 
 
 def answer(
@@ -175,8 +175,8 @@ def answer(
     changes: Sequence[str] | None, device: str, threads: int, plugins: Sequence[str] | None,
 ) -> str:  # fmt: skip
     """Return the commands that run a row of the study of a scene, from the options given to this command."""
-    from tisim.accuracy import table
-    from tisim.accuracy.formatting import options
+    from tisim.accuracy.report import recipe
+    from tisim.accuracy.scene_changes import options
 
     tokens = shlex.split(row.options)
     pairs = list(zip(tokens[::2], tokens[1::2], strict=True))
@@ -186,7 +186,7 @@ def answer(
     _, base = scene_arguments.load_scene(target, size, seed)
     arguments = [target, *_run_options(size, seed, changes, device, threads, plugins)]
     arguments += options(base, measured_scene, row.precision, row.arithmetic)
-    return table.recipe(row, arguments, quantity)
+    return recipe(row, arguments, quantity)
 
 
 def _run_options(
@@ -232,7 +232,7 @@ def _whole_numbers(text: str) -> tuple[int, ...]:
 
 def _measure(study: Study, out_folder: Path) -> bool:
     """Run a study, show its progress and store each row when it is complete; return False after Ctrl-C."""
-    from tisim.accuracy import storage
+    from tisim.accuracy import runner, storage
     from tisim.cli.cost_progress import CostProgress
 
     with CostProgress(study) as progress, Interrupt(print_stopping) as ctrl_c:
@@ -246,7 +246,7 @@ def _measure(study: Study, out_folder: Path) -> bool:
             progress.finished()
 
         try:
-            study.run(report, store_rows)
+            runner.run(study, report, store_rows)
         except KeyboardInterrupt:
             if ctrl_c.forced:
                 raise

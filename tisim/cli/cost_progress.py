@@ -6,7 +6,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from tisim.accuracy import table
+from tisim.accuracy import report
 from tisim.console import err, progress_bar
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class CostProgress:
 
     def _print_truths(self) -> None:
         if len(self.study.truths) > self.truths:
-            for line in table.truths(self.study):
+            for line in report.truths(self.study):
                 self._print(line)
             self.truths = len(self.study.truths)
 
@@ -73,5 +73,5 @@ class CostProgress:
 
 def _line(row: Row, left: str) -> str:
     """Return one line with the error and the time of a setting."""
-    measured = f"error {', '.join(table.error_texts(row))}; {row.median:.3g} s"
+    measured = f"error {', '.join(report.error_texts(row))}; {row.median:.3g} s"
     return f"{row.method}, {row.setting}: {row.failed or measured}{left}"

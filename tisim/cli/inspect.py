@@ -25,8 +25,8 @@ from tisim.cli.options import (
 )
 from tisim.console import err, progress_bar
 from tisim.errors import InputError
-from tisim.files import lock, ownership, pictures, regular_file
-from tisim.files.resuming import resumes
+from tisim.files import output_folder, pictures, regular_file
+from tisim.files.output_folder import resumes
 from tisim.streams import say
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def plot(
         with pictures.drawing(f"{file}"):
             drawn = _pictures(trajectory)
         _print_missing(trajectory.missing)
-    ownership.claim(out_folder, drawn, overwrite)
+    output_folder.claim(out_folder, drawn, overwrite)
     for name, figure in drawn.items():
         print(_save(figure, out_folder / name))
 
@@ -119,15 +119,20 @@ def figures(
         pictures.image(style.empty(1.0, 1.0))
     runtime.init(device, precision, threads, arithmetic)
     out_folder = folder or Path("out") / f"{chosen_case.name}-figures"
-    ownership.check_all(out_folder, overwrite)
+    output_folder.check_all(out_folder, overwrite)
     resumes(
-        out_folder, "figures", False, "finished figures" * ownership.has_results(out_folder), None, overwrite
+        out_folder,
+        "figures",
+        False,
+        "finished figures" * output_folder.has_results(out_folder),
+        None,
+        overwrite,
     )
-    ownership.claim(out_folder, (lock.LOCK,), overwrite)
-    with lock.acquire(out_folder):
+    output_folder.claim(out_folder, (output_folder.LOCK,), overwrite)
+    with output_folder.lock(out_folder):
         with _progress("running") as progress:
             results = chosen_case.figures(size_name, progress)
-        ownership.claim(out_folder, results, overwrite)
+        output_folder.claim(out_folder, results, overwrite)
         # Write numbers first, so that a figure that cannot be drawn does not lose them.
         for name, content in sorted(results.items(), key=lambda item: not isinstance(item[1], str)):
             if isinstance(content, str):
@@ -158,7 +163,7 @@ def movie(
         from tisim.plotting.movie import movie as draw
 
         check(trajectory, path, rate)
-        ownership.claim(path.parent, (path.name, while_drawn(path)), overwrite)
+        output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with _progress("drawing") as progress:
             draw(trajectory, path, rate, progress)
         _print_missing(trajectory.missing)
@@ -180,7 +185,7 @@ def export(
     file = _trajectory_file(file)
     check(file, kind)
     out_folder = folder or file.parent
-    ownership.claim(out_folder, file_names(file, kind), overwrite)
+    output_folder.claim(out_folder, file_names(file, kind), overwrite)
     with _progress("writing") as progress:
         path = write(file, kind, out_folder, progress)
     for world in range(count := world_count(file)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 from rich.table import Table
@@ -35,8 +36,11 @@ from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.resuming import resume_hint
+from tisim.files.output_folder import resume_hint
 from tisim.interrupt import Interrupt
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def run(
@@ -72,7 +76,7 @@ def run(
                     err().print(f"going on with {out_folder.checkpoint}, from {simulation.fraction():.1%}")
                 observers = [recorder, checkpoints] if recorder else [checkpoints]
                 finished = _advance(simulation, name, observers)
-            paths = run_folder.write(simulation.results()[0], out_folder) if finished else []
+            paths = run_folder.write(simulation.results()[0], out_folder, _cloud) if finished else []
         except RunError as error:
             hint = resume_hint(fresh, overwrite, "make room and ")
             advice = _save_after_error(simulation, out_folder.checkpoint, hint)
@@ -136,6 +140,12 @@ def _save_after_error(simulation: Simulation, path: Path, hint: str) -> str:
             + "; the previous one is intact." * regular_file.exists(path)
         )
     return f"{path} is written. {hint}"
+
+
+def _cloud(result: Result) -> Figure:
+    from tisim.plotting.cloud import cloud
+
+    return cloud(result)
 
 
 def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:

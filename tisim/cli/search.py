@@ -25,7 +25,7 @@ from tisim.cli.options import (
 from tisim.console import err, out, print_stopping
 from tisim.errors import RunError
 from tisim.files.atomic import replace_file
-from tisim.files.resuming import resume_hint
+from tisim.files.output_folder import resume_hint
 from tisim.interrupt import Interrupt
 from tisim.streams import say
 

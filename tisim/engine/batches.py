@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from tisim.backend import memory, runtime
 from tisim.engine.crowding import check_places
+from tisim.engine.observer import Observer
 from tisim.engine.result import Result, Status
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, must
@@ -19,7 +20,6 @@ from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
     from tisim.io.recording import Recording
-    from tisim.io.trajectory import Trajectory
 
 
 BATCH_PARTICLES = 300_000
@@ -64,13 +64,14 @@ class Batches:
         scenes: Sequence[Scene],
         progress: Progress | None = None,
         strict: bool = True,
-        trajectory: Trajectory | None = None,
+        recorder: Callable[[Simulation, list[int]], Observer] | None = None,
     ) -> Iterator[tuple[int, Result]]:
         """Yield (index into scenes, Result) as worlds end; scenes without a valid initial state come first.
 
         progress : called with the finished fraction of this call, 0..1.
         strict : raise the InputError of an invalid initial state; otherwise it becomes a failed Result.
-        trajectory : made for these scenes; records them.
+        recorder : returns the observer that records a loaded simulation, given the index into scenes of each
+            of its worlds.
         """
         starts: dict[int, Arrays] = {}
         groups: dict[Any, list[int]] = {}
@@ -97,7 +98,7 @@ class Batches:
                 for begin in range(0, len(members), simulation.worlds):
                     batch = members[begin : begin + simulation.worlds]
                     simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
-                    observers = [trajectory.recorder(simulation, batch)] if trajectory else []
+                    observers = [recorder(simulation, batch)] if recorder else []
                     handed_on: set[int] = set()
                     for _ in simulation.chunks(observers=observers):
                         new = [w for w in simulation.ended() if w not in handed_on]
@@ -232,6 +233,6 @@ def run(
         if record is None:
             results = dict(_batches.run(scenes, progress))
         else:
-            with record.create(scenes, runtime.current().precision) as trajectory:
-                results = dict(_batches.run(scenes, progress, trajectory=trajectory))
+            with record.recorders(scenes, runtime.current().precision) as recorder:
+                results = dict(_batches.run(scenes, progress, recorder=recorder))
     return [results[index].watched() for index in range(len(scenes))]

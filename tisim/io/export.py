@@ -14,7 +14,6 @@ from tisim.domains.domain import Domain
 from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, temporary_name
 from tisim.io.reader import Frame, Frames, frames, world_count
-from tisim.io.recording import Recording
 from tisim.io.run_folder import units
 from tisim.io.trajectory import Trajectory
 from tisim.scene.initial_state import Arrays
@@ -212,7 +211,7 @@ def _h5md(file: Path, out: Path) -> Path:
             scenes.append(trajectory.scene)
     single = _first_frame(file).arrays["position"].dtype == np.float32
     temporary, real = out.with_name(temporary_name(out.name)), "f32" if single else "f64"
-    with replacing(out, temporary), Trajectory(Recording(temporary, frames=1), scenes, real) as copy:
+    with replacing(out, temporary), Trajectory(temporary, scenes, real) as copy:
         for world in range(len(scenes)):
             with frames(file, world) as trajectory:
                 for frame in trajectory:

@@ -1,20 +1,23 @@
-"""The trajectory that a user requests from a run."""
+"""Recording of a run: the trajectory that a user requests, and the observer that writes its frames."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import h5py
 import numpy as np
 
+from tisim.engine.observer import Observer, next_due
 from tisim.engine.simulation import Simulation
 from tisim.errors import Words, is_number, is_whole, must
 from tisim.files import regular_file
-from tisim.io.recorder import Recorder
+from tisim.io.reader import Frame
 from tisim.io.trajectory import Trajectory
 from tisim.scene.scene import Scene
+from tisim.state.status import WorldStatus
 
 
 @dataclass(frozen=True)
@@ -45,9 +48,17 @@ class Recording:
         """Return the time between frames, s."""
         return self.every if self.every is not None else scene.duration / (self.frames or 1)
 
-    def create(self, scenes: Sequence[Scene], real: str = "f64") -> Trajectory:
-        """Create the file for these scenes, replacing an earlier one."""
-        return Trajectory(self, scenes, real)
+    @contextmanager
+    def recorders(
+        self, scenes: Sequence[Scene], real: str = "f64"
+    ) -> Iterator[Callable[[Simulation, Sequence[int]], Recorder]]:
+        """Create the file for these scenes, replacing an earlier one, and yield a function that returns the
+        observer of a loaded simulation.
+
+        Its arguments are the simulation, and for each of its worlds the index of its scene in the file.
+        """
+        with Trajectory(self.path, scenes, real) as trajectory:
+            yield lambda simulation, indices: Recorder(trajectory, self.interval, simulation, indices)
 
     @contextmanager
     def observer(self, simulation: Simulation, resume: bool = False) -> Iterator[Recorder]:
@@ -59,11 +70,64 @@ class Recording:
         scenes, real = simulation.scenes, simulation.runtime.precision
         if resume:
             time = float(simulation.monitor.last_good["time"][0])
-            trajectory_file = Trajectory.resume(self, scenes[0], time, real)
+            file = Trajectory.resume(self.path, scenes[0], time, real)
         else:
-            trajectory_file = self.create(scenes, real)
-        with trajectory_file as trajectory:
-            yield trajectory.recorder(simulation, range(len(scenes)))
+            file = Trajectory(self.path, scenes, real)
+        with file as trajectory:
+            yield Recorder(trajectory, self.interval, simulation, range(len(scenes)))
+
+
+class Recorder(Observer):
+    """An observer that writes a frame of each world when it is due, and pauses worlds at these times."""
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        interval: Callable[[Scene], float],
+        simulation: Simulation,
+        indices: Sequence[int],
+    ) -> None:
+        """Record a trajectory.
+
+        interval : returns the time between frames of a scene, s.
+        indices : for each world of the loaded simulation, the index of its scene in the trajectory.
+        """
+        self.trajectory, self.indices = trajectory, list(indices)
+        self.interval = [interval(scene) for scene in simulation.scenes]
+        self.last = [_last_time(trajectory.groups[index]) for index in self.indices]
+        # A resumed run may lack the frame of the time at which it resumes, if the disk was full.
+        self.due = np.array(
+            [
+                0.0 if last < 0 else next_due(last, interval)
+                for last, interval in zip(self.last, self.interval, strict=True)
+            ]
+        )
+
+    def pause(self, simulation: Simulation) -> np.ndarray:
+        return self.due
+
+    def observe(self, simulation: Simulation) -> None:
+        s, good = simulation.s, simulation.monitor.last_good
+        running = s.read("status") == WorldStatus.RUNNING
+        steps, new = s.read("steps"), []
+        for w, interval in enumerate(self.interval):
+            time = float(good["time"][w])
+            if time < self.due[w] and running[w]:
+                continue
+            self.due[w] = next_due(time, interval)
+            if time > self.last[w]:
+                new.append(w)
+        for w, measures in zip(new, simulation.measures(new), strict=True):
+            time, count = float(good["time"][w]), int(good["count"][w])
+            arrays = {f.name: good[f.name][w, :count] for f in self.trajectory.fields[self.indices[w]]}
+            self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays, measures))
+            self.last[w] = time
+
+
+def _last_time(group: h5py.Group) -> float:
+    """Return the time of the last frame, s; negative if there is none."""
+    times = group["position/time"]
+    return float(times[-1]) if len(times) else -1.0
 
 
 def recording_from_options(

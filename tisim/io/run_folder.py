@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,9 +26,9 @@ from tisim.components import serialization
 from tisim.engine.assembly import needed_fields
 from tisim.engine.result import Result, Status
 from tisim.errors import InputError, must
-from tisim.files import checksum, lock, ownership, pictures, regular_file
+from tisim.files import checksum, output_folder, pictures, regular_file
 from tisim.files.atomic import replace_file
-from tisim.files.resuming import resumes
+from tisim.files.output_folder import resumes
 from tisim.io.reader import RESULT, frames, refuse_damage, world_count
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
 """Files of one run, in the order in which a new run removes them: without result.h5 the folder is one of an
 interrupted run, and a checkpoint is useful only with the earlier frames."""
-RUN_FILES = (*DATA, lock.LOCK)
+RUN_FILES = (*DATA, output_folder.LOCK)
 """Names of all files that a run writes."""
 
 
@@ -64,21 +64,21 @@ class RunFolder:
         return self.path / "checkpoint.h5"
 
     def check(self, scene: Scene, fresh: bool | None = None, overwrite: bool = False) -> bool:
-        """Return whether a run of a scene resumes the work in this folder (see ``resuming.resumes``); nothing
-        is changed.
+        """Return whether a run of a scene resumes the work in this folder (see ``output_folder.resumes``);
+        nothing is changed.
 
         Raise InputError if another run is in progress here, or if writing would destroy results. Frames of a
         run that was killed before its first checkpoint may be overwritten, because the same scene reproduces
         them.
         """
-        lock.check(self.path)
+        output_folder.check_unlocked(self.path)
         return self._check(scene, fresh, overwrite)
 
     def _check(self, scene: Scene, fresh: bool | None, overwrite: bool) -> bool:
         finished = regular_file.exists(self.result)
         resumable = regular_file.exists(self.checkpoint) and not finished
         resume = resumes(self.path, "run", resumable, "a finished run" * finished, fresh, overwrite)
-        ownership.check(self.path, RUN_FILES, overwrite)
+        output_folder.check(self.path, RUN_FILES, overwrite)
         if regular_file.exists(self.trajectory) and not (resume or fresh or overwrite):
             rule = "without frames of another scene (or give --fresh)"
             must(self._has_frames_of(scene), "output folder", rule, str(self.path))
@@ -100,8 +100,8 @@ class RunFolder:
         so that they cannot be taken for results of the new run, even if that is killed. Raise InputError as
         ``check`` does, and if the folder cannot be created or locked.
         """
-        ownership.claim(self.path, RUN_FILES, overwrite)
-        with lock.acquire(self.path):
+        output_folder.claim(self.path, RUN_FILES, overwrite)
+        with output_folder.lock(self.path):
             resume = self._check(scene, fresh, overwrite)  # another run may have finished in the meantime
             for name in () if resume else DATA:
                 (self.path / name).unlink(missing_ok=True)
@@ -121,11 +121,12 @@ def versions() -> dict[str, str]:
     }
 
 
-def write(result: Result, folder: RunFolder) -> list[Path]:
+def write(result: Result, folder: RunFolder, draw: Callable[[Result], Figure] | None = None) -> list[Path]:
     """Write all files of a run, replacing earlier ones; return their paths. Raise RunError if the disk is
     full.
 
-    The picture is written last; if drawing fails, a message is printed on standard error and it is left out.
+    draw : draws cloud.png, which is written last; no picture if None. If drawing fails, a message is printed
+        on standard error and the picture is left out.
     """
     # The folder may have been removed during the run.
     folder.path.mkdir(parents=True, exist_ok=True)
@@ -137,14 +138,10 @@ def write(result: Result, folder: RunFolder) -> list[Path]:
     )
     write_result(result, folder.result)
     folder.checkpoint.unlink(missing_ok=True)
-    picture = pictures.write_beside_data(folder.path / "cloud.png", lambda: _cloud(result))
-    return [folder.result, *paths.values(), *picture]
-
-
-def _cloud(result: Result) -> Figure:
-    from tisim.plotting import cloud
-
-    return cloud.cloud(result)
+    written = [folder.result, *paths.values()]
+    if draw is None:
+        return written
+    return written + pictures.write_beside_data(folder.path / "cloud.png", lambda: draw(result))
 
 
 def write_result(result: Result, path: Path) -> None:
@@ -162,10 +159,10 @@ def write_result(result: Result, path: Path) -> None:
         file.create_group("measures").attrs.update(result.measures)
 
 
-def read_result(path: Path) -> Result:
-    """Return the Result written by ``write_result``, bitwise equal. Raise InputError unless the file is
-    intact."""
-    with checksum.open_file(path, "result", RESULT) as file, refuse_damage():
+def result_in(file: h5py.File) -> Result:
+    """Return the Result in an open file written by ``write_result``, bitwise equal. Raise InputError if its
+    content is damaged."""
+    with refuse_damage():
         arrays = {
             group: {name: np.asarray(values) for name, values in file[group].items()}
             for group in ("start", "end")

@@ -6,9 +6,9 @@ in the order of their ids; frames with fewer particles are padded (see h5md.py).
 are the measures of its world, such as forces on walls.
 
 The file can be read after every single write by any reader, so also after the run was killed (see
-growing_hdf5.py). A reader that meets an unfinished write must retry, as reader.py does. ``step`` is extended
-last, so all frames that it counts are complete. The file is created under a temporary name, with all datasets
-but no frames, and then renamed.
+tisim/files/hdf5.py). A reader that meets an unfinished write must retry, as reader.py does. ``step`` is
+extended last, so all frames that it counts are complete. The file is created under a temporary name, with all
+datasets but no frames, and then renamed.
 """
 
 from __future__ import annotations
@@ -17,30 +17,24 @@ import errno
 import io
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
 
 from tisim import version
 from tisim.engine.assembly import measured, needed_fields
-from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, Words, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file, temporary_name
-from tisim.files.growing_hdf5 import GrowingFile
+from tisim.files.hdf5 import GrowingFile
 from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.io.reader import Frame, frames, world_count
-from tisim.io.recorder import Recorder
 from tisim.scene.scene import Scene
 from tisim.state.fields import Field, resolve_fields
-
-if TYPE_CHECKING:
-    from tisim.io.recording import Recording
 
 LIBVER = ("v110", "v110")
 """Oldest and newest HDF5 version of the file format; earlier versions have no checksums of the file
@@ -54,12 +48,12 @@ class Trajectory:
     It is a context manager: without ``with``, ``close`` must be called.
     """
 
-    def __init__(self, recording: Recording, scenes: Sequence[Scene], real: str = "f64") -> None:
+    def __init__(self, path: str | Path, scenes: Sequence[Scene], real: str = "f64") -> None:
         """Create the file, replacing an earlier one. real : "f64" or "f32".
 
         Raise InputError if it cannot be created, RunError if the disk is full.
         """
-        self.recording, self.scenes, self.path = recording, list(scenes), Path(recording.path)
+        self.scenes, self.path = list(scenes), Path(path)
         self.fields = [recorded_fields(scene) for scene in scenes]
         _replace(self.path, self._empty_image(np.float64 if real == "f64" else np.float32))
         self._resources = ExitStack()
@@ -103,14 +97,14 @@ class Trajectory:
         return image.getvalue()
 
     @classmethod
-    def resume(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
+    def resume(cls, path: str | Path, scene: Scene, time: float, real: str = "f64") -> Self:
         """Open the file of a stopped run without its frames after ``time`` (s), or create one.
 
         Raise InputError if the file is damaged, or of another scene; it is then unchanged.
         """
-        path = Path(recording.path)
+        path = Path(path)
         if not regular_file.exists(path):
-            return cls(recording, [scene], real)
+            return cls(path, [scene], real)
         new = path.with_name(temporary_name(path.name))
         with frames(path) as before, ExitStack() as cleanup:
             same_scene = world_count(path) == 1 and before.scene.digest() == scene.digest()
@@ -118,7 +112,7 @@ class Trajectory:
                 same_scene, "trajectory to go on with", "of the same scene", Words(f"{path}, of another one")
             )
             cleanup.callback(new.unlink, missing_ok=True)
-            trajectory = cls(replace(recording, path=new), [scene], real)
+            trajectory = cls(new, [scene], real)
             cleanup.push(trajectory)
             for frame in before:
                 if frame.time <= time:
@@ -191,13 +185,6 @@ class Trajectory:
         self._finish()
         if value is None:
             self._check()
-
-    def recorder(self, simulation: Simulation, indices: Sequence[int]) -> Recorder:
-        """Return an observer, to be passed to ``run``, that writes frames of a loaded simulation.
-
-        indices : for each world of the simulation, the index of its scene in the file.
-        """
-        return Recorder(self, simulation, indices)
 
 
 def _replace(path: Path, image: bytes) -> None:

@@ -14,7 +14,7 @@ from tests.optimize.test_several import OBJECTIVES
 from tisim import InputError
 from tisim.cases import case as catalogue
 from tisim.cli.main import main
-from tisim.files import ownership
+from tisim.files import output_folder
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.report import comparison
@@ -124,7 +124,7 @@ def test_incomparable_objects_are_refused():
 @pytest.mark.parametrize("wrong", [("--methods", "simplex"), ("--repeats", "0"), ("--executor", "nobody")])
 def test_a_refused_comparison_keeps_earlier_files(tmp_path, monkeypatch, capsys, wrong):
     monkeypatch.setattr(catalogue, "every", lambda: {CASE.name: CASE})
-    ownership.claim(tmp_path, comparison.COMPARISON_FILES)
+    output_folder.claim(tmp_path, comparison.COMPARISON_FILES)
     with Cache(tmp_path / "compare.h5") as cache:
         cache.put_table("other", {})
     content = (tmp_path / "compare.h5").read_bytes()

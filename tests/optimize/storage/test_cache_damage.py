@@ -8,7 +8,7 @@ import pytest
 from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
-from tisim.files.framing import MAGIC, frame, scan
+from tisim.files.checksum import MAGIC, frame, scan
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.journal import Journal
 from tisim.optimize.storage.maintenance import compact, verify

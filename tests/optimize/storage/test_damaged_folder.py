@@ -10,9 +10,8 @@ from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
 from tisim.cli.main import main
-from tisim.files.framing import MAGIC, frame
-from tisim.files.lock import LOCK
-from tisim.files.ownership import MARKER
+from tisim.files.checksum import MAGIC, frame
+from tisim.files.output_folder import LOCK, MARKER
 from tisim.optimize.storage.cache import Cache
 
 BOWL = Case(

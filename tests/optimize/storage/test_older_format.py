@@ -11,8 +11,7 @@ import pytest
 
 from tests.optimize.cache_files import hurt, journal_of
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
-from tisim.files.checksum import with_checksum
-from tisim.files.framing import frame
+from tisim.files.checksum import frame, with_checksum
 from tisim.optimize.search import search
 from tisim.optimize.search_records import searches
 from tisim.optimize.settings import Settings

@@ -17,8 +17,7 @@ from tests.steppers.brownian.colloids import (
 )
 from tests.steppers.brownian.mobility_twin import expansion, matrix, oseen, rotne_prager
 from tisim import Box, InputError, Simulation
-from tisim.accuracy.quantity import usual
-from tisim.accuracy.reference import attempts
+from tisim.accuracy.quantity import reference_runs, usual
 from tisim.accuracy.sweep import methods
 from tisim.backend.runtime import memory
 from tisim.io.checkpoint import restore, save
@@ -349,7 +348,7 @@ def test_cost_compares_exact_and_fast_noise():
     }
     assert {(Brownian, noise, "longest", "drift") for noise in ("exact", "fast")} <= turned
     assert {kind for kind, *_ in turned} == {Brownian}
-    assert [attempt.method.base.stepper.noise for attempt in attempts(methods_, 0.0)] == ["exact"] * 2
+    assert [attempt.method.base.stepper.noise for attempt in reference_runs(methods_, 0.0)] == ["exact"] * 2
     assert [quantity.random for quantity in usual(scene)] == [True]
 
 

@@ -11,13 +11,11 @@ import pytest
 import tisim
 from tests.accuracy.scenes import oscillator
 from tests.scenes import compiled, flow, scene
-from tisim import InputError, Recording, Result, Scene, Status
-from tisim.accuracy import Study, storage
-from tisim.accuracy.row import Row
+from tisim import InputError, Recording, Result, Scene, Status, reading
+from tisim.accuracy import Row, Study, storage
 from tisim.effects import Contact, ContactFriction
 from tisim.io import checkpoint, run_folder
-from tisim.io import read as reading
-from tisim.io.reader import world_count
+from tisim.io.reader import Frames, world_count
 from tisim.io.run_folder import RunFolder
 from tisim.optimize.storage import hdf5_store
 from tisim.optimize.storage.cache import Cache
@@ -126,9 +124,9 @@ def test_worlds_of_a_trajectory(completed_run):
 def test_a_frame_is_read_when_it_is_asked_for(completed_run, monkeypatch):
     """Of a thousand frames one costs as much as of one."""
     rows = []
-    row = reading.recorded_trajectory.Frames._read_row
+    row = Frames._read_row
     monkeypatch.setattr(
-        reading.recorded_trajectory.Frames,
+        Frames,
         "_read_row",
         lambda self, file, k: rows.append(k) or row(self, file, k),
     )

@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
-from tisim.accuracy.cost_study import Study
-from tisim.accuracy.row import Row, decades
+from tisim.accuracy.cost_study import Row, Study, decades
 from tisim.accuracy.sweep import USUAL_NUMBERS
 from tisim.plotting.style import empty, letters, plain
 
@@ -25,7 +24,7 @@ LEGEND_WIDTH = 80
 """Largest number of characters in a line of the legend; a panel is this wide."""
 
 
-def picture(study: Study) -> Figure:
+def plot(study: Study) -> Figure:
     """Draw one panel per quantity: wall time (s) on the horizontal axis, error on the vertical, both
     logarithmic.
 

@@ -9,10 +9,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tisim.accuracy.cost_study import Study
-from tisim.accuracy.formatting import shell_line
-from tisim.accuracy.reference import ADVICE, tells_apart
-from tisim.accuracy.row import Row
+from tisim.accuracy.cost_study import Row, Study
+from tisim.accuracy.quantity import ADVICE, tells_apart
+from tisim.accuracy.scene_changes import shell_line
 from tisim.console import TERMINAL_WIDTH
 
 HEADINGS = (
@@ -24,9 +23,12 @@ HEADINGS = (
 
 
 def table(study: Study) -> RenderableType:
-    """Return a table of all settings by method, with median time, work and errors. The last column has the
-    error for which a setting is the cheapest, in brackets if its timing is indistinguishable from that of the
-    recommended setting. Failed settings are listed below each method with the reason."""
+    """Return a table of all settings by method, with median time, work and errors, for printing with rich.
+
+    The last column has the error for which a setting is the cheapest, in brackets if its timing is
+    indistinguishable from that of the recommended setting. Failed settings are listed below each method with
+    the reason.
+    """
     names = [quantity.name.replace(" ", "\n") for quantity in study.quantities]
     heads = ["", "time\n(s)", "spread\n(s)", "steps", "forces", "re-\njected", *names, "best\nfor"]
     best: dict[tuple[str, str], str] = {}

@@ -1,8 +1,7 @@
-"""Reading of any file written by a run; the kind of file is recognised from its content."""
+"""Reading of any file written by a run or a cost study; the kind of file is recognised from its content."""
 
 from __future__ import annotations
 
-import io
 import json
 import os
 from collections.abc import Callable
@@ -14,9 +13,9 @@ import h5py
 from tisim.components import serialization
 from tisim.errors import InputError, Words, must
 from tisim.files import checksum, regular_file
-from tisim.files.superblock import SIGNATURE, SIZE, is_valid
-from tisim.io import checkpoint, recorded_trajectory, run_folder
-from tisim.io.reader import RESULT
+from tisim.files.hdf5 import SIGNATURE, SIZE, is_valid
+from tisim.io import checkpoint, run_folder
+from tisim.io.reader import RESULT, RecordedTrajectory
 from tisim.scene.scene import Scene
 
 READABLE = (
@@ -53,24 +52,25 @@ def read(path: str | Path) -> Any:
     if not head.startswith(SIGNATURE):
         return _read_text(file_path)
     # A trajectory has its own checksums, and may be large.
-    return recorded_trajectory.RecordedTrajectory(file_path) if is_valid(head) else _read_hdf5(file_path)
+    return RecordedTrajectory(file_path) if is_valid(head) else _read_hdf5(file_path)
 
 
 def _read_hdf5(path: Path) -> Any:
     """Return the content of an HDF5 file that is written at once."""
+    # Cost studies load SciPy, which takes a second and is not needed for trajectories and scenes.
     from tisim.accuracy import storage
 
-    with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", READABLE)), "r") as file:
-        kind = str(file.attrs.get("format", "none"))
-    rule = f"{READABLE}; a search is read by `tisim.optimize.read`, and listed by `tisim cache`"
-    must(not kind.startswith(SEARCH_FORMAT), "file to read", rule, Words(f"{path}, of a search"))
-    readers: dict[str, Callable[[Path], Any]] = {
-        RESULT: run_folder.read_result,
-        checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot,
-        storage.COST_FORMAT: storage.rows,
+    readers: dict[str, Callable[[h5py.File], Any]] = {
+        RESULT: run_folder.result_in,
+        checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot_in,
+        storage.COST_FORMAT: storage.rows_in,
     }
-    must(kind in readers, "file to read", READABLE, Words(f"{path}, of the format {kind}"))
-    return readers[kind](path)
+    rule = f"{READABLE}; a search is read by `tisim.optimize.read`, and listed by `tisim cache`"
+    with checksum.open_any(path, "file to read", READABLE) as file:
+        kind = str(file.attrs.get("format", "none"))
+        must(not kind.startswith(SEARCH_FORMAT), "file to read", rule, Words(f"{path}, of a search"))
+        must(kind in readers, "file to read", READABLE, Words(f"{path}, of the format {kind}"))
+        return readers[kind](file)
 
 
 def _read_text(path: Path) -> Any:
