@@ -4,8 +4,8 @@
     python tests/rooms.py --run         files and changes of room of one ``tisim.run``, and of one design
 
 A room is a package or a module of tisim: the longest name in ``ROOMS`` with which the name of a module
-begins. A module imports from its own room and from earlier ones. A function may import from a later room when
-it is called, but only if ``LATE`` lists the import. Imports for type checkers do not count.
+begins. A module imports from its own room and from earlier ones. This holds for imports within functions too.
+Imports for type checkers do not count.
 """
 
 import ast
@@ -40,10 +40,6 @@ ROOMS = (
     "tisim.__main__",
 )  # fmt: skip
 """In order. ``tisim.cases.*`` is every other case: each is a room of its own beside the others."""
-LATE = {
-    ("tisim.engine.simulation", "tisim.io.checkpoint"),
-}
-"""A module, and a module of a later room that one of its functions imports."""
 Imports = dict[str, set[str]]
 
 

@@ -14,7 +14,8 @@ from tests.scenes import compiled, flow, scene
 from tisim import InputError, Recording, Result, Scene, Status, reading
 from tisim.accuracy import Row, Study, storage
 from tisim.effects import Contact, ContactFriction
-from tisim.io import checkpoint, run_folder
+from tisim.engine import checkpoint
+from tisim.io import run_folder
 from tisim.io.reader import Frames, world_count
 from tisim.io.run_folder import RunFolder
 from tisim.optimize.storage import hdf5_store

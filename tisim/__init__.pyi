@@ -30,6 +30,7 @@ from . import (
 )
 from .backend.runtime import init as init
 from .engine.batches import run as run
+from .engine.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .engine.observer import MeasureSeries as MeasureSeries
 from .engine.observer import Observer as Observer
 from .engine.result import Result as Result
@@ -40,7 +41,6 @@ from .errors import MeshWarning as MeshWarning
 from .errors import RunError as RunError
 from .errors import RunWarning as RunWarning
 from .errors import StartWarning as StartWarning
-from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.recording import Recording as Recording
 from .materials.materials import Material as Material
 from .materials.materials import MaterialPair as MaterialPair

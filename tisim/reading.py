@@ -11,10 +11,11 @@ from typing import Any
 import h5py
 
 from tisim.components import serialization
+from tisim.engine import checkpoint
 from tisim.errors import InputError, Words, must
 from tisim.files import checksum, regular_file
 from tisim.files.hdf5 import SIGNATURE, SIZE, is_valid
-from tisim.io import checkpoint, run_folder
+from tisim.io import run_folder
 from tisim.io.reader import RESULT, RecordedTrajectory
 from tisim.scene.scene import Scene
 

@@ -14,7 +14,7 @@ from tisim.files import output_folder
 STOPPED = """
 import os, signal
 from tisim.cli.main import main
-from tisim.io import checkpoint
+from tisim.engine import checkpoint
 
 def save(*arguments, save=checkpoint.save):
     save(*arguments)

@@ -13,9 +13,10 @@ from tests.files.test_growing_hdf5 import STILL, frame, same
 from tests.soak import damage
 from tisim import InputError
 from tisim.accuracy import storage
+from tisim.engine import checkpoint
 from tisim.files import checksum
 from tisim.files.hdf5 import SIGNATURE
-from tisim.io import checkpoint, h5md
+from tisim.io import h5md
 from tisim.io.export import export
 from tisim.io.reader import frames, world_count
 from tisim.io.trajectory import LIBVER, Trajectory

@@ -10,7 +10,7 @@ from tests.scenes import compiled, scene
 from tisim import Particles, Scene, Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import Force, parameter
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.sources import UniformFlow
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid, intervals
 

@@ -9,7 +9,7 @@ from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity, Impact, parameter
 from tisim.engine import monitor
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.operators.base import Operator
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 

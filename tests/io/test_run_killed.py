@@ -22,7 +22,7 @@ MAIN = "from tisim.cli.main import main; main()"
 KILLED = (
     """
 import os, signal
-from tisim.io import checkpoint
+from tisim.engine import checkpoint
 save, left = checkpoint.save, {saves}
 
 def counted(*arguments):

@@ -16,8 +16,8 @@ import pytest
 import tisim
 from tests.scenes import by_id, compiled, flow, scene
 from tisim import Box, InputError, Recording
+from tisim.engine.checkpoint import restore, save
 from tisim.io import h5md
-from tisim.io.checkpoint import restore, save
 from tisim.io.reader import Frame, frames, world_count
 from tisim.io.trajectory import Trajectory, recorded_fields
 

@@ -8,7 +8,7 @@ from tests.throwaway import Bridge, SoftShell, Trap
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import PairForce, parameter
-from tisim.io import checkpoint
+from tisim.engine import checkpoint
 from tisim.operators import Operator
 from tisim.steppers import Trapezoid
 from tisim.steppers.implicit.step_control import ErrorControl

@@ -8,7 +8,7 @@ from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import PairForce, parameter
-from tisim.io import checkpoint
+from tisim.engine import checkpoint
 from tisim.pairs import pair_chunks
 from tisim.steppers import Trapezoid
 from tisim.steppers.implicit.step_control import ErrorControl

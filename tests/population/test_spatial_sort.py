@@ -11,8 +11,8 @@ from tests.scenes import by_id
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.engine import checkpoint
 from tisim.geometry import Plane
-from tisim.io import checkpoint
 from tisim.operators import Outflow, Passage
 from tisim.pairs import pair_chunks
 from tisim.population import spatial_sort

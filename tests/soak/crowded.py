@@ -26,7 +26,7 @@ from tests.soak import damage
 from tisim import Box, Cloud, RunError, Scene, Simulation
 from tisim.backend import runtime
 from tisim.cli import main as command_line
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.steppers import FixedStep, Verlet
 
 FRAMES = 20

@@ -104,7 +104,7 @@ def _simulation():
 
 
 def _checkpoint(folder: Path) -> Path:
-    from tisim.io.checkpoint import save
+    from tisim.engine.checkpoint import save
 
     simulation = _simulation()
     simulation.run(steps=3)
@@ -113,7 +113,7 @@ def _checkpoint(folder: Path) -> Path:
 
 
 def _restore(path: Path) -> list[str]:
-    from tisim.io.checkpoint import restore
+    from tisim.engine.checkpoint import restore
 
     simulation = _simulation()
     restore(simulation, path)

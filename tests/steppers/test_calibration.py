@@ -16,7 +16,7 @@ from tests.steppers.calibrated import (
 )
 from tests.steppers.charged import order
 from tisim import Box, Scene
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.steppers import ErrorControl, StageControl, Trapezoid
 from tisim.steppers.implicit.stages import leading
 

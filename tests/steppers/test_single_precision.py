@@ -86,7 +86,7 @@ def restarts():
     import tempfile
     from pathlib import Path
 
-    from tisim.io.checkpoint import restore, save
+    from tisim.engine.checkpoint import restore, save
 
     scene = tisim.Scene(
         particles=tisim.Particles(

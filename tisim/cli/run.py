@@ -51,7 +51,8 @@ def run(
     variant: SceneVariant = None,
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
-    from tisim.io import checkpoint, run_folder
+    from tisim.engine import checkpoint
+    from tisim.io import run_folder
     from tisim.io.recording import recording_from_options
 
     scene_arguments.checkpoint_seconds()
@@ -117,7 +118,7 @@ def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -
 
 def _restore(simulation: Simulation, path: Path) -> None:
     """Restore a simulation to the state in which the run was stopped."""
-    from tisim.io import checkpoint
+    from tisim.engine import checkpoint
 
     try:
         checkpoint.restore(simulation, path)
@@ -130,7 +131,7 @@ def _save_after_error(simulation: Simulation, path: Path, hint: str) -> str:
 
     hint : the command that resumes the run, as a sentence.
     """
-    from tisim.io import checkpoint
+    from tisim.engine import checkpoint
 
     try:
         checkpoint.save(simulation, path)

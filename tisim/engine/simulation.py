@@ -292,7 +292,7 @@ class Simulation(CompiledWorlds):
 
         A simulation of the same scenes continues from it with bitwise the same results (``restore``).
         """
-        from tisim.io import checkpoint
+        from tisim.engine import checkpoint
 
         self._check_loaded()
         checkpoint.save(self, path)
@@ -303,7 +303,7 @@ class Simulation(CompiledWorlds):
         Raise InputError if the file is not a checkpoint, is truncated or damaged, or belongs to other scenes,
         another precision or another capacity; the simulation then does not change.
         """
-        from tisim.io import checkpoint
+        from tisim.engine import checkpoint
 
         self._check_loaded()
         checkpoint.restore(self, path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 from tisim.backend import runtime
 from tisim.backend.layout import Builder
@@ -11,9 +11,6 @@ from tisim.backend.taichi import ti
 from tisim.program.phases import Item, Phase, Repeat, WorldAction
 from tisim.state.bound import Bound
 from tisim.state.state import State
-
-if TYPE_CHECKING:
-    from tisim.operators.insertion import Insertion
 
 COMPARED_TOGETHER = {"cpu": 1024}
 """Number of particles in a block, 64 on other devices; the spheres of the grain are rotated once per
@@ -31,7 +28,7 @@ class TriedPlace(WorldAction):
     fraction.
     """
 
-    def __init__(self, insertion: Bound[Insertion], s: State) -> None:
+    def __init__(self, insertion: Bound[Any], s: State) -> None:
         self.insertion, self.s = insertion, s
         self.seeking, self.attempt, self.taken, self.drawn = (ti.field(ti.i32) for _ in range(4))
         self.radius, self.filled = ti.field(s.real), ti.field(ti.f64)

@@ -8,7 +8,7 @@ from tests.scenes import compiled, simulate
 from tests.steppers.brownian.colloids import DIFFUSIVITY, RADIUS, SIGMAS, Stop, colloids, run
 from tisim import Box, InputError, Open, Simulation
 from tisim.effects import ContactDissipation, Force, Hertz, Impact, StokesDrag
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.steppers.brownian import brownian
 from tisim.steppers.brownian.independent import IndependentBrownianSteps
 from tisim.steppers.brownian.vectorised import VectorisedBrownianSteps

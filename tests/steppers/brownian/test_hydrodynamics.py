@@ -20,7 +20,7 @@ from tisim import Box, InputError, Simulation
 from tisim.accuracy.quantity import reference_runs, usual
 from tisim.accuracy.sweep import methods
 from tisim.backend.runtime import memory
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.steppers import Brownian
 
 WORLDS, CAPACITY = 8, 40

@@ -13,7 +13,7 @@ from tests.steppers.implicit.test_trapezoid import with_stepper
 from tests.throwaway import SoftShell
 from tisim import Box
 from tisim.effects import NearField
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.steppers import Collocation, StageControl
 from tisim.steppers.implicit.stages import highest, integrals, nodes
 

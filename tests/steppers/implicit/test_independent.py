@@ -8,7 +8,7 @@ from tests.steppers.charged import accurate, charged
 from tisim.backend.taichi import ti
 from tisim.components.component import parameter
 from tisim.effects import Force
-from tisim.io.checkpoint import restore, save
+from tisim.engine.checkpoint import restore, save
 from tisim.steppers import IterationControl, Trapezoid
 
 DRIVEN = {"stiffness": 8.0, "amplitude": 1.5, "omega": 2.0}

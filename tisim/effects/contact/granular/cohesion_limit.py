@@ -1,10 +1,10 @@
-"""Checks, before a scene runs, that a normal force can balance overlap-dependent cohesion."""
+"""Checks, before a scene runs, that the normal force of a law can balance its cohesion."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations_with_replacement
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -12,8 +12,18 @@ from tisim.errors import must
 
 if TYPE_CHECKING:
     from tisim.effects.base import Effect
-    from tisim.effects.contact.granular.granular import Granular
+    from tisim.effects.contact.granular.parts import Cohesion, NormalForce
     from tisim.materials.materials import Materials, Touching
+
+
+class CohesiveLaw(Protocol):
+    """A contact law with a normal force and perhaps a cohesion."""
+
+    normal: NormalForce
+    cohesion: Cohesion | None
+
+    @property
+    def label(self) -> str: ...
 
 
 def with_inserted(start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> dict[str, np.ndarray]:
@@ -30,7 +40,7 @@ def largest_radii(grains: Mapping[str, np.ndarray]) -> dict[int, list[float]]:
     return {int(k): np.sort(radius[material == k])[:-3:-1].tolist() for k in np.unique(material)}
 
 
-def check_grains(law: Granular, materials: Materials, grains: Mapping[str, np.ndarray]) -> None:
+def check_grains(law: CohesiveLaw, materials: Materials, grains: Mapping[str, np.ndarray]) -> None:
     """Raise InputError unless a law repels more than it attracts when the largest grains of any two materials
     touch."""
     radii, number = largest_radii(grains), max(1, len(materials.named))
@@ -43,7 +53,7 @@ def check_grains(law: Granular, materials: Materials, grains: Mapping[str, np.nd
 
 
 def check_wall(
-    law: Granular, materials: Materials, grains: Mapping[str, np.ndarray], wall: int, label: str
+    law: CohesiveLaw, materials: Materials, grains: Mapping[str, np.ndarray], wall: int, label: str
 ) -> None:
     """Raise InputError unless a law does so when the largest grains touch a wall of a material."""
     number = max(1, len(materials.named))
@@ -52,7 +62,7 @@ def check_wall(
         _check(law, pair, radius, f"{pair.names[0]} of {radius:g} m in radius touches {label}")
 
 
-def _check(law: Granular, pair: Touching, radius: float, what: str) -> None:
+def _check(law: CohesiveLaw, pair: Touching, radius: float, what: str) -> None:
     """Compare elastic force and cohesion at an overlap of R* (m)."""
     if law.cohesion is not None:
         push, pull = law.normal.push(pair, radius, radius), law.cohesion.pulls(pair, radius, radius)

@@ -8,8 +8,8 @@ import pytest
 
 from tests.scenes import Agglomeration, Cooling, Heating, Impact
 from tisim import Box, Cloud, InputError, RunError, Scene, Simulation
+from tisim.engine.checkpoint import restore, save, snapshot
 from tisim.files import checksum
-from tisim.io.checkpoint import restore, save, snapshot
 
 
 def flow(seed=3, number=100, heat_capacity=500.0):
