@@ -20,6 +20,7 @@ from tisim.accuracy.report import notes
 from tisim.accuracy.scene_changes import exchanged, expression, finest, options, parts, softened, softening
 from tisim.accuracy.sweep import methods, rivals
 from tisim.cli.scene_arguments import assignments
+from tisim.components import serialization
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.effects import (
@@ -547,3 +548,16 @@ def test_a_reference_that_tells_nothing_apart_is_said_to():
         study.truths, study.complete = (truth,), True
         text = " ".join(notes(study))
         assert ("the reference itself is off by 1 of the motion" in text) == said
+
+
+@pytest.mark.parametrize("error", [1e-4, 1e-9])
+def test_options_replace_a_stepper_that_tisim_has_chosen(error):
+    """It is not in the data of the scene, so that its settings cannot be set one by one."""
+    chosen = oscillator().model_copy()
+    automatic = type(chosen).from_dict({k: v for k, v in chosen.to_dict().items() if k != "stepper"})
+    control = automatic.stepper.control.model_copy(update={"error": error})
+    wanted = automatic.stepper.model_copy(update={"control": control})
+    changed = type(chosen).from_dict({**automatic.to_dict(), "stepper": serialization.to_dict(wanted)})
+    changes = assignments(options(automatic, changed)[1::2])
+    assert automatic.replace(changes).stepper == wanted
+    assert options(automatic, automatic) == []
