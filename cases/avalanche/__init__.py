@@ -16,4 +16,5 @@ CASE = Case(
     variants=("calibrate",),
     calibration=Late("tisim.cases.avalanche.problem", "calibration"),
     figures=Late("tisim.cases.avalanche.figures", "figures"),
+    pictures=Late("tisim.cases.avalanche.figures", "pictures"),
 )

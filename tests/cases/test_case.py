@@ -1,5 +1,7 @@
 """The contract of a case, and what its checks hold."""
 
+import importlib
+import importlib.util
 import inspect
 
 import pytest
@@ -78,3 +80,11 @@ def test_what_is_shown_is_not_judged():
 
 def test_checks_are_checks():
     assert Check("", 1.0, 1.0, 0.0).cells[3] == "0.0e+00"
+
+
+@pytest.mark.parametrize("name", every())
+def test_the_pictures_of_a_case_are_drawn_by_the_command_line(name):
+    """A case that draws pictures of a run names them in its CASE."""
+    spec = importlib.util.find_spec(f"tisim.cases.{name}.figures")
+    figures = importlib.import_module(spec.name) if spec else None
+    assert (every()[name].pictures is not None) or not hasattr(figures, "pictures")

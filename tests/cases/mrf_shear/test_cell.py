@@ -12,13 +12,18 @@ UM = 1e-6
 SMALL_CELL = {"sides": (30 * UM, 30 * UM, 36 * UM), "raft": 7 * UM, "rate": 1e4, "magnetising": 10e-6,
               "strain": 0.4, "before": 0.2}  # fmt: skip
 """As wide as twice the reach of grains, and five diameters high."""
+STARTS = 4
+"""Number of starts: the stress of one run has a standard deviation of 15 %."""
 
 
 @pytest.fixture(scope="module")
 def results():
+    """Runs at full field, at half of it, without one, and without one in oil at rest; then further starts of
+    the first two."""
+    further = [scene(**SMALL_CELL, **flux, seed=k) for flux in ({}, {"flux": 0.3}) for k in range(1, STARTS)]
     scenes = [scene(**SMALL_CELL), scene(**SMALL_CELL, flux=0.3), scene(**SMALL_CELL, flux=0.0)]
     scenes.append(scene(**SMALL_CELL, flux=0.0, still=True))
-    return simulate(scenes, worlds=8, capacity=128)
+    return simulate([*scenes, *further], worlds=len(scenes) + len(further), capacity=128)
 
 
 @pytest.mark.slow
@@ -38,7 +43,10 @@ def test_rafts_are_frozen_and_driven_apart(results):
 @pytest.mark.slow
 def test_chains_bear_a_stress_that_goes_as_the_field_squared(results):
     """Grains are in contact along the field, and both rafts are held back alike; without a field neither."""
-    strong, weak, none, still = (shear_stress(result) for result in results)
+    stresses = [shear_stress(result) for result in results]
+    none, still = stresses[2:4]
+    strong = np.mean([stresses[0], *stresses[4 : 3 + STARTS]])
+    weak = np.mean([stresses[1], *stresses[3 + STARTS :]])
     assert strong > 10e3
     assert 2.5 < strong / weak < 6.0
     assert abs(none) < 0.02 * strong
