@@ -75,7 +75,8 @@ MEASURED = {
         "sliding_angle": 21.8,
     },
 }
-"""Quantities of KNOWN, by size: means over 64 starts for "small" and several for "default", which ``tests/benchmarks/draw_down.py`` prints."""
+"""Quantities of KNOWN, by size: means over starts, for "small" over 64, which
+``tests/benchmarks/draw_down.py`` prints."""
 EXAMPLES: Mapping[str, Measured] = {
     size: {name: Measurement(value, UNCERTAINTIES[name]) for name, value in values.items()}
     for size, values in MEASURED.items()

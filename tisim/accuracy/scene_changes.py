@@ -129,7 +129,7 @@ def options(scene: Scene, changed: Scene, precision: str = "f64", arithmetic: st
     """Return the options that make ``tisim run`` run ``changed`` instead of ``scene``."""
     old, new = ({effect.label: effect for effect in s.effects} for s in (scene, changed))
     arguments = [argument for name in old if name not in new for argument in ("--without", name)]
-    # A stepper that tisim has chosen is not in the data of a scene, and its settings cannot be set one by one.
+    # A stepper that tisim has chosen is not in the data of a scene: its settings cannot be set one by one.
     named = scene.stepper if "stepper" in scene.model_fields_set else None
     same = changed.stepper == scene.stepper
     settings = [] if same else list(_differences(named, changed.stepper, "stepper"))
