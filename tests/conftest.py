@@ -31,7 +31,7 @@ ON_DEVICES = (
     *("effects/gravitation/test_tree_gravity.py", "effects/pair/test_virial.py"),
     *("effects/magnetic/test_moment.py", "effects/magnetic/test_froehlich.py"),
     *("effects/magnetic/test_permanent_moment.py", "effects/constraint/test_prescribed_motion.py"),
-    *("steppers/implicit/test_independent.py", "steppers/implicit/test_trapezoid.py"),
+    *("steppers/implicit/test_one_particle.py", "steppers/implicit/test_trapezoid.py"),
     *("steppers/implicit/test_collocation.py", "steppers/brownian/test_brownian.py"),
     "packing/test_random_sequential.py",
 )

@@ -11,6 +11,7 @@ from tisim.program.phases import PerParticle, Phase
 from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import (
+    FORCE_BEFORE,
     AdvanceClock,
     BeginStep,
     apply_displacement,
@@ -22,7 +23,6 @@ from tisim.steppers.common import (
 )
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
-from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import Controller, FixedStep
 from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_fields
 

@@ -23,7 +23,7 @@ from tisim.effects.base import Effect, Force, PairForce
 from tisim.forces.force_sum import turning
 from tisim.state.fields import Field, WorldField
 from tisim.state.status import WorldStatus
-from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
+from tisim.steppers.common import FORCE_BEFORE, TORQUE_BEFORE
 
 STEP_LIMIT = 0.8
 """Limit of (omega dt)^2; a leapfrog is stable below 4."""

@@ -16,6 +16,7 @@ from tisim.program.phases import PerParticle, Phase
 from tisim.state.fields import Field
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import (
+    FORCE_BEFORE,
     BeginStep,
     advance_clock,
     apply_displacement,
@@ -25,7 +26,6 @@ from tisim.steppers.common import (
 )
 from tisim.steppers.constraints import advance_bodies, kick_bodies, put_held, steer_held
 from tisim.steppers.context import Step, StepContext
-from tisim.steppers.implicit.saved_state import FORCE_BEFORE
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
 from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_fields
 

@@ -9,7 +9,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.effects import Force
 from tisim.engine.assembly import needed_fields
 from tisim.state.fields import CORE, resolve_fields
-from tisim.steppers.implicit.saved_state import FORCE_BEFORE, TORQUE_BEFORE
+from tisim.steppers.common import FORCE_BEFORE, TORQUE_BEFORE
 
 WORLDS = 8
 """Number of worlds at a time: the same for all, so that each structure is compiled once."""

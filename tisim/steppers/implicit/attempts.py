@@ -4,9 +4,8 @@ from tisim.backend.taichi import ti
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.state.fields import WorldField
 from tisim.state.status import WorldStatus
-from tisim.steppers.common import note_displacement
+from tisim.steppers.common import SavedState, note_displacement
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.saved_state import SavedState
 from tisim.steppers.step_control import note_speed
 
 RETRY, ACCEPTED, HOPELESS = range(3)

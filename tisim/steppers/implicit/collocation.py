@@ -17,7 +17,7 @@ from tisim.program.phases import Item
 from tisim.program.scans import BlockSums
 from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
-from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
+from tisim.steppers.common import CHANGE, AdvanceClock, apply_operators, report_displacement, saved_fields
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.attempts import ATTEMPTS, Begin, Decide, RestoreState, SaveState, StepAttempt
 from tisim.steppers.implicit.collocation_phases import (
@@ -30,10 +30,15 @@ from tisim.steppers.implicit.collocation_phases import (
     StageSweep,
     TakeStages,
 )
-from tisim.steppers.implicit.excursion import NoteExcursion, Per, error_scale, excursion_fields
-from tisim.steppers.implicit.saved_state import CHANGE, saved_fields
 from tisim.steppers.implicit.stages import Stages
-from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
+from tisim.steppers.implicit.step_control import (
+    LEAST_SAFETY,
+    ImplicitControl,
+    NoteExcursion,
+    Per,
+    error_scale,
+    excursion_fields,
+)
 from tisim.steppers.step_control import SHORTEST_STEP
 
 CONTRACTION = 0.25

@@ -18,9 +18,9 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.state.fields import Field
+from tisim.steppers.common import SavedState
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
-from tisim.steppers.implicit.saved_state import SavedState
 
 
 @ti.data_oriented

@@ -14,7 +14,14 @@ from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
-from tisim.steppers.common import AdvanceClock, apply_operators, note_displacement, report_displacement
+from tisim.steppers.common import (
+    CHANGE,
+    AdvanceClock,
+    apply_operators,
+    note_displacement,
+    report_displacement,
+    saved_fields,
+)
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.anderson import accelerated, memory_of_iterates
 from tisim.steppers.implicit.attempts import (
@@ -31,11 +38,13 @@ from tisim.steppers.implicit.attempts import (
     length,
     report_failure,
 )
-from tisim.steppers.implicit.excursion import NoteExcursion, excursion_fields
-from tisim.steppers.implicit.independent import IndependentSteps
-from tisim.steppers.implicit.one_particle import Solve
-from tisim.steppers.implicit.saved_state import CHANGE, saved_fields
-from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
+from tisim.steppers.implicit.one_particle import IndependentSteps, Solve
+from tisim.steppers.implicit.step_control import (
+    ErrorControl,
+    IterationControl,
+    NoteExcursion,
+    excursion_fields,
+)
 from tisim.steppers.intervals import (
     INTERVALS,
     OWN_CLOCK,
