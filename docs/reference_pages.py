@@ -60,6 +60,21 @@ def parts() -> str:
     return "\n".join(lines) + "\n"
 
 
+def docstrings() -> Iterator[tuple[str, str]]:
+    """Yield the names and texts of the docstrings of the reference."""
+    yield from ((entry.name, entry.body) for entry in reference.entries())
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        yield package, inspect.getdoc(module) or ""
+        for name in getattr(module, "__all__", ()):
+            value = getattr(module, name)
+            members = vars(value).items() if inspect.isclass(value) else ()
+            inner = {f"{name}.{key}": one for key, one in members if not key.startswith("_")}
+            for path, one in {name: value, **inner}.items():
+                if inspect.isroutine(one) or inspect.isclass(one) or isinstance(one, property):
+                    yield f"{package}.{path}", inspect.getdoc(one) or ""
+
+
 def _put(path: Path, lines: Iterable[str]) -> None:
     """Write a page, but not one that is there: Sphinx reads anew what is newer."""
     path.parent.mkdir(parents=True, exist_ok=True)
