@@ -5,6 +5,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 import equation_nodes
+import pair_plots
 import reference_pages
 
 from tisim.version import __version__
@@ -57,10 +58,17 @@ INNER = "|".join(
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in (*OTHERS, *TYPES))]
 
 
+def write_pages(app):
+    """Write the plots, and the pages that come from the code."""
+    folder = Path(app.srcdir) / "reference"
+    pair_plots.write(folder / "effects")
+    reference_pages.write(folder)
+
+
 def setup(app):
     """Write the pages that come from the code, read its docstrings as the plain text that they are, and set
     equations."""
-    app.connect("builder-inited", lambda app: reference_pages.write(Path(app.srcdir) / "reference"))
+    app.connect("builder-inited", write_pages)
     app.connect("autodoc-process-docstring", reference_pages.as_rst)
     app.connect("autodoc-process-signature", reference_pages.signature)
     app.connect("doctree-read", equation_nodes.set_blocks)

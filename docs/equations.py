@@ -5,7 +5,6 @@ with spaces divides all factors since the last fraction, sum or word by the next
 is ((2 pi R)/(4 d)) n. `F_i`, `r^2`, `d^-beta_1`, `R*` and `v'` have scripts. `m.n` and ` . ` are scalar
 products, ` x ` a vector product, `(x)` a dyadic product, ` * ` a product. `|v|` is an absolute value, `<R>` a
 mean. Greek letters and functions go by their names, `dt` is a differential, and all other words are text.
-
 Anything else raises ``Unset``, so that no equation is set wrongly.
 """
 
@@ -32,6 +31,7 @@ from mathml import (
     symbol,
     tag,
     tokens,
+    words,
 )
 
 OPERAND = ("name", "number", "word")
@@ -164,7 +164,7 @@ class Parser:
         self.take()
         if token.kind == "word":
             role = "joining" if JOINING & set(token.text.split()) else "text"
-            return self.scripts(tag("mtext", token.text), role)
+            return self.scripts(words(token.text), role)
         if token.kind == "number":
             return self.scripts(number(token.text))
         if token.kind != "name":

@@ -122,6 +122,11 @@ def operator(text: str, **attributes: str) -> str:
     return tag("mo", escape(SIGNS.get(text, text)), **attributes)
 
 
+def words(text: str) -> str:
+    """Return text. A space is left between ``mi`` and an operator, which ``mtext`` has none of."""
+    return tag("mi", text, **{"class": "text", "mathvariant": "normal"})
+
+
 def space(width: float) -> str:
     """Return a gap, in em."""
     return f'<mspace width="{width}em"></mspace>'
@@ -140,7 +145,7 @@ def symbol(name: str) -> str:
 
 def script(text: str) -> str:
     """Return an index or exponent: a symbol, or a word as text."""
-    return symbol(text) if len(text) == 1 or text in GREEK else tag("mtext", text)
+    return symbol(text) if len(text) == 1 or text in GREEK else words(text)
 
 
 def number(text: str) -> str:

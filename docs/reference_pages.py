@@ -16,6 +16,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from pair_plots import RANGES
+from snippets import snippet
+
 from tisim.components.component import Checked, Component
 from tisim.describe import reference
 from tisim.describe.reference import Declaration, Entry
@@ -180,8 +183,22 @@ def _law(entry: Entry) -> Iterator[str]:
         f"   :canonical: {module}.{name}",
         "",
     )
-    text = (*rst(f"{entry.summary}."), *rst(entry.body), *_facts(entry), *_settings(entry.settings))
-    yield from (f"   {line}".rstrip() for line in (*text, *_toml(entry)))
+    text = (*rst(f"{entry.summary}."), *rst(entry.body), *_plot(entry), *_facts(entry))
+    tables = (*_settings(entry.settings), *_toml(entry), *_snippet(entry))
+    yield from (f"   {line}".rstrip() for line in (*text, *tables))
+
+
+def _plot(entry: Entry) -> Iterator[str]:
+    """The force against the distance (pair_plots.py)."""
+    if entry.name in RANGES:
+        yield from (f".. image:: {entry.name}.svg", f"   :alt: {entry.name}: force against distance", "")
+
+
+def _snippet(entry: Entry) -> Iterator[str]:
+    """A scene with the part, in Python."""
+    if lines := snippet(entry.name).splitlines():
+        yield from ("In a scene of two grains:", "", ".. code-block:: python", "")
+        yield from (*(f"   {line}" for line in lines), "")
 
 
 def _facts(entry: Entry) -> Iterator[str]:

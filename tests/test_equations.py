@@ -29,11 +29,10 @@ def tex(element):
     parts = [tex(child) for child in element]
     layouts = {
         "mfrac": r"\frac{%s}{%s}", "msqrt": r"\sqrt{%s}", "msub": "%s_{%s}", "msup": "%s^{%s}",
-        "msubsup": "%s_{%s}^{%s}", "munder": "%s_{%s}", "mover": r"\overset{%s}{%s}", "mtext": r"\text{%s}",
-        "mtr": r"%s\\",
+        "msubsup": "%s_{%s}^{%s}", "munder": "%s_{%s}", "mover": r"\overset{%s}{%s}", "mtr": r"%s\\",
     }  # fmt: skip
-    if element.tag == "mtext":
-        return layouts["mtext"] % element.text
+    if element.get("class") == "text":
+        return rf"\text{{{element.text}}}"
     if element.tag in layouts and element.tag not in ("msqrt", "mtr"):
         return layouts[element.tag] % tuple(parts)
     inner = (element.text or "") + "".join(parts)
