@@ -117,7 +117,7 @@ class Parser:
                 start += start == len(parts)
                 parts += [Part(operator(sign), "operator"), self.tight()]
             elif parts[-1].role in ("text", "joining") and self.next.text == "-" and not self.next.after:
-                parts += [Part(operator(self.take(), form="prefix"), "operator"), self.tight()]
+                parts += [Part(operator(self.take(), form="prefix")), self.tight()]
             elif self.begins_factor():
                 parts.append(self.tight())
             else:
