@@ -76,7 +76,8 @@ def _scene(name: str, distance: float) -> tisim.Scene:
 def _version(name: str) -> str:
     """Return a digest of everything that a plot shows."""
     law = inspect.getsource(inspect.getmodule(reference.find(name).kind) or snippets)
-    text = f"{law} {snippets.EFFECTS[name]} {RANGES[name]} {inspect.getsource(_draw)} {POINTS}"
+    scene = f"{snippets.EFFECTS[name]} {snippets.materials(name)} {RANGES[name]} {POINTS}"
+    text = f"{law} {scene} {inspect.getsource(_draw)}"
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -197,7 +197,7 @@ def _plot(entry: Entry) -> Iterator[str]:
 def _snippet(entry: Entry) -> Iterator[str]:
     """A scene with the part, in Python."""
     if lines := snippet(entry.name).splitlines():
-        yield from ("In a scene of two grains:", "", ".. code-block:: python", "")
+        yield from ("A scene with it:", "", ".. code-block:: python", "")
         yield from (*(f"   {line}" for line in lines), "")
 
 

@@ -1,4 +1,5 @@
-"""A runnable scene for each effect, source and operator, which stands on its page of the reference.
+"""A runnable scene for each effect, source, operator, part of a contact law, stepper and step control, which
+stands on its page of the reference.
 
     python docs/snippets.py NAME...    runs the snippets of some, or of all
 
@@ -29,7 +30,6 @@ HEATING = f"{IMPACT}, Heating(heat_capacity=500.0)"
 DRAG = "StokesDrag(viscosity=1e-3)"
 DRIFTING = "low=(-5e-3, -5e-3, 5e-3), high=(5e-3, 5e-3, 1e-2)"
 GRAINS = "grains=[GrainClass(sizes=EqualSizes(radius=5e-4), density=2500.0)], number=20"
-MATERIALS = '{"glass": tisim.Material(young=1e7, poisson=0.25, restitution=0.5, friction=0.5)}'
 PLATE = "planes=[Plane(point=(0, 0, 5e-5), normal=(0, 0, 1))]"
 
 EFFECTS = {
@@ -111,8 +111,50 @@ EFFECTS = {
     "peak_displacement": f"{CONTACT}, PeakDisplacement()",
     "peak_height": "Gravity(), PeakHeight(direction=(1.0, 0.0, 0.0))",
     "permanent_moment": f"{FIELD}, PermanentMoment(magnetisation=1e5), Magnetophoresis()",
-}  # fmt: skip
+    "constant_damping": "Granular(normal=Hooke(), damping=ConstantDamping())",
+    "dmt": "Granular(normal=HertzMaterial(), damping=RestitutionDamping(), cohesion=DMT())",
+    "hertz_material": "Granular(normal=HertzMaterial(), damping=RestitutionDamping())",
+    "hooke": "Granular(normal=Hooke(), damping=RestitutionDamping())",
+    "jkr": "Granular(normal=JKR(), damping=RestitutionDamping())",
+    "linear_spring": "Granular(normal=Hooke(), damping=RestitutionDamping(), tangential=LinearSpring())",
+    "mindlin_displacement": GRANULAR.replace("MindlinForce", "MindlinDisplacement"),
+    "mindlin_force": GRANULAR,
+    "restitution_damping": "Granular(normal=HertzMaterial(), damping=RestitutionDamping())",
+    "rolling_cdt": f"{GRANULAR[:-1]}, rolling=RollingCDT())",
+    "rolling_epsd": f"{GRANULAR[:-1]}, rolling=RollingEPSD())",
+    "rolling_sds": f"{GRANULAR[:-1]}, rolling=RollingSDS())",
+    "sjkr": "Granular(normal=HertzMaterial(), damping=RestitutionDamping(), cohesion=SJKR())",
+    "twisting_marshall": f"{GRANULAR[:-1]}, twisting=TwistingMarshall())",
+    "twisting_sds": f"{GRANULAR[:-1]}, twisting=TwistingSDS())",
+    "viscoelastic_damping": "Granular(normal=HertzMaterial(), damping=ViscoelasticDamping())",
+    "viscous_friction": GRANULAR.replace("MindlinForce", "ViscousFriction"),
+    "boris": "MagneticField(constant=(0.0, 0.0, 0.1)), Lorentz()",
+    "approach_time": IMPACT,
+} | dict.fromkeys(
+    ("brownian", "collocation", "trapezoid", "verlet", "drift_limit", "error_control", "fixed_step",
+     "iteration_control", "stage_control"),
+    "Tether(stiffness=(1.0, 1.0, 2.0))",
+)  # fmt: skip
 """The effects of the scene of each part."""
+COLLOID = "Brownian(temperature=300.0, viscosity=1e-3, control=DriftLimit(longest=1e-6))"
+STEPPERS = {
+    "brownian": COLLOID,
+    "drift_limit": COLLOID,
+    "collocation": "Collocation(control=StageControl(error=1e-6))",
+    "stage_control": "Collocation(control=StageControl(error=1e-6))",
+    "trapezoid": "Trapezoid(control=ErrorControl(error=1e-6))",
+    "error_control": "Trapezoid(control=ErrorControl(error=1e-6))",
+    "iteration_control": "Trapezoid(control=IterationControl(tolerance=1e-6))",
+    "approach_time": "Verlet(control=ApproachTime())",
+}
+"""The steppers of scenes that need another one than Verlet's, or Boris's for charges in magnetic fields."""
+PROPERTIES = {
+    "young": "1e7", "poisson": "0.25", "stiffness": "1e3", "restitution": "0.5", "damping": "0.01",
+    "viscous_time": "1e-6", "friction": "0.5", "rolling_friction": "0.1", "rolling_stiffness": "100.0",
+    "rolling_damping": "0.01", "twisting_friction": "1e-4", "twisting_stiffness": "1e-4",
+    "twisting_damping": "1e-8", "surface_energy": "0.01", "cohesion_energy_density": "1e4",
+}  # fmt: skip
+"""Properties of a material, for contact laws that need them."""
 TEMPERATURES = ("heating", "deformation_work", "reaction", "softening", "contact_softening", "cooling")
 MEASURES = (
     "virial", "at_rest", "compacted", "insertion_by_flux", "insertion_by_fraction", "outflow", "passage",
@@ -122,17 +164,24 @@ COUNTERS = ("agglomeration", "impact", "capture", "fragmentation", "join_group")
 """Parts whose temperatures, measures or counters are printed. For others it is moments or velocities."""
 QUANTITIES = {
     "temperature": "300.0", "charge": "1e-6", "saturation_moment": "1e-6", "domain_moment": "1e-18",
-    "group": "[1, 0]",
+    "group": "[1, 0]", "spin": "[[100.0, 0, 50.0], [0, 0, 0]]",
 }  # fmt: skip
 """Quantities of particles that are given if an effect needs them."""
 GIVEN = {
     "rigid_clumps": """particles=tisim.Particles.of_clumps(
-        tisim.Clump(centres=[(0, 0, 0), (1e-3, 0, 0)], radii=[1e-3, 8e-4], density=2500.0),
+        tisim.Clump(
+            centres=[(0, 0, 0), (1e-3, 0, 0)],
+            radii=[1e-3, 8e-4],
+            density=2500.0,
+        ),
         position=[[0, 0, 0], [2.85e-3, 0, 2e-4]],
         velocity=[[0.1, 0, 0], [-0.1, 0, 0]],
     )"""
 }
 """Particles that are no two grains."""
+
+WIDTH = 84
+"""Characters of a line that a page has room for."""
 
 
 def snippet(name: str) -> str:
@@ -140,22 +189,22 @@ def snippet(name: str) -> str:
     if name not in EFFECTS:
         return ""
     calls, made = EFFECTS[name], effects(name)
-    stepper = "Boris" if any(effect.gyrates(made) for effect in made) else "Verlet"
+    usual = "Boris" if any(effect.gyrates(made) for effect in made) else "Verlet"
+    stepper = STEPPERS.get(name, f"{usual}(control=FixedStep(dt=1e-5))")
     given = [GIVEN.get(name) or _particles(made)]
     if "Ewald" in calls:
         given.append("domain=tisim.Box(low=(-0.02, -0.02, -0.02), high=(0.02, 0.02, 0.02))")
-    if "Granular(" in calls:
-        given.append(
-            'materials={"glass": tisim.Material(young=1e7, poisson=0.25, restitution=0.5, friction=0.5)}'
-        )
+    if properties := _properties(made):
+        values = ", ".join(f"{key}={value}" for key, value in properties.items())
+        given.append(_broken(f'materials={{"glass": tisim.Material({values})}}', 4))
     given += [
-        f"effects={_broken(f'({calls},)', 4) if calls.count('), ') else f'({calls},)'}",
-        f"stepper={stepper}(control=FixedStep(dt=1e-5))",
+        _broken(f"effects=({calls},)" if len(made) == 1 else f"effects=({calls})", 4),
+        _broken(f"stepper={stepper}", 4),
         "duration=1e-3",
     ]
     lines = "".join(f"    {one},\n" for one in given)
     return (
-        f"{_imports(f'{calls} {stepper}() FixedStep()')}\n"
+        f"{_imports(f'{calls} {stepper}')}\n"
         f"scene = tisim.Scene(\n{lines})\nresult = tisim.run(scene)\nprint({_shown(name)})\n"
     )
 
@@ -168,7 +217,15 @@ def effects(name: str) -> tuple[Effect, ...]:
 
 def materials(name: str) -> dict[str, tisim.Material]:
     """Return the materials of the scene of a part."""
-    return eval(MATERIALS) if "Granular(" in EFFECTS[name] else {}
+    values = {key: float(value) for key, value in _properties(effects(name)).items()}
+    return {"glass": tisim.Material(**values)} if values else {}
+
+
+def _properties(effects: tuple[Effect, ...]) -> dict[str, str]:
+    """The properties of a material that effects need."""
+    parts = [getattr(effect, field) for effect in effects for field in type(effect).model_fields]
+    needed = {name for part in parts for name in getattr(part, "uses", ())}
+    return {name: value for name, value in PROPERTIES.items() if name in needed}
 
 
 def _particles(effects: tuple[Effect, ...]) -> str:
@@ -204,13 +261,19 @@ def _imports(code: str) -> str:
     lines: dict[str, list[str]] = {}
     for module, name in _homes(code):
         lines.setdefault(module, []).append(name)
-    rows = "".join(f"from {module} import {', '.join(names)}\n" for module, names in lines.items())
-    return f"import tisim\n{rows}"
+    rows = []
+    for module, names in lines.items():
+        start, listed = f"from {module} import ", ", ".join(names)
+        fits = len(start + listed) < WIDTH
+        rows.append(start + (listed if fits else _broken(f"({listed})", 0, width=0)))
+    return "\n".join(("import tisim", *rows, ""))
 
 
-def _broken(code: str, indent: int, width: int = 88) -> str:
-    """A call, tuple or list with an item in each line, as far as lines would be too long."""
-    start = next((k for k, sign in enumerate(code) if sign in "(["), len(code) - 1) + 1
+def _broken(code: str, indent: int, width: int = WIDTH) -> str:
+    """A call, tuple, list or dictionary with an item in each line, unless it is short enough for one line."""
+    if len(code) + indent < width:
+        return code
+    start = next((k for k, sign in enumerate(code) if sign in "([{"), len(code) - 1) + 1
     depth, items = 0, [""]
     for sign in code[start:-1]:
         depth += (sign in "([{") - (sign in ")]}")
@@ -219,19 +282,19 @@ def _broken(code: str, indent: int, width: int = 88) -> str:
         else:
             items[-1] += sign
     inner = " " * (indent + 4)
-    rows = (
-        f"{inner}{one if len(one) + indent < width else _broken(one, indent + 4)},\n"
-        for item in items
-        if (one := item.strip())
-    )
+    rows = (f"{inner}{_broken(one, indent + 4)},\n" for item in items if (one := item.strip()))
     return f"{code[:start]}\n{''.join(rows)}{' ' * indent}{code[-1]}"
 
 
 def _shown(name: str) -> str:
-    """The expression that a snippet prints."""
+    """The expression that a snippet prints: the result that the part is for."""
     if name in MEASURES or name in COUNTERS:
         return "result.measures" if name in MEASURES else "result.work"
     others = {"mean_force": "mean_force", "peak_height": "peak_height"}
+    if STEPPERS.get(name) == COLLOID:
+        return 'result.state["position"]'
+    if name.startswith(("rolling_", "twisting_")):
+        return 'result.state["spin"]'
     moment = "moment" if name.endswith("_moment") else "velocity"
     quantity = others.get(name, "temperature" if name in TEMPERATURES else moment)
     return f'result.state["{quantity}"]'
