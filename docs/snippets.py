@@ -90,7 +90,7 @@ EFFECTS = {
     "darcy_flow": "DarcyFlow(pressure_gradient=(0.0, 0.0, 1e3), viscosity=1e-3, porosity=0.4, diameter=1e-3),"
     f" {DRAG}",
     "electric_field": "ElectricField(amplitude=(1e3, 0.0, 0.0), omega=(1e3, 0.0, 0.0)), Lorentz()",
-    "magnetic_cylinders": "MagneticCylinders(cylinders=[Cylinder(centre=(0, 0, -4e-3), radius=1e-3,"
+    "magnetic_cylinders": "MagneticCylinders(cylinders=[Cylinder(centre=(0, 0, -6e-3), radius=1e-3,"
     f" length=5e-3, magnetisation=(0, 0, 1e6))]), {SOFT}, Magnetophoresis()",
     "magnetic_field": "MagneticField(constant=(0.0, 0.0, 0.1)), Lorentz()",
     "magnetic_spheres": f"{MAGNET}, {SOFT}, Magnetophoresis()",
