@@ -101,9 +101,7 @@ class Parser:
         """Factors and spaced fractions. start : first factor that a `/` divides."""
         parts, start = [self.tight()], 0
         while True:
-            if parts[-1].role in ("large", "joining") or parts[start:] == [
-                Part(parts[-1].mathml, "operator")
-            ]:
+            if parts[-1].role in ("large", "joining"):
                 start = len(parts)
             if self.next.text == "/":
                 self.take()

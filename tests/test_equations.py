@@ -46,6 +46,8 @@ TYPICAL = {
     "2 pi R gamma cos(theta) / (1 + 1.05 s) n": r"\frac{2πRγcos(θ)}{1+1.05s}n",
     "V 3 chi / (3 + chi) B / mu_0": r"\frac{V3χ}{3+χ}\frac{B}{μ_{0}}",
     "a / b / c": r"\frac{\frac{a}{b}}{c}",
+    "a / b x c / d + a/b.c": r"\frac{a}{b}×\frac{c}{d}+\frac{a}{b}·c",
+    "a/b/c d / e": r"\frac{\frac{\frac{a}{b}}{c}d}{e}",
     "x = G sum_j m_i m_j / d^2 n_ij": r"x=G∑_{j}\frac{m_{i}m_{j}}{d^{2}}n_{ij}",
     "T_i = m_i x B_j": "T_{i}=m_{i}×B_{j}",
     "L(x) = coth x - 1/x": r"L(x)=cothx−\frac{1}{x}",
@@ -77,7 +79,7 @@ def test_typical_equations(text):
     "text",
     [
         "a +", "a / ", "(a", "a)", "|a", "a b^", "a_", "= =", "sqrt a", "a + + b", "2 ** 3", "x: {1}",
-        "gt=0", "tisim.run(scene)", "found = optimize.run(scene)", 'read("a")', "a / / b", "",
+        "gt=0", "a*b", "tisim.run(scene)", "found = optimize.run(scene)", 'read("a")', "a / / b", "",
     ],
 )  # fmt: skip
 def test_anything_else_is_left(text):
