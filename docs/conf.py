@@ -4,6 +4,8 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+import equation_nodes
+import pair_plots
 import reference_pages
 
 from tisim.version import __version__
@@ -13,6 +15,8 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = f"tisim {release}"
+html_static_path = ["_static"]
+html_css_files = ["equations.css"]
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 HIDDEN = (
@@ -54,8 +58,18 @@ INNER = "|".join(
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in (*OTHERS, *TYPES))]
 
 
+def write_pages(app):
+    """Write the plots, and the pages that come from the code."""
+    folder = Path(app.srcdir) / "reference"
+    pair_plots.write(folder / "effects")
+    reference_pages.write(folder)
+
+
 def setup(app):
-    """Write the pages that come from the code, and read its docstrings as the plain text that they are."""
-    app.connect("builder-inited", lambda app: reference_pages.write(Path(app.srcdir) / "reference"))
+    """Write the pages that come from the code, read its docstrings as the plain text that they are, and set
+    equations."""
+    app.connect("builder-inited", write_pages)
     app.connect("autodoc-process-docstring", reference_pages.as_rst)
     app.connect("autodoc-process-signature", reference_pages.signature)
+    app.connect("doctree-read", equation_nodes.set_blocks)
+    app.add_node(equation_nodes.Equations, html=(equation_nodes.visit, None))

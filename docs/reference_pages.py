@@ -16,6 +16,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from pair_plots import RANGES
+from snippets import snippet
+
 from tisim.components.component import Checked, Component
 from tisim.describe import reference
 from tisim.describe.reference import Declaration, Entry
@@ -58,6 +61,21 @@ def parts() -> str:
             if one.family == name
         ]
     return "\n".join(lines) + "\n"
+
+
+def docstrings() -> Iterator[tuple[str, str]]:
+    """Yield the names and texts of the docstrings of the reference."""
+    yield from ((entry.name, entry.body) for entry in reference.entries())
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        yield package, inspect.getdoc(module) or ""
+        for name in getattr(module, "__all__", ()):
+            value = getattr(module, name)
+            members = vars(value).items() if inspect.isclass(value) else ()
+            inner = {f"{name}.{key}": one for key, one in members if not key.startswith("_")}
+            for path, one in {name: value, **inner}.items():
+                if inspect.isroutine(one) or inspect.isclass(one) or isinstance(one, property):
+                    yield f"{package}.{path}", inspect.getdoc(one) or ""
 
 
 def _put(path: Path, lines: Iterable[str]) -> None:
@@ -165,8 +183,22 @@ def _law(entry: Entry) -> Iterator[str]:
         f"   :canonical: {module}.{name}",
         "",
     )
-    text = (*rst(f"{entry.summary}."), *rst(entry.body), *_facts(entry), *_settings(entry.settings))
-    yield from (f"   {line}".rstrip() for line in (*text, *_toml(entry)))
+    text = (*rst(f"{entry.summary}."), *rst(entry.body), *_plot(entry), *_facts(entry))
+    tables = (*_settings(entry.settings), *_toml(entry), *_snippet(entry))
+    yield from (f"   {line}".rstrip() for line in (*text, *tables))
+
+
+def _plot(entry: Entry) -> Iterator[str]:
+    """The force against the distance (pair_plots.py)."""
+    if entry.name in RANGES:
+        yield from (f".. image:: {entry.name}.svg", f"   :alt: {entry.name}: force against distance", "")
+
+
+def _snippet(entry: Entry) -> Iterator[str]:
+    """A scene with the part, in Python."""
+    if lines := snippet(entry.name).splitlines():
+        yield from ("A scene with it:", "", ".. code-block:: python", "")
+        yield from (*(f"   {line}" for line in lines), "")
 
 
 def _facts(entry: Entry) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Pages of the reference from the code; Sphinx itself is run by .ci/run."""
 
-import importlib.util
+import importlib
 import re
 from pathlib import Path
 
@@ -14,10 +14,9 @@ DOCS = Path(__file__).parents[1] / "docs"
 @pytest.fixture(scope="module")
 def maker():
     """docs/reference_pages.py, which does not belong to a package."""
-    spec = importlib.util.spec_from_file_location("reference_pages", DOCS / "reference_pages.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(DOCS))
+        yield importlib.import_module("reference_pages")
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ class SizeDistribution(Component):
     are the result of sieving and weighing. Classes with other densities have their own ``share`` of the mass.
     The densities by volume, q_3, and by number, q_0, are related by
 
-        q_0(r) = q_3(r) / r^3 / integral of q_3(r) / r^3
+        q_0(r) = q_3(r) / r^3 / integral q_3(r) / r^3 dr
 
     For equal volume fractions, the number of grains is therefore inversely proportional to the cube of the
     radius. Each distribution provides nodes of sufficient density. Between nodes the density is constant in

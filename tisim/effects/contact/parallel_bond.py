@@ -37,7 +37,7 @@ class ParallelBond(PairForce):
 
         F_n = k_n A (d - d_0),    dF_s/dt = k_s A u_s,    dM_n/dt = k_s J Omega_n,    dM_s/dt = k_n I Omega_s
         k_n = E / (R_i + R_j),    k_s = k_n / kappa,    A = pi r^2,    I = pi r^4 / 4,    J = 2 I
-        breaks at   F_n / A + |M_s| r / I > sigma_c   or   |F_s| / A + |M_n| r / J > tau_c
+        breaks if F_n / A + |M_s| r / I > sigma_c or |F_s| / A + |M_n| r / J > tau_c
 
     A bond is a disc of cement of radius r = lambda min(R_i, R_j); a chain of bonds is an elastic beam. d_0 is
     the distance of the centres at the start, u_s the relative velocity of the surfaces midway between them,

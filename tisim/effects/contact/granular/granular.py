@@ -54,7 +54,7 @@ class Granular(ContactGuards, GranularContact):
     law.
 
         F_n = elastic force - gamma_n v_n - cohesion
-        F_t, couples : of the tangential, rolling and twisting part, each up to its friction times N
+        F_t = tangential force,    M = rolling couple + twisting couple,    each up to its friction times N
 
     v_n is the speed at which the surfaces separate. N is |F_n| without cohesion; beside ``jkr`` and ``dmt``
     it is |F_n + 2 F_c|, with the pull-off force F_c and without damping. The point of contact lies in the
