@@ -43,5 +43,5 @@ def test_a_field_arrests_it_and_walls_bear_the_drag(three, further):
         assert flow.arrested
         assert held_pressure(flow.result) == pytest.approx(drag_pressure(flow.result), rel=0.1)
         assert 0 < overlap(flow.result) < 0.15
-    # Grains may also be held by chains that lead from one wall around the constriction.
+    # Of six starts, one is jammed without a chain of contacts between opposite sides.
     assert sum(clusters(flow.result.state, flow.result.scene).bridged for flow in jammed) >= 2
