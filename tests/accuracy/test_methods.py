@@ -561,3 +561,17 @@ def test_options_replace_a_stepper_that_tisim_has_chosen(error):
     changes = assignments(options(automatic, changed)[1::2])
     assert automatic.replace(changes).stepper == wanted
     assert options(automatic, automatic) == []
+
+
+def test_options_name_the_stepper_beside_an_exchanged_law():
+    """For the other law tisim might choose another stepper than the one that was measured."""
+    law = NearField(alpha1=1.0, alpha2=2.0, beta2=3)
+    data = oscillator().model_copy(update={"effects": (law,)}).to_dict()
+    automatic = Scene.from_dict({key: value for key, value in data.items() if key != "stepper"})
+    other = methods_of(automatic)["TruncatedNearField"].settings[0].scene
+    arguments = options(automatic, other)
+    assert arguments[:2] == ["--without", "near_field"]
+    changes = assignments(arguments[3::2])
+    assert changes.keys() == {"stepper", "effects.truncated_near_field"}
+    again = automatic.without("near_field").replace(changes)
+    assert again.stepper == other.stepper

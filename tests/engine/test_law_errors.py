@@ -6,6 +6,7 @@ import tisim
 from tests.scenes import scene
 from tisim import InputError
 from tisim.cli.main import main
+from tisim.effects import Field, Force, WorldField
 from tisim.files import python_file
 from tisim.steppers import Collocation, Trapezoid
 
@@ -72,8 +73,8 @@ SAID = {
     "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be code that Taichi can compile; .*'kk'",
     "NotCalled": r"laws\.py, line 19, in NotCalled\.force, must be code that Taichi can compile; .*bad op",
     "Undeclared": r"laws\.py, line 25, in Undeclared\.force, must be .*'charge' must be declared in",
-    "Reads": r"^name of .* must be a name of no other use on a state; received 'read'$",
-    "Again": r"^name of .* must be a name of no other use on a state; received 'status'$",
+    "Reads": r"^name of a field must be a Python name that nothing else in the state has; received 'read'$",
+    "Again": r"^name of a field must be a Python name that nothing else in the state has; received 'status'$",
 }
 
 
@@ -89,7 +90,9 @@ def test_in_python(own_file, name):
 def test_names_of_stepper_and_effect_must_differ(own_file, stepper):
     """Both would write the same counter."""
     own = python_file.load(own_file("laws.py", LAWS)).OfStepper()
-    rule = r"^name of .* must be a name of no other use on a state; received 'rejections'$"
+    rule = (
+        r"^name of a field must be a Python name that nothing else in the state has; received 'rejections'$"
+    )
     with pytest.raises(InputError, match=rule):
         tisim.run(scene([[0, 0, 0]], [[0, 0, 0]], (own,), stepper=stepper))
 
@@ -120,3 +123,35 @@ def test_only_scenes_can_be_run():
             tisim.run(wrong)
     with pytest.raises(InputError, match=r"path must be text or a pathlib\.Path; received 3"):
         tisim.read(3)
+
+
+@pytest.mark.parametrize("name", ["capacity", "real", "remove", "time", "a-b"])
+def test_a_particle_field_needs_a_name_of_its_own(name):
+    class Marked(Force):
+        fields = (Field(name, ""),)
+
+    rule = f"^name of a field must be a Python name that nothing else in the state has; received '{name}'$"
+    with pytest.raises(InputError, match=rule):
+        tisim.run(scene([[0, 0, 0]], [[0, 0, 0]], (Marked(),)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("push", "count"), "kind of world field push must be one of counter, measure, .*; received 'count'"),
+        (("push", "measure", "N", 3), "components of world field push must be 1, or 3 for .*; received 3"),
+    ],
+)
+def test_a_world_field_of_an_unknown_kind_is_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        WorldField(*arguments)
+
+
+def test_every_attribute_of_a_state_is_reserved():
+    """No field can replace it: ``reserved`` reads the annotations of the class."""
+    one = scene([[0, 0, 0]], [[1, 0, 0]], ())
+    simulation = tisim.Simulation(one)
+    own = {field.name for field in (*simulation.s.fields, *simulation.s.world_fields)}
+    public = {name for name in vars(simulation.s) if not name.startswith("_")}
+    assert public - own <= set(simulation.s.reserved())
+    simulation.close()

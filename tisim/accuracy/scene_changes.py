@@ -129,9 +129,11 @@ def options(scene: Scene, changed: Scene, precision: str = "f64", arithmetic: st
     """Return the options that make ``tisim run`` run ``changed`` instead of ``scene``."""
     old, new = ({effect.label: effect for effect in s.effects} for s in (scene, changed))
     arguments = [argument for name in old if name not in new for argument in ("--without", name)]
-    # A stepper that tisim has chosen is not in the data of a scene: its settings cannot be set one by one.
+    # A stepper that tisim has chosen is not in the data of a scene: its settings cannot be set one by one,
+    # and it is chosen anew for other effects.
     named = scene.stepper if "stepper" in scene.model_fields_set else None
-    same = changed.stepper == scene.stepper
+    chosen_anew = named is None and (changed.effects, changed.materials) != (scene.effects, scene.materials)
+    same = changed.stepper == scene.stepper and not chosen_anew
     settings = [] if same else list(_differences(named, changed.stepper, "stepper"))
     for name, effect in new.items():
         settings += _differences(old.get(name), effect, f"effects.{name}")

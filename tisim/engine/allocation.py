@@ -33,7 +33,7 @@ class Allocation:
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
         asked = (scene.acting(), scene.stepper)
-        fields = resolve_fields(needed_fields(*asked))
+        fields = resolve_fields(needed_fields(*asked), State.reserved())
         world_fields = needed_world_fields(*asked, (*State.reserved(), *(field.name for field in fields)))
         # Checked before compilation: a vector in place of a number would end the process.
         for effect in scene.effects:

@@ -217,7 +217,7 @@ def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> 
 
 
 def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int) -> dict[str, Any]:
-    """Return the initial values of world quantities that are not 0, by name; worlds without a scene have
+    """Return the initial values of world fields that are not 0, by name; worlds without a scene have
     ended."""
     empty = worlds - len(scenes)
     counts = np.array([len(start["mass"]) for start in starts] + [0] * empty)

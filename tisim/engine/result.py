@@ -46,7 +46,7 @@ class Result:
     start : the same arrays for the initial state, with ids numbered from 0 in the order of the arrays.
     time : time of ``state``, s.
     work : counts up to that time (steps, particle_steps, and the counters of the effects).
-    measures : world quantities that the effects keep, at the end.
+    measures : the world fields of the kind "measure" and the values of ``Effect.measures``, at the end.
     wall_s : wall time of the batch divided by its number of worlds, s. It excludes set-up, compilation and
     observers, and includes the search for last good steps.
     settings : precision, device and threads of the run. ``edited`` lists values written to

@@ -43,7 +43,7 @@ class Worlds(Protocol):
         """Return the check on the device that all quantities are finite."""
 
     def put(self, image: Mapping[str, np.ndarray]) -> None:
-        """Put all worlds back into the state of an image made by ``s.image()``."""
+        """Put all worlds back into the state of an image, a copy of their state made by ``s.image()``."""
 
     def begin(self) -> None:
         """Set every world to its initial state, and prepare the first step."""
@@ -52,7 +52,7 @@ class Worlds(Protocol):
         """Take at most this number of steps in every running world."""
 
     def is_running(self, until: float = np.inf) -> bool:
-        """Return whether any world still has steps to take before ``until`` (s) or its goal."""
+        """Return whether any world has steps to take before ``until`` (s) or its goal, a number of steps."""
 
     def list_sizes(self) -> ListSizes:
         """Return sizes that would have held the pair lists as last made."""
@@ -61,7 +61,10 @@ class Worlds(Protocol):
         """Make pair lists of these sizes, and compile the step again for them."""
 
     def in_order(self, w: int, good: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the indices of the live particles of a world in output order."""
+        """Return the indices of the live particles of a world in output order.
+
+        good : quantities of all worlds by name, such as those of the last good state.
+        """
 
     def measures(self, worlds: Sequence[int]) -> list[dict[str, float]]:
         """Return the current measures of these loaded worlds, by name."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from tisim.errors import must
 
@@ -79,6 +79,9 @@ SHARED = {
 """Fields that several effects share by name."""
 
 
+WorldFieldKind = Literal["counter", "measure", "real", "integer", "sum"]
+
+
 @dataclass(frozen=True)
 class WorldField:
     """A world field is a number that every world has, ``s.NAME[w]``; it is 0 at the start.
@@ -86,15 +89,22 @@ class WorldField:
     kind : "counter" (i64), a number of events, which is in the ``work`` of a Result; "measure" (f64), in its
     ``measures``; or internal: "real" (f64), "integer" (i32), or "sum" (i64), to which particles add whole
     numbers within a step, in any order, by ``ti.atomic_add``.
-    components : 3 for a vector, of which kernels read and write ``s.NAME[w, k]``.
+    components : 3 for a vector of the kind "real", of which kernels read and write ``s.NAME[w, k]``.
     saved : whether the continuation of a run depends on it, so that checkpoints contain it.
     """
 
     name: str
-    kind: Literal["counter", "measure", "real", "integer", "sum"]
+    kind: WorldFieldKind
     unit: str = ""
     components: Literal[1, 3] = 1
     saved: bool = True
+
+    def __post_init__(self) -> None:
+        kinds = get_args(WorldFieldKind)
+        must(self.kind in kinds, f"kind of world field {self.name}", f"one of {', '.join(kinds)}", self.kind)
+        number = self.components == 1 or (self.components == 3 and self.kind == "real")
+        rule = "1, or 3 for the kind real"
+        must(number, f"components of world field {self.name}", rule, self.components)
 
 
 CORE_OF_WORLDS = (
@@ -156,21 +166,26 @@ def resolve_world_fields(
     uses too, or that is ``taken``.
     """
     fields = (*CORE_OF_WORLDS, *dict.fromkeys(effects), *dict.fromkeys(stepper))
-    names = [field.name for field in fields]
-    for k, name in enumerate(names):
-        free = name.isidentifier() and name not in taken and name not in names[:k]
-        must(free, "name of a world field", "a name of no other use on a state", name)
+    check_names([field.name for field in fields], taken)
     return fields
 
 
-def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
+def check_names(names: Sequence[str], taken: Sequence[str]) -> None:
+    """Raise InputError unless the names of fields are Python names, all different and none ``taken``."""
+    for k, name in enumerate(names):
+        free = name.isidentifier() and name not in taken and name not in names[:k]
+        must(free, "name of a field", "a Python name that nothing else in the state has", name)
+
+
+def resolve_fields(needs: Iterable[str | Field], taken: Sequence[str] = ()) -> tuple[Field, ...]:
     """Return the core fields and all needed fields, each once, in a fixed order.
 
-    InputError is raised for a field that two parts declare differently.
+    InputError is raised for a field that two parts declare differently, or whose name is ``taken``.
     """
     fields = {field.name: field for field in CORE}
     for need in needs:
         field = SHARED[need] if isinstance(need, str) else need
         declared = fields.setdefault(field.name, field)
         must(declared == field, f"field {field.name}", f"declared as everywhere, {declared}", field)
+    check_names([*fields], taken)
     return tuple(fields.values())

@@ -20,8 +20,8 @@ class State(StateMemory):
     """A state holds all fields of a batch of worlds at one time; kernels read and write it.
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
-    ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
-    (i64), quantities (f64) and flags (i32) that effects and steppers declare.
+    ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the world
+    fields that effects, steppers and step controls declare (``WorldField``).
 
     A long step may be made in several launches. ``underway`` is the number of particles that have not ended
     it yet. Unless it is 0, the particles have no common time: ``time`` is then the beginning of the step, and
@@ -31,7 +31,7 @@ class State(StateMemory):
 
     @ti.func
     def axes(self, column: ti.template(), w):  # type: ignore[valid-type]
-        """Return the three components of a world quantity."""
+        """Return the three components of a world field."""
         return ti.Vector([column[w, 0], column[w, 1], column[w, 2]])
 
     @ti.func
@@ -197,7 +197,7 @@ class State(StateMemory):
 
     @ti.func
     def fail_world_by_effect(self, w, effect):
-        """Stop a world in which an effect, given by its index in the scene, has made a world quantity not
+        """Stop a world in which an effect, given by its index in the scene, has made a world field not
         finite."""
         ti.atomic_max(self.failed[w], WorldStatus.NOT_FINITE)
         ti.atomic_min(self.failing_effect[w], effect)

@@ -139,7 +139,7 @@ class StateMemory:
     def snapshot(self, names: Iterable[str]) -> dict[str, np.ndarray]:
         """Return fields as arrays of their full shapes, by name.
 
-        A copy kernel is compiled for each choice of particle fields, and one for all world quantities.
+        A copy kernel is compiled for each choice of particle fields, and one for all world fields.
         """
         names = tuple(names)
         particles = tuple(name for name in names if name not in self.columns)
@@ -162,7 +162,7 @@ class StateMemory:
 
     @classmethod
     def reserved(cls) -> tuple[str, ...]:
-        """Return the names that no field may have, as they have another use on a state."""
+        """Return the names that no field may have, because a state uses them otherwise."""
         return (*StateMemory.__annotations__, *dir(cls))
 
     def image(self) -> dict[str, np.ndarray]:

@@ -135,8 +135,8 @@ class Stepper(Component):
         Verlet is an example. Kernels read parameters of the stepper from ``context.stepper``.
 
         Forces are summed at ``time``. A stepper that sums them within a step sets ``time`` to that instant,
-        as Boris does, and stores the beginning of the step in ``time_before``, which it names in
-        ``world_fields``; ``apply_operators`` and ``AdvanceClock`` (steppers/common.py) continue from it.
+        as Boris does, and stores the beginning of the step in ``time_before``, which it declares
+        in ``world_fields``; ``apply_operators`` and ``AdvanceClock`` (steppers/common.py) continue from it.
         A stepper that moves particles twice reports both displacements with ``report_displacement``, which
         sets them to 0 after each. ``s.axes(s.frame, w)`` is the velocity of the frame (m/s). Forces and
         derived quantities after a step may belong to the middle of the step; the next step must not rely on

@@ -22,9 +22,10 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
    those of the kinds "counter", as in ``ti.atomic_add(s.NAME[w], 1)``, and "measure". Several effects of one
    kind write to the same fields, which therefore hold their sums. Sums over particles within a step are whole
    numbers (kind "sum"), so that they do not depend on the order of summation. If the fields depend on the
-   options, ``required_world_fields`` returns them; the names of the stepper are not allowed. ``end_step``
-   sets measures from the forces of the step. ``measures`` computes further quantities from the particles of a
-   Result, and ``measured`` gives the names and units of all of them.
+   options, ``required_world_fields`` returns them; the names of the stepper are not allowed. ``bind_fields``
+   gives the bound object the fields whose names contain the name of the effect. ``end_step`` sets measures
+   from the forces of the step. ``measures`` computes further quantities from the particles of a Result, and
+   ``measured`` gives the names and units of all of them.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state and writes nothing. Forces and torques
    are summed in scene order. The velocity of j relative to i is ``s.relative_velocity(w, i, j, separation)``:
    it includes the velocity of a moving periodic image, which the difference of both velocities does not.
@@ -53,10 +54,11 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
     approximate effect is tried. No code depends on the name of an effect.
 12. ``at_start`` fills in values that depend on the start; ``capacity`` returns the largest number of
     particles that may exist at once, given the start.
-13. Four hooks serve scenes that name no stepper (see tisim/steppers/choice.py): ``critical_step`` gives the
-    longest stable step of a leapfrog; ``kinked`` says that forces have kinks or jumps; ``leapfrog`` says that
-    only explicit steppers keep their order with it; ``reached_speed`` estimates the speed that it gives to
-    particles.
+13. The following serve scenes that name no stepper (see tisim/steppers/choice.py): ``critical_step`` gives
+    the longest stable step of a leapfrog, and ``part_of_critical_step`` the part of it for an accuracy;
+    ``kinked`` says that forces have kinks or jumps; ``leapfrog`` says that only explicit steppers keep their
+    order with it; ``gyrates`` says that it rotates velocities; ``incompatible_controls`` lists step controls
+    that it cannot have; ``reached_speed`` estimates the speed that it gives to particles.
 14. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``. After ``world`` or
     ``resolve`` has moved or resized a particle it must call ``s.invalidate_lists(w)``. Indices change only
     between steps. Results must not depend on the order of parallel work: no float atomics.

@@ -218,8 +218,7 @@ class Effect(Component):
 
     def failure_hint(self, effects: Sequence[Effect], domain: Domain) -> str:
         """Return the condition in which it stops a world on purpose by values that are not a number, given
-        the effects and the domain of a scene; worded to continue the message "it is so where". Empty by
-        default."""
+        the effects and the domain of a scene; worded to follow "this happens if". Empty by default."""
         return ""
 
     @classmethod
