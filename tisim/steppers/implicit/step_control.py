@@ -7,8 +7,6 @@ far, the distances of particles from their starts, and not to the displacement i
 be added up over the run.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal, Self
 
 import numpy as np
