@@ -1,4 +1,4 @@
-"""Observables of trajectories: what effects measure of a world stands beside its frames."""
+"""Observables of trajectories: the measurements of effects are stored beside the frames of a world."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ TIMES = 0.025 * np.arange(4)
 
 
 def value(name, k):
-    """A number that says of which measure and of which frame it is."""
+    """A number that identifies the measure and the frame."""
     return float(1 + sorted(UNITS).index(name) + 0.1 * k)
 
 
@@ -48,7 +48,7 @@ def frame(k):
 
 
 def write(path, *more):
-    """Four frames by hand; nothing is run."""
+    """Write four frames that are made by hand; nothing is run."""
     with Trajectory(path, [PRESSED, *more]) as trajectory:
         for w in range(1 + len(more)):
             for k in range(4):
@@ -72,7 +72,7 @@ def test_they_are_those_of_the_frames(file):
 
 
 def test_the_layout_is_that_of_h5md(tmp_path):
-    """Of several worlds each has a group; time and step are hard links to those of the positions."""
+    """Each of several worlds has a group; time and step are hard links to the datasets of the positions."""
     with h5py.File(write(tmp_path / "t.h5", PRESSED)) as read:
         assert set(read["observables"]) == set(read["particles"]) == {"world_0", "world_1"}
         for name, group in read["observables"].items():
@@ -109,7 +109,7 @@ def test_they_go_along_into_a_copy_and_a_resumed_file(file, tmp_path):
 
 
 def test_a_file_that_lacks_them_is_copied_without(tmp_path):
-    """Such as one of a version that did not know of a measure."""
+    """It may come from a version of tisim without one of the measures."""
     with Trajectory(tmp_path / "t.h5", [PRESSED]) as trajectory:
         trajectory.write(0, Frame(0.0, 0, frame(0).arrays))
     with frames(tmp_path / "t.h5") as sequence:
@@ -117,7 +117,7 @@ def test_a_file_that_lacks_them_is_copied_without(tmp_path):
 
 
 def test_forces_are_drawn_against_time(file):
-    """A row of force and torque for each body, and the travel of the one with a servo."""
+    """Each body has a row with force and torque, and the one with a servo also its displacement."""
     with frames(file) as sequence:
         assert bodies(sequence) == ["floor", "lid"]
         figure, series = loads(sequence), sequence.measures
@@ -133,7 +133,7 @@ def test_forces_are_drawn_against_time(file):
             np.testing.assert_array_equal(line.get_ydata(), series[measure])
 
 
-def test_all_that_is_measured_has_its_unit():
+def test_every_measure_has_its_unit():
     assert {name: unit or None for name, unit in measured(EFFECTS).items()} == {
         **UNITS, "lid_speed": "m/s",
     }  # fmt: skip
