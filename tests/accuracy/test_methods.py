@@ -503,7 +503,7 @@ def test_a_picture_of_large_errors_is_not_blank():
     assert low < 1e5 < high
 
 
-def test_nothing_found_is_reported_in_words():
+def test_an_accuracy_that_no_setting_reaches_is_refused():
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = [row("good", 1.0, 1e-3, 1e-4)]
     with pytest.raises(RunError) as error:
@@ -539,7 +539,7 @@ def test_the_table_fits_80_columns_and_cuts_no_number():
     assert "  error=1e-05: a quantity is not finite" in lines
 
 
-def test_a_reference_that_tells_nothing_apart_is_said_to():
+def test_a_useless_reference_is_reported():
     """Its own error is as large as the motion, as in a chaotic system."""
     quantity = Quantity("positions", lambda result: result.state["position"])
     for error, said in ((1e-3, False), (1.3, True)):

@@ -109,7 +109,7 @@ def test_compilation_does_not_count_in_the_budget(verlet_only, monkeypatch):
     assert len(cost_study.rows) == 3
 
 
-def test_a_setting_over_the_limit_is_a_row_that_says_so(verlet_only, monkeypatch, tmp_path):
+def test_a_setting_over_the_limit_is_a_failed_row(verlet_only, monkeypatch, tmp_path):
     now, late = time.monotonic, [0.0]
 
     def slowly(self, scenes, progress, on_result=None, run=SimulationCache.run):
@@ -165,7 +165,7 @@ def test_a_setting_over_the_budget_is_not_begun_in_a_later_repeat(verlet_only, m
     assert not cost_study.complete
 
 
-def test_a_reference_that_tells_nothing_apart_ends_a_study_that_needs_one(verlet_only, monkeypatch):
+def test_a_useless_reference_ends_a_study_that_needs_one(verlet_only, monkeypatch):
     """The study ends before any setting is run, and keeps the reference values."""
     monkeypatch.setattr(quantity, "LARGEST_REFERENCE_ERROR", 1e-12)
     cost_study = Study(closed(), **FEW, require_reference=True)

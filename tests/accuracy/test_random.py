@@ -42,7 +42,7 @@ def test_the_interval_covers_the_true_mean_at_its_nominal_level(drifts):
     assert np.mean([one.uncertainty for one in estimates]) == pytest.approx(half, rel=0.1)
 
 
-def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
+def test_the_interval_of_several_components_bounds_their_distance(drifts):
     values = np.array([[r.state["velocity"][0, 0], r.state["velocity"][1, 0]] for r in drifts])
     both, one = mean(values), mean(values[:, :1])
     assert both.value.shape == (2,)

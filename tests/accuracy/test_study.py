@@ -65,7 +65,7 @@ def test_errors_fall_and_work_rises_with_the_requested_accuracy(measured, method
         assert fine.sums > 1.5 * coarse.sums
 
 
-def test_work_is_that_of_the_steppers(measured):
+def test_work_is_counted_by_the_steppers(measured):
     """Verlet takes one force evaluation a step, the implicit stepper one for each iteration."""
     for row in measured.line("Verlet, FixedStep: dt"):
         dt = float(row.setting.removeprefix("dt="))
@@ -192,7 +192,7 @@ def verlet_only(monkeypatch):
     only(monkeypatch)
 
 
-def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
+def test_a_failed_setting_is_a_row_with_its_reason(verlet_only, monkeypatch):
     run = SimulationCache.run
 
     def brittle(self, scenes, *more):

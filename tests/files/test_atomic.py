@@ -201,7 +201,7 @@ print(json.dumps(ends))
 """
 
 
-def test_commands_on_a_folder_that_may_not_be_entered_say_so(theirs):
+def test_commands_on_an_inaccessible_folder_are_refused(theirs):
     code = f"COMMANDS = {COMMANDS}\n{AS_ANOTHER}"
     # The folder of compiled kernels, by default in the home folder, may not be entered either.
     elsewhere = {name: value for name, value in os.environ.items() if "OFFLINE_CACHE" not in name}

@@ -25,7 +25,7 @@ from tisim.io.trajectory import LIBVER, Trajectory
 @pytest.mark.parametrize(
     "name", ["result.h5", "trajectory.h5", "cost.h5", pytest.param("checkpoint.h5", marks=pytest.mark.long)]
 )
-def test_no_damage_goes_unnoticed(tmp_path, name):
+def test_all_damage_is_detected(tmp_path, name):
     """With flipped bits, lost or swapped pages, or cut short, a file is read correctly or refused."""
     kind, rng = damage.KINDS[name], np.random.default_rng(12)
     path = kind.make(tmp_path)

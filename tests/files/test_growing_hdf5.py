@@ -51,7 +51,7 @@ def whole_frames(path, least):
 
 
 @pytest.mark.parametrize("rows", [4, pytest.param(12, marks=pytest.mark.slow)])
-def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows):
+def test_a_trajectory_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows):
     """The writer may be killed at any write: HDF5 opens the file without tisim and finds all frames."""
     path, contents = tmp_path / "t.h5", []
 
@@ -72,7 +72,7 @@ def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows)
             assert len(plain["particles/all/position/value"]) >= least
 
 
-def test_it_can_be_read_while_it_is_written(tmp_path):
+def test_a_trajectory_can_be_read_while_it_is_written(tmp_path):
     path = tmp_path / "t.h5"
     with Trajectory(path, [STILL]) as trajectory:
         for k in range(5):
@@ -262,7 +262,7 @@ def test_ctrl_c_while_a_run_resumes_leaves_the_earlier_file(tmp_path, monkeypatc
     assert interrupted(monkeypatch, GrowingFile, "write", go_on, 17) > 50
 
 
-def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypatch):
+def test_a_file_that_another_process_has_locked_is_not_an_input_error(tmp_path, monkeypatch):
     monkeypatch.setattr(atomic, "LOCK_TIMEOUT", 0.01)
     with (
         atomic.locked(tmp_path / "t.h5.new", exclusive=True),
@@ -283,7 +283,7 @@ def test_the_superblock_is_the_one_that_hdf5_writes(size):
     assert not is_valid(block[:-1])
 
 
-def test_lookup3_is_that_of_its_author():
+def test_lookup3_agrees_with_its_author():
     """A value from the comments of lookup3.c."""
     assert lookup3(b"Four score and seven years ago") == 0x17770551
 

@@ -31,7 +31,7 @@ def test_a_changed_file_is_another_and_its_old_classes_are_not_known(own_file):
     assert python_file.is_superseded(first.Pull)
 
 
-def test_the_text_that_was_loaded_is_what_is_compiled(own_file):
+def test_the_loaded_text_is_compiled(own_file):
     """Taichi reads the source when it compiles, and the file may have changed by then."""
     module = python_file.load(own_file("a_law.py", LAW))
     own_file("a_law.py", "# nothing is left of it\n" * 40)

@@ -61,7 +61,7 @@ def test_planted_links_are_refused_and_not_followed(file, tmp_path, write, name)
 
 
 @pytest.mark.slow
-def test_meshio_reads_what_paraview_would(file, tmp_path):
+def test_meshio_reads_the_files_for_paraview(file, tmp_path):
     path = export(file, "vtk", tmp_path)
     assert path == tmp_path / "flow.pvd"
     datasets = ElementTree.parse(path).findall("Collection/DataSet")

@@ -61,7 +61,7 @@ def file(tmp_path):
     return write(tmp_path / "t.h5")
 
 
-def test_they_are_those_of_the_frames(file):
+def test_observables_belong_to_their_frames(file):
     with frames(file) as sequence:
         assert sequence.measures.keys() == UNITS.keys()
         for name, series in sequence.measures.items():
@@ -71,7 +71,7 @@ def test_they_are_those_of_the_frames(file):
     assert read.measures["floor_force_z"].tolist() == [value("floor_force_z", k) for k in range(4)]
 
 
-def test_the_layout_is_that_of_h5md(tmp_path):
+def test_the_layout_of_observables_follows_h5md(tmp_path):
     """Each of several worlds has a group; time and step are hard links to the datasets of the positions."""
     with h5py.File(write(tmp_path / "t.h5", PRESSED)) as read:
         assert set(read["observables"]) == set(read["particles"]) == {"world_0", "world_1"}
@@ -85,7 +85,7 @@ def test_the_layout_is_that_of_h5md(tmp_path):
                 assert observable["step"] == read[f"particles/{name}/position/step"]
 
 
-def test_a_scene_in_which_nothing_is_measured_has_none(tmp_path):
+def test_a_scene_without_measures_has_no_observables(tmp_path):
     with Trajectory(tmp_path / "t.h5", [scene([(0, 0, 0)], [(0, 0, 0)])]):
         pass
     with h5py.File(tmp_path / "t.h5") as read, frames(tmp_path / "t.h5") as sequence:
@@ -100,7 +100,7 @@ def test_a_number_that_is_damaged_is_refused(file):
         len(sequence)
 
 
-def test_they_go_along_into_a_copy_and_a_resumed_file(file, tmp_path):
+def test_observables_are_in_a_copy_and_in_a_resumed_file(file, tmp_path):
     copied = export(file, "h5md", tmp_path)
     Trajectory.resume(file, PRESSED, float(TIMES[1])).close()
     for path, count in ((copied, 4), (file, 2)):
@@ -108,7 +108,7 @@ def test_they_go_along_into_a_copy_and_a_resumed_file(file, tmp_path):
             assert [one.measures for one in sequence] == [frame(k).measures for k in range(count)]
 
 
-def test_a_file_that_lacks_them_is_copied_without(tmp_path):
+def test_a_file_without_observables_is_copied(tmp_path):
     """It may come from a version of tisim without one of the measures."""
     with Trajectory(tmp_path / "t.h5", [PRESSED]) as trajectory:
         trajectory.write(0, Frame(0.0, 0, frame(0).arrays))

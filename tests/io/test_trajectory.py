@@ -97,7 +97,7 @@ def test_frames_are_the_first_states_at_or_after_the_wanted_times(file, states, 
     assert (np.diff(counts) > 0).any() == (world == 0)
 
 
-def test_times_that_steps_meet_only_to_rounding_cost_no_step(tmp_path):
+def test_frame_times_met_up_to_rounding_cost_no_step(tmp_path):
     """Ten steps of 30 us with a frame each; sums of 30 us are below its multiples in the last bit."""
     steady = scene([(0, 0, 0)], [(1.0, 0, 0)], dt=3e-5, steps=10)
     tisim.run(steady, record=Recording(tmp_path / "t.h5", frames=10))
@@ -133,7 +133,7 @@ def test_a_failed_run_ends_with_its_last_good_state(tmp_path):
 
 
 @pytest.mark.slow
-def test_scenes_of_different_structure_go_to_one_file(tmp_path):
+def test_scenes_of_different_structure_are_written_to_one_file(tmp_path):
     mixed = [scene([(k * 1e-3, 0, 0)], [(1.0, 0, 0)], dt=1e-4, steps=4) for k in range(3)]
     mixed[1] = mixed[1].model_copy(update={"domain": Box(low=(-1,) * 3, high=(1,) * 3)})
     results = tisim.run(mixed, record=Recording(tmp_path / "t.h5", frames=2))
@@ -164,7 +164,7 @@ def test_an_independent_reader_reads_it(file):
                     assert (element.step[k], element.time[k]) == (frame.step, frame.time)
 
 
-def test_layout_is_that_of_the_specification(file):
+def test_layout_follows_the_specification(file):
     with h5py.File(file) as read:
         head = read["h5md"]
         assert head.attrs["version"].tolist() == [1, 1]
@@ -212,7 +212,7 @@ def test_layout_is_that_of_the_specification(file):
         ("J/(kg K)", "J kg-1 K-1"),
     ],
 )
-def test_units_are_written_as_the_units_module_says(text, expected):
+def test_units_are_written_by_the_rules_of_the_units_module(text, expected):
     assert h5md.unit_string(text) == expected
 
 
@@ -224,7 +224,7 @@ def test_open_space_has_no_edges(tmp_path):
         assert (box.attrs["boundary"].tolist(), list(box)) == ([b"none"] * 3, [])
 
 
-def test_the_box_says_along_which_axes_it_is_periodic():
+def test_the_box_lists_its_periodic_axes():
     slab = Box(low=(0, 0, 0), high=(1, 2, 3), periodic=(True, False, True))
     with h5py.File("slab.h5", "w", driver="core", backing_store=False) as made:
         h5md.write_box(made, slab)
@@ -232,7 +232,7 @@ def test_the_box_says_along_which_axes_it_is_periodic():
         assert made["box/edges"][...].tolist() == [1.0, 2.0, 3.0]
 
 
-def test_it_goes_on_from_a_checkpoint(tmp_path):
+def test_a_trajectory_resumes_from_a_checkpoint(tmp_path):
     """Frames after the checkpoint are written again; none is missing or duplicated."""
     sim = simulation()
     recording = Recording(tmp_path / "t.h5", frames=15)
@@ -261,7 +261,7 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
 
 
 @pytest.mark.parametrize("worlds", [1, 2])
-def test_it_does_not_go_on_with_the_frames_of_another_scene(tmp_path, worlds):
+def test_a_trajectory_of_another_scene_is_not_resumed(tmp_path, worlds):
     """The other scene has other velocities of the same number of particles, or several worlds."""
     path, mine, other = tmp_path / "t.h5", *(scene([(0, 0, 0)], [(v, 0, 0)]) for v in (1.0, 2.0))
     Trajectory(path, [mine, other][-worlds:]).close()

@@ -128,7 +128,7 @@ def integrated(acceleration, apart, distance):
     return end.t[-1], -end.y[1, -1]
 
 
-def test_closed_forms_are_those_of_the_equations_of_motion():
+def test_closed_forms_solve_the_equations_of_motion():
     mass, charge, magnet, apart, distance = 2e-5, 3e-8, 5e-3, 5e-3, 2e-3
     coulomb = charge**2 / (4 * np.pi * epsilon_0) / (mass / 2)
     time, _ = integrated(lambda d: -coulomb / d**2, apart, distance)
@@ -141,7 +141,7 @@ def test_closed_forms_are_those_of_the_equations_of_motion():
 
 
 @pytest.mark.long
-def test_two_charges_meet_when_the_closed_form_says_and_are_one_without_charge():
+def test_two_charges_meet_at_the_time_of_the_closed_form_and_merge_to_zero_charge():
     time = field_checks.fall_time(
         field_checks.MASS, field_checks.CHARGE, field_checks.START_DISTANCE, 2 * field_checks.RADIUS
     )
@@ -240,7 +240,7 @@ def test_the_rate_follows_from_two_touching_grains(felt):
     assert fields.rate({**design, **fields.NO_FIELDS}, radius) == 0.0
 
 
-def test_steps_of_small_grains_in_strong_fields_may_be_shorter_than_those_of_the_paper():
+def test_steps_of_small_grains_in_strong_fields_may_be_shorter_than_in_the_paper():
     strong = {**BEST, **FELT["opposite charges"], "magnetic_field": 1.0, "density": 1e3, "length_ratio": 0.4}
     control = scene({**fields.NO_FIELDS, **strong}, 1, 1000).stepper.control
     assert control.shortest == control.longest < 1e-6

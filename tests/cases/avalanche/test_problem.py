@@ -81,7 +81,7 @@ def test_a_profile_is_met_by_the_same_slope_of_any_size():
     assert off(flatter, place, height) == pytest.approx(float(((gap / 0.1) ** 2).mean()), rel=0.02)
 
 
-def test_a_profile_tells_slopes_apart():
+def test_a_profile_distinguishes_slopes():
     """The misfit to its own profile is zero, and to a steeper slope it is large."""
     place, height = profile(leaning(16, 2))
     target = MeasuredProfile(place, height, np.full(len(place), 1e-3))

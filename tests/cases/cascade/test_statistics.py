@@ -67,7 +67,7 @@ def test_every_stage_has_a_start_of_its_own_and_random_ones_an_orientation(stage
     assert len(set(axes)) == 7
 
 
-def test_random_orientations_have_the_law_they_name():
+def test_random_orientations_have_the_named_distribution():
     draw = np.random.default_rng(3)
     cosines = [np.cos(np.radians(Cascade().angle(draw))) for _ in range(4000)]
     angles = [Cascade(orientation="angles").angle(draw) for _ in range(4000)]

@@ -53,7 +53,7 @@ def test_claims_about_runs():
 
 
 @pytest.mark.parametrize(("weak", "strong"), [(2, 0), (0, 0), (0, 2)])
-def test_magnetised_grains_that_do_not_agglomerate_more_are_against_it(weak, strong):
+def test_a_claim_fails_if_magnetised_grains_do_not_agglomerate_more(weak, strong):
     """Some of the 40 grains are lost, either without or with magnetisation."""
     runs = [made(m, 18, seed, lost=strong if m > 1000 else weak) for m in MAGNETISATIONS for seed in (0, 1)]
     claims = {claim.name: claim for claim in (*of_agglomeration(runs), *of_structure(runs))}

@@ -48,7 +48,7 @@ def test_mu_of_glass_beads():
     assert expected_ratio(0.279) == pytest.approx(0.51)
 
 
-def test_inertial_number_goes_by_the_middle_of_the_gap():
+def test_inertial_number_is_of_the_middle_of_the_gap():
     assert bed().shear_rate == pytest.approx(8.0)
     assert bed().inertial_number == pytest.approx(8.0 * DIAMETER * np.sqrt(DENSITY / 300.0))
     assert bed().ratio == pytest.approx(0.4)

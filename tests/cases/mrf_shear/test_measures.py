@@ -68,7 +68,7 @@ def test_the_shear_rate_between_the_rafts():
     np.testing.assert_allclose(np.array(published.SHEAR_RATES)[[1, 5, 7]], [590, 36.4, 9], rtol=0.02)
 
 
-def test_a_chain_along_the_field_across_a_face_and_one_that_lies():
+def test_a_chain_along_the_field_and_one_across_it():
     """Five grains are in line along the field, and three along x across a face of the cell."""
     upright = np.column_stack([np.full(5, 0.02e-6), np.full(5, 5e-6), 2 * R * np.arange(5) + R])
     lying = np.array([[39 * UM, 20 * UM, 9 * UM]] * 3) + np.outer(np.arange(3), [2 * R, 0, 0])
@@ -90,7 +90,7 @@ def test_overlap_and_volume_fraction():
     assert volume_fraction(result) == pytest.approx(3 * 4 / 3 * np.pi * R**3 / (72000 * UM**3))
 
 
-def test_the_regime():
+def test_the_dimensionless_numbers():
     """Drag is far below the magnetic forces, and oil stops a grain within microseconds."""
     assert mason_number(1000.0, 0.6) == pytest.approx(8 * 0.01 * 1000 * mu_0 / 0.36)
     assert stokes_time() == pytest.approx(2e-6, rel=0.05)

@@ -62,7 +62,7 @@ def test_the_fine_mixture_of_l21():
     assert duct_of(made).length < duct_of(every()["valve"].scene("l21_30", 0)).length
 
 
-def test_constrictions_are_named_by_how_many_grains_they_are_wide():
+def test_constrictions_are_named_by_their_width_in_grains():
     for width, throat in published.CONSTRICTIONS.items():
         assert throat / published.LARGEST == pytest.approx(width)
 
