@@ -183,7 +183,7 @@ def test_a_cut_off_is_tried_against_the_law_without_one():
     assert arguments[2:] == ["--set", f"effects.truncated_near_field={table}"]
     changed = scene.without("near_field")
     assert changed.replace({"effects.truncated_near_field": cuts[0].model_dump()}).effects == (cuts[0],)
-    # A truncated law that the scene itself has is not an approximation of it.
+    # If the scene itself has the truncated law, it is not offered as an approximation.
     assert "TruncatedNearField" not in methods_of(scene.model_copy(update={"effects": (cuts[0],)}))
 
 
@@ -196,7 +196,7 @@ def test_a_tree_is_tried_in_place_of_all_pairs_if_the_domain_allows_it():
     assert "TreeGravity" not in methods_of(scene.model_copy(update={"domain": box}))
     tree = scene.model_copy(update={"effects": (TreeGravity(opening_angle=0.2),)})
     turned = methods_of(tree)["tree_gravity: opening_angle"]
-    # The angles are for errors ten times larger in each step; angles of 1 and more are left out.
+    # The angles are for errors larger by factors of ten; angles of 1 and more are left out.
     assert [s.scene.effects[0].opening_angle for s in turned.settings] == [0.928, 0.431, 0.2]
 
 
@@ -421,7 +421,7 @@ def test_work_decides_between_methods_of_indistinguishable_timings():
         assert decades(rows)[1e-5] == rows
     apart = [row("a", (0.020, 0.021, 0.022), 1e-5, sums=20.0), spread[1]]
     assert [r.method for r in tied(apart, 1e-4)] == ["b"]
-    # A setting that is slower and less accurate is not recommended, whatever its work.
+    # A setting that is slower and less accurate is not recommended even if its work is less.
     beaten = [row("a", (1.05e-3, 1.05e-3), 9.7e-7, sums=20.0), row("b", (6.6e-4, 6.6e-4), 4e-10, sums=90.0)]
     assert [r.method for r in tied(beaten, 1e-4)] == ["b", "a"]
     # The number of starts counts as work.

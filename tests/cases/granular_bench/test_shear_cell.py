@@ -55,7 +55,7 @@ def test_inertial_number_is_of_the_middle_of_the_gap():
 
 
 def test_stresses_are_means_over_both_walls_and_over_time():
-    """Of two samples of three grains, with walls pushed apart and dragged in opposite directions."""
+    """The means are over two samples; the walls are pushed apart and dragged in opposite directions."""
     gap = 10 * DIAMETER
     state = {
         "group": np.array([0, 0, 1]), "radius": np.full(3, DIAMETER / 2),

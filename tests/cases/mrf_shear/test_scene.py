@@ -105,7 +105,7 @@ def test_cells_of_l21_have_its_numbers_of_grains(size):
 
 
 def test_a_cell_of_many_sizes_is_wider_than_the_range_of_its_grains():
-    """It is twice as wide as the range of the two largest grains, and its step suits the smallest."""
+    """It is wider than twice the range of the two largest grains, and its step suits the smallest."""
     made = every()["mrf_shear"].scene("polydisperse", 0)
     radius = made.particles.arrays(made.domain, 0)["radius"]
     assert made.domain.high[0] > 2 * (24.44e-6 + published.NEIGHBOUR_GAP)

@@ -38,7 +38,7 @@ def test_centre_of_gravity_follows_the_closed_form(near_field):
 
 @pytest.mark.long
 def test_error_falls_and_work_rises_with_the_requested_accuracy():
-    """With the printed near field, before chaos, paths are compared with a tolerance tighter by 100."""
+    """The printed near field, before chaos: the reference has a tolerance 100 times tighter."""
     tolerances = (1e-4, 1e-5, 1e-6, 1e-8)
     results = simulate(
         [scene(0.8, "printed", duration=0.001, sites=3, error=e) for e in tolerances], worlds=8, capacity=27
