@@ -14,7 +14,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 @pytest.fixture(scope="module", autouse=True)
 def path():
-    """The modules of docs, which are no package."""
+    """Add docs, which is not a package, to the import path."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(DOCS))
         yield
@@ -25,7 +25,7 @@ def load(name):
 
 
 def tex(element):
-    """MathML in the notation of TeX, with Greek letters as they are."""
+    """MathML converted to the notation of TeX; Greek letters stay Unicode."""
     parts = [tex(child) for child in element]
     layouts = {
         "mfrac": r"\frac{%s}{%s}", "msqrt": r"\sqrt{%s}", "msub": "%s_{%s}", "msup": "%s^{%s}",
@@ -114,12 +114,12 @@ def test_the_text_of_an_equation_can_be_read_aloud_and_searched():
 
 
 def test_no_equation_of_the_reference_stays_plain():
-    """What is listed is code."""
+    """The only block that is not converted is code."""
     plain = load("equation_blocks").unset(load("reference_pages").docstrings())
     assert [line.partition(":")[0] for line in plain] == ["tisim.analysis.Mean"]
 
 
-def test_of_the_guides_equations_are_set_and_nothing_else():
+def test_only_equations_of_the_guides_are_typeset():
     blocks = load("equation_blocks")
     found = []
     for page in sorted(DOCS.rglob("*.md")):

@@ -1,4 +1,4 @@
-"""Whatever a run has written is read back by one function, which knows it by what is in it."""
+"""``tisim.read`` reads back all files of runs and studies, and detects their type by their content."""
 
 import dataclasses
 import math
@@ -30,7 +30,7 @@ CAPACITY = max(world_scene.capacity() for world_scene in FLOWS)
 
 @pytest.fixture(scope="module")
 def completed_run(tmp_path_factory):
-    """Two flows: a trajectory of both, one of the first, a checkpoint on the way, and results."""
+    """Two flows: a trajectory of both, a trajectory of the first, a checkpoint half-way, and results."""
     folder = tmp_path_factory.mktemp("ran")
     simulation = compiled(FLOWS[0], 2, CAPACITY)
     simulation.load(FLOWS)
@@ -48,7 +48,7 @@ def completed_run(tmp_path_factory):
 
 
 def identical(actual, expected):
-    """All of a Result, arrays bit by bit and with their types."""
+    """Assert that two Results are equal in all fields, with arrays equal in each bit and in type."""
     for field in dataclasses.fields(Result):
         one, other = getattr(actual, field.name), getattr(expected, field.name)
         if field.name not in ("state", "start"):
@@ -70,7 +70,7 @@ def test_a_result_is_the_same_to_the_bit(completed_run, tmp_path, world):
     assert tisim.read(tmp_path / "versions.json") == {**run_folder.versions(), **result.settings}
 
 
-def test_so_are_one_that_failed_and_one_of_odd_numbers(completed_run, tmp_path):
+def test_a_failed_result_and_one_of_odd_numbers_are_the_same_to_the_bit(completed_run, tmp_path):
     odd = np.array([[np.nan, -0.0, 5e-324]])
     result = dataclasses.replace(
         completed_run.results[0], state={"position": odd}, start={},
@@ -83,7 +83,7 @@ def test_so_are_one_that_failed_and_one_of_odd_numbers(completed_run, tmp_path):
 
 
 def test_all_quantities_have_units(tmp_path):
-    """Also forces and torques, and what a start has that no effect needs."""
+    """This includes forces, torques and quantities of a start that no effect needs."""
     pair = scene([(0, 0, 0), (1, 0, 0)], [(0, 0, 0)] * 2, CONTACT)
     units = {"force": "N", "torque": "N m", "spin": "rad/s", "velocity": "m/s", "temperature": "K"}
     arrays = {name: np.zeros((2, 3)) for name in units}
@@ -107,7 +107,7 @@ def test_frames_of_a_trajectory(completed_run):
     with trajectory:
         assert [frame.time for frame in trajectory] == times
         assert trajectory[2].time == times[2]
-    assert trajectory[2].time == times[2]  # after the with, too
+    assert trajectory[2].time == times[2]  # also after the with block
     with pytest.raises(IndexError):
         _ = trajectory[6]
 
@@ -122,8 +122,8 @@ def test_worlds_of_a_trajectory(completed_run):
         len(trajectory)
 
 
-def test_a_frame_is_read_when_it_is_asked_for(completed_run, monkeypatch):
-    """Of a thousand frames one costs as much as of one."""
+def test_a_frame_is_read_on_access(completed_run, monkeypatch):
+    """The cost of a frame does not depend on the number of frames."""
     rows = []
     row = Frames._read_row
     monkeypatch.setattr(
@@ -184,7 +184,7 @@ def test_rows_of_a_study(tmp_path):
         (".", None, r"folder must be one with a whole run or study \(the files of an interrupted run are"),
     ],
 )
-def test_what_cannot_be_read(tmp_path, name, content, message):
+def test_unreadable_files_are_refused(tmp_path, name, content, message):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message):

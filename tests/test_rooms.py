@@ -45,7 +45,7 @@ SEQUELS = {"tisim.cases.cascade": "tisim.cases.capture", "tisim.cases.spin_up": 
 
 
 def test_a_case_imports_only_the_case_that_it_continues():
-    """What several cases need is in ``cases/common``."""
+    """Code that several cases need is in ``cases/common``."""
     imports = {
         (home, other)
         for module in EARLY

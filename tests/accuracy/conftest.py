@@ -1,4 +1,4 @@
-"""Studies of one scene and another share what they compile."""
+"""Studies of several scenes share their compiled simulations."""
 
 import os
 
@@ -25,5 +25,5 @@ def shared():
 
 @pytest.fixture
 def own(monkeypatch):
-    """A cache keeps the simulations that it has made, as it does outside of tests."""
+    """Restore the cache that keeps its own simulations, as outside of tests."""
     monkeypatch.setattr(SimulationCache, "compiled", READY)

@@ -1,4 +1,4 @@
-"""Scenes of one particle that cost little, with their closed forms."""
+"""Cheap scenes with closed forms: an oscillator and freely flying grains."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from tisim.effects import Tether
 from tisim.steppers import FixedStep, Stepper, Verlet
 
 RATE, SPEED, DURATION, STEP = 3.0, 1.0, 2.0, 0.001
-"""sqrt(k/m) (1/s), speed at the start (m/s), s, s."""
+"""sqrt(k/m) (1/s), initial speed (m/s), duration (s) and time step (s) of the oscillator."""
 
 
 def oscillator(dt=STEP):
-    """A tethered particle of 2 kg that is given a push."""
+    """A tethered particle of 2 kg with an initial velocity."""
     tether = Tether(stiffness=(2.0 * RATE**2,) * 3)
     more = {"mass": 2.0, "stepper": Verlet(control=FixedStep(dt=dt)), "duration": DURATION}
     return scene([[0.0, 0.0, 0.0]], [[SPEED, 0.0, 0.0]], (tether,), **more)
 
 
 def place(result):
-    """Of the oscillator, in closed form, m."""
+    """The displacement of the oscillator in closed form, m."""
     return np.array([[SPEED / RATE * np.sin(RATE * result.time), 0.0, 0.0]])
 
 
 KNOWN, UNKNOWN = Quantity("known", displacement, place), Quantity("unknown", displacement)
-"""The same, against the closed form and against a reference."""
+"""The displacement, compared with the closed form and with a reference run."""
 
 GRAINS, GRAIN, MEAN, DEVIATION = 5, 0.25, 2.0, 3.0
-"""Number, mass (kg), mean velocity and deviation along x (m/s) of a drifting cloud."""
+"""Number of grains, mass (kg), mean velocity and its standard deviation along x (m/s) of a drifting cloud."""
 
 
 def drift(seed=0):
@@ -51,7 +51,7 @@ def drift(seed=0):
 
 
 def energy(result=None):
-    """Mean kinetic energy of the drifting cloud over all starts, J: <v^2> = mean^2 + deviation^2 / 3."""
+    """Expected kinetic energy of the drifting cloud, J: <v^2> = mean^2 + deviation^2 / 3."""
     return 0.5 * GRAINS * GRAIN * (MEAN**2 + DEVIATION**2 / 3)
 
 
@@ -59,7 +59,7 @@ ENERGY = Quantity("kinetic energy", kinetic_energy, energy, random=True)
 
 
 def only(patch, *kinds):
-    """From now on, only steppers of these kinds are tried in place of a scene's own: each is compiled."""
+    """Restrict the alternatives of a scene's own stepper to these kinds, as each of them is compiled."""
     load(steppers)
     for kind in Stepper.known().values():
         if kind not in kinds:

@@ -1,4 +1,4 @@
-"""What each case compares in a study."""
+"""The quantities that the cases compare in a study."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from tisim.sources import ElectricField
 
 
 @pytest.mark.parametrize("name", sorted(name for name, case in every().items() if case.quantities))
-def test_every_size_of_every_case_says_what_is_compared(name):
+def test_every_size_of_every_case_names_its_quantities(name):
     case = every()[name]
     for size in case.sizes:
         quantities = case.quantities(case.scene(size, 0))
@@ -33,7 +33,7 @@ def test_paths_that_are_chaotic_are_not_compared():
 
 @pytest.mark.long
 def test_the_array_follows_its_closed_form():
-    """Of a single particle, and of the array's centre whatever the near field."""
+    """Both quantities, the positions and the centre of the array, agree with their closed forms."""
     scene = vibration.scene(near_field="none", sites=2, duration=0.004)
     positions, centre = every()["vibration"].quantities(scene)
     (result,) = simulate([scene], capacity=8)
@@ -46,7 +46,7 @@ def test_the_array_follows_its_closed_form():
     assert np.linalg.norm(truth.estimate.value) > 1e-5
 
 
-def test_a_closed_form_is_claimed_only_where_it_holds():
+def test_a_closed_form_is_used_only_if_it_holds():
     def closed_forms(scene):
         return [q.exact is not None for q in every()["vibration"].quantities(scene)]
 

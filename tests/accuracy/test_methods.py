@@ -1,4 +1,4 @@
-"""How a study finds what to turn: from what the parts of a scene say of themselves."""
+"""A study finds the methods and settings to compare from the declarations of the parts of a scene."""
 
 import io
 from dataclasses import replace
@@ -60,14 +60,14 @@ LEVELS = (2.0, 1.0, 0.0)
 
 
 class Pace(FixedStep):
-    """A step control with a setting of its own."""
+    """A step control with an accuracy parameter of its own."""
 
     error: float = parameter("", "error", 1e-4, gt=0)
     accuracy_parameters = (AccuracyParameter(error=1),)
 
 
 class Sharp(Stepper):
-    """A stepper of high order that nobody has told the study of."""
+    """A stepper of high order that the study does not know by name."""
 
     control: Pace
     is_alternative: ClassVar[bool] = False
@@ -82,7 +82,7 @@ class Sharp(Stepper):
 
 
 class Patchy(Trap):
-    """A force that is as good as its setting."""
+    """A force whose accuracy depends on its parameter ``grain``."""
 
     grain: float = parameter("m", "grain", 1e-3, gt=0)
     accuracy_parameters = (AccuracyParameter(grain=2),)
@@ -92,20 +92,20 @@ def methods_of(scene, numbers=(("f64", "strict"),)):
     return {m.name: m for m in methods(scene, 0.1, 1.0, LEVELS, numbers, 1)}
 
 
-def test_a_new_stepper_and_its_control_say_themselves_what_to_turn(monkeypatch):
+def test_a_new_stepper_and_its_control_declare_their_accuracy_parameters(monkeypatch):
     monkeypatch.setattr(Sharp, "is_alternative", True)
     line = methods_of(oscillator())["Sharp, Pace: error"]
     assert [s.scene.stepper.control.error for s in line.settings] == [1e-4, 1e-5, 1e-6]
     assert [s.scene.stepper.control.dt for s in line.settings] == [0.1] * 3
     assert [s.description for s in line.settings] == ["error=0.0001", "error=1e-05", "error=1e-06"]
-    # It is the reference then, being of the highest order, and the scene's own is its check.
+    # It has the highest order, so it is the reference, and the scene's own stepper checks it.
     references = reference_runs(list(methods_of(oscillator()).values()), 0.0)
     assert [attempt.name for attempt in references] == ["Sharp, Pace"] * 2 + ["Verlet, FixedStep"] * 2
     assert [attempt.scene.stepper.control.error for attempt in references[:2]] == [1e-8, 1e-7]
     assert references[2].scene.stepper.control.dt == pytest.approx(oscillator().stepper.control.dt / 10)
 
 
-def test_a_new_effect_says_so_too_and_is_as_fine_as_can_be_in_the_reference():
+def test_a_new_effect_declares_its_accuracy_parameters_and_is_finest_in_the_reference():
     scene = oscillator().model_copy(update={"effects": (Patchy(stiffness=1.0),)})
     line = methods_of(scene)["patchy: grain"]
     assert [s.scene.effects[0].grain for s in line.settings] == [1e-2, 3.16e-3, 1e-3]
@@ -117,7 +117,7 @@ def test_a_new_effect_says_so_too_and_is_as_fine_as_can_be_in_the_reference():
     assert reference.scene.stepper == reference.method.at(-2).stepper
 
 
-def test_the_scenes_own_method_is_first_and_in_other_numbers_too():
+def test_the_scenes_own_method_is_first_and_is_tried_in_other_precisions():
     tried = methods_of(oscillator(), (("f64", "strict"), ("f32", "strict"), ("f64", "fast")))
     first, *others = list(tried)[:3]
     assert first == "Verlet, FixedStep: dt"
@@ -127,8 +127,8 @@ def test_the_scenes_own_method_is_first_and_in_other_numbers_too():
     assert options(oscillator(), fast.scene, *fast.numbers)[-2:] == ["--arithmetic", "fast"]
 
 
-def test_only_what_suits_a_scene_is_tried():
-    """No magnetic field: no Boris. A force of velocity: no Verlet. No force: nothing implicit."""
+def test_only_suitable_steppers_are_tried():
+    """Boris needs a magnetic field, Verlet velocity-independent forces, and implicit steppers a force."""
 
     def tried(scene):
         return {type(method.base.stepper).__name__ for method in methods_of(scene).values()}
@@ -145,8 +145,8 @@ def test_only_what_suits_a_scene_is_tried():
     assert not tried(drift()) & {"Boris", *implicit}
 
 
-def test_settings_of_what_is_tried_are_rounded():
-    """They are pasted: 1e3 times 0.0556 is 55.599999999999994."""
+def test_settings_of_alternative_steppers_are_rounded():
+    """Users paste them, and 1e3 times 0.0556 is 55.599999999999994."""
     for dt in (0.0556, 7.3e-11, 4.29e-13, 123.0):
         for effects in (oscillator().effects, charged(accurate(1e-3), 1.0).effects):
             for stepper in rivals(Verlet(control=FixedStep(dt=dt)), effects, dt):
@@ -155,8 +155,8 @@ def test_settings_of_what_is_tried_are_rounded():
                 assert list(values) == rounded, expression(stepper)
 
 
-def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_what_it_chooses():
-    """Temperature and viscosity are not of its choice."""
+def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_its_choices():
+    """Its name leaves out temperature and viscosity, which are no choice of method."""
     fluid = Brownian(
         temperature=298.0, viscosity=1e3, control=DriftLimit(longest=1e-3), hydrodynamics="rotne-prager",
         noise="fast",
@@ -170,7 +170,7 @@ def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_what_it_choo
     assert f"{exact}, DriftLimit: longest, drift" in names
 
 
-def test_a_cut_off_is_tried_against_the_law_that_has_none():
+def test_a_cut_off_is_tried_against_the_law_without_one():
     law = NearField(alpha1=1.0, alpha2=2.0, beta2=3)
     scene = oscillator().model_copy(update={"effects": (law,)})
     cuts = [s.scene.effects[0] for s in methods_of(scene)["TruncatedNearField"].settings]
@@ -183,12 +183,12 @@ def test_a_cut_off_is_tried_against_the_law_that_has_none():
     assert arguments[2:] == ["--set", f"effects.truncated_near_field={table}"]
     changed = scene.without("near_field")
     assert changed.replace({"effects.truncated_near_field": cuts[0].model_dump()}).effects == (cuts[0],)
-    # One that a scene asks for is its law.
+    # If the scene itself has the truncated law, it is not offered as an approximation.
     assert "TruncatedNearField" not in methods_of(scene.model_copy(update={"effects": (cuts[0],)}))
 
 
-def test_a_tree_is_tried_in_place_of_all_pairs_where_it_can_stand():
-    """Its opening angle is turned where a scene has it; in a periodic box it would be refused."""
+def test_a_tree_is_tried_in_place_of_all_pairs_if_the_domain_allows_it():
+    """The opening angle of a tree is varied; no tree is tried in a box, which would refuse it."""
     scene = oscillator().model_copy(update={"effects": (SelfGravity(),)})
     angles = [s.scene.effects[0].opening_angle for s in methods_of(scene)["TreeGravity"].settings]
     assert angles == [0.8, 0.5, 0.3]
@@ -196,11 +196,11 @@ def test_a_tree_is_tried_in_place_of_all_pairs_where_it_can_stand():
     assert "TreeGravity" not in methods_of(scene.model_copy(update={"domain": box}))
     tree = scene.model_copy(update={"effects": (TreeGravity(opening_angle=0.2),)})
     turned = methods_of(tree)["tree_gravity: opening_angle"]
-    # For errors that are ten times larger; those of 1 and more are none.
+    # The angles are for errors larger by factors of ten; angles of 1 and more are left out.
     assert [s.scene.effects[0].opening_angle for s in turned.settings] == [0.928, 0.431, 0.2]
 
 
-def test_what_is_mutual_is_tried_without_the_others_and_with_one_sweep_a_step():
+def test_mutual_induction_is_tried_against_moments_of_single_particles_and_one_sweep_a_step():
     law = MutualInducedMoment(susceptibility=2.0)
     scene = oscillator().model_copy(update={"effects": (MagneticField(), law)})
     alone, once = methods_of(scene)["InducedMoment"].settings
@@ -211,8 +211,8 @@ def test_what_is_mutual_is_tried_without_the_others_and_with_one_sweep_a_step():
     assert arguments[2:] == ["--set", "effects.induced_moment={susceptibility = 2.0}"]
 
 
-def test_moments_are_cut_off_with_the_forces_and_are_swept_to_a_tolerance_where_they_are_not():
-    """Else a scene with the law in question would be refused."""
+def test_moments_are_cut_off_with_the_forces_and_otherwise_swept_to_a_tolerance():
+    """Otherwise a scene with the exchanged law would be refused."""
     every = (MagneticField(), MutualInducedMoment(susceptibility=2.0), DipoleDipole())
     cut = {"cutoff": 2.0, "gap": 4.0}
     near = (
@@ -235,7 +235,7 @@ def test_moments_are_cut_off_with_the_forces_and_are_swept_to_a_tolerance_where_
     assert "mutual_induced_moment: largest_change" in known
 
 
-def test_the_accuracy_of_an_ewald_sum_is_turned_for_forces_and_moments_as_far_as_there_are_waves():
+def test_the_accuracy_of_an_ewald_sum_is_varied_for_forces_and_moments_together():
     box = Box(low=(-4, -4, -4), high=(4, 4, 4))
     settings = ewald_settings(box, 100, 1e-3)
     effects = (
@@ -254,7 +254,7 @@ def test_the_accuracy_of_an_ewald_sum_is_turned_for_forces_and_moments_as_far_as
 
 
 def grains(**properties):
-    """A grain above a floor, of Hertz and Mindlin's law with all that it may have."""
+    """A grain above a floor, with Hertz and Mindlin's law, damping and rolling resistance."""
     law = Granular(
         normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
     )
@@ -266,11 +266,11 @@ def grains(**properties):
     )  # fmt: skip
 
 
-def test_grains_are_softened_and_steps_are_longer_by_as_much_as_impacts_are():
+def test_grains_are_softened_and_steps_grow_with_the_duration_of_impacts():
     line = methods_of(grains(stiffness=1e6))["softer, in longer steps: young"]
     materials = [setting.scene.materials["glass"] for setting in line.settings]
     assert [material.young for material in materials] == [5e7, 5e8, 5e9]
-    # Of Hooke's stiffness, which the law does not go by, nothing is taken.
+    # Hooke's stiffness, which the law does not use, stays as it is.
     assert {material.stiffness for material in materials} == {1e6}
     steps = [setting.scene.stepper.control.dt for setting in line.settings]
     assert steps == pytest.approx([1e-6 * factor**0.4 for factor in (1e3, 1e2, 10)], rel=5e-3)
@@ -284,8 +284,8 @@ def test_grains_are_softened_and_steps_are_longer_by_as_much_as_impacts_are():
     assert not any(name.startswith("softer") for name in methods_of(oscillator()))
 
 
-def test_grains_are_tried_with_laws_that_their_materials_have_all_for():
-    """Hooke's needs a stiffness. No implicit stepper is tried: contacts begin, slip and end."""
+def test_grains_are_tried_with_laws_whose_parameters_their_materials_have():
+    """Hooke's law needs a stiffness. No implicit stepper is tried, as contacts begin, slip and end."""
     plain = methods_of(grains())
     assert {method.base.stepper.kind() for method in plain.values()} == {"verlet"}
     tried = [setting.description for setting in plain["Granular"].settings]
@@ -298,12 +298,12 @@ def test_grains_are_tried_with_laws_that_their_materials_have_all_for():
         arguments = options(grains(), setting.scene)
         changed = grains(stiffness=1e6).replace(assignments(arguments[1::2]))
         assert changed.effects == setting.scene.effects
-    # What is left out is said by the whole law, as a file has no word for nothing.
+    # A part is left out by giving the whole law, as a file cannot express None.
     assert "rolling" not in options(grains(stiffness=1e6), rich[0].scene)[1]
 
 
-def test_constants_of_other_parts_stay_as_they_are_where_materials_are_softer():
-    """As people do it. But where a stiffness is given of a pair of materials nothing would be softer."""
+def test_softer_materials_keep_the_constants_of_other_parts():
+    """This is common practice. If a pair of materials has a stiffness of its own, nothing is softened."""
     own = {"damping": 1.0, "viscous_time": 1e-6, "rolling_stiffness": 1e6, "rolling_damping": 1.0,
            "twisting_friction": 0.1, "twisting_stiffness": 1e6, "twisting_damping": 1.0,
            "cohesion_energy_density": 1e3, "stiffness": 1e6}  # fmt: skip
@@ -329,7 +329,7 @@ def test_constants_of_other_parts_stay_as_they_are_where_materials_are_softer():
         assert softening(linear.model_copy(update={"material_pairs": pairs})) == powers
 
 
-def test_hookes_spring_does_not_stand_for_what_pulls_by_the_overlap():
+def test_hookes_spring_does_not_replace_laws_whose_attraction_depends_on_the_overlap():
     for law, offered in (
         (Granular(), True),
         (Granular(normal=JKR()), False),
@@ -349,7 +349,7 @@ def test_a_part_is_exchanged_in_its_place():
     assert expression(changed.stepper) == f"Verlet(control=FixedStep(dt={scene.stepper.control.dt}))"
 
 
-def test_an_accuracy_parameter_is_turned_by_decades_of_error():
+def test_an_accuracy_parameter_is_varied_by_decades_of_error():
     both = AccuracyParameter(dt=2, error=1)
     turned = both.turned(Pace(dt=1.0, error=1e-3), 1)
     assert (turned.dt, turned.error) == (3.16, 1e-2)
@@ -388,7 +388,7 @@ def test_a_reference_that_another_stepper_contradicts_is_not_believed(monkeypatc
         return truth_by_reference(number, [[value] for value in values], references[: len(values)]).error
 
     assert own(1.0, 1.01) == pytest.approx(0.01)
-    # The other one is as far off as its own two settings are apart.
+    # The check differs from the reference by no more than its own two settings differ.
     assert own(1.0, 1.01, 1.2, 1.4) == pytest.approx(0.01)
     assert own(1.0, 1.01, 1.2, 1.21) == pytest.approx(0.2)
 
@@ -398,7 +398,7 @@ def row(name, seconds, error, off=0.0, sums=1.0):
     return Row(name, "", "", "", "f64", 1, seconds=seconds, sums=sums, errors=((error, off),))
 
 
-def test_what_an_error_may_be_off_by_counts_in_the_choice():
+def test_the_uncertainty_of_an_error_counts_in_the_choice():
     rows = [row("sure", 2.0, 5e-4, 1e-5), row("unsure", 1.0, 9e-4, 5e-4), row("slow", 3.0, 1e-6, 0.0)]
     assert [r.method for r in tied(rows, 1e-3)] == ["sure"]
     assert [r.method for r in tied(rows, 2e-3)] == ["unsure"]
@@ -408,8 +408,8 @@ def test_what_an_error_may_be_off_by_counts_in_the_choice():
     assert [r.trusted() for r in rows] == [True, False, True]
 
 
-def test_what_timings_do_not_tell_apart_is_decided_by_work():
-    """2 ms of noise, the clock, and a timing taken once are no reason to prefer one."""
+def test_work_decides_between_methods_of_indistinguishable_timings():
+    """Noise of 2 ms, the resolution of the clock and a single timing do not decide between methods."""
     spread = [
         row("a", (0.010, 0.012, 0.013), 1e-5, sums=20.0),
         row("b", (0.009, 0.01, 0.012), 1e-5, sums=90.0),
@@ -421,10 +421,10 @@ def test_what_timings_do_not_tell_apart_is_decided_by_work():
         assert decades(rows)[1e-5] == rows
     apart = [row("a", (0.020, 0.021, 0.022), 1e-5, sums=20.0), spread[1]]
     assert [r.method for r in tied(apart, 1e-4)] == ["b"]
-    # What the table shows to be slower and less accurate is not recommended, whatever its work.
+    # A setting that is slower and less accurate is not recommended even if its work is less.
     beaten = [row("a", (1.05e-3, 1.05e-3), 9.7e-7, sums=20.0), row("b", (6.6e-4, 6.6e-4), 4e-10, sums=90.0)]
     assert [r.method for r in tied(beaten, 1e-4)] == ["b", "a"]
-    # Starts are work too.
+    # The number of starts counts as work.
     more = replace(spread[0], starts=8)
     assert [r.method for r in tied([more, spread[1]], 1e-4)] == ["b", "a"]
 
@@ -441,7 +441,7 @@ def test_a_law_that_changes_nothing_is_not_chosen():
 
 
 def pictured(*rows):
-    """Labels of the legend, and the limits of the errors, of a study that has found this."""
+    """Labels of the legend, and limits of the error axis, of a study with these rows."""
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = list(rows)
     figure = plot(cost_study)
@@ -449,7 +449,7 @@ def pictured(*rows):
     return [" ".join(text.get_text().split()) for text in legend.get_texts()], figure.axes[0].get_ylim()
 
 
-def test_what_has_failed_is_in_the_legend():
+def test_failed_settings_are_in_the_legend():
     failed = Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")
     labels, _ = pictured(
         row("good", 1.0, 1e-3), failed, row("at times", 1.0, 1e-2), replace(failed, method="at times")
@@ -503,7 +503,7 @@ def test_a_picture_of_large_errors_is_not_blank():
     assert low < 1e5 < high
 
 
-def test_nothing_found_is_reported_in_words():
+def test_an_accuracy_that_no_setting_reaches_is_refused():
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = [row("good", 1.0, 1e-3, 1e-4)]
     with pytest.raises(RunError) as error:
@@ -539,8 +539,8 @@ def test_the_table_fits_80_columns_and_cuts_no_number():
     assert "  error=1e-05: a quantity is not finite" in lines
 
 
-def test_a_reference_that_tells_nothing_apart_is_said_to():
-    """Its own error is of the size of the motion, as where paths are chaotic."""
+def test_a_useless_reference_is_reported():
+    """Its own error is as large as the motion, as in a chaotic system."""
     quantity = Quantity("positions", lambda result: result.state["position"])
     for error, said in ((1e-3, False), (1.3, True)):
         truth = SimpleNamespace(error=error, source="a finer run")
@@ -552,7 +552,7 @@ def test_a_reference_that_tells_nothing_apart_is_said_to():
 
 @pytest.mark.parametrize("error", [1e-4, 1e-9])
 def test_options_replace_a_stepper_that_tisim_has_chosen(error):
-    """It is not in the data of the scene, so that its settings cannot be set one by one."""
+    """It is not part of the data of the scene, so its settings cannot be given one by one."""
     chosen = oscillator().model_copy()
     automatic = type(chosen).from_dict({k: v for k, v in chosen.to_dict().items() if k != "stepper"})
     control = automatic.stepper.control.model_copy(update={"error": error})
@@ -564,7 +564,7 @@ def test_options_replace_a_stepper_that_tisim_has_chosen(error):
 
 
 def test_options_name_the_stepper_beside_an_exchanged_law():
-    """For the other law tisim might choose another stepper than the one that was measured."""
+    """Otherwise tisim might choose another stepper for the exchanged law than the measured one."""
     law = NearField(alpha1=1.0, alpha2=2.0, beta2=3)
     data = oscillator().model_copy(update={"effects": (law,)}).to_dict()
     automatic = Scene.from_dict({key: value for key, value in data.items() if key != "stepper"})

@@ -1,4 +1,4 @@
-"""What a study answers for a scene of one's own: closed paths, short runs, and laws that change nothing."""
+"""Studies of users' own scenes: closed paths, short runs, and laws that make no difference."""
 
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -21,7 +21,7 @@ PERIOD = 2 * np.pi / RATE
 FEW = {"precisions": ("f64",), "repeats": 1, "coarser": 2}
 RETURNING = Quantity("known", displacement, place, returns=True)
 MISSED = 1.1 * (1 - np.cos(np.pi / OBSERVATIONS))
-"""By how much observations may miss a turning point, of the size of the motion: half way between two."""
+"""Largest relative error in the size of the motion if a turning point is half-way between observations."""
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def verlet_only(monkeypatch):
 
 
 def closed():
-    """The oscillator, back where it has begun."""
+    """The oscillator for one period, after which it is back at its start."""
     return oscillator().model_copy(update={"duration": PERIOD})
 
 
@@ -40,11 +40,11 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
     (truth,) = cost_study.truths
     assert truth.size == pytest.approx(SPEED / RATE, rel=MISSED)
     assert np.linalg.norm(truth.estimate.value) < 1e-6 * truth.size
-    # Verlet's phase runs ahead by (w dt)^2 / 24 of itself.
+    # The relative phase error of Verlet is (w dt)^2 / 24.
     for row in cost_study.rows:
         dt = float(row.setting.removeprefix("dt="))
         assert row.errors[0][0] == pytest.approx(2 * np.pi * (RATE * dt) ** 2 / 24, rel=0.1)
-    # The clock decides which of the finer rows is cheapest, but the coarsest is not accurate enough.
+    # Timings decide which of the finer rows is cheapest; the coarsest is not accurate enough.
     assert cost_study.cheapest(1e-4).errors[0][0] <= 1e-4 < cost_study.rows[0].errors[0][0]
     assert (
         "displacement: relative to its largest value during the run" in table(cost_study).renderables[0].plain
@@ -59,10 +59,10 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
 @pytest.mark.parametrize(
     ("stepper", "periods"),
     [
-        # Particles alone are together at the end of the run, and nowhere before.
+        # Particles with individual steps are at one time only at the end of the run.
         (Trapezoid(control=ErrorControl(longest=10.0)), 1),
         (Verlet(control=FixedStep(dt=PERIOD / 8)), 1),
-        # Every other observation of 128 is at the start, and the others half a period later.
+        # Of 128 observations, every second one is at the start and the others half a period later.
         (Verlet(control=FixedStep(dt=PERIOD / 400)), 64),
         (Verlet(control=FixedStep(dt=PERIOD / 400)), 128),
     ],
@@ -72,7 +72,7 @@ def test_observations_see_the_size_of_a_motion(monkeypatch, stepper, periods):
     only(monkeypatch)
     scene = oscillator().model_copy(update={"stepper": stepper, "duration": periods * PERIOD})
     cost_study = study(scene, (RETURNING,), **{**FEW, "coarser": 0})
-    # Verlet's amplitude is off by (w dt)^2 / 8 of itself.
+    # The relative error of Verlet's amplitude is (w dt)^2 / 8.
     error = (RATE * PERIOD / OBSERVATIONS) ** 2 / 8
     assert cost_study.truths[0].size == pytest.approx(SPEED / RATE, rel=MISSED + error)
     assert len(cost_study.rows) == len([row for row in cost_study.rows if not row.failed]) > 0
@@ -94,8 +94,8 @@ def test_other_threads_wait_while_a_study_starts_taichi_anew(verlet_only):
         assert other.submit(free).result()
 
 
-def test_compiling_takes_nothing_of_the_budget(verlet_only, monkeypatch):
-    """Eleven days of it, of a budget of three hours."""
+def test_compilation_does_not_count_in_the_budget(verlet_only, monkeypatch):
+    """Compilation takes eleven days here, and the budget is three hours."""
     now, late, ready = time.monotonic, [0.0], SimulationCache.compiled
 
     def slowly(self, scene, worlds):
@@ -109,7 +109,7 @@ def test_compiling_takes_nothing_of_the_budget(verlet_only, monkeypatch):
     assert len(cost_study.rows) == 3
 
 
-def test_a_setting_over_the_limit_is_a_row_that_says_so(verlet_only, monkeypatch, tmp_path):
+def test_a_setting_over_the_limit_is_a_failed_row(verlet_only, monkeypatch, tmp_path):
     now, late = time.monotonic, [0.0]
 
     def slowly(self, scenes, progress, on_result=None, run=SimulationCache.run):
@@ -139,7 +139,7 @@ def test_a_setting_over_the_limit_is_a_row_that_says_so(verlet_only, monkeypatch
 
 
 def test_a_reference_that_takes_longer_than_the_budget_is_stopped(verlet_only, monkeypatch):
-    """Also where it was thought to take less."""
+    """It is stopped although its estimated time was within the budget."""
     now, late = time.monotonic, [0.0]
 
     def slowly(self, scenes, progress, on_result=None, run=SimulationCache.run):
@@ -155,7 +155,7 @@ def test_a_reference_that_takes_longer_than_the_budget_is_stopped(verlet_only, m
         study(closed(), **FEW, budget=1e3)
 
 
-def test_what_does_not_fit_the_budget_is_not_begun_in_a_later_repeat(verlet_only, monkeypatch):
+def test_a_setting_over_the_budget_is_not_begun_in_a_later_repeat(verlet_only, monkeypatch):
     def cost(self, method, k, cost=StudyRunner._cost):
         return 1e9 if method.settings[k].description == "dt=0.001" else cost(self, method, k)
 
@@ -165,8 +165,8 @@ def test_what_does_not_fit_the_budget_is_not_begun_in_a_later_repeat(verlet_only
     assert not cost_study.complete
 
 
-def test_a_reference_that_tells_nothing_apart_ends_a_study_that_needs_one(verlet_only, monkeypatch):
-    """Before any setting is run; its truth is kept."""
+def test_a_useless_reference_ends_a_study_that_needs_one(verlet_only, monkeypatch):
+    """The study ends before any setting is run, and keeps the reference values."""
     monkeypatch.setattr(quantity, "LARGEST_REFERENCE_ERROR", 1e-12)
     cost_study = Study(closed(), **FEW, require_reference=True)
     refusal = r"^displacement must be known by the reference to 1e-12 of the motion; received .* are chaotic"

@@ -1,4 +1,4 @@
-"""Random scenes: the mean over starts, its confidence interval, and how many starts an error takes."""
+"""Random scenes: the mean over starts, its confidence interval, and the number of starts for an error."""
 
 import numpy as np
 import pytest
@@ -30,8 +30,8 @@ def drifts():
     return simulate(scenes, worlds=len(scenes), capacity=GRAINS)
 
 
-def test_the_interval_covers_the_true_mean_as_often_as_it_says(drifts):
-    """95 % of 60: fewer than 51 happens once in 2000 times, all 60 in 5 % of them."""
+def test_the_interval_covers_the_true_mean_at_its_nominal_level(drifts):
+    """Of 60 intervals at 95 %, fewer than 51 cover once in 2000 trials, and all 60 in 5 % of trials."""
     groups = [drifts[k : k + STARTS] for k in range(0, len(drifts), STARTS)]
     estimates = [estimate(ENERGY, group) for group in groups]
     covered = sum(abs(one.value[0] - energy()) <= one.uncertainty for one in estimates)
@@ -42,7 +42,7 @@ def test_the_interval_covers_the_true_mean_as_often_as_it_says(drifts):
     assert np.mean([one.uncertainty for one in estimates]) == pytest.approx(half, rel=0.1)
 
 
-def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
+def test_the_interval_of_several_components_bounds_their_distance(drifts):
     values = np.array([[r.state["velocity"][0, 0], r.state["velocity"][1, 0]] for r in drifts])
     both, one = mean(values), mean(values[:, :1])
     assert both.value.shape == (2,)
@@ -51,7 +51,7 @@ def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
 
 @pytest.mark.slow
 def test_more_starts_buy_a_smaller_error(drifts):
-    """The error that is certain falls as the square root of the starts, and bounds the true one."""
+    """The error bound falls as the square root of the number of starts, and covers the true error."""
     cost_study = Study(drift(), (ENERGY,), precisions=("f64",), repeats=1, starts=(8, len(drifts)), coarser=0)
     run(cost_study)
     few, many = cost_study.line("random starts")
@@ -63,17 +63,17 @@ def test_more_starts_buy_a_smaller_error(drifts):
     assert gain == pytest.approx(np.sqrt(len(drifts) / 8), rel=0.35)
     assert cost_study.truths[0].estimate.value[0] == pytest.approx(energy())
     assert cost_study.cheapest(many.at_most()).starts == len(drifts)
-    # Other settings are run from the largest number of starts, the same ones.
+    # All other settings are run from the largest number of starts, with the same seeds.
     assert [row.errors for row in cost_study.line("Verlet, FixedStep: dt")] == [many.errors]
 
 
 def test_a_random_reference_is_no_better_than_its_starts(drifts):
-    """The interval of its own mean counts, though the runs that check it agree to the last digit."""
+    """The confidence interval of its mean counts, though the runs that check it agree to the last digit."""
     unknown = Quantity("kinetic energy", kinetic_energy, random=True)
     references = reference_runs(methods(drift(), 0.05, 1.0, (0.0,), (), 1), 0.0)
     truth = truth_by_reference(unknown, [drifts, drifts], references[:2])
     assert truth.estimate.uncertainty == estimate(unknown, drifts).uncertainty > 0
-    # A stepper that errs, the same in every start, is not hidden by that interval.
+    # The interval does not hide a stepper whose error is the same in every start.
     half = drifts[: len(drifts) // 2]
     bias = (
         truth_by_reference(unknown, [drifts, half], references[:2]).estimate.uncertainty
@@ -86,7 +86,7 @@ def test_a_random_reference_is_no_better_than_its_starts(drifts):
     assert error < TRUSTED * off
 
 
-def test_what_is_compared_unless_asked_for():
+def test_default_quantities():
     impacts = (Impact(hardness=1e5),)
     assert [q.name for q in usual(drift())] == ["velocity"]
     assert usual(drift().model_copy(update={"effects": impacts}))[0].random

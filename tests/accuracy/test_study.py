@@ -1,4 +1,4 @@
-"""What a study finds, whatever the machine: orders, work, the error of its reference, and files."""
+"""Results of a study that do not depend on the machine: orders, work, reference error and files."""
 
 import csv
 import io
@@ -28,12 +28,12 @@ STEPPERS = {
     "Trapezoid, IterationControl: longest, tolerance": 2,
     "Trapezoid(phi=1.0), IterationControl: longest, tolerance": 1,
 }
-"""What is tried for the oscillator, and the orders of the steppers."""
+"""Methods that are tried for the oscillator, with the orders of their steppers."""
 
 
 @pytest.fixture(scope="module")
 def measured():
-    """The oscillator, its place compared with the closed form and with a reference."""
+    """A study of the oscillator, whose displacement is compared with the closed form and a reference."""
     with pytest.MonkeyPatch.context() as patch:
         only(patch, Verlet, Trapezoid)
         cost_study = Study(oscillator(), (KNOWN, UNKNOWN), precisions=("f64",), repeats=2)
@@ -42,21 +42,21 @@ def measured():
 
 
 def order(rows):
-    """Of the error in the number of steps, by regression."""
+    """Order of the error in the number of steps, by regression."""
     return -np.polyfit(np.log([r.steps for r in rows]), np.log([r.errors[0][0] for r in rows]), 1)[0]
 
 
 def test_every_stepper_shows_its_order_along_its_line(measured):
     assert {row.method for row in measured.rows} == set(STEPPERS)
     for method, expected in STEPPERS.items():
-        # From the second level on, where the error is small enough to go as a power of the step.
+        # From the second level on the error is small enough to be a power of the step.
         rows = measured.line(method)[1:]
         assert len(rows) == 3
         assert order(rows) == pytest.approx(expected, abs=0.12), method
 
 
 @pytest.mark.parametrize("method", STEPPERS)
-def test_errors_fall_and_work_rises_with_what_is_asked_for(measured, method):
+def test_errors_fall_and_work_rises_with_the_requested_accuracy(measured, method):
     rows = measured.line(method)
     assert not any(row.failed for row in rows)
     for coarse, fine in itertools.pairwise(rows):
@@ -65,8 +65,8 @@ def test_errors_fall_and_work_rises_with_what_is_asked_for(measured, method):
         assert fine.sums > 1.5 * coarse.sums
 
 
-def test_work_is_that_of_the_steppers(measured):
-    """One force evaluation a step for Verlet, one for each iteration for the implicit one."""
+def test_work_is_counted_by_the_steppers(measured):
+    """Verlet takes one force evaluation a step, the implicit stepper one for each iteration."""
     for row in measured.line("Verlet, FixedStep: dt"):
         dt = float(row.setting.removeprefix("dt="))
         assert row.steps == np.ceil(DURATION / dt - 1e-9)
@@ -78,7 +78,7 @@ def test_work_is_that_of_the_steppers(measured):
 
 
 def test_rejections_are_counted_as_the_sums_of_the_stepper_are():
-    """Steps that independent particles take by themselves are shared out; steps of all are not."""
+    """Counts of individual steps are divided by the number of particles, counts of common steps are not."""
     for stepper, expected in ((Trapezoid(), 3.0), (Collocation(), 6.0)):
         scene = oscillator().model_copy(update={"stepper": stepper})
         work = {"particle_steps": 20, "force_evaluations": 40, "rejections": 6}
@@ -86,8 +86,8 @@ def test_rejections_are_counted_as_the_sums_of_the_stepper_are():
         assert Timed([pair], 1.0).work == (10.0, expected * 40 / 6, expected)
 
 
-def test_the_reference_is_no_worse_than_it_says(measured):
-    """Its own error bounds how far it is from the closed form, and is small beside all that is trusted."""
+def test_the_error_of_the_reference_is_within_its_estimate(measured):
+    """Its error estimate bounds its distance to the closed form, and is small beside every trusted error."""
     exact, own = (truth.estimate.value for truth in measured.truths)
     off = np.linalg.norm(own - exact) / np.linalg.norm(exact)
     assert measured.truths[0].error == 0.0
@@ -101,8 +101,8 @@ def test_the_reference_is_no_worse_than_it_says(measured):
     assert measured.truths[1].error < 20 * off
 
 
-def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypatch):
-    """On a rotation the trapezoidal rule with equal steps and Boris' stepper agree, at any step."""
+def test_steppers_with_the_same_error_do_not_confirm_each_other(monkeypatch):
+    """For a rotation, the trapezoidal rule with equal steps and Boris' stepper agree at any step size."""
     limits = {"first": 0.02, "longest": 0.02, "shortest": 1e-9, "tolerance": 1e-4}
     own = Trapezoid(control=IterationControl(**limits))
     circle = charged(own, 2.0, velocity=(1.0, 0.0, 0.0))
@@ -118,10 +118,10 @@ def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypat
     off = np.linalg.norm(cost_study.truths[1].estimate.value - cost_study.truths[0].estimate.value)
     off /= np.linalg.norm(cost_study.truths[0].estimate.value)
     assert off <= cost_study.truths[1].error < 100 * off
-    # Those that go far in one line: the paper's control turned one setting at a time.
+    # One line varies both settings of the paper's control, and one line each of them alone.
     names = {row.method.partition(": ")[2] for row in cost_study.rows}
     assert names == {"longest, tolerance", "longest", "tolerance", "dt"}
-    # The tolerance alone does not take the error of the rule away: dt_lim bounds it.
+    # A smaller tolerance alone does not reduce the discretisation error, which dt_lim bounds.
     bounded = [row.errors[0][0] for row in cost_study.line("Trapezoid, IterationControl: tolerance")]
     assert bounded[1] > bounded[0] / 2
     assert order(cost_study.line("Boris, FixedStep: dt")) == pytest.approx(2, abs=0.05)
@@ -133,7 +133,7 @@ def test_the_cheapest_setting_is_the_cheapest(measured):
             good = [row for row in measured.rows if sum(row.errors[quantity]) <= error]
             chosen = measured.cheapest(error, name)
             assert chosen in good
-            # As far as timings tell.
+            # Within the noise of the timings.
             assert chosen.interval[0] <= min(row.interval[1] for row in good)
         with pytest.raises(RunError, match=f"error of {name} must be at least .*; received 1e-30"):
             measured.cheapest(1e-30, name)
@@ -144,7 +144,7 @@ def test_the_cheapest_setting_is_the_cheapest(measured):
 
 
 def test_words_and_python_of_a_row_make_its_scene(measured):
-    """Pasted into a command line or a scene, they give the stepper that was measured."""
+    """Pasted into a command line or a scene, they give the measured stepper."""
     names = {kind.__name__: kind for kind in (Boris, Verlet, Trapezoid, FixedStep, ErrorControl)}
     names["IterationControl"] = IterationControl
     for row in measured.rows:
@@ -188,11 +188,11 @@ def test_files_are_read_back(measured, tmp_path, monkeypatch):
 
 @pytest.fixture
 def verlet_only(monkeypatch):
-    """Takes one compilation."""
+    """Only Verlet is tried, which takes one compilation."""
     only(monkeypatch)
 
 
-def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
+def test_a_failed_setting_is_a_row_with_its_reason(verlet_only, monkeypatch):
     run = SimulationCache.run
 
     def brittle(self, scenes, *more):
@@ -209,7 +209,7 @@ def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
     assert "not finite" in printed_table(cost_study)
 
 
-def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
+def test_an_interrupted_study_keeps_its_measurements(verlet_only, monkeypatch):
     run, runs = SimulationCache.run, []
 
     def stopped(self, scenes, *more):
@@ -232,7 +232,7 @@ def printed_table(cost_study):
     return console.file.getvalue()
 
 
-def test_what_does_not_fit_the_budget_is_left_out(verlet_only):
+def test_settings_over_the_budget_are_left_out(verlet_only):
     cost_study = study(oscillator(), (KNOWN,), precisions=("f64",), budget=1e-6)
     assert cost_study.rows == []
     assert not cost_study.complete
@@ -253,7 +253,7 @@ def test_single_precision_and_fast_arithmetic_are_lines_of_their_own_and_the_run
     assert runtime.current() == before
     single, double = cost_study.line("Verlet, FixedStep: dt, f32"), cost_study.line("Verlet, FixedStep: dt")
     assert [row.precision for row in single] == ["f32"] * 6
-    # Rounding of f32 is met on the way to 1e-8, and not by f64.
+    # Before 1e-8 the rounding error of f32 dominates, and f64 has none of that size.
     assert single[0].errors[0][0] == pytest.approx(double[0].errors[0][0], rel=1e-3)
     assert single[-1].errors[0][0] > 10 * double[-1].errors[0][0]
     assert single[-1].options.endswith("--precision f32")

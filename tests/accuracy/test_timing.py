@@ -1,4 +1,4 @@
-"""How a study observes its runs, and how many simulations it keeps."""
+"""Observation of the runs of a study, and the number of simulations that it keeps."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ CONTROLS = {k: c for k, c in StepControl.known().items() if c.__module__.startsw
 
 
 class Waiting:
-    """A world that is where it waits to be observed, or at its end."""
+    """A world that stops at each observation time and at its end."""
 
     def __init__(self, duration):
         self.time = 0.0
@@ -31,8 +31,8 @@ class Waiting:
         return [Result(self.scenes[0], {}, {}, self.time, {}, Status(True, ""), 0.0)]
 
 
-def test_a_world_is_observed_each_time_once_and_waits_for_what_is_to_come():
-    """In one case of 20, n times a part of the duration is rounded to less than n such parts."""
+def test_a_world_is_observed_once_at_each_time():
+    """In one of 20 cases, n times a fraction of the duration is rounded down."""
     for duration in np.random.default_rng(0).uniform(0.0, 10.0, 200):
         times, world = [], Waiting(duration)
         observer = ResultObserver(duration, lambda result, times=times: times.append(result.time))
@@ -47,7 +47,7 @@ def test_a_world_is_observed_each_time_once_and_waits_for_what_is_to_come():
 
 @pytest.mark.parametrize("kind", CONTROLS)
 def test_steps_of_every_control_can_be_kept_short(kind):
-    """Whatever a control calls its lengths, and whatever the shortest is."""
+    """This holds for any names of the step lengths, and for any shortest step."""
     control = CONTROLS[kind]
     required = {name: 1e-3 for name, info in control.model_fields.items() if info.is_required()}
     duration = 1e-5
@@ -56,13 +56,13 @@ def test_steps_of_every_control_can_be_kept_short(kind):
     assert scene.stepper.control.min_steps(duration) < OBSERVATIONS
     short = in_steps_of_at_most(scene, duration / OBSERVATIONS).stepper.control
     assert short.min_steps(duration) >= OBSERVATIONS * (1 - 1e-12)
-    # Its parts still agree with each other, and what is compiled is the same.
+    # Its settings are still consistent, and the compiled structure is the same.
     assert control(**short.model_dump()) == short
     assert short.structure() == control(**required).structure()
 
 
 class Memory:
-    """The trees of a simulation, without what they are for."""
+    """The SNode trees of a simulation, and nothing else of it."""
 
     def __init__(self, scene, worlds):
         self.trees = [self.tree() for _ in range(4)]
@@ -78,7 +78,7 @@ class Memory:
             tree.destroy()
 
 
-def test_a_study_of_many_structures_gives_back_what_it_has_not_used_for_longest(own, monkeypatch):
+def test_a_study_of_many_structures_closes_the_least_recently_used_simulations(own, monkeypatch):
     monkeypatch.setattr(timing, "Simulation", Memory)
     monkeypatch.setattr(memory, "MAX_TREES", len(memory.in_use()) + ROOM + 8)
     cache, scene = SimulationCache(), oscillator()
@@ -88,7 +88,7 @@ def test_a_study_of_many_structures_gives_back_what_it_has_not_used_for_longest(
         assert cache.compiled(scene, 1) is first
         assert cache.compiled(scene, worlds) is latest
     assert all(tree.alive for tree in first.trees + latest.trees)
-    # Two fit beside the room for another, and that one.
+    # Two older simulations fit beside the space reserved for a new one, and the new one.
     assert len(cache.cached) == 3
     assert sum(tree.alive for simulation in cache.cached.values() for tree in simulation.trees) == 12
     for simulation in cache.cached.values():

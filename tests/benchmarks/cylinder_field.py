@@ -5,7 +5,7 @@
 Field, or field and gradient, exact or from tables. magpylib has no gradient, so it computes six more fields
 for central differences. Runs are interleaved, and the fastest of each counts. Points lie around a cylinder
 of L/D 5/3 (B16 6.3), outside it and within three diameters, like particles about to be captured. Errors are
-relative to magpylib's values. The error of a gradient is at least that of its field over the step of the
+relative to magpylib's values. The error of a gradient is at least the error of its field over the step of the
 differences, 1e-5 radii.
 """
 

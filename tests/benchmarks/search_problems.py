@@ -145,10 +145,10 @@ def path(design: Design, times: Sequence[float]) -> np.ndarray:
 
 
 def bent_particle() -> Problem:
-    """Find the field, speed and angle of a proton whose final position and velocity are those of BENT_TRUTH.
+    """Find the field, speed and angle of a proton with the final position and velocity of BENT_TRUTH.
 
-    The cost is the distance of the final positions over that of BENT_TRUTH from the origin, plus the
-    difference of the final velocities over the final speed of BENT_TRUTH.
+    The cost is the distance between the final positions, relative to the distance of BENT_TRUTH from the
+    origin, plus the difference of the final velocities over the final speed of BENT_TRUTH.
     """
     (end,) = path(BENT_TRUTH, [BENT_TIME])
     turned = elementary_charge * BENT_TRUTH["flux"] / proton_mass * BENT_TIME

@@ -1,4 +1,4 @@
-"""The contract of a case, and what its checks hold."""
+"""The contract of a case, and the checks of a case."""
 
 import importlib
 import importlib.util
@@ -14,7 +14,7 @@ INVERSE = [name for name, case in every().items() if case.problem]
 
 
 @pytest.mark.parametrize("name", INVERSE)
-def test_variants_are_those_of_the_inverse_problem(name):
+def test_variants_of_the_inverse_problem(name):
     case = every()[name]
     size = next(key for key, one in case.sizes.items() if one.search is not None)
     with pytest.raises(InputError, match=f"variant must be one of {', '.join(case.variants)}; received ''"):
@@ -42,7 +42,7 @@ ARGUMENTS = {"check": (), "problem": ("default", ""), "quantities": (None,), "pi
 
 
 @pytest.mark.parametrize("name", every())
-def test_what_a_case_imports_late_is_there_and_takes_what_it_is_called_with(name):
+def test_late_imports_of_a_case_exist_and_accept_their_arguments(name):
     functions = {field: value for field, value in vars(every()[name]).items() if isinstance(value, Late)}
     assert functions.keys() <= ARGUMENTS.keys()
     for field, late in functions.items():
@@ -50,8 +50,8 @@ def test_what_a_case_imports_late_is_there_and_takes_what_it_is_called_with(name
 
 
 @pytest.mark.parametrize("name", every())
-def test_every_scene_of_a_moderate_size_may_begin(name):
-    """Its effects take its start; nothing is compiled."""
+def test_every_scene_of_moderate_size_has_a_valid_start(name):
+    """Its effects accept its initial state; nothing is compiled."""
     case, begun = every()[name], 0
     for size in case.sizes:
         for variant in (None, *case.scenes):
@@ -72,7 +72,7 @@ def test_claim_holds_when_all_of_the_interval_does():
     assert Claim("", Mean(0.5, 0.1), most=0.6).cells[:2] == ("0.50 ± 0.10", "below 0.6")
 
 
-def test_what_is_shown_is_not_judged():
+def test_shown_values_are_not_judged():
     assert Shown("", Mean(1.0, 0.5), "2").cells == ("1.00 ± 0.50", "2", "", "")
     assert Shown("", 1.23456).cells[0] == "1.235"
     assert Shown("", 1.0).ok is None

@@ -73,7 +73,7 @@ def test_without_any_effect_nothing_of_effects_is_compiled():
 
 
 @pytest.mark.slow
-def test_memory_is_what_is_allocated():
+def test_memory_equals_the_allocated_memory():
     flow = agglomeration(BEST, 1, grains=60)
     simulation = Simulation(flow)
     sizes = {item.name: item.bytes for item in explain(flow).memory}
@@ -103,7 +103,7 @@ BESIDE = {
 
 @pytest.mark.parametrize("kind", BESIDE)
 @in_taichi_thread
-def test_step_memory_is_what_is_allocated(kind):
+def test_step_memory_equals_the_allocated_memory(kind):
     made, capacity = BESIDE[kind]
     with memory.collected() as trees:
         allocation = Allocation(made(), 3, capacity)

@@ -1,4 +1,4 @@
-"""Checkpoints: to the same bits, whole or refused."""
+"""Checkpoints: a resumed run has the same bits, and an incomplete checkpoint is refused."""
 
 import io
 
@@ -46,7 +46,7 @@ def test_goes_on_to_the_same_bits(simulation, tmp_path):
     simulation.run(steps=17)
     save(simulation, tmp_path / "c.h5")
     assert [path.name for path in tmp_path.iterdir()] == ["c.h5"]
-    simulation.run(steps=5)  # away from what was saved
+    simulation.run(steps=5)  # moves the state away from the saved one
     simulation.load(scenes)
     restore(simulation, tmp_path / "c.h5")
     assert simulation.results()[0].work["steps"] == 17
@@ -115,7 +115,7 @@ def test_full_disk_keeps_the_checkpoint_before(simulation, checkpoint_file, monk
 
 
 def forged(path, name, change):
-    """Change a column of a checkpoint, and give the file the checksum of that."""
+    """Change a column of a checkpoint, and give the file a matching checksum."""
     image = io.BytesIO(checksum.read_image(path, "checkpoint", "a file"))
     with h5py.File(image, "r+") as file:
         values, attributes = np.asarray(file[name]), dict(file[name].attrs)

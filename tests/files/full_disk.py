@@ -1,4 +1,4 @@
-"""A full disk, without one."""
+"""Simulation of a full disk."""
 
 import contextlib
 import resource
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def files_of_at_most(size: int) -> Iterator[None]:
-    """While this lasts, a write beyond so many bytes fails as on a full disk: the system's own limit."""
+    """Limit the size of files to ``size`` bytes by RLIMIT_FSIZE: a larger write fails as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

@@ -1,4 +1,4 @@
-"""Nothing that has been put in the place of a file of ours is followed, written to or waited for."""
+"""A link, folder, fifo or socket at the path of an output file is not followed, written to or waited for."""
 
 import json
 import os
@@ -28,7 +28,7 @@ def lock_to_read(path):
 
 
 def replace_by_name(path):
-    # Of a fifo "r+b" says that it is none; "wb" would wait.
+    # "r+b" fails on a fifo; "wb" would block.
     with replacing(path.with_suffix(""), path), path.open("r+b") as file:
         file.write(b"new")
 
@@ -42,7 +42,7 @@ WAYS = {
     "read": regular_file.content,
     "look": regular_file.file_status,
 }
-"""What is done with the file "file.new"."""
+"""Operations on the file "file.new"."""
 
 
 def put_link(path, victim):
@@ -78,14 +78,14 @@ THINGS = {
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("put", THINGS, ids=lambda put: put.__name__)
-def test_what_is_no_file_of_its_own_is_refused_and_left_alone(tmp_path, way, put):
+def test_a_path_without_a_regular_file_is_refused_and_left_alone(tmp_path, way, put):
     victim, path = tmp_path / "victim", tmp_path / "file.new"
     victim.write_bytes(VICTIM)
     put(path, victim)
     before = path.lstat().st_mode, sorted(p.name for p in tmp_path.iterdir())
     if put is put_hard_link and way == "replace by name":
         WAYS[way](path)
-        assert victim.read_bytes() == VICTIM  # what it was another name of
+        assert victim.read_bytes() == VICTIM  # the other name of the hard link
         return
     if put is put_hard_link and way in ("lock to read", "read", "look"):
         WAYS[way](path)  # nothing is written to it
@@ -146,7 +146,7 @@ for number, what in enumerate((
 
 @pytest.fixture
 def theirs(tmp_path):
-    """A folder, and files in it, that one who is not root can read in part and write nothing of."""
+    """A folder whose files a user other than root can read only in part and cannot write."""
     folder = tmp_path / "theirs"
     folder.mkdir()
     for above in folder.parents[:4]:
@@ -160,7 +160,7 @@ def theirs(tmp_path):
 
 
 def test_files_of_another_user_are_read_or_refused(theirs):
-    """A lock file of another user serves to read; a folder that nothing can be made in is read without."""
+    """Reading uses the lock file of another user; in a folder that is not writable it does without a lock."""
     command = [sys.executable, "-c", OTHER_USER, str(theirs)]
     completed = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert completed.stderr == ""
@@ -201,9 +201,9 @@ print(json.dumps(ends))
 """
 
 
-def test_commands_on_a_folder_that_may_not_be_entered_say_so(theirs):
+def test_commands_on_an_inaccessible_folder_are_refused(theirs):
     code = f"COMMANDS = {COMMANDS}\n{AS_ANOTHER}"
-    # Nor may the folder of compiled kernels be entered, which is at home unless named.
+    # The folder of compiled kernels, by default in the home folder, may not be entered either.
     elsewhere = {name: value for name, value in os.environ.items() if "OFFLINE_CACHE" not in name}
     command = [sys.executable, "-c", code, str(theirs)]
     home = {**elsewhere, "HOME": str(theirs / "closed"), "MPLCONFIGDIR": str(theirs.parent)}

@@ -1,4 +1,4 @@
-"""Files that are damaged, or no files of ours, are refused in a line by all that reads them."""
+"""All readers refuse damaged and foreign files with an error message of one line."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from tisim.io.trajectory import LIBVER, Trajectory
 @pytest.mark.parametrize(
     "name", ["result.h5", "trajectory.h5", "cost.h5", pytest.param("checkpoint.h5", marks=pytest.mark.long)]
 )
-def test_no_damage_goes_unnoticed(tmp_path, name):
-    """Flipped bits, lost and swapped pages, cuts: the file is read as it was, or refused."""
+def test_all_damage_is_detected(tmp_path, name):
+    """With flipped bits, lost or swapped pages, or cut short, a file is read correctly or refused."""
     kind, rng = damage.KINDS[name], np.random.default_rng(12)
     path = kind.make(tmp_path)
     content, whole = path.read_bytes(), kind.read(path)
@@ -51,7 +51,7 @@ def test_hundreds_of_damaged_files(tmp_path, name):
 
 
 def test_a_kind_whose_undamaged_file_is_refused_is_not_counted(tmp_path):
-    """All damaged ones would be refused as well, and none would be read wrong."""
+    """Its damaged files would all be refused as well, which would prove nothing."""
 
     def reader(name, action, path, whole=None, patience=0.0):
         if action == "make":
@@ -64,7 +64,7 @@ def test_a_kind_whose_undamaged_file_is_refused_is_not_counted(tmp_path):
 
 
 def test_every_lost_page_of_a_result_is_found(tmp_path):
-    """HDF5 alone reads most of them as data."""
+    """HDF5 alone would read most lost pages as data."""
     path = damage._result(tmp_path)
     content = path.read_bytes()
     pages = [at for at in range(0, len(content), 512) if any(content[at : at + 512])]
@@ -95,7 +95,7 @@ def test_damage_to_a_frame_is_damage_to_that_frame(tmp_path):
 
 
 def test_numbers_that_hdf5_does_not_check_are_checked(tmp_path):
-    """Times, steps and small frames are stored as they are, in which HDF5 sees no damage."""
+    """Times, steps and small frames are stored as plain numbers, in which HDF5 detects no damage."""
     path = damage._trajectory(tmp_path)
     with h5py.File(path) as file:
         place = file["particles/all/position/time"].id.get_chunk_info(0).byte_offset
@@ -106,7 +106,7 @@ def test_numbers_that_hdf5_does_not_check_are_checked(tmp_path):
 
 
 def test_a_lost_last_step_leaves_a_run_that_has_not_ended(tmp_path):
-    """As a killed run does, whose last row is none yet; the frames before are read."""
+    """A killed run leaves the same: its last row is incomplete, and the frames before it are read."""
     path, short = tmp_path / "t.h5", STILL.model_copy(update={"duration": frame(3).time})
     with Trajectory(path, [short]) as trajectory:
         for k in range(4):
@@ -126,7 +126,7 @@ def test_a_lost_last_step_leaves_a_run_that_has_not_ended(tmp_path):
 @pytest.fixture(params=["none", "folder", "fifo", "link to a fifo", "device", "unreadable", "empty", "text",
                         "another program's", "another file of tisim's"])  # fmt: skip
 def no_file(request, tmp_path):
-    """The path of something that is no file of a run."""
+    """A path at which there is no file of a run."""
     path = tmp_path / "trajectory.h5"
     if request.param == "folder":
         path.mkdir()
@@ -159,7 +159,7 @@ def no_file(request, tmp_path):
     ],
     ids=["frames", "worlds", "export", "checkpoint", "cost"],
 )
-def test_what_is_no_file_of_ours_is_refused(no_file, read):
+def test_a_foreign_file_is_refused(no_file, read):
     with pytest.raises(InputError) as error_info:
         read(no_file)
     assert "\n" not in str(error_info.value)
@@ -168,7 +168,7 @@ def test_what_is_no_file_of_ours_is_refused(no_file, read):
 
 @pytest.mark.parametrize("libver", ["earliest", LIBVER])
 def test_a_trajectory_without_checksums_is_refused(tmp_path, libver):
-    """With HDF5's first superblock, and with its third, the one that tisim writes."""
+    """The file has HDF5's first superblock or the third, which tisim writes."""
     path = tmp_path / "t.h5"
     with h5py.File(path, "w", libver=libver) as file:
         h5md.write_metadata(file, "0.1.0")
@@ -190,7 +190,7 @@ def test_a_result_without_its_checksum_is_refused(tmp_path):
 
 
 class _Loaded:
-    """A simulation that no checkpoint gets as far as."""
+    """A stand-in for a simulation: the checkpoint is refused before it is used."""
 
     class s:
         @staticmethod
@@ -201,7 +201,7 @@ class _Loaded:
 @pytest.mark.parametrize(
     "trailer", [{"size": 9, "data": 5, "crc": 1}, {"size": 9, "data": ["ab"], "crc": 1}, []]
 )
-def test_a_frame_that_is_no_checksum_is_none(trailer):
+def test_a_trailer_without_a_checksum_is_not_verified(trailer):
     image = SIGNATURE + b"x"
     assert checksum.verified(image + checksum.frame(json.dumps(trailer).encode())) is None
     assert checksum.verified(checksum.with_checksum(image)) == image

@@ -1,4 +1,4 @@
-"""Trajectories are whole after every single write, whatever ends the writing: a kill, a full disk."""
+"""Trajectories are valid after every single write, also if a kill or a full disk ends the writing."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from tisim.io.trajectory import LIBVER, Trajectory
 
 GRAINS = 300
 STILL = scene([(0, 0, 0)] * GRAINS, [(0.0, 0, 0)] * GRAINS)
-"""Nothing is run here: frames are made by hand."""
+"""A scene that is not run; its frames are made by hand."""
 
 
 def frame(k):
-    """A frame whose numbers, which do not compress, say which one it is; it has fewer grains than room."""
+    """Frame k, of random numbers that identify it and do not compress, with up to 6 grains below capacity."""
     draw, n = np.random.Generator(np.random.Philox(k)), GRAINS - k % 7
     arrays = dict(
         position=draw.random((n, 3)), velocity=draw.random((n, 3)), mass=draw.random(n),
@@ -42,7 +42,7 @@ def same(actual, k):
 
 
 def whole_frames(path, least):
-    """How many frames there are in the file, each as it was written, and none missing that was."""
+    """Number of frames in the file; checks that they are as written and that no written frame is missing."""
     with frames(path) as sequence:
         assert least <= len(sequence) <= least + 1
         for k, one in enumerate(sequence):
@@ -51,8 +51,8 @@ def whole_frames(path, least):
 
 
 @pytest.mark.parametrize("rows", [4, pytest.param(12, marks=pytest.mark.slow)])
-def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows):
-    """So at whatever write the writer is killed. HDF5 opens it as any other file, and finds all frames."""
+def test_a_trajectory_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows):
+    """The writer may be killed at any write: HDF5 opens the file without tisim and finds all frames."""
     path, contents = tmp_path / "t.h5", []
 
     def note(self, at, piece, put=GrowingFile._write_piece):
@@ -72,7 +72,7 @@ def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows)
             assert len(plain["particles/all/position/value"]) >= least
 
 
-def test_it_can_be_read_while_it_is_written(tmp_path):
+def test_a_trajectory_can_be_read_while_it_is_written(tmp_path):
     path = tmp_path / "t.h5"
     with Trajectory(path, [STILL]) as trajectory:
         for k in range(5):
@@ -83,7 +83,7 @@ def test_it_can_be_read_while_it_is_written(tmp_path):
 
 
 def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
-    """HDF5 itself would refuse them: they lie behind the end of the file that it has found."""
+    """HDF5 itself would refuse them, as they are behind the end of the file at the time of opening."""
     path = tmp_path / "t.h5"
     with Trajectory(path, [STILL]) as trajectory, frames(path) as sequence:
         for k in range(5):
@@ -93,8 +93,8 @@ def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
             same(sequence[k], k)
 
 
-def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
-    """At whatever block of the file that is: HDF5 alone would call it damaged."""
+def test_a_half_written_block_is_read_again(tmp_path, monkeypatch):
+    """This holds for each block of the file; HDF5 alone would report damage."""
     path = tmp_path / "t.h5"
     with Trajectory(path, [STILL]) as trajectory:
         trajectory.write(0, frame(0))
@@ -126,7 +126,7 @@ def test_a_trajectory_that_is_cut_short_is_refused(tmp_path):
     "part",
     [0.1, 0.5, 0.7, 0.98, *(pytest.param(p, marks=pytest.mark.slow) for p in np.linspace(0.02, 0.96, 16))],
 )
-def test_full_disk_says_so_and_keeps_what_is_there(tmp_path, part):
+def test_a_full_disk_is_reported_and_keeps_the_written_frames(tmp_path, part):
     path, count = tmp_path / "t.h5", 0
 
     def write():
@@ -151,7 +151,7 @@ def test_full_disk_says_so_and_keeps_what_is_there(tmp_path, part):
 
 
 @pytest.mark.parametrize("last", [3, 9])
-def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, last):
+def test_a_full_disk_while_a_run_resumes_leaves_the_earlier_file(tmp_path, last):
     path = tmp_path / "t.h5"
     with Trajectory(path, [STILL]) as trajectory:
         for k in range(10):
@@ -165,7 +165,7 @@ def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, last)
         assert whole_frames(path, last + 1) == last + 1
 
 
-def test_killed_before_its_first_frame_it_can_be_opened_and_gone_on_with(tmp_path):
+def test_a_trajectory_killed_before_its_first_frame_can_be_opened_and_resumed(tmp_path):
     path = tmp_path / "t.h5"
     trajectory = Trajectory(path, [STILL])
     assert whole_frames(path, 0) == 0
@@ -175,7 +175,7 @@ def test_killed_before_its_first_frame_it_can_be_opened_and_gone_on_with(tmp_pat
     assert whole_frames(path, 1) == 1
 
 
-def test_killed_while_it_is_made_it_is_not_there(tmp_path, monkeypatch):
+def test_a_trajectory_killed_while_it_is_created_does_not_exist(tmp_path, monkeypatch):
     class Killed(BaseException):
         pass
 
@@ -195,8 +195,9 @@ def test_a_folder_that_takes_no_file_is_reported_before_anything_runs(tmp_path):
 
 
 def interrupted(monkeypatch, owner, name, act, stride):
-    """Have act done again and again, with a Ctrl-C at one call of a method of owner after another, at so many
-    calls from each other, until there are no more; how many there were."""
+    """Repeat ``act`` with a Ctrl-C at every ``stride``-th call of the method ``name`` of ``owner``.
+
+    Each repetition raises it at a later call, until there are no more. Returns the number of calls."""
     method, calls, at = getattr(owner, name), 0, 1 - stride
 
     def called(self, *arguments):
@@ -245,7 +246,7 @@ def test_ctrl_c_while_hdf5_reads_waits_for_the_frame(tmp_path, monkeypatch, name
     assert interrupted(monkeypatch, SharedFile, name, lambda: whole_frames(path, 2), 3) > 1
 
 
-def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypatch):
+def test_ctrl_c_while_a_run_resumes_leaves_the_earlier_file(tmp_path, monkeypatch):
     path = tmp_path / "t.h5"
     with Trajectory(path, [STILL]) as trajectory:
         for k in range(3):
@@ -261,7 +262,7 @@ def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypa
     assert interrupted(monkeypatch, GrowingFile, "write", go_on, 17) > 50
 
 
-def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypatch):
+def test_a_file_that_another_process_has_locked_is_not_an_input_error(tmp_path, monkeypatch):
     monkeypatch.setattr(atomic, "LOCK_TIMEOUT", 0.01)
     with (
         atomic.locked(tmp_path / "t.h5.new", exclusive=True),
@@ -282,13 +283,13 @@ def test_the_superblock_is_the_one_that_hdf5_writes(size):
     assert not is_valid(block[:-1])
 
 
-def test_lookup3_is_that_of_its_author():
-    """A value in the comments of lookup3.c."""
+def test_lookup3_agrees_with_its_author():
+    """A value from the comments of lookup3.c."""
     assert lookup3(b"Four score and seven years ago") == 0x17770551
 
 
-def test_what_could_not_be_written_is_read_back(tmp_path):
-    """HDF5 may read again what it has written, and must find it, or it ends the process."""
+def test_data_that_could_not_be_written_are_read_back(tmp_path):
+    """HDF5 may read back its own writes, and ends the process if they are missing."""
     path = tmp_path / "f"
     with h5py.File(path, "w", libver=LIBVER) as file:
         file["x"] = np.zeros(10)

@@ -1,4 +1,4 @@
-"""Whose files are whose: the marker of a folder."""
+"""Ownership of files in an output folder, recorded in its marker file."""
 
 import multiprocessing
 
@@ -13,7 +13,7 @@ def write_file(folder, name, text="theirs"):
     (folder / name).write_text(text)
 
 
-def test_what_was_taken_may_be_replaced_and_nothing_else(tmp_path):
+def test_only_claimed_files_may_be_replaced(tmp_path):
     folder = tmp_path / "new" / "below"
     check(folder, ["a", "b"])
     assert not folder.exists()
@@ -41,7 +41,7 @@ def test_many_files_are_not_all_spelled_out(tmp_path):
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_links_and_folders_are_refused_even_where_all_may_be_replaced(tmp_path, overwrite):
+def test_links_and_folders_are_refused_even_with_overwrite(tmp_path, overwrite):
     claim(tmp_path, ["a", "b"])
     (tmp_path / "a").symlink_to("elsewhere")
     (tmp_path / "b.new").mkdir()
@@ -50,7 +50,7 @@ def test_links_and_folders_are_refused_even_where_all_may_be_replaced(tmp_path, 
             claim(tmp_path, [name], overwrite)
 
 
-def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
+def test_all_files_must_be_claimed_if_their_names_are_not_known(tmp_path):
     check_all(tmp_path / "none")
     check_all(tmp_path)
     claim(tmp_path, ["a"])
@@ -63,7 +63,7 @@ def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
     check_all(tmp_path, overwrite=True)
 
 
-def test_a_name_that_a_killed_process_has_not_finished_is_nobodys(tmp_path):
+def test_a_name_that_a_killed_process_has_not_finished_is_ignored(tmp_path):
     claim(tmp_path, ["first"])
     (tmp_path / MARKER).write_text("first\nsec")
     claim(tmp_path, ["third"])

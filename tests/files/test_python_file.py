@@ -1,4 +1,4 @@
-"""Python files of the user's: imported under their own names, told in a line when they cannot be."""
+"""Python files of users are imported under their own names, or refused with an error of one line."""
 
 import functools
 import inspect
@@ -31,8 +31,8 @@ def test_a_changed_file_is_another_and_its_old_classes_are_not_known(own_file):
     assert python_file.is_superseded(first.Pull)
 
 
-def test_the_text_that_was_loaded_is_what_is_compiled(own_file):
-    """Taichi reads the source when it compiles, by which time the file may be another."""
+def test_the_loaded_text_is_compiled(own_file):
+    """Taichi reads the source when it compiles, and the file may have changed by then."""
     module = python_file.load(own_file("a_law.py", LAW))
     own_file("a_law.py", "# nothing is left of it\n" * 40)
     assert inspect.getsource(module.Pull).startswith("class Pull(Force):")
@@ -59,7 +59,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("text", FAULTS)
-def test_what_cannot_be_imported_is_reported_in_a_line(own_file, text):
+def test_a_failed_import_is_reported_in_one_line(own_file, text):
     path = own_file("faulty.py", text)
     with pytest.raises(InputError) as fault:
         python_file.load(path)
@@ -78,14 +78,14 @@ def test_what_cannot_be_imported_is_reported_in_a_line(own_file, text):
         ("folder.py", r"Python file must be a file; received 'folder.py'"),
     ],
 )
-def test_what_is_no_file_is_refused(own_file, name, message):
+def test_a_path_without_a_file_is_refused(own_file, name, message):
     own_file("folder.py/inside.txt", "")
     with pytest.raises(InputError, match=message):
         python_file.load(name)
 
 
-def test_checksums_name_what_is_not_of_this_package(own_file):
-    """A function, one that is part of another, a class with its bases, and files that a file takes from."""
+def test_checksums_cover_code_outside_of_this_package(own_file):
+    """Covered are functions, nested functions, classes with their bases, and the imports of a file."""
     python_file.load(own_file("a_law.py", LAW))
     problem = python_file.load(own_file("uses_law.py", "from a_law import Pull\ndef of(r): return 1.0\n"))
     one, two = (file.checksum for file in python_file.loaded_files())
@@ -93,4 +93,4 @@ def test_checksums_name_what_is_not_of_this_package(own_file):
     assert python_file.module_checksums(problem.of) == {"uses_law": two, "a_law": one}
     assert python_file.module_checksums(functools.partial(problem.of, 1)) == {"uses_law": two, "a_law": one}
     assert python_file.module_checksums(Force, len, python_file.load) == {}
-    assert set(python_file.module_checksums(test_what_is_no_file_is_refused)) == {__name__}
+    assert set(python_file.module_checksums(test_a_path_without_a_file_is_refused)) == {__name__}

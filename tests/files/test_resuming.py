@@ -1,4 +1,4 @@
-"""The one rule of going on and beginning anew, that all commands share."""
+"""The rule by which all commands resume or begin anew."""
 
 from pathlib import Path
 
@@ -14,14 +14,14 @@ BOTH = "--overwrite must be given without --resume"
 @pytest.mark.parametrize(
     ("begun", "results", "without", "fresh", "resume", "overwrite"),
     [
-        # What becomes of a command without options, with --fresh, with --resume and with --overwrite.
+        # Outcomes without options, with --fresh, with --resume and with --overwrite.
         (False, "", False, False, LEFT, False),
         (True, "", True, False, True, False),
         (True, "a finished run", True, KEPT, True, False),
         (False, "a finished run", KEPT, KEPT, LEFT, False),
     ],
 )
-def test_what_a_command_does_follows_from_what_is_there(begun, results, without, fresh, resume, overwrite):
+def test_options_and_existing_files_decide_about_resuming(begun, results, without, fresh, resume, overwrite):
     for options, expected in (
         ((None, False), without),
         ((True, False), fresh),
@@ -38,7 +38,7 @@ def test_what_a_command_does_follows_from_what_is_there(begun, results, without,
                 resumes(*arguments)
 
 
-def test_the_same_command_goes_on_but_for_what_would_begin_anew():
+def test_the_hint_to_resume_leaves_out_options_that_begin_anew():
     assert resume_hint(None, False) == "To go on, give the same command again."
     assert resume_hint(True, True) == (
         "To go on, give the same command again, without --fresh and --overwrite."

@@ -403,7 +403,7 @@ class TestTheChoice:
                 duration=1.0,
             )
 
-    def test_a_user_law_counts_as_smooth_if_it_says_so(self):
+    def test_a_user_law_counts_as_smooth_if_declared_so(self):
         class SaysNothing(laws.Tether):
             pass
 

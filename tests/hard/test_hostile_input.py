@@ -106,7 +106,7 @@ COMMANDS = (
 
 @pytest.mark.parametrize("words", COMMANDS, ids=[" ".join(words[:-1])[:40] for words in COMMANDS])
 def test_commands(words, tmp_path, monkeypatch):
-    """Refused commands print one line to standard error and exit with code 2, whatever the words."""
+    """Refused commands print one line to standard error and exit with code 2, for any arguments."""
     monkeypatch.chdir(tmp_path)
     scene = tmp_path / "scene.toml"
     scene.write_text(Scene.from_dict(hostile.valid()[1]).to_toml())

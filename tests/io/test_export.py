@@ -1,4 +1,4 @@
-"""Frames for other programs, read back by readers that are not ours."""
+"""Exports of frames to other programs, read back by independent readers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tisim.plotting.movie import movie
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """A trajectory in a box, in which grains merge."""
+    """A trajectory of merging grains in a box."""
     path = tmp_path_factory.mktemp("export") / "flow.h5"
     slab = {"domain.periodic": (True, True, False)}
     tisim.run(flow(0, images=True).replace(slab), record=Recording(path, frames=4))
@@ -61,7 +61,7 @@ def test_planted_links_are_refused_and_not_followed(file, tmp_path, write, name)
 
 
 @pytest.mark.slow
-def test_meshio_reads_what_paraview_would(file, tmp_path):
+def test_meshio_reads_the_files_for_paraview(file, tmp_path):
     path = export(file, "vtk", tmp_path)
     assert path == tmp_path / "flow.pvd"
     datasets = ElementTree.parse(path).findall("Collection/DataSet")
@@ -128,7 +128,7 @@ def test_each_world_has_its_own_files(tmp_path):
 
 @pytest.fixture
 def growing(tmp_path):
-    """A trajectory of three worlds in single precision, of which only the second has come to a frame."""
+    """A trajectory of three worlds in single precision, of which only the second has a frame."""
     with Trajectory(tmp_path / "t.h5", [STILL] * 3, "f32") as trajectory:
         trajectory.write(1, grown(4))
     return tmp_path / "t.h5"

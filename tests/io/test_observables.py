@@ -1,4 +1,4 @@
-"""Observables of trajectories: what effects measure of a world stands beside its frames."""
+"""Observables of trajectories: the measurements of effects are stored beside the frames of a world."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ TIMES = 0.025 * np.arange(4)
 
 
 def value(name, k):
-    """A number that says of which measure and of which frame it is."""
+    """A number that identifies the measure and the frame."""
     return float(1 + sorted(UNITS).index(name) + 0.1 * k)
 
 
@@ -48,7 +48,7 @@ def frame(k):
 
 
 def write(path, *more):
-    """Four frames by hand; nothing is run."""
+    """Write four frames that are made by hand; nothing is run."""
     with Trajectory(path, [PRESSED, *more]) as trajectory:
         for w in range(1 + len(more)):
             for k in range(4):
@@ -61,7 +61,7 @@ def file(tmp_path):
     return write(tmp_path / "t.h5")
 
 
-def test_they_are_those_of_the_frames(file):
+def test_observables_belong_to_their_frames(file):
     with frames(file) as sequence:
         assert sequence.measures.keys() == UNITS.keys()
         for name, series in sequence.measures.items():
@@ -71,8 +71,8 @@ def test_they_are_those_of_the_frames(file):
     assert read.measures["floor_force_z"].tolist() == [value("floor_force_z", k) for k in range(4)]
 
 
-def test_the_layout_is_that_of_h5md(tmp_path):
-    """Of several worlds each has a group; time and step are hard links to those of the positions."""
+def test_the_layout_of_observables_follows_h5md(tmp_path):
+    """Each of several worlds has a group; time and step are hard links to the datasets of the positions."""
     with h5py.File(write(tmp_path / "t.h5", PRESSED)) as read:
         assert set(read["observables"]) == set(read["particles"]) == {"world_0", "world_1"}
         for name, group in read["observables"].items():
@@ -85,7 +85,7 @@ def test_the_layout_is_that_of_h5md(tmp_path):
                 assert observable["step"] == read[f"particles/{name}/position/step"]
 
 
-def test_a_scene_in_which_nothing_is_measured_has_none(tmp_path):
+def test_a_scene_without_measures_has_no_observables(tmp_path):
     with Trajectory(tmp_path / "t.h5", [scene([(0, 0, 0)], [(0, 0, 0)])]):
         pass
     with h5py.File(tmp_path / "t.h5") as read, frames(tmp_path / "t.h5") as sequence:
@@ -100,7 +100,7 @@ def test_a_number_that_is_damaged_is_refused(file):
         len(sequence)
 
 
-def test_they_go_along_into_a_copy_and_a_resumed_file(file, tmp_path):
+def test_observables_are_in_a_copy_and_in_a_resumed_file(file, tmp_path):
     copied = export(file, "h5md", tmp_path)
     Trajectory.resume(file, PRESSED, float(TIMES[1])).close()
     for path, count in ((copied, 4), (file, 2)):
@@ -108,8 +108,8 @@ def test_they_go_along_into_a_copy_and_a_resumed_file(file, tmp_path):
             assert [one.measures for one in sequence] == [frame(k).measures for k in range(count)]
 
 
-def test_a_file_that_lacks_them_is_copied_without(tmp_path):
-    """Such as one of a version that did not know of a measure."""
+def test_a_file_without_observables_is_copied(tmp_path):
+    """It may come from a version of tisim without one of the measures."""
     with Trajectory(tmp_path / "t.h5", [PRESSED]) as trajectory:
         trajectory.write(0, Frame(0.0, 0, frame(0).arrays))
     with frames(tmp_path / "t.h5") as sequence:
@@ -117,7 +117,7 @@ def test_a_file_that_lacks_them_is_copied_without(tmp_path):
 
 
 def test_forces_are_drawn_against_time(file):
-    """A row of force and torque for each body, and the travel of the one with a servo."""
+    """Each body has a row with force and torque, and the one with a servo also its displacement."""
     with frames(file) as sequence:
         assert bodies(sequence) == ["floor", "lid"]
         figure, series = loads(sequence), sequence.measures
@@ -133,7 +133,7 @@ def test_forces_are_drawn_against_time(file):
             np.testing.assert_array_equal(line.get_ydata(), series[measure])
 
 
-def test_all_that_is_measured_has_its_unit():
+def test_every_measure_has_its_unit():
     assert {name: unit or None for name, unit in measured(EFFECTS).items()} == {
         **UNITS, "lid_speed": "m/s",
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""The folder of a run, its picture, and that nothing is overwritten."""
+"""The output folder of a run: its files, its picture, and protection against overwriting."""
 
 import json
 import tomllib
@@ -86,7 +86,7 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
     assert not folder.check(SCENE, fresh=True)
     folder.trajectory.unlink()
     folder.result.touch()
-    folder.checkpoint.touch()  # of a run that was killed at its very end
+    folder.checkpoint.touch()  # left by a run that was killed at its very end
     for fresh in (None, True):
         with pytest.raises(InputError, match="without a finished run"):
             folder.check(SCENE, fresh)
@@ -106,7 +106,7 @@ def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
 
 
 @pytest.mark.parametrize("options", [{"fresh": True}, {"overwrite": True}])
-def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp_path, options):
+def test_beginning_anew_removes_the_earlier_files_before_anything_is_written(tmp_path, options):
     folder = RunFolder(tmp_path)
     for name in (*DATA, "notes.txt"):
         (tmp_path / name).touch()
@@ -119,12 +119,12 @@ def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp
         assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, output_folder.LOCK}
 
 
-def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):
+def test_checking_whether_a_folder_is_in_use_creates_no_files(tmp_path):
     RunFolder(tmp_path).check(SCENE)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
+def test_files_that_another_run_has_left_meanwhile_are_not_replaced(tmp_path):
     folder = RunFolder(tmp_path)
     folder.check(SCENE)
     with folder.claim(SCENE):
@@ -140,7 +140,7 @@ def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
 
 
 def test_frames_of_a_run_that_was_killed_before_its_first_checkpoint_are_made_again(tmp_path):
-    """The same command begins anew by itself; frames of another scene, or damaged ones, are kept."""
+    """The same command begins anew; frames of another scene and damaged frames are kept."""
     folder = RunFolder(tmp_path)
     output_folder.claim(tmp_path, RUN_FILES)
     Trajectory(folder.trajectory, [SCENE]).close()

@@ -1,4 +1,4 @@
-"""A run killed at any moment goes on from its last checkpoint, in another process, to the same bits."""
+"""A run killed at any moment resumes from its last checkpoint and ends with the same bits."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ checkpoint.save = counted
 """
     + MAIN
 )
-"""Killed after some checkpoints. There are more, however fast the machine: the first come after few steps."""
+"""Code of a run that is killed after some checkpoints; the first come after few steps on any machine."""
 ROOT = Path(__file__).parents[2]
 
 
 def begin(folder, *more, code=MAIN):
-    """Start a run that saves a checkpoint as often as it can."""
+    """Start a run that saves checkpoints as often as possible."""
     environment = {**os.environ, "TISIM_CHECKPOINT_SECONDS": "0", "PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
         [sys.executable, "-c", code, *COMMAND, str(folder), *more],
@@ -80,13 +80,13 @@ def test_sigkill_and_resume_end_as_if_never_stopped(whole, tmp_path, saves):
 
 @pytest.mark.slow
 def test_kills_and_full_disks_at_random_lose_nothing(tmp_path):
-    """Some of the trials of tests/soak.sh."""
+    """A part of the trials of tests/soak.sh."""
     for counts in runs.soak(seed=8, share=0.1, folder=tmp_path):
         assert counts.clean, counts
 
 
 def test_half_of_the_kills_wait_for_the_file(tmp_path, monkeypatch):
-    """The file is made after a hundred looks; whoever does not wait for it goes on at the first."""
+    """The file appears after a hundred polls; a kill that does not wait for it comes before any poll."""
     looks = []
 
     class Running:

@@ -1,4 +1,4 @@
-"""Trajectories: the run is the one without, frames come on time, and files are H5MD 1.1."""
+"""Trajectories do not change the run, have frames at the requested times, and are H5MD 1.1 files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tisim.io.reader import Frame, frames, world_count
 from tisim.io.trajectory import Trajectory, recorded_fields
 
 FLOWS = [flow(0, surface_energy=1e3, threshold=0.9, images=True), flow(1, duration=4e-4, images=True)]
-"""Worlds in which grains merge and break, of different durations."""
+"""Worlds of different durations in which grains merge and break."""
 CAPACITY = max(one.capacity() for one in FLOWS)
 ROOT = Path(__file__).parents[2]
 
@@ -32,7 +32,7 @@ def simulation(schedule="world"):
 
 
 def record(path, schedule="world", **rate):
-    """Results of the flows, and their trajectory at the path."""
+    """Run the flows, write their trajectory to the path and return their results."""
     sim = simulation(schedule)
     sim.load(FLOWS)
     with Recording(path, **rate).observer(sim) as recorder:
@@ -84,7 +84,7 @@ def test_a_run_is_the_same_to_the_last_bit_with_a_trajectory(tmp_path, schedule)
 def test_frames_are_the_first_states_at_or_after_the_wanted_times(file, states, world):
     times = np.array([t for t, _ in states[world]])
     due = np.arange(0.0, FLOWS[world].duration * (1 + 1e-9), 5e-5)
-    # A step may be longer than the interval: then one frame stands for two times.
+    # If a step is longer than the interval, one frame stands for two times.
     expected = np.unique(np.searchsorted(times, due - 1e-9 * 5e-5))
     recorded_frames = every_frame(file, world)
     assert [frame.step for frame in recorded_frames] == expected.tolist()
@@ -97,15 +97,15 @@ def test_frames_are_the_first_states_at_or_after_the_wanted_times(file, states, 
     assert (np.diff(counts) > 0).any() == (world == 0)
 
 
-def test_times_that_steps_meet_only_to_rounding_cost_no_step(tmp_path):
-    """Ten steps of 30 us, a frame each: sums of 30 us fall short of its multiples in the last bit."""
+def test_frame_times_met_up_to_rounding_cost_no_step(tmp_path):
+    """Ten steps of 30 us with a frame each; sums of 30 us are below its multiples in the last bit."""
     steady = scene([(0, 0, 0)], [(1.0, 0, 0)], dt=3e-5, steps=10)
     tisim.run(steady, record=Recording(tmp_path / "t.h5", frames=10))
     assert [frame.step for frame in every_frame(tmp_path / "t.h5")] == list(range(11))
 
 
 def test_intervals_far_below_a_step_give_every_step(tmp_path):
-    """Also where times do not resolve them: of a frame and of an entry of a series."""
+    """The same holds for intervals below the rounding of times, for frames and for entries of a series."""
     steady = scene([(0, 0, 0)], [(1.0, 0, 0)], dt=1e-4, steps=60)
     simulation = tisim.Simulation(steady)
     for every in (1e-9, 1e-12, 1e-15, 1e-300):
@@ -133,7 +133,7 @@ def test_a_failed_run_ends_with_its_last_good_state(tmp_path):
 
 
 @pytest.mark.slow
-def test_scenes_of_different_structure_go_to_one_file(tmp_path):
+def test_scenes_of_different_structure_are_written_to_one_file(tmp_path):
     mixed = [scene([(k * 1e-3, 0, 0)], [(1.0, 0, 0)], dt=1e-4, steps=4) for k in range(3)]
     mixed[1] = mixed[1].model_copy(update={"domain": Box(low=(-1,) * 3, high=(1,) * 3)})
     results = tisim.run(mixed, record=Recording(tmp_path / "t.h5", frames=2))
@@ -164,7 +164,7 @@ def test_an_independent_reader_reads_it(file):
                     assert (element.step[k], element.time[k]) == (frame.step, frame.time)
 
 
-def test_layout_is_that_of_the_specification(file):
+def test_layout_follows_the_specification(file):
     with h5py.File(file) as read:
         head = read["h5md"]
         assert head.attrs["version"].tolist() == [1, 1]
@@ -185,7 +185,7 @@ def test_layout_is_that_of_the_specification(file):
             assert (np.diff(position["step"]) > 0).all()
             for name in set(group) - {"box"}:
                 element = group[name]
-                # Hard links to the same objects, as elements that are sampled together may have.
+                # Elements that are sampled together may be hard links to the same objects.
                 assert element["step"] == position["step"]
                 assert element["time"] == position["time"]
                 assert element["value"].shape[:2] == position["value"].shape[:2]
@@ -212,7 +212,7 @@ def test_layout_is_that_of_the_specification(file):
         ("J/(kg K)", "J kg-1 K-1"),
     ],
 )
-def test_units_are_written_as_the_units_module_says(text, expected):
+def test_units_are_written_by_the_rules_of_the_units_module(text, expected):
     assert h5md.unit_string(text) == expected
 
 
@@ -224,7 +224,7 @@ def test_open_space_has_no_edges(tmp_path):
         assert (box.attrs["boundary"].tolist(), list(box)) == ([b"none"] * 3, [])
 
 
-def test_the_box_says_along_which_axes_it_is_periodic():
+def test_the_box_lists_its_periodic_axes():
     slab = Box(low=(0, 0, 0), high=(1, 2, 3), periodic=(True, False, True))
     with h5py.File("slab.h5", "w", driver="core", backing_store=False) as made:
         h5md.write_box(made, slab)
@@ -232,8 +232,8 @@ def test_the_box_says_along_which_axes_it_is_periodic():
         assert made["box/edges"][...].tolist() == [1.0, 2.0, 3.0]
 
 
-def test_it_goes_on_from_a_checkpoint(tmp_path):
-    """Frames after the checkpoint are written again, and none is missing or double."""
+def test_a_trajectory_resumes_from_a_checkpoint(tmp_path):
+    """Frames after the checkpoint are written again; none is missing or duplicated."""
     sim = simulation()
     recording = Recording(tmp_path / "t.h5", frames=15)
     sim.load(FLOWS[:1])
@@ -261,8 +261,8 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
 
 
 @pytest.mark.parametrize("worlds", [1, 2])
-def test_it_does_not_go_on_with_the_frames_of_another_scene(tmp_path, worlds):
-    """Here of as many particles and other velocities, or of several worlds."""
+def test_a_trajectory_of_another_scene_is_not_resumed(tmp_path, worlds):
+    """The other scene has other velocities of the same number of particles, or several worlds."""
     path, mine, other = tmp_path / "t.h5", *(scene([(0, 0, 0)], [(v, 0, 0)]) for v in (1.0, 2.0))
     Trajectory(path, [mine, other][-worlds:]).close()
     content = path.read_bytes()
@@ -287,7 +287,7 @@ with Trajectory(sys.argv[1], [scene]) as trajectory:
 
 
 def synthetic(k):
-    """A frame that says in each of its numbers which one it is."""
+    """A frame that each of its numbers identifies."""
     n = 3000 - k % 7
     numbers = k + np.arange(n) / 4096
     vector = numbers[:, None] + np.array([0.0, 0.25, 0.5]) / 4096
@@ -296,7 +296,7 @@ def synthetic(k):
 
 
 @pytest.mark.slow
-def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
+def test_all_finished_frames_of_a_killed_run_can_be_read(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for kill in range(2):
         path = tmp_path / f"{kill}.h5"

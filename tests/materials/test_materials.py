@@ -103,7 +103,7 @@ def test_a_wrong_material_in_a_file_is_named():
         Scene.from_dict({**data, "material_pairs": pairs})
 
 
-def test_pair_values_replace_those_of_single_materials():
+def test_pair_values_replace_values_of_single_materials():
     """A pair friction from the table needs no friction of the single materials."""
     alone = {name: Material(young=1e7, poisson=0.3, restitution=0.5) for name in ("a", "b")}
     pairs = {f"{a}-{b}": MaterialPair(friction=0.1) for a, b in ("aa", "ab", "bb")}

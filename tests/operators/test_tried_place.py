@@ -1,4 +1,4 @@
-"""Insertion trials are compared with all particles, in whatever block of memory they are."""
+"""Insertion trials are compared with all particles in all blocks of memory."""
 
 import numpy as np
 import pytest

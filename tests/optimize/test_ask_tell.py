@@ -30,7 +30,7 @@ def going_on(campaign, generations, of=worth):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_ask_gives_the_designs_of_a_search(method):
-    """The designs equal those of a search with the same method, seed and options, if there is no noise."""
+    """Without noise, a search with the same method, seed and options has the same designs."""
     problem = fake_problem(3)
 
     def quiet(design, seed=0):

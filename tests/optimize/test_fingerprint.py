@@ -148,7 +148,7 @@ def test_cached_values_of_an_object_do_not_count():
 
 
 def test_redefined_code_counts():
-    """As in a notebook, where there is no file."""
+    """Code in a notebook has no file."""
     names = {}
     exec("def f(r): return r - 1", names)
     before = fingerprint(names["f"], "x")

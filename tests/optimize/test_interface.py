@@ -67,7 +67,7 @@ def test_pandas_is_optional(drift, monkeypatch):
 
 @pytest.mark.long
 def test_a_search_in_a_folder_can_be_continued(drift, tmp_path, capsys):
-    """The designs equal those of a search without a folder; a repetition runs and prints nothing."""
+    """A search without a folder has the same designs; a repetition runs and prints nothing."""
     first = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
     again = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
     assert first.designs == again.designs == drift.designs

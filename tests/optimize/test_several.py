@@ -32,7 +32,7 @@ OBJECTIVES = (
 def zdt1(design, seed, noise=0.0):
     """ZDT1 (Zitzler, Deb and Thiele, Evol. Comput. 8 (2000) 173-195), with the first objective inverted.
 
-    The front is price = 1 - sqrt(-gain), where all genes but the first are 0.
+    The front is price = 1 - sqrt(-gain), with all genes but the first equal to 0.
     """
     x = np.array(list(design.values()))
     g = 1 + 9 * x[1:].mean()

@@ -39,7 +39,7 @@ def truth(law, power):
 def test_sizes_follow_the_distributions_of_scipy(name, by):
     """Kolmogorov-Smirnov test of 4e5 sizes at the level of 1 %.
 
-    A distribution by volume taken for one by number would deviate by 20 times as much.
+    A distribution by volume taken for one by number would deviate 20 times more.
     """
     kind, values, law = LAWS[name]
     sizes = kind(by=by, **BOUNDS, **values)

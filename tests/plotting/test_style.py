@@ -24,7 +24,7 @@ def test_panels_have_letters_before_their_titles():
         ((0, 2e-17), "time (10⁻¹⁸ s)", "1e+15"),
     ],
 )
-def test_an_axis_says_its_quantity_and_a_unit_that_suits_it(limits, label, tick):
+def test_an_axis_label_has_the_quantity_and_a_suitable_unit(limits, label, tick):
     axis = empty(4, 3).subplots()
     axis.set_xlim(*limits)
     quantity(axis.xaxis, "time", "s")

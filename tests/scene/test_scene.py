@@ -201,7 +201,7 @@ class TestRequires:
             ((Impact(hardness=1), Impact(hardness=2)), "effects.impact must be given once; received 2"),
         ],
     )
-    def test_an_effect_without_what_it_needs_is_refused(self, effects, message):
+    def test_an_effect_without_its_requirements_is_refused(self, effects, message):
         with pytest.raises(InputError) as fault:
             cloud(effects=effects)
         assert str(fault.value).startswith(message)

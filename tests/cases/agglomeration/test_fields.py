@@ -1,4 +1,4 @@
-"""Agglomeration with charges and fields: forces beside a NumPy twin, closed forms, what merging conserves."""
+"""Agglomeration with charges and fields: forces against a NumPy twin, closed forms, conservation laws."""
 
 import itertools
 
@@ -33,7 +33,7 @@ GRAINS = 12
 
 
 def moment(flux, radius):
-    """Moments of spheres of iron in a field along x, by bisection of Froehlich's law."""
+    """Magnetic moment of an iron sphere in a field along x, by Brent's method for Froehlich's law."""
     chi, saturation = CARBONYL_IRON.parameters().values()
 
     def excess(m):
@@ -44,8 +44,7 @@ def moment(flux, radius):
 
 
 def forces_twin(design, state, t):
-    """Coulomb's force and that of dipoles, of every pair by its nearest image, and that of the electric
-    field."""
+    """Coulomb and dipole forces of every pair with its nearest image, and the force of the electric field."""
     wave = np.sin(2 * np.pi * t * np.array([design["electric_frequency"], design["magnetic_frequency"]]))
     electric = design["electric_field"] + design["electric_amplitude"] * wave[0]
     flux = design["magnetic_field"] + design["magnetic_amplitude"] * wave[1]
@@ -63,7 +62,7 @@ def forces_twin(design, state, t):
 
 
 @pytest.mark.long
-def test_the_forces_are_those_of_a_numpy_twin():
+def test_the_forces_agree_with_a_numpy_twin():
     setup = scene(DESIGN, 3, GRAINS, duration=1e-12)
     (result,) = simulate([setup.model_copy(update={"stepper": fixed(1e-12)})])
     assert result.work["impacts"] == 0
@@ -73,7 +72,7 @@ def test_the_forces_are_those_of_a_numpy_twin():
 
 @pytest.mark.long
 def test_the_fields_oscillate():
-    """After some steps the force is that of the fields then."""
+    """After some steps the forces are in accord with the fields at that time."""
     setup = scene({**DESIGN, "relative_velocity": 20.0, "length_ratio": 0.2}, 3, GRAINS, duration=8e-5)
     (result,) = simulate([setup.model_copy(update={"stepper": fixed(2e-5)})])
     assert (result.work["steps"], result.work["impacts"]) == (4, 0)
@@ -100,8 +99,8 @@ def test_grains_are_of_two_classes_that_differ_in_charge_alone():
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_genes_of_no_charge_and_no_field_change_nothing():
-    """Beside the flow of Z04 in the same box and steps."""
+def test_genes_without_charge_and_field_change_nothing():
+    """The comparison is with the flow of Z04 in the same box with the same steps."""
     with_none = scene({**BEST, **fields.NO_FIELDS}, 2, 60, duration=1e-3)
     control = {"stepper": with_none.stepper, "domain": with_none.domain}
     a, b = (
@@ -129,7 +128,7 @@ def integrated(acceleration, apart, distance):
     return end.t[-1], -end.y[1, -1]
 
 
-def test_closed_forms_are_those_of_the_equations_of_motion():
+def test_closed_forms_solve_the_equations_of_motion():
     mass, charge, magnet, apart, distance = 2e-5, 3e-8, 5e-3, 5e-3, 2e-3
     coulomb = charge**2 / (4 * np.pi * epsilon_0) / (mass / 2)
     time, _ = integrated(lambda d: -coulomb / d**2, apart, distance)
@@ -142,7 +141,7 @@ def test_closed_forms_are_those_of_the_equations_of_motion():
 
 
 @pytest.mark.long
-def test_two_charges_meet_when_the_closed_form_says_and_are_one_without_charge():
+def test_two_charges_meet_at_the_time_of_the_closed_form_and_merge_to_zero_charge():
     time = field_checks.fall_time(
         field_checks.MASS, field_checks.CHARGE, field_checks.START_DISTANCE, 2 * field_checks.RADIUS
     )
@@ -185,7 +184,7 @@ def test_the_genome_has_velocity_hardness_reaction_charges_and_fields():
         assert low.effects != high.effects
 
 
-def test_a_search_without_genes_of_fields_is_one_of_no_fields():
+def test_a_search_without_genes_of_fields_has_no_fields():
     searched = problem_of("and magnetic field", "small")
     design = searched.genome.decode([0.5] * len(searched.genome))
     assert "surface_charge" not in design
@@ -193,7 +192,7 @@ def test_a_search_without_genes_of_fields_is_one_of_no_fields():
     assert [len(problem_of(kind, "small").genome) for kind in KINDS_OF_GENES] == [10, 12, 15, 13, 18]
 
 
-def test_the_table_and_the_picture_of_what_fields_add():
+def test_the_table_and_the_picture_of_the_effect_of_fields():
     found = {
         kind: [Found({}, 0.1 * k, true) for true in (0.2, 0.3, 0.4)] for k, kind in enumerate(KINDS_OF_GENES)
     }
@@ -205,7 +204,7 @@ def test_the_table_and_the_picture_of_what_fields_add():
 
 
 @pytest.mark.slow
-def test_what_fields_do_to_one_flow_is_beside_the_same_starts():
+def test_the_effect_of_fields_on_one_flow_is_compared_for_the_same_starts():
     head, _, *rows = one_flow(60, 48).splitlines()
     assert head.split("|")[1].strip() == "grains feel"
     cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
@@ -224,9 +223,9 @@ def test_what_fields_do_to_one_flow_is_beside_the_same_starts():
     ],
     ids=["charges", "moments", "electric field"],
 )
-def test_the_rate_is_that_of_two_touching_grains(felt):
-    """Its square is their acceleration over the radius, for charges of both classes and moments in line; of
-    an electric field alone it counts the largest charge."""
+def test_the_rate_follows_from_two_touching_grains(felt):
+    """The square of the rate is their acceleration over the radius, with charges of both classes and moments
+    in line; for an electric field alone the largest charge counts."""
     radius, design = 1e-3, {**BEST, **fields.NO_FIELDS, **felt}
     mass = 4 / 3 * np.pi * radius**3 * design["density"]
     charge = 4 * np.pi * radius**2 * design["surface_charge"]
@@ -241,7 +240,7 @@ def test_the_rate_is_that_of_two_touching_grains(felt):
     assert fields.rate({**design, **fields.NO_FIELDS}, radius) == 0.0
 
 
-def test_steps_of_small_grains_in_strong_fields_may_be_shorter_than_those_of_the_paper():
+def test_steps_of_small_grains_in_strong_fields_may_be_shorter_than_in_the_paper():
     strong = {**BEST, **FELT["opposite charges"], "magnetic_field": 1.0, "density": 1e3, "length_ratio": 0.4}
     control = scene({**fields.NO_FIELDS, **strong}, 1, 1000).stepper.control
     assert control.shortest == control.longest < 1e-6

@@ -1,15 +1,15 @@
-"""Slopes of grains that are made, not run."""
+"""Synthetic slopes of grains on a lattice."""
 
 import numpy as np
 
 from tisim.cases.avalanche.scene import DIAMETERS
 
 WIDTH = 6
-"""Of the cells of these slopes, in diameters."""
+"""Width of the cells of these slopes, in diameters."""
 
 
 def block(heights, d=DIAMETERS[0]):
-    """The state of grains on a square lattice, stacked so many high at each diameter along the cell."""
+    """The state of grains on a cubic lattice, with the given number of layers at each diameter along x."""
     place = [(x, y, z) for x, n in enumerate(heights) for y in range(WIDTH) for z in range(n)]
     n = len(place)
     return {

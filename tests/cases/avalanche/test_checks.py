@@ -1,4 +1,4 @@
-"""What is yielded of avalanches, of slopes that are made; and avalanches that are run."""
+"""Checks and figures of avalanches, with synthetic slopes and with a few runs."""
 
 from types import SimpleNamespace
 
@@ -20,20 +20,20 @@ CELL = Cell(number=0, column=8.0, width=WIDTH, length=40.0, height=20.0)
 
 
 def avalanche(d, field, seed, run, top=16):
-    """An avalanche that has left a staircase."""
+    """An avalanche that ends as a staircase."""
     state = leaning(top + seed % 2, run, d)
     measures = {"box_force_z": -GRAVITY * state["mass"].sum(), "gate_force_z": 0.0, "kinetic_ratio": 1e-5}
     sides = (CELL.length * d, CELL.width * d, CELL.height * d)
     cell = Box(low=(0.0, 0.0, 0.0), high=sides, periodic=(False, True, False))
     end = SimpleNamespace(state=state, measures=measures, time=0.0, scene=SimpleNamespace(domain=cell))
-    # Magnetised columns are half as high again, those of small grains alone.
+    # Only columns of small grains become higher when they are magnetised, by a half.
     high = 6 if field and d == DIAMETERS[0] else 4
     return Avalanche(CELL, d, field, seed, block([4] * 8, d), block([high + seed % 2] * 8, d), end)
 
 
 @pytest.fixture(scope="module")
 def staircases():
-    """Those of the smallest grains are 45 degrees steep in a field, all others 27."""
+    """Staircases of all sizes: 45 degrees for the smallest grains in a field, 27 for all others."""
     return [
         avalanche(d, field, seed, 1 if field and d == DIAMETERS[0] else 2)
         for d in DIAMETERS
@@ -42,7 +42,7 @@ def staircases():
     ]
 
 
-def test_what_is_steeper_is_told_by_pairs_of_starts(staircases):
+def test_steeper_slopes_are_detected_by_pairs_of_starts(staircases):
     d = DIAMETERS[0]
     without, magnetised = of(staircases, d, 0.0), of(staircases, d, FLUX)
     assert [one.seed for one in without] == [0, 1]
@@ -50,7 +50,7 @@ def test_what_is_steeper_is_told_by_pairs_of_starts(staircases):
     claims = {check.name: check for check in of_avalanches(staircases)}
     flat = claims["5 mm, without a field: angle, degrees (L21: 37.2)"]
     assert flat.mean.value == pytest.approx(26.57, abs=1.0)
-    # The heap is as high and half as long.
+    # The heap is equally high and half as long.
     assert not claims["5 mm: volume with field over volume without (L21: 1.09)"].ok
     assert claims["5 mm: volume magnetised over volume settled"].mean.value == pytest.approx(6.5 / 4)
     assert claims["growth of the volume, 5 mm minus 5 cm"].mean.value == pytest.approx(0.5)
@@ -61,7 +61,7 @@ def test_what_is_steeper_is_told_by_pairs_of_starts(staircases):
     assert claims["load on the walls over weight, largest deviation"].ok
 
 
-def test_figures_of_a_size_are_of_its_settings_and_have_each_slope(staircases, monkeypatch):
+def test_figures_of_a_size_use_its_settings_and_show_each_slope(staircases, monkeypatch):
     calls = []
     monkeypatch.setattr(drawing, "avalanches", lambda *a, **more: calls.append((a, more)) or staircases)
     monkeypatch.setitem(SIZES, "stiff", Size("", {"cell": CELL, "stiffness": 1e6}))
@@ -84,7 +84,7 @@ def test_figures_of_a_size_are_of_its_settings_and_have_each_slope(staircases, m
         figures("l21_1cm", None)
 
 
-def test_strips_are_those_of_the_column():
+def test_strips_of_a_column():
     state = block([1] * 7)
     strips = strips_of(state, DIAMETERS[0])
     assert sorted(set(strips.values())) == [0, 1, 2]
@@ -93,7 +93,7 @@ def test_strips_are_those_of_the_column():
 
 
 def test_moments_of_two_grains_have_known_eigenvalues():
-    """In contact, through the periodic face: 2 a along the line between them, a across, of either sign."""
+    """Two grains touch through the periodic face: +-2 a along the line between them, +-a across."""
     d, a = DIAMETERS[0], CONTRAST / 8
     state = {"position": np.array([[0, 0.3 * d, 0], [0, 5.3 * d, 0]]), "radius": np.full(2, d / 2)}
     found = moment_eigenvalues(state, 6 * d)
@@ -102,8 +102,8 @@ def test_moments_of_two_grains_have_known_eigenvalues():
 
 
 @pytest.mark.slow
-def test_a_field_loosens_small_grains_and_without_one_all_sizes_are_alike():
-    """From two starts of each; without a field slopes are those of the weight alone, whatever the size."""
+def test_a_field_loosens_small_grains_and_without_a_field_all_sizes_are_alike():
+    """There are two starts of each; without a field gravity alone shapes the slopes of all sizes alike."""
     small, _, large = DIAMETERS
     wanted = [(d, field, seed) for seed in (0, 1) for d, field in ((small, 0.0), (large, 0.0), (small, FLUX))]
     runs = avalanches(DEFAULT, wanted)
@@ -115,7 +115,7 @@ def test_a_field_loosens_small_grains_and_without_one_all_sizes_are_alike():
     for one in runs:
         assert one.overlap < 0.02
         assert load_on_walls(one.end) == pytest.approx(1.0, abs=0.03)
-    # Whole sweeps would diverge in the bed that has settled; those that are made converge.
+    # Full sweeps would diverge in the settled bed; the relaxed sweeps converge.
     for one in loose:
         least, most = moment_eigenvalues(one.settled, one.width)[[0, -1]]
         assert least < -1

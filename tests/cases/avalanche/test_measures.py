@@ -29,16 +29,16 @@ def test_a_bent_slope_has_two_angles():
     assert two_slopes(block(heights)) == pytest.approx((45.0, 26.57), abs=2.0)
 
 
-def test_what_is_not_a_slope_has_no_angle():
+def test_a_state_without_a_slope_has_no_angle():
     assert np.isnan(repose(block([5] * 10)))
     assert np.isnan(two_slopes(block([5] * 10))).all()
 
 
-def test_the_volume_of_a_block_is_that_of_its_box():
+def test_the_volume_of_a_block_is_the_volume_of_its_box():
     state = block([4] * 8)
     assert heap_volume(state, WIDTH * D) == pytest.approx(4 * 8 * WIDTH * D**3)
     assert grains_volume(state) == pytest.approx(np.pi / 6 * 4 * 8 * WIDTH * D**3)
-    # Grains that have left the cell through a periodic face are in it.
+    # Grains that have left the cell through a periodic face count as inside.
     state["position"][::3, 1] += WIDTH * D
     assert heap_volume(state, WIDTH * D) == pytest.approx(4 * 8 * WIDTH * D**3)
 

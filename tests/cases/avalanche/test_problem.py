@@ -1,4 +1,4 @@
-"""Calibration to an angle of repose, and to a profile of any size."""
+"""Calibration to an angle of repose, and to a slope profile of any size."""
 
 from types import SimpleNamespace
 
@@ -75,14 +75,14 @@ def test_a_profile_is_met_by_the_same_slope_of_any_size():
     assert area(place, height) == pytest.approx(1.125, rel=1e-3)
     for size in (1.0, 30.0):
         assert off(triangle(1.5 * size, 1.5 * size, 0.01 * size), place, height) < 0.01
-    # One that is flatter is off by what its heights are: at the end of the cell by 1.5 - 1.5 / sqrt(1.5).
+    # The misfit of a flatter slope is in its heights: 1.5 - 1.5 / sqrt(1.5) at the end of the cell.
     flatter = triangle(1.5, 1.5 * 1.5, 0.1)
     gap = flatter.height - np.maximum(1.5 * 1.5**0.5 - flatter.distance, 0.0)
     assert off(flatter, place, height) == pytest.approx(float(((gap / 0.1) ** 2).mean()), rel=0.02)
 
 
-def test_a_profile_tells_slopes_apart():
-    """That of the state itself is met best."""
+def test_a_profile_distinguishes_slopes():
+    """The misfit to its own profile is zero, and to a steeper slope it is large."""
     place, height = profile(leaning(16, 2))
     target = MeasuredProfile(place, height, np.full(len(place), 1e-3))
     same, steep = (misfit(SimpleNamespace(state=leaning(16, run)), target) for run in (2, 1))
@@ -105,8 +105,9 @@ def test_other_measurements_are_another_problem(tmp_path):
 
 @pytest.mark.slow
 def test_a_known_design_is_met():
-    """What is found has the angle of the known design, from other starts than those of the search, too. One
-    angle does not tell three parameters: designs that have it are far from each other."""
+    """The best design has the angle of the known design, also from starts that the search has not used.
+
+    One angle does not determine three parameters: designs with this angle are far from each other."""
     case = every()["avalanche"]
     problem, search = case.inverse("default", "calibrate")
     outcome = optimize.run(problem, **search)

@@ -1,4 +1,4 @@
-"""The scenes: L21's numbers, copies of each other at all sizes, and forces of two grains by size."""
+"""The scenes: L21's numbers, scaled copies for all sizes, and forces of two grains of each size."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_the_sizes_of_l21_have_its_numbers(size, sides, number):
 
 
 def test_grains_of_all_sizes_are_copies_of_each_other():
-    """In units of d and sqrt(d/g): but for rounding, which steps have to three digits."""
+    """In units of d and sqrt(d/g) they are equal but for rounding, which is to three digits for steps."""
     small, large = (scene(DEFAULT, diameter=d, field=0.0) for d in (5e-3, 5e-2))
     assert large.duration / small.duration == pytest.approx(10**0.5)
     assert step(5e-2, 2e5) / step(5e-3, 2e5) == pytest.approx(10**0.5, rel=5e-3)
@@ -62,7 +62,7 @@ def test_grains_begin_apart_beside_the_wall():
     assert not np.array_equal(state["position"], scene(DEFAULT, seed=4).start()["position"])
 
 
-def test_what_is_not_magnetised_has_no_field_and_a_wall_that_stays_does_not_move():
+def test_an_unmagnetised_scene_has_no_field_and_a_closed_gate_does_not_move():
     kinds = {effect.kind() for effect in scene(TINY, field=0.0).effects}
     assert not kinds & {"magnetic_field", "truncated_dipole_dipole"}
     gates = [
@@ -84,7 +84,7 @@ def test_a_state_is_handed_on_in_the_order_of_ids():
 
 
 def test_the_attraction_is_the_slope_of_the_energy_of_two_dipoles():
-    """Two that magnetise each other are of lower energy by -m.B/2 each, m = c B / (1 - 2 a)."""
+    """The energy of each of two dipoles that magnetise each other is -m.B/2, with m = c B / (1 - 2 a)."""
     d = DIAMETERS[0]
     alone = moment(d)
 
@@ -102,13 +102,13 @@ def test_the_attraction_is_the_slope_of_the_energy_of_two_dipoles():
     assert weight(d) == pytest.approx(7750 * np.pi / 6 * d**3 * 0.144)
 
 
-def test_magnetism_loses_as_grains_grow():
-    """L21 section 4.5: ten times gravity for 5 mm, more than it for 1 cm, about as much for 5 cm."""
+def test_magnetism_over_gravity_decreases_with_the_size_of_grains():
+    """L21 section 4.5: ten times gravity for 5 mm, above gravity for 1 cm, about equal to it for 5 cm."""
     small, medium, large = (ratio(d) for d in DIAMETERS)
     assert small == pytest.approx(14.1, abs=0.1)
     assert medium == pytest.approx(small / 2)
     assert large == pytest.approx(small / 10)
-    # Without what grains do to each other's moments it is 9/16 of that in the limit of iron.
+    # Without mutual induction the ratio is 9/16 of this in the limit of iron.
     assert ratio(DIAMETERS[2], mutual=False) / large == pytest.approx(9 / 16, rel=5e-3)
 
 

@@ -1,4 +1,4 @@
-"""The stages of an avalanche: what each begins with, and what becomes of one that fails."""
+"""The stages of an avalanche: their initial states, and failed stages."""
 
 from types import SimpleNamespace
 
@@ -18,7 +18,7 @@ D = DIAMETERS[0]
 
 
 def moving_up(scenes, progress, fails=None):
-    """Results of scenes in which each grain has moved up by its diameter, and the gate is noted."""
+    """Results of scenes in which each grain has moved up by its diameter."""
     results = []
     for index, scene in enumerate(scenes):
         state = {**scene.start(), "spin": np.zeros((TINY.number, 3)), "id": np.arange(TINY.number)}
@@ -33,7 +33,7 @@ def gate(scene):
 
 
 def test_each_stage_begins_where_the_last_one_ended(monkeypatch):
-    """Those of one size and start settle once, whatever the field; the wall goes in the last stage alone."""
+    """Runs of one size and start share one settling run for all fields; the wall opens in the last stage."""
     calls, parts = [], []
 
     def run(scenes, progress):
@@ -61,7 +61,7 @@ def test_each_stage_begins_where_the_last_one_ended(monkeypatch):
     assert {(one.energy, one.unbalanced) for one in rests} == {tuple(REST.values())}
 
 
-def test_one_that_fails_is_no_slope(monkeypatch):
+def test_a_failed_stage_is_an_error(monkeypatch):
     monkeypatch.setattr(stages, "run", lambda scenes, progress: moving_up(scenes, progress, fails=1))
     with pytest.raises(RunError, match="avalanche: as made"):
         avalanches(TINY, [(D, 0.0, 3), (D, 0.0, 4)])

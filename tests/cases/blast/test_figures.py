@@ -1,4 +1,4 @@
-"""What pictures of a blast show of its run."""
+"""Pictures of a run of a blast."""
 
 import numpy as np
 import pytest

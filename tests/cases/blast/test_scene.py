@@ -1,4 +1,4 @@
-"""The case of Z16: numbers of its start, and what the field does to the cloud, on a small ball."""
+"""The case of Z16: numbers of its start, and the effect of the field on a small ball of particles."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_start_has_the_speed_and_the_energy_of_the_paper():
 
 @pytest.mark.long
 def test_the_field_makes_an_ellipsoid_of_the_sphere():
-    """Across the field particles circle and get nowhere; along it they fly as if there were none."""
+    """Particles circle across the field, and fly freely along it."""
     still, field = simulate(
         [scene(flux, number=SMALL, duration=0.3) for flux in (0.0, FLUX)], worlds=2, capacity=SMALL
     )
@@ -38,7 +38,7 @@ def test_the_field_makes_an_ellipsoid_of_the_sphere():
 
 @pytest.mark.slow
 def test_contact_conserves_momentum_and_takes_energy():
-    """Without air and field: touching spheres exchange momentum, and dissipate."""
+    """Without air and field, touching spheres exchange momentum and dissipate energy."""
     blast = scene(0.0, contact=True, number=60, duration=0.02)
     (result,) = simulate([blast.without("chow_drag")], worlds=1, capacity=60)
     assert result.status.ok, result.status.reason
@@ -50,8 +50,8 @@ def test_contact_conserves_momentum_and_takes_energy():
 
 
 @pytest.mark.slow
-def test_neighbours_agglomerate_where_contact_alone_does_not():
-    """Z16 Fig. 9: clumps, while the cloud goes on growing along the field."""
+def test_neighbours_agglomerate_but_not_by_contact_alone():
+    """Z16 Fig. 9: clumps form while the cloud continues to grow along the field."""
     blast = scene(number=100, duration=0.1, contact=True, near=True, cutoff=NEIGHBOURS)
     law = "effects.truncated_near_field"
     without = blast.replace({f"{law}.alpha1": 0.0, f"{law}.alpha2": 0.0})

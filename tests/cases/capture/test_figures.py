@@ -1,4 +1,4 @@
-"""What figures of capture show, of results that are known."""
+"""Figures of capture, drawn from known results."""
 
 from types import SimpleNamespace
 
@@ -13,17 +13,17 @@ from tisim.cases.common.magnetic_fibre import APPLIED_FLUX, SATURATION_MOMENTS
 
 
 def mean_of(n):
-    """Captured fraction of particles of size n in time, see below."""
+    """Mean captured fraction of particles of size n against time, for the runs of the test below."""
     return 0.5 * np.heaviside(TIMES - n / 20, 1.0) + 0.25 * np.heaviside(TIMES - n / 10, 1.0)
 
 
 def caught(*times):
-    """A run in which as many particles were captured at these times, s; -1 for never."""
+    """A run whose particles were captured at these times, s; -1 for never."""
     return SimpleNamespace(state={"captured_at": np.array(times, float)})
 
 
 def test_captured_fraction_in_time_and_at_the_end():
-    """One of two particles of size n is caught at n/10 s in one start; both, at n/20 s, in the other."""
+    """Of two particles of size n, one is caught at n/10 s in one start, and both at n/20 s in the other."""
 
     def rows(settings):
         return [
@@ -57,7 +57,7 @@ def test_captured_fraction_in_time_and_at_the_end():
 
 @pytest.mark.slow
 def test_pictures_of_the_magnet(monkeypatch):
-    """A shorter cylinder has more capture volume for its own (B16 6.4.1), and most of it across the field."""
+    """Shorter cylinders have more capture volume over their own (B16 6.4.1), most of it across the field."""
     monkeypatch.setattr(figures, "PLANE", 41)
     monkeypatch.setattr(figures, "SPACE", 40)
     short, *_, long = (
@@ -69,5 +69,5 @@ def test_pictures_of_the_magnet(monkeypatch):
     titles = [axis.get_title("left") for axis in figures.volume().axes]
     assert titles[2] == f"(c) L/D = 1.67, 90°:\n{short[1]:.1f} times its own volume"
     field = figures.field().axes[2].collections[0]
-    # |B| at the edge of the picture is hardly that of the magnet, 1 T along x.
+    # At the edge of the picture |B| is nearly the applied field, 1 T along x.
     assert field.get_array().reshape(41, 41)[0, 0] == pytest.approx(APPLIED_FLUX, rel=0.1)

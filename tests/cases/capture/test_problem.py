@@ -1,4 +1,4 @@
-"""The inverse problem of capture: the filter, what it is judged by, and what a search finds."""
+"""The inverse problem of capture: the filter, its objectives, and the result of a search."""
 
 import numpy as np
 import pytest
@@ -41,8 +41,8 @@ def test_wire_is_limited():
         Filter(aspect=20.0, number=1.6).places()
 
 
-def test_every_string_of_the_search_has_a_fibre():
-    """Also those on the bounds, to which methods clip."""
+def test_every_individual_of_the_search_has_a_fibre():
+    """This includes designs on the bounds, to which the methods clip."""
     genome = filters.problem(variant="fraction").genome
     for end in (0.0, 1.0):
         number = genome.decode([end] * len(genome))["number"]
@@ -56,8 +56,8 @@ def effect(scene, kind):
 
 
 @pytest.mark.parametrize("angle", [0.0, 30.0, 90.0])
-def test_hard_magnets_are_saturated_where_their_gene_says_whatever_the_field(angle):
-    """Angles to the axis, z, in the plane of x and z; what soft ones do is the field's."""
+def test_hard_magnets_are_saturated_along_their_gene_in_any_field(angle):
+    """Angles are to the axis z, in the plane of x and z; the field determines the moments of soft magnets."""
     hard, soft = filters.problem(variant="hard"), filters.problem(variant="fraction")
     assert {*hard.genome.names} - {*soft.genome.names} == {"magnetisation_angle"}
     way = np.array([np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))])
@@ -78,7 +78,7 @@ def test_hard_magnets_are_saturated_where_their_gene_says_whatever_the_field(ang
 
 
 def outcome_of(scene, caught_by):
-    """A result in which particles lie where they began, but for those that a fibre has caught."""
+    """A result in which all particles are at their start except those that a fibre has caught."""
     start = scene.particles.arrays(scene.domain, scene.seed)
     places = np.array([body.centre for body in effect(scene, MagneticCylinders).cylinders])
     stopped = caught_by >= 0
@@ -99,7 +99,7 @@ def test_objectives_are_the_fraction_caught_and_the_water_that_flows_through():
         assert flow.of(result) == pytest.approx(speed * 3.6e-3 * 12e-3)
         assert result.scene.particles.radius == pytest.approx(50e-9)
     assert (flow.unit, caught.unit) == ("m^3/s", "")
-    # Costs are minimised: more of either is better.
+    # Costs are minimised, and both objectives are to be large.
     assert problem.costs([0.25, 1e-7]) == (-0.25, -1e-7)
     assert filters.problem(variant="hard").costs([0.25]) == (-0.25,)
 
@@ -112,7 +112,7 @@ def test_details_of_the_best_filter():
     assert details["wire used, of what there is"] == pytest.approx(1.0)
     assert details["magnetisation to the axis, degrees"] == pytest.approx(90.0)
     assert details["magnetisation over saturation"] == pytest.approx(1.0)
-    # A weak field magnetises in proportion, and nearer to the axis than it is itself.
+    # In a weak field the magnetisation is proportional to the field and nearer to the axis than the field.
     weak, weaker = ({**FIBRES, "flux": flux, "field_angle": 45.0} for flux in (0.1, 0.05))
     shares = [filters.details(one, None)["magnetisation over saturation"] for one in (weak, weaker)]
     assert shares[0] == pytest.approx(2 * shares[1])
@@ -123,12 +123,12 @@ def test_details_of_the_best_filter():
     assert hard["magnetisation over saturation"] == pytest.approx(1.0)
 
 
-def test_picture_shows_the_fibres_and_what_they_caught():
+def test_picture_shows_the_fibres_and_the_captured_particles():
     scene = Filter(**FIBRES).scene(0)
     caught_by = np.full(120, -1)
     caught_by[:30] = np.arange(30) % 8
     result = outcome_of(scene, caught_by)
-    # Such a high picture would be narrower, were it as large as it can be.
+    # At its largest scale such a high picture would be narrower.
     result.start["position"][-1, 0] = 4e-3
     figure = filters.caught(result)
     side, front = figure.axes
@@ -154,7 +154,7 @@ def test_picture_shows_the_fibres_and_what_they_caught():
 
 
 def captured(variant, designs, starts):
-    """Fractions from starts that no search has used, the same of all designs. Shape (designs, starts)."""
+    """Fractions from held-out seeds, which all designs share. Shape (designs, starts)."""
     problem = filters.problem(variant=variant)
     seeds = [start_seed(FRESH, k) for k in range(starts)]
     results = run([problem.scene(design, seed) for design in designs for seed in seeds])
@@ -163,7 +163,7 @@ def captured(variant, designs, starts):
 
 @pytest.mark.slow
 def test_hard_magnets_are_best_magnetised_across_in_a_weak_field():
-    """A strong one holds the moments of particles where fibres then repel them in places."""
+    """A strong field fixes the moments of particles, so that fibres repel them in some places."""
     across = {**FIBRES, "flux": 0.07, "spacing": 3.9, "magnetisation_angle": 90.0}
     along, strong = {**across, "magnetisation_angle": 0.0}, {**across, "flux": 0.8}
     best, *worse = captured("hard", (across, along, strong), 24)
@@ -172,8 +172,8 @@ def test_hard_magnets_are_best_magnetised_across_in_a_weak_field():
 
 
 @pytest.mark.slow
-def test_what_is_in_the_way_is_all_that_is_caught_of_a_fast_flow():
-    """The part of the channel's cross-section that fibres cover, none behind another."""
+def test_fibres_catch_only_particles_in_their_way_from_a_fast_flow():
+    """The fraction is the part of the channel's cross-section that fibres cover; none is behind another."""
     half = {**FIBRES, "number": 4.0, "speed": 1e-2, "radius": 208.0}
     whole = {**half, "number": 8.0}
     for design in (half, whole):
@@ -188,7 +188,7 @@ def test_what_is_in_the_way_is_all_that_is_caught_of_a_fast_flow():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_search_finds_transverse_and_short(tmp_path, seed):
-    """B16's conclusions, by a search that knows nothing of them; and what it found is worse without them."""
+    """A search reproduces B16's conclusions, and designs that contradict them are worse."""
     evaluator = BatchEvaluator()
     with Cache(tmp_path / "search.h5") as cache:
         problem = filters.problem(variant="fraction")
@@ -199,7 +199,7 @@ def test_search_finds_transverse_and_short(tmp_path, seed):
     assert design["aspect"] < 6.0
     across, along = ({**design, "field_angle": angle} for angle in (90.0, 0.0))
     one_long = {**design, "aspect": 20.0, "number": 1.0}
-    # Enough starts to tell a difference of 0.04, with an error of 0.007.
+    # With this number of starts a difference of 0.04 has an error of 0.007.
     best, turned, *worse = captured("fraction", (design, across, along, one_long), 240)
     assert Claim("right across the field is as good", Mean.of(turned - best), least=-0.03).ok
     for name, other in zip(("along the field", "all wire in one fibre"), worse, strict=True):

@@ -19,7 +19,7 @@ def test_cylinder_lies_at_its_angle_and_is_saturated_along_the_field():
     body = fibre(30.0, 20.0)
     assert np.degrees(np.arccos(body.axis[0])) == pytest.approx(30.0)
     assert np.linalg.norm(body.magnetisation) == pytest.approx(SATURATION_MAGNETISATION)
-    # Between the axis of a long cylinder and the field.
+    # The angle is between the axis of a long cylinder and the field.
     turned = np.degrees(np.arccos(np.dot(body.axis, body.magnetisation) / SATURATION_MAGNETISATION))
     assert 0.0 < turned < 30.0
     across = fibre(90.0, 5 / 3).magnetisation
@@ -32,7 +32,7 @@ def test_transverse_captures_more_and_pictures_show_it(tmp_path):
     along, across = statistics.results(settings, 16)
     gain = statistics.fractions(across) - statistics.fractions(along)
     assert Claim("", Mean.of(gain), least=0.02).ok
-    # The fraction at an earlier time is that of a shorter run from the same start.
+    # The fraction at an earlier time is equal to the fraction of a shorter run from the same start.
     (short,) = statistics.results([{**settings[1], "duration": 1.0}], 16)
     early = [statistics.fraction(r.state, 1.0) for r in across]
     assert early == [statistics.fraction(r.state) for r in short]
@@ -50,7 +50,7 @@ def test_transverse_captures_more_and_pictures_show_it(tmp_path):
     assert len(figure.axes[0].collections[0].get_segments()) == 40 * (len(trajectory.times) - 1)
 
 
-def test_a_scene_of_its_own_placement_is_read_where_nothing_else_is_imported(tmp_path):
+def test_a_scene_with_the_placement_of_the_case_is_read_without_other_imports(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(capture.scene().to_toml(), encoding="utf-8")
     code = f"import tisim; print(tisim.Scene.from_toml({str(file)!r}).digest())"
@@ -78,14 +78,14 @@ def test_weights_of_directions():
 
 
 @pytest.mark.slow
-def test_interval_of_a_mean_over_angles_knows_that_starts_are_shared():
-    """Fractions at neighbouring angles rise and fall together, start by start."""
+def test_interval_of_a_mean_over_angles_accounts_for_shared_starts():
+    """Fractions at neighbouring angles are correlated, as they share their starts."""
     settings = [{"angle": angle, "number": 20, "duration": 10.0} for angle in (45.0, 50.0)]
     one, other = (statistics.fractions(group) for group in statistics.results(settings, 40))
     assert np.corrcoef(one, other)[0, 1] > 0.4
 
 
 @pytest.mark.slow
-def test_what_b16_concludes():
+def test_the_conclusions_of_b16():
     failed = [item.name for item in CASE.check() if not item.ok]
     assert failed == []

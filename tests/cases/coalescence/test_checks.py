@@ -1,4 +1,4 @@
-"""What the case coalescence must show."""
+"""The checks of the case coalescence."""
 
 import pytest
 

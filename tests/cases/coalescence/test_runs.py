@@ -1,4 +1,4 @@
-"""Clouds that are looked at on their way, and what is drawn and said of them."""
+"""Series of states of clouds, and the checks and figures made from them."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,8 @@ from tisim.cases.common.rubble_pile import Conserved
 
 
 def made(magnetisation, bound, seed=0, lost=0):
-    """A run in which so many of 40 grains have come to be in a block, the others in pairs but for some that
-    are lost; the moments of all are along the pairs."""
+    """A run that ends with ``bound`` of 40 grains in a block, ``lost`` grains far away and the others in
+    pairs; all moments are along the pairs."""
     block = np.argwhere(np.ones((bound // 9, 3, 3))).astype(float)
     pairs = [row(2, at=(0, 10.0 * (k + 1), 0)) for k in range((40 - len(block)) // 2)]
     place = np.vstack([block, *pairs])
@@ -38,7 +38,7 @@ RUNS = [
 ]
 
 
-def test_what_is_said_of_runs():
+def test_claims_about_runs():
     claims = {claim.name: claim for claim in (*of_agglomeration(RUNS), *of_structure(RUNS))}
     outside = claims["0 A/m: fraction of outside grains in clusters of two or more"]
     assert (outside.value.value, outside.beside) == (1.0, "L21, 50 cm: 0.007")
@@ -48,13 +48,13 @@ def test_what_is_said_of_runs():
     assert RUNS[-1].magnetised_part == pytest.approx(ratio)
     assert RUNS[-1].asteroid is RUNS[-1].asteroid
     checks = {check.name: check for check in of_conservation(RUNS)}
-    # Nothing moves; energy of gravity alone has fallen.
+    # Velocities do not change; only the gravitational energy has decreased.
     assert all(check.ok for check in checks.values())
 
 
 @pytest.mark.parametrize(("weak", "strong"), [(2, 0), (0, 0), (0, 2)])
-def test_magnetised_grains_that_do_not_agglomerate_more_are_against_it(weak, strong):
-    """Of 40 grains some are lost without magnetisation, or with it."""
+def test_a_claim_fails_if_magnetised_grains_do_not_agglomerate_more(weak, strong):
+    """Some of the 40 grains are lost, either without or with magnetisation."""
     runs = [made(m, 18, seed, lost=strong if m > 1000 else weak) for m in MAGNETISATIONS for seed in (0, 1)]
     claims = {claim.name: claim for claim in (*of_agglomeration(runs), *of_structure(runs))}
     for of in (
@@ -67,8 +67,8 @@ def test_magnetised_grains_that_do_not_agglomerate_more_are_against_it(weak, str
     assert not claims["density, 1190 minus 0 A/m, kg/m^3"].ok
 
 
-def test_chains_are_told_by_magnetisation():
-    """A block of two layers, whose grains are in rows of two along their moments, and pairs; then of four."""
+def test_chain_lengths_are_given_by_magnetisation():
+    """A block whose rows along the moments have two grains, and pairs; then a block with rows of four."""
     shown = {item.name: item.value for item in of_agglomeration(RUNS) if "chain length" in item.name}
     assert [one for one in shown if one.endswith("at the end")] == [
         f"{m} A/m: chain length in grains, at the end" for m in (119, 1190)
@@ -77,13 +77,13 @@ def test_chains_are_told_by_magnetisation():
     assert shown["1190 A/m: chain length in grains, at the end"].value == (36 * 4 + 4 * 2) / 40
 
 
-def test_the_rotation_at_which_a_cloud_parts():
+def test_the_rotation_that_disrupts_a_cloud():
     checks = list(of_the_cloud())
     assert all(isinstance(one, Check) and one.ok for one in checks)
     assert [one.expected for one in checks] == pytest.approx([82.8, 234.2], abs=0.5)
 
 
-def test_what_is_drawn_of_runs():
+def test_figures_of_runs():
     assert len(growth(RUNS).axes) == 3
     assert len(asteroids([of_magnetisation(RUNS, m)[0] for m in MAGNETISATIONS]).axes) == 3
     assert len(forces().axes) == 1
@@ -96,7 +96,7 @@ def test_what_is_drawn_of_runs():
 
 def test_the_regime_of_clouds():
     shown = {item.name: item.value for item in regime()}
-    # Of a ball: M R^2 w^2 / 5 over 3/5 G M^2 / R.
+    # For a ball it is M R^2 w^2 / 5 over 3/5 G M^2 / R.
     mass, radius, spin = 7.0, 0.3, 1e-3
     density = mass / (4 / 3 * np.pi * radius**3)
     expected = mass * radius**2 * spin**2 / 5 / (0.6 * G * mass**2 / radius)
@@ -107,7 +107,7 @@ def test_the_regime_of_clouds():
         "50 cm, 1000 urad/s: rotational over gravitational energy": 49,
         "50 cm, 2000 urad/s, read as microdegrees: final over critical spin": 0.86,
         "100 cm: 2 K / |U| of the cloud": 0.41,
-        # Above 2: its energy is above 0.
+        # A value above 2 means a positive energy.
         "50 cm: 2 K / |U| of the cloud": 3.3,
         "default: overlap of an impact over a radius": 0.008,
     }.items():
@@ -115,16 +115,16 @@ def test_the_regime_of_clouds():
 
 
 @pytest.mark.slow
-def test_a_tiny_cloud_conserves_what_it_should():
+def test_a_tiny_cloud_satisfies_conservation_laws():
     runs = clouds(1, number=30, seed_diameter=2.0, duration=400.0, samples=2, magnetisations=(0.0, 1190.0))
     assert [one.magnetisation for one in runs] == [0.0, 1190.0]
     for check in of_conservation(runs):
         assert check.ok, check
-    # Magnets pull; the others only fall.
+    # Magnets attract each other in addition to gravity.
     assert runs[1].conserved[-1].kinetic > 1.05 * runs[0].conserved[-1].kinetic
 
 
-def test_how_far_a_cloud_has_agglomerated():
+def test_the_degree_of_agglomeration_of_a_cloud():
     """A row of 20 is the asteroid; a row of 12, a pair and 6 single grains are outside."""
     single = row(6, 5.0, (0.0, 40.0, 0.0))
     place = np.vstack([row(20), row(12, at=(0, 10, 0)), row(2, at=(0, 20, 0)), single])

@@ -1,4 +1,4 @@
-"""The clouds: L21's numbers, copies of fewer grains, and the closed forms that rule them."""
+"""The clouds: L21's numbers, scaled copies with fewer grains, and closed forms."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_the_sizes_of_l21_have_its_numbers(size, diameter):
     assert set(2 * start["radius"][1:]) == {diameter}
     np.testing.assert_allclose(start["mass"], 3000 * np.pi / 6 * (2 * start["radius"]) ** 3)
     assert len(contacts(start["position"], start["radius"])) == 0
-    # On a lattice of 2 m, in a ball.
+    # The grains are on a lattice of 2 m within a ball.
     np.testing.assert_array_equal(start["position"] % 2.0, 0.0)
     assert np.linalg.norm(start["position"], axis=1).max() == pytest.approx(39.7, abs=0.5)
     rock = made.materials["rubble"]
@@ -64,7 +64,7 @@ def test_velocities_are_thermal_around_a_rotation_without_momentum():
 
 
 def test_a_smaller_cloud_is_a_copy():
-    """Velocities go as the scale, stresses as its square; steps are the longer."""
+    """Velocities scale with the size and stresses with its square; steps are longer."""
     whole, small = (scene(number=n, rotation=0.0, seed_diameter=0.0, of=1000, seed=3) for n in (1000, 125))
     assert scale_of(125, 1000) == pytest.approx(0.5)
     a, b = whole.start(), small.start()
@@ -104,8 +104,8 @@ def test_sites_are_the_nearest_to_the_middle():
 
 
 def test_closed_forms_of_clouds():
-    """A cloud's free fall is half the period of an orbit of half its radius; a critical spin is an orbit at
-    the equator."""
+    """The free-fall time of a cloud is half the period of an orbit with half its radius. The critical spin is
+    the rate of an orbit at the equator."""
     density = mean_density(0.5, 2.0, 3000.0)
     assert free_fall(density) == pytest.approx(13_400, abs=50)
     radius = 7.0
@@ -113,7 +113,7 @@ def test_closed_forms_of_clouds():
     assert free_fall(density) == pytest.approx(np.pi * np.sqrt((radius / 2) ** 3 / (G * mass)))
     assert critical_spin(density) == pytest.approx(np.sqrt(G * mass / radius**3))
     assert critical_spin(1800.0) == pytest.approx(7.1e-4, rel=0.01)
-    # What L21 prints parts its clouds; what the default has leaves a pile that holds.
+    # The rotations printed in L21 disrupt its clouds; the default rotation leaves a stable pile.
     for d in published.DIAMETERS:
         assert min(published.ROTATIONS) > 2 * critical_spin(mean_density(d, 2.0, 3000.0))
         assert spin_when_packed(min(published.ROTATIONS), d, 2.0) > 2 * critical_spin(1800.0)
@@ -133,8 +133,9 @@ def test_closed_forms_of_grains():
 
 
 def test_which_force_dominates():
-    """L21 section 4.6: gravity beats magnetism of 119 A/m, less so of smaller grains; that it also is all
-    but as large at 1190 A/m is not what Eqs (4.1) and (4.13) give."""
+    """L21 section 4.6: gravity exceeds the magnetic force at 119 A/m, by less for smaller grains.
+
+    L21 also calls them nearly equal at 1190 A/m, which contradicts its Eqs (4.1) and (4.13)."""
     weak, strong = (
         [attraction(d, m) / surface_weight(d, 3000.0, 5e-6) for d in (0.5, 1.0)] for m in (119.0, 1190.0)
     )

@@ -1,4 +1,4 @@
-"""L21's mixtures are drawn as they are printed; the viscosity without field has the limits of its laws."""
+"""L21's mixtures have the printed sizes, and the viscosity without a field has the known limits."""
 
 import numpy as np
 import pytest
@@ -27,14 +27,14 @@ def test_curves_are_whole_and_have_the_medians_that_are_printed(parts, median):
 
 @pytest.mark.parametrize("by", ["number", "mass"])
 def test_grains_are_drawn_by_number_or_by_mass(by):
-    """100 000 grains: each size as often, or of as much mass, as the table says."""
+    """Among 100 000 grains each size has the number or the mass fraction in the table."""
     made = mixtures.classes(mixtures.LARGE_GRAINS, by)
     which, radius = draw(made, 100_000, seed=3)
     weight = np.ones(len(radius)) if by == "number" else masses(made, which, radius)
     found = np.bincount(which, weight, minlength=len(made)) / weight.sum()
     diameter, part = numbers(mixtures.LARGE_GRAINS)
     np.testing.assert_allclose(2 * np.array([one.sizes.radius for one in made]), diameter)
-    # Of the mass, a single large grain may be much.
+    # A single large grain may be a large part of the mass.
     np.testing.assert_allclose(found, part, atol=0.005 if by == "number" else 0.02)
 
 
@@ -54,15 +54,15 @@ def test_valve_grains_are_parts_of_the_mass():
         assert made[0].share == pytest.approx(44 / 122)
 
 
-def test_of_one_size_it_is_a_random_packing():
+def test_a_fluid_of_one_size_is_a_random_packing():
     assert closest_packing([3.0], [1.0]) == BETA
     assert closest_packing([3.0, 1.0], [1.0, 0.0]) == BETA
-    # Two classes of all but one size are one class.
+    # Two classes of nearly equal size are as one class.
     assert closest_packing([1.0, 0.999], [0.5, 0.5]) == pytest.approx(BETA, rel=0.03)
 
 
-def test_much_smaller_grains_fill_holes_as_furnas_has_it():
-    """Small ones in the holes of large ones, or large ones as islands among small ones."""
+def test_much_smaller_grains_fill_holes_by_furnas():
+    """Small grains fill the holes between large ones, or large grains are islands among small ones."""
     for small in (0.1, 0.26, 0.5):
         filled, islands = BETA / (1 - small), BETA / (1 - (1 - BETA) * (1 - small))
         expected = min(filled, islands)
@@ -74,11 +74,11 @@ def test_the_densest_mixture_has_a_quarter_to_a_third_of_small_grains():
     packed = np.array([closest_packing([1.0, 0.25], [1 - y, y]) for y in parts])
     assert packed.min() == BETA
     assert 0.25 < parts[packed.argmax()] < 0.4
-    # Which of the two classes comes first is all one.
+    # The order of the two classes does not matter.
     assert closest_packing([0.25, 1.0], [0.3, 0.7]) == closest_packing([1.0, 0.25], [0.7, 0.3])
 
 
-def test_few_grains_thicken_as_einstein_has_it_and_many_without_bound():
+def test_viscosity_follows_einstein_for_few_grains_and_diverges_for_many():
     for fraction in (1e-6, 1e-5):
         assert relative_viscosity(fraction, 0.64) - 1 == pytest.approx(2.5 * fraction, rel=1e-4)
     assert relative_viscosity(0.64, 0.64) == relative_viscosity(0.7, 0.64) == np.inf

@@ -1,4 +1,4 @@
-"""Measures of a rubble pile, of arrangements for which they are known."""
+"""Measures of rubble piles, for arrangements with known values."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_grains_within_a_hundredth_of_a_diameter_are_bound():
 
 
 def block(spin, centre=(30.0, 0.0, 4.0), drift=(1.0, 2.0, 3.0)):
-    """Eight grains as corners of a cube, that turn as a rigid body and drift; one is far away."""
+    """Eight grains at the corners of a cube that rotates as a rigid body and drifts; a ninth is far away."""
     corners = np.array(np.meshgrid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0])).reshape(3, -1).T
     place = np.vstack([corners + centre, [[90.0, 0.0, 0.0]]])
     arm = corners - 0.5
@@ -53,7 +53,7 @@ def test_an_asteroid():
     np.testing.assert_allclose(inertia(asteroid.grains), around * np.eye(3), atol=1e-12)
 
 
-def test_what_is_conserved():
+def test_conserved_quantities():
     pair = state_of(row(2, 2.0), velocity=np.array([[0, 1.0, 0], [0, -1.0, 0]]))
     pair["spin"] = np.array([[0, 0, 3.0], [0, 0, 0]])
     found = Conserved.of(pair)
@@ -66,7 +66,7 @@ def test_what_is_conserved():
 
 
 def test_how_flat_an_asteroid_is():
-    """A sphere is not; a row across z is as wide as the roots of its second moments."""
+    """A sphere is not flat; the axes of a row across z are the roots of its second moments."""
     assert Asteroid.of(state_of(row(1))).flattening == pytest.approx(1.0)
     # Along x: variance 2/3 of three places at -1, 0, 1, beside R^2/5 of the spheres.
     assert Asteroid.of(state_of(row(3))).flattening == pytest.approx(np.sqrt((2 / 3 + 0.1) / 0.1))

@@ -1,4 +1,4 @@
-"""Closed forms of two spheres against quadrature and differences."""
+"""Closed forms of two spheres against quadrature and finite differences."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_hertz():
     depth = hertz_depth(speed, radius, mass, modulus)
     work = quad(lambda x: hertz_force(x, radius, modulus), 0, depth)[0]
     assert work == pytest.approx(mass * speed**2 / 2, rel=1e-12)
-    # In x = 1 - y^2 the root at the turn is no pole.
+    # With x = 1 - y^2 the integrand has no pole at the turning point.
     slow = quad(lambda y: 2 * y / np.sqrt(1 - (1 - y**2) ** 2.5), 0, 1)[0]
     assert pytest.approx(2 * slow, rel=1e-9) == HERTZ_DURATION
     assert hertz_overlap(hertz_force(1e-5, radius, modulus), radius, modulus) == pytest.approx(1e-5)

@@ -1,4 +1,4 @@
-"""What figures of concentrated samples show, of results that are known."""
+"""Figures of concentrated samples, drawn from known results."""
 
 from types import SimpleNamespace
 
@@ -22,7 +22,7 @@ def test_curves_of_concentrated_samples():
 
 
 def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
-    """Two pairs along the field and one particle by itself, which all were single at the start."""
+    """Two pairs along the field and a single particle; all five were single at the start."""
 
     class FewFrames(list):
         times = np.array([0.0, 1e-3])
@@ -38,7 +38,7 @@ def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
     np.testing.assert_allclose(right.lines[0].get_xdata(), [0.0, 1.0])
     np.testing.assert_allclose(right.lines[0].get_ydata(), [1.0, 5 / 3])
     discs = left.collections[0]
-    # Drawn from the farthest, the single one, on; places in µm, seen along y.
+    # The farthest particle, the single one, is drawn first; positions are in µm, seen along y.
     assert discs.get_array().mask.tolist() == [True, False, False, False, False]
     middle = pairs.mean(axis=0)
     np.testing.assert_allclose(discs.get_offsets()[0], 1e6 * (pairs[4] - middle)[[0, 2]])

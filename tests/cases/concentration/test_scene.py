@@ -1,4 +1,4 @@
-"""Concentrated samples: how they are placed, and what chains are."""
+"""Concentrated samples: initial positions and the identification of chains."""
 
 from types import SimpleNamespace
 
@@ -63,7 +63,7 @@ def test_noise_moves_a_particle_by_a_part_of_its_radius_in_the_longest_step():
         assert np.sqrt(2 * diffusivity * longest(radius, coarse)) == pytest.approx(0.03 * coarse * radius)
 
 
-def test_near_pairs_are_those_of_a_double_loop():
+def test_near_pairs_agree_with_a_double_loop():
     position = np.random.default_rng(1).uniform(size=(60, 3))
     expected = [
         (i, j)
@@ -76,7 +76,7 @@ def test_near_pairs_are_those_of_a_double_loop():
 
 
 def test_pairs_bound_head_to_tail_by_energy():
-    """Against B16 Eq. (6.21), pair by pair."""
+    """Every pair is compared with B16 Eq. (6.21)."""
     draw = np.random.default_rng(2)
     position, moment = draw.uniform(size=(80, 3)) * 4, draw.normal(size=(80, 3))
     moment[:, 0] += 2
@@ -105,7 +105,7 @@ def test_chains_and_singles():
     assert mean_size(6, pairs[:0]) == 1.0
 
 
-def test_held_is_what_hangs_on_a_captured_one():
+def test_particles_connected_to_a_captured_one_are_held():
     position = np.array([[0, 0, 0], [2.1, 0, 0], [4.2, 0, 0], [9, 0, 0], [11, 0, 0]], float)
     state = {"position": position, "radius": np.ones(5), "fixed": np.array([1, 0, 0, 0, 0])}
     assert held_fraction(state) == 3 / 5
@@ -123,14 +123,14 @@ def test_first_capture_is_not_the_end_of_the_run():
 
 @pytest.mark.slow
 def test_every_size_runs():
-    """A few steps of each kind; the longest of them take days."""
+    """A few steps of each size are run, as the longest sizes take days."""
     for size in SIZES:
         sample = scene_for(size, 0).replace({"duration": 2e-6})
         assert run(sample).status.ok, size
 
 
 def spread(coarse):
-    """Standard deviation of the distance of a bound pair, in diameters, after it has come to equilibrium."""
+    """Standard deviation of the distance of a bound pair in equilibrium, in diameters."""
     two = scene(nanometres=75, number=2, coarse=coarse)
     place = np.asarray(two.particles.placement.low) + np.array([[0.0, 0, 0], [1.5e-7, 0, 0]])
     pair = Particles(
@@ -149,7 +149,7 @@ def spread(coarse):
 
 
 @pytest.mark.slow
-def test_bound_pairs_spread_as_the_case_says():
+def test_the_spread_of_bound_pairs():
     assert spread(1.0) == pytest.approx(0.03, rel=0.2)
     assert spread(1 / 3) == pytest.approx(0.008, rel=0.2)
     assert spread(3.0) == pytest.approx(0.09, rel=0.2)
@@ -157,7 +157,7 @@ def test_bound_pairs_spread_as_the_case_says():
 
 @pytest.mark.slow
 def test_first_capture_does_not_depend_on_the_steps():
-    """Half as long ones: the same time within its confidence interval, start by start."""
+    """With half the step size the time of each start changes by less than its confidence interval."""
     settings = [{"concentration": 0.5, "angle": 0.0, **CAPTURE, "coarse": coarse} for coarse in (3.0, 1.5)]
     usual, finer = (firsts(group) for group in results(settings, 4))
     change = Mean.of(finer - usual)
@@ -165,8 +165,8 @@ def test_first_capture_does_not_depend_on_the_steps():
 
 
 @pytest.mark.slow
-def test_what_is_more_concentrated_is_captured_sooner_along_the_field_too():
-    """Within what B16 tried, where it makes less of a difference than across the field: of many starts."""
+def test_denser_samples_are_captured_sooner_along_the_field_too():
+    """Concentrations are within the range of B16. Many starts are needed, as the effect is small."""
     settings = [{"angle": 0.0, "concentration": c, **CAPTURE, "duration": 0.3} for c in (DENSE, DENSEST)]
     usual, denser = map(firsts, results(settings, 32))
     assert Claim("", Mean.of(usual - denser), least=0.0).ok
@@ -174,8 +174,8 @@ def test_what_is_more_concentrated_is_captured_sooner_along_the_field_too():
 
 @pytest.mark.slow
 def test_chains_hardly_depend_on_the_steps():
-    """Particles that move a third or three times as far in one: to half a particle, of three by which chains
-    grow, at 95 % confidence. The first differ by 0.19 ± 0.14, the second by -0.02 ± 0.15."""
+    """With steps that move particles a third or three times as far, the growth of chains by three particles
+    changes by less than half a particle at 95 % confidence: by 0.19 ± 0.14 and by -0.02 ± 0.15."""
     settings = [{"concentration": 0.5, **CHAINS, "coarse": coarse} for coarse in (1.0, 1 / 3, 3.0)]
     usual, *others = (np.array([grown(result) for result in group]) for group in results(settings, 64))
     assert Mean.of(usual).value > 2
@@ -185,6 +185,6 @@ def test_chains_hardly_depend_on_the_steps():
 
 
 @pytest.mark.slow
-def test_what_is_claimed_holds():
+def test_the_claims_hold():
     for claim in CASE.check():
         assert claim.ok, (claim.name, *claim.cells)

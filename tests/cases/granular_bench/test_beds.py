@@ -1,4 +1,4 @@
-"""What is made of draw-down tests: Beverloo's law, the heap, the table and the figure; and two runs."""
+"""Evaluation of draw-down tests: Beverloo's law, the heap, the table and the figure; and a few runs."""
 
 from types import SimpleNamespace
 
@@ -25,8 +25,8 @@ STARTS = 4
 
 
 def cone(degrees, rate=0.1, closed=None):
-    """A result with a heap of known slope on the disc of a scene, grains in the silo and one that falls. The
-    silo flows at a rate (kg/s), and is closed for the last part of its time."""
+    """A result with a heap of known slope on the disc, grains in the silo and one falling grain. The silo
+    discharges at ``rate`` (kg/s), and is clogged for the last part ``closed`` of the run."""
     made = scene(number=10)
     low, slope = -8 * DIAMETER, np.tan(np.radians(degrees))
     side = np.arange(-8 * DIAMETER, 8 * DIAMETER, 0.4 * DIAMETER)
@@ -57,7 +57,7 @@ def cone(degrees, rate=0.1, closed=None):
     return SimpleNamespace(scene=made, state=state, time=1.0, measures=measures)
 
 
-def test_the_heap_is_what_lies_on_the_disc_and_has_its_slope():
+def test_the_heap_lies_on_the_disc_and_has_its_slope():
     result = cone(25.0)
     assert floor(result) == pytest.approx(-0.04)
     assert heap(result).sum() == len(result.state["radius"]) - 4
@@ -69,7 +69,7 @@ def test_the_heap_is_what_lies_on_the_disc_and_has_its_slope():
     assert np.isnan(repose(nothing))
 
 
-def test_beverloos_law_is_found_again():
+def test_beverloos_law_is_recovered():
     outlets = np.array([4.0, 6.0, 9.0])
     rates = np.array([
         beverloo_rate(d * DIAMETER, DIAMETER, PACKED * DENSITY, discharge=0.61, empty=1.3) for d in outlets
@@ -77,8 +77,8 @@ def test_beverloos_law_is_found_again():
     assert beverloo_fit(outlets, rates) == pytest.approx((0.61, 1.3), rel=1e-9)
 
 
-def test_beverloos_law_is_known_as_well_as_starts_agree():
-    """What is closed in a start is left out of its fit: also where it flowed at first."""
+def test_the_interval_of_beverloos_law_is_the_spread_over_starts():
+    """Clogged silos are left out of the fit of their start, also if they flowed at first."""
 
     def bed(d, closed):
         law = [beverloo_rate(d * DIAMETER, DIAMETER, PACKED * DENSITY, discharge=c) for c in (0.5, 0.7)]
@@ -90,7 +90,7 @@ def test_beverloos_law_is_known_as_well_as_starts_agree():
     assert (constant.value, constant.half) == pytest.approx((0.6, 1.2706), rel=1e-4)
     assert (k.value, k.half) == pytest.approx((1.4, 0.0), abs=1e-9)
     assert found[0].mean_rate().value == found[0].rates[1]
-    # Lines are through two outlets and more.
+    # A fit needs at least two outlets.
     assert beverloo_constants(found[1:3])[0].value == pytest.approx(0.7)
     closed = Bed("outlet", 3.0, [cone(25.0, 0.0), cone(25.0, 0.0, 0.5)])
     assert np.isnan([closed.mean_rate().value, beverloo_constants([closed])[0].value]).all()
@@ -105,7 +105,7 @@ def test_table_and_figure_have_each_bed():
     rows = table(found).splitlines()
     assert len(rows) == 1 + len(found)
     assert rows[0].startswith("varied,value,angle_of_repose_degrees,angle_of_repose_degrees_95,discharge")
-    # Of 0.009 and 0.011: Student's 12.7 for two, times 0.001.
+    # The interval of 0.009 and 0.011 is Student's 12.7 for two values, times 0.001.
     name, *first = rows[1].split(",")
     assert name == "friction"
     assert [float(x) for x in first[2:5]] == pytest.approx([0.0, 0.01, 0.012706], abs=1e-6)
@@ -127,9 +127,10 @@ def test_settings_of_the_search_are_sound():
 
 @pytest.mark.slow
 def test_rough_grains_make_a_steeper_heap_and_flow_more_slowly():
-    """Draw-down tests with three kinds of grains, from four starts each, whose rates differ by a tenth; what
-    flows out is near Beverloo's law. The heap of the case as it is has an angle of repose between those of
-    glass beads and of sand."""
+    """Draw-down tests with three kinds of grains, from four starts each, whose rates differ by a tenth.
+
+    The discharge rate is near Beverloo's law. The default case has an angle of repose between glass beads and
+    sand."""
     smooth_grains = {"friction": 0.1, "rolling_friction": 0.0, "restitution": 0.5}
     rough_grains = {"friction": 0.8, "rolling_friction": 0.4, "restitution": 0.5}
     results = tisim.run([
@@ -145,7 +146,7 @@ def test_rough_grains_make_a_steeper_heap_and_flow_more_slowly():
     usual, smooth, rough = angles
     assert ((usual > 18) & (usual < 32)).all()
     assert (rough > usual).all()
-    # Where nothing holds them back from rolling, hardly any stay on the disc.
+    # Without rolling friction hardly any grains stay on the disc.
     assert (rough > 8).all()
     kept = np.reshape([heap(result).sum() for result in results], (3, STARTS))
     assert (kept[1] < 0.3 * kept[2]).all()

@@ -1,4 +1,4 @@
-"""The tests of single contacts: impacts of one structure in the suite, all of them with the slow tests."""
+"""Tests of single contacts: a few impacts as one batch, and all checks among the slow tests."""
 
 from types import SimpleNamespace
 
@@ -12,8 +12,8 @@ from tisim.cases.granular_bench.shear_cell import expected_ratio
 
 
 @pytest.mark.slow
-def test_impacts_are_those_of_the_law_in_numpy_and_of_rigid_spheres():
-    """One of each test of Chung and Ooi, as one batch."""
+def test_impacts_agree_with_the_law_in_numpy_and_with_rigid_spheres():
+    """At least one impact of each test of Chung and Ooi, as one batch."""
     tests = particle_tests.TESTS
     some = [tests[3][1], tests[4][4], tests[4][12], tests[5][16], tests[6][5], tests[7][20], tests[8][30]]
     found = rebounds([*tests[1], *tests[2], *some])
@@ -33,8 +33,8 @@ def test_impacts_are_those_of_the_law_in_numpy_and_of_rigid_spheres():
 
 
 @pytest.mark.parametrize(("law", "right"), [(expected_ratio, True), (lambda number: 0.465, False)])
-def test_one_stress_ratio_for_all_flows_is_not_that_of_glass_beads(monkeypatch, law, right):
-    """Though it is near enough to each of theirs."""
+def test_one_stress_ratio_for_all_flows_is_not_accepted_for_glass_beads(monkeypatch, law, right):
+    """It is nevertheless within the bounds for each single flow."""
     beds = [SimpleNamespace(inertial_number=n, ratio=float(law(n))) for n in (0.28, 0.11, 0.05)]
     monkeypatch.setattr(checks, "sheared_beds", lambda fractions: beds)
     *each, rise = checks.shear_checks()

@@ -18,7 +18,7 @@ def test_jkr_pulls_most_at_its_pull_off_and_ends_at_its_stretch():
     assert min(force) == pytest.approx(-parts, rel=1e-6)
     assert force[0] == pytest.approx(-5 / 9 * parts, rel=2e-3)
     assert jkr_force(0.0, energy, radius, modulus) == pytest.approx(-8 / 9 * parts, rel=1e-12)
-    # Pressed hard it is Hertz's.
+    # At large loads it approaches Hertz's law.
     deep = 1e4 * end
     assert jkr_force(deep, energy, radius, modulus) == pytest.approx(
         hertz_force(deep, radius, modulus), rel=2e-3
@@ -33,7 +33,7 @@ def test_a_bridge_pulls_most_at_contact():
 
 
 def test_an_impact_in_numpy_slides_or_sticks_as_rigid_spheres_do():
-    """Where it slides it loses mu (1 + e) v; energy never grows; twins are as an impact with a plane."""
+    """A sliding impact loses mu (1 + e) v, energy never grows, and equal spheres collide as with a plane."""
     slides = ParticleImpact("glass", 0.01, 0.01, friction=0.1, sideways=0.1)
     sticks = ParticleImpact("glass", 0.01, 0.01, friction=5.0, sideways=0.005)
     twins = ParticleImpact("glass", 0.01, 0.005, friction=5.0, spin=0.5, partner="twin")

@@ -1,4 +1,4 @@
-"""Single grains on a plate beside the silo: what they tell of their restitution and friction."""
+"""Single grains on a plate beside the silo, which measure restitution and friction."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ DESIGNS = (
 )
 
 
-def test_the_draw_down_test_is_the_same_and_the_plate_is_out_of_its_reach():
+def test_the_plate_does_not_affect_the_draw_down_test():
     test, both = scene(seed=3, **FEW), scene_with_plate(seed=3, **FEW)
     alone, beside = (one.particles.arrays(one.domain, 3) for one in (test, both))
     for name in ("position", "velocity", "radius", "mass"):
@@ -32,13 +32,13 @@ def test_the_draw_down_test_is_the_same_and_the_plate_is_out_of_its_reach():
 
 @pytest.mark.slow
 def test_a_grain_rebounds_by_its_restitution_and_a_block_slides_at_its_friction():
-    """The root of the ratio of heights is e, to what the weight of a grain does while it is in soft contact;
-    and arctan mu."""
+    """The root of the ratio of heights is e, up to the effect of the weight during the soft contact. The
+    angle of sliding is arctan mu."""
     results = tisim.run([scene_with_plate(design, **FEW) for design in DESIGNS])
     for design, result in zip(DESIGNS, results, strict=True):
         assert result.status.ok
         assert np.sqrt(rebound(result)) == pytest.approx(design["restitution"], abs=0.01)
         assert np.tan(np.radians(sliding(result))) == pytest.approx(design["friction"], rel=1e-6)
-        # It is drawn to the end of its way, and never turned.
+        # The block is drawn to the end of its way without rotation.
         way = by_id(result)["position"][-2] - result.start["position"][-2]
         np.testing.assert_allclose(way, [0.1, 0.0, 0.0], atol=1e-9)

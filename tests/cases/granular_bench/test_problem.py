@@ -25,7 +25,7 @@ from tisim.cases.granular_bench.problem import (
 )
 
 INTERVALS = {"friction": 0.05, "rolling_friction": 0.05, "restitution": 0.02}
-"""How far what is found may be from the known design."""
+"""Largest deviation of the calibrated design from the known design."""
 GOOD = (
     "quantity, value, uncertainty\n\nangle_of_repose,24.5,1.0\n discharge_rate , 0.15,5e-3\n"
     "sliding_angle,27,1\nrebound_ratio,0.25,0.02\n"
@@ -62,7 +62,7 @@ def test_misfit_counts_in_uncertainties(monkeypatch):
 
 
 def test_a_bed_in_a_cup_is_not_calibrated():
-    """It is no draw-down test: it has neither an angle of repose nor a discharge rate."""
+    """It has neither an angle of repose nor a discharge rate, which draw-down tests have."""
     with pytest.raises(InputError, match="size must be one of default, small for the inverse problem"):
         calibration_to(EXAMPLES["small"], "bed")
     with pytest.raises(InputError, match="size must be one of default, small for the inverse problem"):
@@ -89,8 +89,7 @@ def test_other_measurements_are_another_problem(tmp_path):
 
 @pytest.mark.slow
 def test_a_known_design_is_found_again():
-    """Its measures are means over runs from starts that the search does not make; the case's example has
-    them."""
+    """Its measures are means over held-out starts, given in the example of the case."""
     results = tisim.run(other_runs(KNOWN, "small", 8))
     assert all(result.status.ok for result in results)
     measured = {}
@@ -99,7 +98,7 @@ def test_a_known_design_is_found_again():
         mean = Mean.of(values)
         measured[name] = Measurement(mean.value, UNCERTAINTIES[name])
         assert values.std(ddof=1) < 1.5 * UNCERTAINTIES[name]
-        # The example is a mean of 64 other starts.
+        # The example is a mean over 64 other starts.
         near = max(mean.half, 0.1 * UNCERTAINTIES[name])
         assert EXAMPLES["small"][name].value == pytest.approx(mean.value, abs=near)
     search = every()["granular_bench"].sizes["small"].search

@@ -1,4 +1,4 @@
-"""The shear cell: its walls, what is taken of a series, and mu(I) beside that of glass beads."""
+"""The shear cell: its walls, means over a series, and mu(I) compared with glass beads."""
 
 from types import SimpleNamespace
 
@@ -29,11 +29,11 @@ from tisim.engine.result import Status
 
 
 def bed(pressure=300.0, gap=10 * DIAMETER):
-    """A bed whose velocity grows by 8 1/s in the middle, and slips at both walls."""
+    """A bed with a shear rate of 8 1/s in the middle and slip at both walls."""
     height = (np.arange(12) + 0.5) / 12 * gap
     velocity = SHEAR_RATE * gap / 2 + 8.0 * (height - gap / 2)
     velocity[0], velocity[-1] = np.nan, np.nan
-    # Two grains of the walls, and one between them.
+    # One grain of each wall, and one between the walls.
     state = {
         "position": np.array([[0.02, 0.01, z * gap] for z in (0.0, 0.5, 1.0)]),
         "velocity": np.array([[part * SHEAR_RATE * gap, 0.0, 0.0] for part in (0.0, 0.4, 1.0)]),
@@ -48,14 +48,14 @@ def test_mu_of_glass_beads():
     assert expected_ratio(0.279) == pytest.approx(0.51)
 
 
-def test_inertial_number_goes_by_the_middle_of_the_gap():
+def test_inertial_number_is_of_the_middle_of_the_gap():
     assert bed().shear_rate == pytest.approx(8.0)
     assert bed().inertial_number == pytest.approx(8.0 * DIAMETER * np.sqrt(DENSITY / 300.0))
     assert bed().ratio == pytest.approx(0.4)
 
 
 def test_stresses_are_means_over_both_walls_and_over_time():
-    """Two samples at three grains; the walls are pushed apart, and dragged along and back."""
+    """The means are over two samples; the walls are pushed apart and dragged in opposite directions."""
     gap = 10 * DIAMETER
     state = {
         "group": np.array([0, 0, 1]), "radius": np.full(3, DIAMETER / 2),
@@ -77,7 +77,7 @@ def test_stresses_are_means_over_both_walls_and_over_time():
 
 
 class Failing:
-    """It runs scenes as a simulation does, of which the second fails after a number of runs."""
+    """A stand-in for a simulation, in which the second scene fails after a number of runs."""
 
     def __init__(self, scene, worlds, runs):
         self.left, self.closed = runs, False
@@ -108,7 +108,7 @@ class Failing:
 
 @pytest.mark.parametrize("runs", [0, 1, 5])
 def test_a_cell_that_fails_has_no_mu(monkeypatch, runs):
-    """While it is closed and at any look after; what others have is not given for it."""
+    """It may fail while it is compressed or at any later sample; no other cell replaces it."""
     made = []
 
     def simulation(scene, worlds):
@@ -122,7 +122,7 @@ def test_a_cell_that_fails_has_no_mu(monkeypatch, runs):
     assert made[0].left == -1
 
 
-def test_the_cell_begins_without_overlaps_of_what_moves():
+def test_the_cell_begins_without_overlaps_of_free_grains():
     gap = gap_of(100, 0.26)
     state = loose(100, gap, 3)
     free = state["group"] == 0
@@ -131,11 +131,11 @@ def test_the_cell_begins_without_overlaps_of_what_moves():
     pairs = contacts(state["position"], state["radius"], sides=(*CELL_SIDES, 0.0))
     assert not free[pairs].any()
     np.testing.assert_allclose(state["velocity"][:, 0], SHEAR_RATE * state["position"][:, 2])
-    # Walls are as rough as half a diameter, and no two neighbours of a row are level.
+    # The roughness of walls is half a diameter, and no two neighbours in a row have equal heights.
     height = rough_wall(0.0)[:, 2]
     assert np.ptp(height) == pytest.approx(0.5 * DIAMETER, rel=0.1)
     assert np.abs(np.diff(height)).min() > 0.1 * DIAMETER
-    # Grains fill what the walls leave them.
+    # The fraction refers to the space between the walls.
     volume = np.pi / 6 * (state["radius"][free] * 2) ** 3
     assert volume.sum() / ((gap - DIAMETER) * CELL_AREA) == pytest.approx(0.26, rel=0.03)
 
@@ -143,7 +143,7 @@ def test_the_cell_begins_without_overlaps_of_what_moves():
 def test_figure_and_table_have_each_bed():
     beds = [bed(pressure) for pressure in (30.0, 300.0, 3000.0)]
     grains, _, ratio, fraction, _ = shear_figure(beds).axes
-    # Grains are coloured by their velocity.
+    # Colours of grains show their velocity.
     picture = grains.images[0].get_array()
     beds[1].state["velocity"][1, 0] *= 2
     other = shear_figure(beds).axes[0].images[0].get_array()
@@ -158,8 +158,8 @@ def test_figure_and_table_have_each_bed():
 
 
 @pytest.mark.slow
-def test_grains_that_are_sheared_have_the_friction_of_glass_beads():
-    """mu grows with the inertial number, as published; the denser of two is slower than its pressure."""
+def test_sheared_grains_have_the_friction_of_glass_beads():
+    """mu grows with the inertial number as published, and the denser bed has the smaller number."""
     dilute, dense = sheared_beds((0.50, 0.55), number=200)
     assert dense.inertial_number < 0.5 * dilute.inertial_number
     assert dense.fraction > dilute.fraction + 0.02
@@ -167,7 +167,7 @@ def test_grains_that_are_sheared_have_the_friction_of_glass_beads():
     for one in (dilute, dense):
         assert one.ratio == pytest.approx(float(expected_ratio(one.inertial_number)), abs=0.09)
         middle = one.filled & (np.abs(one.height / one.gap - 0.5) < 0.3)
-        # Sheared throughout, and not in a band: layers near the walls move as one, a grain thick.
+        # The shear is uniform and not in a band, except for a layer of one grain at each wall.
         height, velocity = one.height[middle], one.velocity[middle]
         line = np.polyval(np.polyfit(height, velocity, 1), height)
         assert np.abs(velocity - line).max() < 0.06 * one.wall_speed

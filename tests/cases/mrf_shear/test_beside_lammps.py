@@ -1,4 +1,4 @@
-"""A sheared cell without mutual induction beside LAMMPS."""
+"""A sheared cell without mutual induction, compared with LAMMPS."""
 
 import numpy as np
 import pytest
@@ -15,12 +15,12 @@ NEAR = {
     "contacts of a grain": 0.05,
     "order of contacts along the field": 0.015,
 }
-"""How far the same start may be apart at the end."""
+"""Largest difference between the programs at the end of a run from the same start."""
 
 
-def test_a_short_experiment_is_that_of_lammps():
-    """Forces agree to rounding; paths and stress to what half a step's kicks make of them, which are by
-    forces after or before rafts are frozen."""
+def test_a_short_experiment_agrees_with_lammps():
+    """Forces agree to rounding. Paths and stress differ by the kick of half a step, for which the programs
+    take the forces after or before the rafts are frozen."""
     (short,) = mrf_lammps.scenes([0], **mrf_lammps.SHORT)
     apart = mrf_lammps.apart(short)
     assert apart["contacts of a grain there"] > 3
@@ -29,8 +29,8 @@ def test_a_short_experiment_is_that_of_lammps():
     assert apart["stress, over itself"] < 2e-5
 
 
-def test_stress_and_chains_are_those_of_lammps():
-    """Start by start, though single grains have parted; and starts differ by more than that."""
+def test_stress_and_chains_agree_with_lammps():
+    """They agree for each start although paths of grains have diverged; starts differ by more."""
     made = mrf_lammps.scenes(range(100, 104))
     programs = mrf_lammps.by_package, mrf_lammps.by_lammps
     ours, theirs = (mrf_lammps.table(by(made)[0], made) for by in programs)

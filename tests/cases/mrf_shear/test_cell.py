@@ -1,4 +1,4 @@
-"""A small cell that is run: chains form, rafts are frozen and driven, and bear what they should."""
+"""Runs of a small cell: chains form, rafts are frozen and driven, and the stress is as expected."""
 
 import numpy as np
 import pytest
@@ -11,15 +11,15 @@ from tisim.cases.mrf_shear.scene import LOWER, UPPER, scene
 UM = 1e-6
 SMALL_CELL = {"sides": (30 * UM, 30 * UM, 36 * UM), "raft": 7 * UM, "rate": 1e4, "magnetising": 10e-6,
               "strain": 0.4, "before": 0.2}  # fmt: skip
-"""As wide as twice the reach of grains, and five diameters high."""
+"""A cell with a width of twice the interaction range of grains and a height of five diameters."""
 STARTS = 4
 """Number of starts: the stress of one run has a standard deviation of 15 %."""
 
 
 @pytest.fixture(scope="module")
 def results():
-    """Runs at full field, at half of it, without one, and without one in oil at rest; then further starts of
-    the first two."""
+    """Runs at full field, half field, no field, and no field with oil at rest; then further starts of the
+    first two."""
     further = [scene(**SMALL_CELL, **flux, seed=k) for flux in ({}, {"flux": 0.3}) for k in range(1, STARTS)]
     scenes = [scene(**SMALL_CELL), scene(**SMALL_CELL, flux=0.3), scene(**SMALL_CELL, flux=0.0)]
     scenes.append(scene(**SMALL_CELL, flux=0.0, still=True))
@@ -41,8 +41,8 @@ def test_rafts_are_frozen_and_driven_apart(results):
 
 
 @pytest.mark.slow
-def test_chains_bear_a_stress_that_goes_as_the_field_squared(results):
-    """Grains are in contact along the field, and both rafts are held back alike; without a field neither."""
+def test_the_stress_of_chains_is_proportional_to_the_squared_field(results):
+    """Grains touch along the field and resist both rafts equally; without a field there is no stress."""
     stresses = [shear_stress(result) for result in results]
     none, still = stresses[2:4]
     strong = np.mean([stresses[0], *stresses[4 : 3 + STARTS]])
@@ -50,7 +50,7 @@ def test_chains_bear_a_stress_that_goes_as_the_field_squared(results):
     assert strong > 10e3
     assert 2.5 < strong / weak < 6.0
     assert abs(none) < 0.02 * strong
-    # Nor is the drag of oil at rest on the rafts a stress of the grains.
+    # The drag of oil at rest on the rafts does not count as a stress either.
     assert abs(still) < 0.02 * strong
     back, on = (raft_force(results[0], group)[0] for group in (LOWER, UPPER))
     assert back == pytest.approx(-on, rel=0.15)

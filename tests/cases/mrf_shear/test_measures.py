@@ -1,4 +1,4 @@
-"""What is taken of a cell: stress on rafts, shear rate, chains, and numbers of the regime."""
+"""Measures of a cell: stress on rafts, shear rate, chains, and dimensionless numbers."""
 
 from types import SimpleNamespace
 
@@ -28,7 +28,7 @@ CELL = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0)
 
 
 def result_of(position, mean_force=None, group=None, radius=R, cell=CELL):
-    """A result with the grains given."""
+    """A result with the given grains."""
     n = len(position)
     state = {
         "position": np.asarray(position, float),
@@ -49,7 +49,7 @@ def test_stress_is_the_mean_of_both_rafts_over_their_area():
 
 
 def test_the_drag_of_oil_at_rest_is_no_stress():
-    """Rafts go through it at their own speed; what is left of the force on them is that of the grains."""
+    """Rafts move through the oil at their own speed; the force without this drag comes from the grains."""
     still = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0, still=True)
     drag = 6 * np.pi * 0.01 * R * 500.0 * 40 * UM / 2
     grains, group = np.array([[2e-6, 0, 1e-6], [-2e-6, 0, 0], [0, 0, 0]]), [LOWER, UPPER, 0]
@@ -58,18 +58,18 @@ def test_the_drag_of_oil_at_rest_is_no_stress():
     assert drag > 1e-9
     np.testing.assert_allclose(raft_force(one, LOWER), grains[0], rtol=1e-12)
     assert shear_stress(one) == pytest.approx(2e-6 / 1.2e-9)
-    # Oil that goes with the rafts drags them not at all.
+    # Oil that moves with the rafts does not drag them.
     assert raft_force(result_of(np.zeros((3, 3)), grains, group), UPPER)[0] == -2e-6
 
 
-def test_the_shear_rate_is_that_between_the_rafts():
+def test_the_shear_rate_between_the_rafts():
     assert shear_rate(result_of(np.zeros((1, 3)))) == pytest.approx(500.0)
-    # L21 names these of its own speeds.
+    # L21 gives these three rates for its own wall speeds.
     np.testing.assert_allclose(np.array(published.SHEAR_RATES)[[1, 5, 7]], [590, 36.4, 9], rtol=0.02)
 
 
-def test_a_chain_along_the_field_across_a_face_and_one_that_lies():
-    """Five grains in line with the field, and three along x, through a face of the cell."""
+def test_a_chain_along_the_field_and_one_across_it():
+    """Five grains are in line along the field, and three along x across a face of the cell."""
     upright = np.column_stack([np.full(5, 0.02e-6), np.full(5, 5e-6), 2 * R * np.arange(5) + R])
     lying = np.array([[39 * UM, 20 * UM, 9 * UM]] * 3) + np.outer(np.arange(3), [2 * R, 0, 0])
     lying[:, 0] %= 40 * UM
@@ -90,8 +90,8 @@ def test_overlap_and_volume_fraction():
     assert volume_fraction(result) == pytest.approx(3 * 4 / 3 * np.pi * R**3 / (72000 * UM**3))
 
 
-def test_the_regime():
-    """Drag is far below magnetic forces, and oil stops a grain in microseconds."""
+def test_the_dimensionless_numbers():
+    """Drag is far below the magnetic forces, and oil stops a grain within microseconds."""
     assert mason_number(1000.0, 0.6) == pytest.approx(8 * 0.01 * 1000 * mu_0 / 0.36)
     assert stokes_time() == pytest.approx(2e-6, rel=0.05)
     moment = magnetisation(0.6) * np.pi / 6 * (2 * R) ** 3
@@ -105,7 +105,7 @@ def test_the_regime():
     assert shown["magnetisation of a single grain, MA/m"] == pytest.approx(1.43, rel=2e-3)
 
 
-def test_how_much_grains_are_magnetised():
+def test_the_moment_of_grains_relative_to_isolated_grains():
     result = result_of(np.zeros((2, 3)))
     alone = magnetisation(0.6) * 4 / 3 * np.pi * R**3
     result.state["moment"] = alone * np.array([[0, 0, 1.0], [0, 0.9, 1.2]])
@@ -113,13 +113,13 @@ def test_how_much_grains_are_magnetised():
 
 
 def group(rate, stresses):
-    """Cells with a shear stress each."""
+    """Cells with the given shear stresses."""
     cell = scene(rate=rate, sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM)
     force = [[[one * 1.2e-9, 0, 0], [-one * 1.2e-9, 0, 0]] for one in stresses]
     return [result_of(np.zeros((2, 3)), one, [LOWER, UPPER], cell=cell) for one in force]
 
 
-def test_yield_stresses_are_those_of_each_start():
+def test_yield_stresses_of_each_start():
     rates = np.array([1e3, 2e3, 4e3])
     of_starts = 40e3 * np.array([0.9, 1.0, 1.1])
     curve = Curve(rates, [group(rate, of_starts + rate) for rate in rates])
@@ -133,7 +133,7 @@ def test_a_curve_is_fitted_with_the_spread_over_starts():
     fit = curve.bingham()
     assert fit.yield_stress.value == pytest.approx(40e3)
     assert fit.plastic_viscosity.value == pytest.approx(0.5)
-    # Starts are shared: what the yield stress varies by is what a whole curve is off.
+    # All rates share their starts, so the yield stress varies by the shift of a whole curve.
     assert fit.yield_stress.half == pytest.approx(Mean.of([39e3, 41e3, 40e3]).half)
     assert fit.plastic_viscosity.half == pytest.approx(0.0, abs=1e-6)
     rows = table(curve, "shear_rate_per_s").splitlines()
@@ -147,7 +147,7 @@ def test_a_curve_is_fitted_with_the_spread_over_starts():
 
 
 def test_rafts_balance_in_each_start(monkeypatch):
-    """What is off in one start, and as much the other way in the next, is off."""
+    """Opposite imbalances in two starts do not cancel."""
     forces = {("a", LOWER): 1.0, ("a", UPPER): -0.7, ("b", LOWER): 0.7, ("b", UPPER): -1.0}
     monkeypatch.setattr(checks, "raft_force", lambda result, group: np.array([forces[result, group], 0, 0]))
     (found,) = checks.balances(["a", "b"])

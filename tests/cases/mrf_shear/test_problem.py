@@ -1,4 +1,4 @@
-"""The search: what a design makes, what it is judged by, and which designs are not allowed."""
+"""The inverse problem: scenes of designs, objectives, and designs that are not allowed."""
 
 from types import SimpleNamespace
 
@@ -24,7 +24,7 @@ def test_small_grains_lower_the_viscosity_without_field():
     assert off_state_viscosity(0.3, [1.0, 0.25], [0.67, 0.33]) < thick
 
 
-def test_a_design_is_the_fluid_it_says():
+def test_a_design_makes_its_fluid():
     made = problem().scene(DESIGN, 3)
     assert made.seed == 3
     result = SimpleNamespace(scene=made)
@@ -39,7 +39,7 @@ def test_a_design_is_the_fluid_it_says():
     assert set(np.unique(radius)) == {SMALL_RADIUS, LARGE_RADIUS}
 
 
-def test_too_thick_a_fluid_is_refused_where_viscosity_is_bounded():
+def test_a_fluid_above_the_bound_of_viscosity_is_refused():
     thick = {"small": 0.0, "fraction": 0.33, "flux": 0.6}
     assert design_viscosity(0.0, 0.33) > BOUND > design_viscosity(0.25, 0.2)
     problem(variant="front").scene(thick, 0)
@@ -59,8 +59,8 @@ def test_objectives_of_each_variant():
 
 
 @pytest.mark.slow
-def test_a_fluid_that_a_search_found_bears_as_much_from_other_starts():
-    """That of the largest stress in docs/mrf_shear.md; in half of its field a quarter, as it goes as B^2."""
+def test_a_fluid_that_a_search_found_has_the_same_stress_from_other_starts():
+    """The design of largest stress in docs/mrf_shear.md; half its field gives a quarter of it, as B^2."""
     found = {"small": 0.0875, "fraction": 0.2736, "flux": 0.7874}
     fields = (found["flux"], found["flux"] / 2)
     scenes = [problem().scene({**found, "flux": b}, OTHER_STARTS + k) for b in fields for k in range(3)]

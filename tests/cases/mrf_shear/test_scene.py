@@ -1,4 +1,4 @@
-"""The cell: its sizes, L21's numbers in it, mixtures, and what is one structure."""
+"""The cell: its sizes, L21's numbers, mixtures, and scenes of equal structure."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def part(made, kind):
     return one
 
 
-def test_table_2_1_and_what_is_beside_it():
+def test_parameters_of_table_2_1():
     made = scene()
     iron = made.materials["iron"]
     assert (iron.young, iron.poisson, iron.restitution) == (1e9, 0.278, 0.1)
@@ -55,8 +55,8 @@ def test_rafts_and_oil_move_apart_at_the_shear_rate():
     assert magnetised({"rate": 3000.0}, 4).duration == MAGNETISING_TIME
 
 
-def test_what_is_compared_is_one_structure():
-    """So that all of it runs as one batch, but grains that saturate, which have another law."""
+def test_compared_scenes_have_one_structure():
+    """All of them run as one batch, except for grains that saturate, which have another law."""
     structure = scene().structure()
     for name, settings in VARIATIONS.items():
         alike = scene(**{**COMPARED, **settings}).structure() == structure
@@ -78,8 +78,8 @@ def test_a_mixture_fills_its_fraction_with_its_share(share):
     assert {one.density for one in grains} == {DENSITY}
 
 
-def test_a_step_is_a_part_of_an_impact_and_goes_as_the_size():
-    """Hertz: at one speed it lasts as the radius, and as the modulus to the power -2/5."""
+def test_a_step_is_a_part_of_an_impact_and_scales_with_the_size():
+    """Hertz: at equal speed it is proportional to the radius and to the modulus to the power -2/5."""
     assert impact_step(2e-6, 1e9) == pytest.approx(2 * impact_step(1e-6, 1e9), rel=0.01)
     assert impact_step(1e-6, 1e7) == pytest.approx(100**0.4 * impact_step(1e-6, 1e9), rel=0.01)
     assert 3e-9 < impact_step(LARGE_RADIUS, 1e9) < 6e-9
@@ -88,24 +88,24 @@ def test_a_step_is_a_part_of_an_impact_and_goes_as_the_size():
 NUMBERS = {
     "l21": 12_000, "l21_volume": 60_000, "l21_bidisperse": 200_000, "l21_monodisperse": 30_000
 }  # fmt: skip
-"""What L21 says of its own (section 2.4.3), roughly."""
+"""Approximate numbers of grains in L21's cells (section 2.4.3)."""
 
 
 @pytest.mark.parametrize("size", NUMBERS)
-def test_cells_of_l21_have_as_many_grains_as_it_says(size):
+def test_cells_of_l21_have_its_numbers_of_grains(size):
     made = every()["mrf_shear"].scene(size, 1)
     assert made.seed == 1
     assert made.particles.number == pytest.approx(NUMBERS[size], rel=0.03)
     assert made.domain.high == (250e-6,) * 3
     assert made.stepper.control.dt == 2e-10
     assert made.duration == pytest.approx(0.93 / published.SHEAR_RATES[0] + 1e5 * 2e-10)
-    # It is open along the field.
+    # The cell is open along the field.
     assert "walls" not in {effect.kind() for effect in made.effects}
     assert made.materials.keys() == {"iron"}
 
 
-def test_a_cell_of_many_sizes_is_wider_than_its_grains_reach():
-    """Twice as far as the two largest grains magnetise each other, and a step for the smallest."""
+def test_a_cell_of_many_sizes_is_wider_than_the_range_of_its_grains():
+    """It is wider than twice the range of the two largest grains, and its step suits the smallest."""
     made = every()["mrf_shear"].scene("polydisperse", 0)
     radius = made.particles.arrays(made.domain, 0)["radius"]
     assert made.domain.high[0] > 2 * (24.44e-6 + published.NEIGHBOUR_GAP)
@@ -113,6 +113,6 @@ def test_a_cell_of_many_sizes_is_wider_than_its_grains_reach():
     assert made.stepper.control.dt == pytest.approx(impact_step(0.73e-6, 1e9))
 
 
-def test_a_step_of_nothing_is_refused():
+def test_a_step_of_zero_is_refused():
     with pytest.raises(InputError, match=r"dt must be at least .*; received 0\.0"):
         scene(dt=0.0)

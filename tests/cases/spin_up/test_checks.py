@@ -1,4 +1,4 @@
-"""What the case spin_up must show."""
+"""The checks of the case spin_up."""
 
 import pytest
 

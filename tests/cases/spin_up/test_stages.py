@@ -1,4 +1,4 @@
-"""Piles that are spun up: L21's numbers, how a pile is turned, and when it counts as deformed or broken."""
+"""Spin-up of piles: L21's numbers, the rotation of a pile, and its deformation and disruption."""
 
 from types import SimpleNamespace
 
@@ -15,12 +15,12 @@ from tisim.cases.spin_up.scene import NUMBERS, SIZES, scene_for
 from tisim.cases.spin_up.stages import DEFORMATION, DISRUPTION, RATES, SpinStep, SpinUp, spin_ups, turn
 
 
-def test_a_size_without_a_duration_settles_for_that_of_the_scene(monkeypatch):
-    """Sizes of L21 have none of their own."""
+def test_a_size_without_a_duration_settles_for_the_duration_of_the_scene(monkeypatch):
+    """The sizes of L21 have no duration of their own."""
     made = []
 
     class Loaded(Exception):
-        """Scenes have been made, and would be run."""
+        """Raised in place of running the scenes."""
 
     def load(scenes):
         made.extend(scenes)
@@ -37,7 +37,7 @@ def test_the_sizes_of_l21_have_its_numbers(size, diameter):
     start = scene_for(size, 0).start()
     assert len(start["mass"]) == NUMBERS[diameter]
     assert set(2 * start["radius"]) == {diameter}
-    # Equal masses of all, as L21 has it, to a fiftieth.
+    # The total masses are equal within 2 %, as in L21.
     assert start["mass"].sum() == pytest.approx(4088 * 3000 * np.pi / 6, rel=0.02)
     np.testing.assert_allclose(np.linalg.norm(start["moment"], axis=1), 1190 * np.pi / 6 * diameter**3)
 
@@ -52,7 +52,7 @@ def test_the_cloud_of_the_default_does_not_turn():
 
 
 def test_a_pile_is_turned_as_a_whole():
-    """It gets the angular velocity about z, whatever it had; its momentum and what is not in it stay."""
+    """It gets the given angular velocity about z; its momentum and the grains outside of it do not change."""
     state = block(np.array([0.1, -0.2, 0.3]))
     state["mass"] = np.arange(1.0, 10.0)
     before = {name: np.array(values) for name, values in state.items()}
@@ -65,7 +65,7 @@ def test_a_pile_is_turned_as_a_whole():
 
 
 def pile(tall=1, lost=0):
-    """A block of 3 x 3 grains, 3 or more along x, and some that are far away."""
+    """A block of 3 x 3 grains with 3 or more layers along x, of which ``lost`` grains are far away."""
     place = np.argwhere(np.ones((2 + tall, 3, 3))).astype(float)
     place[len(place) - lost :] += 50.0 * np.arange(1, lost + 1)[:, None]
     return state_of(place)
@@ -82,15 +82,15 @@ def test_when_a_pile_deforms_and_breaks():
     assert run.disruption == pytest.approx(3e-4)
     assert run.steps[3].held == pytest.approx(33 / 36)
     assert run.at(1.9e-4) is run.steps[2]
-    # Grains that come down late are no loss.
+    # Grains that return later are not lost.
     assert np.isnan(spin_up(pile(lost=3), pile(), pile(lost=1)).disruption)
-    # One that breaks is no longer what it was either.
+    # A pile that breaks also counts as deformed.
     assert spin_up(pile(), pile(lost=3)).deformation == pytest.approx(1e-4)
     assert np.isnan([spin_up(pile(), pile()).deformation, spin_up(pile(), pile(tall=2)).disruption]).all()
 
 
 @pytest.mark.parametrize(("when", "later"), [(0, False), (1, False), (2, True)])
-def test_strong_piles_break_later_where_they_do_so_by_a_step(when, later):
+def test_the_claim_of_later_breaking_needs_a_difference_of_one_step(when, later):
     whole, broken = pile(), pile(lost=3)
     runs = [
         spin_up(whole, *[whole] * (when if m > 1000 else 1), broken, magnetisation=m)
@@ -134,8 +134,8 @@ def test_the_regime_of_piles():
 
 
 @pytest.mark.slow
-def test_a_tiny_pile_has_the_spins_that_it_is_given():
-    """Grains that touch at the start are a pile at once; it keeps its momentum while it is turned."""
+def test_a_tiny_pile_has_the_given_spins():
+    """Grains that touch at the start form a pile, which keeps its momentum when its rotation is set."""
     settings = {"number": 27, "spacing": 1.0, "softened": 10.0, "duration": 50.0}
     (run,) = spin_ups(1, magnetisations=(0.0,), rates=(1e-4, 5e-4), holds=(5.0, 5.0), **settings)
     assert [step.rate for step in run.steps] == [0.0, 1e-4, 5e-4]

@@ -1,4 +1,4 @@
-"""States of valves that tests make up."""
+"""Synthetic states of valves."""
 
 from types import SimpleNamespace
 
@@ -6,12 +6,12 @@ import numpy as np
 
 
 def at_rest(made):
-    """The start of a scene as a result, at rest."""
+    """The initial state of a scene as a result, with all grains at rest."""
     return result_of(made, **made.start())
 
 
 def result_of(made, position, velocity=None, radius=22e-6, mass=1.0, measures=None, **_):
-    """A result of a scene with the grains given."""
+    """A result of a scene with the given grains."""
     n = len(position)
     state = {
         "position": np.asarray(position, float),

@@ -1,4 +1,4 @@
-"""A small valve that is run: grains flow, a field arrests them, and walls hold what drags them."""
+"""Runs of a small valve: grains flow, a field arrests them, and walls bear the drag on them."""
 
 import numpy as np
 import pytest
@@ -19,13 +19,13 @@ def three():
 
 @pytest.fixture(scope="module")
 def further():
-    """Two more starts in the strong field."""
+    """Flows from two more starts in the strong field."""
     return flows([scene(**SMALL_VALVE, flux=0.5, pressure=40e3, seed=seed) for seed in (1, 2)])
 
 
 @pytest.mark.slow
 def test_grains_flow_without_a_field(three):
-    """No slower than half of what goes with the oil; and when the field comes, all else is the same."""
+    """The rate is above half of the unhindered rate, and equal in all runs until the field is switched on."""
     for flow in three:
         mass = flow.result.state["mass"].sum()
         assert 0.5 < flow.open_rate / unhindered_rate(flow.result.scene, mass) < 1.1
@@ -35,7 +35,7 @@ def test_grains_flow_without_a_field(three):
 
 
 @pytest.mark.slow
-def test_a_field_arrests_it_and_walls_bear_the_drag(three, further):
+def test_a_field_arrests_the_flow_and_walls_bear_the_drag(three, further):
     weak, strong = three[1:]
     assert strong.left < weak.left
     jammed = [strong, *further]
@@ -43,5 +43,5 @@ def test_a_field_arrests_it_and_walls_bear_the_drag(three, further):
         assert flow.arrested
         assert held_pressure(flow.result) == pytest.approx(drag_pressure(flow.result), rel=0.1)
         assert 0 < overlap(flow.result) < 0.15
-    # Of six starts, one is jammed without a chain of contacts between opposite sides.
+    # In one of six starts the jam has no chain of contacts between opposite sides.
     assert sum(clusters(flow.result.state, flow.result.scene).bridged for flow in jammed) >= 2

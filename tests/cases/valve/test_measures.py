@@ -1,4 +1,4 @@
-"""What is taken of a valve: flow rates, pressures, clusters, and when a flow is arrested."""
+"""Measures of a valve: flow rates, pressures, clusters, and the arrest of a flow."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_the_flow_rate_is_the_momentum_over_the_length():
     assert flow_rate(result) == pytest.approx((2e-9 * 0.5 - 1e-9 * 0.1) / 440e-6)
 
 
-def test_grains_that_go_with_the_oil_flow_unhindered():
+def test_grains_that_move_with_the_oil_flow_unhindered():
     result = at_rest(VALVE)
     state, duct, oil = result.state, duct_of(VALVE), oil_of(VALVE)
     rho = np.hypot(*state["position"][:, :2].T)
@@ -43,29 +43,29 @@ def test_grains_that_go_with_the_oil_flow_unhindered():
 def test_the_drag_on_grains_in_the_duct_and_in_the_constriction():
     oil = oil_of(VALVE).speed
     result = result_of(VALVE, [[0, 0, 200 * UM], [50 * UM, 0, 20 * UM], [0, 132 * UM, 200 * UM]])
-    # In the core, four times as fast in the constriction, and half as fast half-way to the wall.
+    # Oil speeds are 1 in the core, 4 in the constriction and 1/2 half-way to the wall.
     assert drag(result) == pytest.approx(6 * np.pi * 0.16 * R * oil * (1 + 4 + 0.5))
     held = result_of(VALVE, np.zeros((1, 3)), measures={"valve_force_z": 3e-3})
     assert held_pressure(held) == pytest.approx(3e-3 / (np.pi * (176e-6) ** 2))
 
 
 ARCH = [[x, 0, 0] for x in (-66, -22, 22, 66)]
-"""Four grains across the constriction, um: they just touch each other and the wall."""
+"""Positions of four grains across the constriction that just touch each other and the wall, um."""
 PRESSED = 22.05
-"""Radius of grains that are pressed together there, um."""
+"""Radius with which these grains are pressed together, um."""
 
 
 def found(places, radius=PRESSED):
-    """The clusters of grains at some places, um."""
+    """The clusters of grains at the given positions, um."""
     return clusters(result_of(VALVE, np.array(places) * UM, radius=radius * UM).state, VALVE)
 
 
 def test_an_arch_across_the_constriction_and_grains_elsewhere():
-    """Four grains from wall to wall, three in a row along the duct that goes on across its ends, and one."""
+    """Four grains from wall to wall, a row of three across the periodic ends, and a single one."""
     row, alone = [[0, 0, z] for z in (-216, 216, 172)], [[100, 100, 150]]
     assert found(ARCH + row + alone).largest == pytest.approx(4 / 8)
     assert found(ARCH + row + alone).bridged
-    # It is none without one of its grains, nor where two are near and do not touch, nor in the duct.
+    # There is no arch if one grain is missing, if two do not touch, or in the wide part of the duct.
     assert not found(ARCH[:3] + row).bridged
     assert not found([[-66, 0, 0], [-22.3, 0, 0], [22.3, 0, 0], [66, 0, 0]]).bridged
     assert not found(ARCH, radius=21.9).bridged
@@ -75,7 +75,7 @@ def test_an_arch_across_the_constriction_and_grains_elsewhere():
 
 
 def test_two_neighbours_at_the_wall_are_no_arch():
-    """They touch it on either side of the axis, side by side across the field."""
+    """They touch the wall on both sides of the axis, next to each other."""
     y = np.sqrt(66**2 - 22**2)
     pair = [[-22, y, 0], [22, y, 0]]
     assert found(pair).largest == 1
@@ -83,7 +83,7 @@ def test_two_neighbours_at_the_wall_are_no_arch():
 
 
 def test_a_row_along_the_wall_is_no_arch():
-    """Four of them reach around a third of it."""
+    """Four grains span a third of the circumference."""
     angle = np.radians(39.0) * np.array([-1.5, -0.5, 0.5, 1.5])
     row = np.column_stack([66 * np.sin(angle), 66 * np.cos(angle), 0 * angle])
     assert found(row).largest == 1
@@ -104,7 +104,7 @@ def test_a_random_start_is_no_arch(throat, seed):
 
 
 def test_a_grain_touches_a_cone_by_its_distance_from_it():
-    """Halfway up a cone of 45 degrees, where the duct is 132 um wide."""
+    """The grains are half-way up a cone of 45 degrees, at a duct radius of 132 um."""
     z, wall = 22 + 44, 132
     near = wall - 21.99 * np.sqrt(2)
     chain = [[x, 0, z] for x in np.linspace(-near, near, 6)]
@@ -119,7 +119,7 @@ def test_overlaps_across_the_ends():
 
 
 def test_attraction_and_mason_number():
-    """16/9 of that of two with the moments that they have alone."""
+    """The attraction is 16/9 of the force between two grains with the moments of isolated grains."""
     alone = 4 * np.pi * R**3 * 0.23 / mu_0
     assert attraction(R, 0.23) == pytest.approx(16 / 9 * 3 * mu_0 * alone**2 / (2 * np.pi * (2 * R) ** 4))
     drag_there = 6 * np.pi * 0.16 * R * 4 * oil_of(VALVE).speed
@@ -127,13 +127,13 @@ def test_attraction_and_mason_number():
 
 
 def flow_of(before, after):
-    """A flow at one rate, and in the field at another at last."""
+    """A flow with the rate ``before`` without the field and finally ``after`` in the field."""
     times = np.arange(FLOW_SAMPLES) * 4e-4 / FLOW_SAMPLES
     rates = np.where(times <= 1e-4, before, np.where(times > 3.2e-4, after, 9.0))
     return Flow(result_of(VALVE, np.zeros((1, 3))), times, rates)
 
 
-def test_a_flow_is_arrested_where_little_of_it_is_left():
+def test_a_flow_is_arrested_if_little_of_it_is_left():
     assert flow_of(2.0, 0.5).left == pytest.approx(0.25)
     assert not flow_of(2.0, 0.5).arrested
     assert flow_of(2.0, 1.9 * ARRESTED).arrested

@@ -1,4 +1,4 @@
-"""The search: what a design makes, what it is judged by, and which designs are not allowed."""
+"""The inverse problem: scenes of designs, objectives, and designs that are not allowed."""
 
 import numpy as np
 import pytest
@@ -31,14 +31,14 @@ DESIGN = {"throat": 200e-6, "diameter": 40e-6, "flux": 0.15}
 
 
 def moving(made, part):
-    """A result of a scene in which grains flow at a part of the rate at which they go with the oil."""
+    """A result of a scene in which grains flow at the given part of the unhindered rate."""
     mass = made.particles.masses(0)
     speed = part * unhindered_rate(made, mass.sum()) * duct_of(made).length / mass.sum()
     n = len(mass)
     return result_of(made, np.zeros((n, 3)), [[0, 0, speed]] * n, radius=20e-6, mass=mass)
 
 
-def test_a_design_is_the_valve_it_says():
+def test_a_design_makes_its_valve():
     made = problem().scene(DESIGN, 3)
     assert made.seed == 3
     result = moving(made, 0.5)
@@ -46,7 +46,7 @@ def test_a_design_is_the_valve_it_says():
     assert part_left(result) == pytest.approx(0.5)
     (field,) = [effect for effect in made.effects if isinstance(effect, MagneticField)]
     assert field.begin == 0.0
-    # At the pressure at which it is run: 100 kPa over 0.9 mm, on the 0.352 mm of its duct.
+    # The pressure of the run is 100 kPa over 0.9 mm, applied to the 0.352 mm of the duct.
     assert volume_rate(made) == pytest.approx(open_flow(duct_of(made), 100e3 * 0.352 / 0.9, 0.345))
     assert pressure_at_rest(made) == pytest.approx(100e3 * 0.352 / 0.9, rel=2e-3)
     wider = problem().scene({**DESIGN, "throat": 260e-6}, 0)
@@ -54,8 +54,8 @@ def test_a_design_is_the_valve_it_says():
 
 
 @pytest.mark.parametrize("part", [0.9 * ARRESTED, 1.1 * ARRESTED])
-def test_fields_count_where_they_arrest_and_widths_where_they_do_not(part):
-    """Elsewhere a start counts as so much worse than the worst that one of four is worse than none."""
+def test_fields_count_if_they_arrest_and_widths_if_they_do_not(part):
+    """A start that misses counts as so bad that one miss in four starts is worse than none."""
     jams = part < ARRESTED
     result = moving(problem().scene(DESIGN, 0), part)
     assert arrested(result) == jams
@@ -67,14 +67,14 @@ def test_fields_count_where_they_arrest_and_widths_where_they_do_not(part):
 
 
 def test_one_of_four_starts_that_misses_is_worse_than_none():
-    """The least field and constriction of which one start misses, and the largest of which none does."""
+    """The least mean field and constriction with one miss exceed the largest without a miss."""
     genes = {gene.name: gene for gene in problem(variant="front").genome.genes}
     weakest, narrowest = genes["flux"].low, genes["throat"].low / genes["diameter"].high
     assert (3 * weakest + MISSED * STRONGEST) / 4 > STRONGEST
     assert (3 * narrowest + MISSED * MOST_ACROSS) / 4 > MOST_ACROSS
 
 
-def test_a_valve_that_lets_little_through_is_refused_where_that_is_bounded():
+def test_a_valve_with_an_open_flow_below_the_bound_is_refused():
     narrow, wide = ({**DESIGN, "throat": throat} for throat in (160e-6, 210e-6))
     assert volume_rate(problem(variant="front").scene(narrow, 0)) < BOUND
     assert volume_rate(problem(variant="field").scene(wide, 0)) >= BOUND
@@ -96,7 +96,7 @@ def test_variants():
 
 
 @pytest.mark.parametrize("name", ["valve", "mrf_shear"])
-def test_every_variant_is_searched_with_as_few_designs_as_the_case_says(name):
+def test_every_variant_is_searched_with_the_population_of_the_case(name):
     case = every()[name]
     for variant in case.variants:
         made, search = case.inverse("default", variant)
@@ -107,7 +107,7 @@ def test_every_variant_is_searched_with_as_few_designs_as_the_case_says(name):
 
 @pytest.mark.slow
 def test_a_valve_that_a_search_found_jams_from_other_starts_and_flows_in_a_weak_field():
-    """That of the largest flow in docs/valve.md."""
+    """The design of largest flow in docs/valve.md."""
     found = {"throat": 233.2e-6, "diameter": 41.33e-6, "flux": 0.3247}
     scenes = [
         problem().scene({**found, "flux": b}, OTHER_STARTS + k) for b in (0.3247, 0.02) for k in range(6)

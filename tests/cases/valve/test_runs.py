@@ -1,4 +1,4 @@
-"""What is compared, what is claimed of it and how it is drawn, of flows that are made up."""
+"""Comparisons, claims and figures of valves, with synthetic flows."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from tisim.cases.valve.scene import FIELD, FINE_DIAMETER, THROATS, D
 
 
 def made_up(scenes, progress):
-    """Coarse grains in the narrow constriction are arrested in a field, all others slow down to a third."""
+    """Flows in which a field arrests coarse grains in the narrow constriction and slows others to a third."""
     done = []
     for k, one in enumerate(scenes):
         result = at_rest(one)
@@ -51,12 +51,12 @@ def test_each_valve_has_its_starts():
 
 
 @pytest.mark.slow
-def test_claims_are_of_the_valves_they_name(monkeypatch):
+def test_claims_refer_to_the_named_valves(monkeypatch):
     found = {one.name: one for one in checks.check(4)}
     arrested = [one for name, one in found.items() if "20x, 30x jam" in name]
     assert [one.mean.value for one in arrested] == [pytest.approx(0.01 + 3.5e-4)]
     assert arrested[0].ok
-    # Start by start, over what flows without a field.
+    # The ratio to the flow without a field is taken for each start.
     parts = [(0.01 + 1e-4 * k) / (0.33 + 1e-3 * (k + 14)) for k in range(8)]
     (beside,) = [one for name, one in found.items() if "same starts without a field" in name]
     assert beside.value.value == pytest.approx(np.mean(parts))
@@ -66,13 +66,13 @@ def test_claims_are_of_the_valves_they_name(monkeypatch):
     assert all(one.ok for name, one in found.items() if "40x" in name or "fine grains yield" in name)
     without = next(one for name, one in found.items() if "no field" in name and "at the end" in name)
     assert without.value.value == pytest.approx(0.33 + 1e-3 * 17.5)
-    # Two that are alike show nothing.
+    # Two equal valves do not support the claim.
     monkeypatch.setattr(checks, "by_throat", lambda starts: [runs.by_throat(starts)[k] for k in (0, 0, 2, 3)])
     assert not next(one for one in checks.check(4) if "minus flow left" in one.name).ok
 
 
 def test_the_start_farthest_from_balance_is_judged(monkeypatch):
-    """Not the mean of starts, whose errors may cancel."""
+    """The errors of starts might cancel in their mean."""
     held = iter((1.0, 1.04, 0.94, *[1.0] * 5))
     monkeypatch.setattr(checks, "held_pressure", lambda result: next(held))
     monkeypatch.setattr(checks, "drag_pressure", lambda result: 1.0)
@@ -81,7 +81,7 @@ def test_the_start_farthest_from_balance_is_judged(monkeypatch):
     assert not found.ok
 
 
-def test_figures_are_of_all_valves():
+def test_figures_show_all_valves():
     throats, fields = runs.by_throat(2), runs.by_field(2)
     rows = figures.table([*throats, *fields]).splitlines()
     assert len(rows) == 1 + 2 * 4 + 2 + 1 + 2 * 4

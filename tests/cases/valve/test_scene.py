@@ -1,4 +1,4 @@
-"""The valve: L21's numbers in it, its shape, the oil, and what is one structure."""
+"""The valve: L21's numbers, its shape, the oil, and scenes of equal structure."""
 
 import itertools
 
@@ -44,7 +44,7 @@ def test_numbers_of_l21(size, throat):
     sizes = {round(2e6 * float(one.sizes.nodes()[0].mean()), 2): one.share for one in made.particles.grains}
     parts = {44: 44, 38.9: 35, 33.8: 24.2, 28.7: 13.2, 23.6: 5.6}
     assert sizes == pytest.approx({one: part / 122 for one, part in parts.items()})
-    # They fill 0.345.
+    # The volume fraction is 0.345.
     duct = duct_of(made)
     volume = sum(one.share / one.density for one in made.particles.grains) / sum(
         one.number() for one in made.particles.grains
@@ -62,7 +62,7 @@ def test_the_fine_mixture_of_l21():
     assert duct_of(made).length < duct_of(every()["valve"].scene("l21_30", 0)).length
 
 
-def test_constrictions_are_named_by_how_many_grains_they_are_wide():
+def test_constrictions_are_named_by_their_width_in_grains():
     for width, throat in published.CONSTRICTIONS.items():
         assert throat / published.LARGEST == pytest.approx(width)
 
@@ -71,13 +71,13 @@ def test_constrictions_are_named_by_how_many_grains_they_are_wide():
     ("size", "pressure"), [("l21_20", 90e3), ("l21_30", 117e3), ("l21_40", 141e3), ("l21_fine", 724e3)]
 )
 def test_the_drag_on_grains_at_rest_and_their_number_at_the_sizes_of_l21(size, pressure):
-    """L21's 100 kPa is that of none of them."""
+    """At none of the sizes is it L21's 100 kPa."""
     made = every()["valve"].scene(size, 0)
     assert pressure_at_rest(made) == pytest.approx(pressure, rel=0.02)
     assert f"{made.particles.number:,} grains" in SIZES[size].summary
 
 
-def test_the_duct_of_a_scene_is_the_one_that_was_asked_for():
+def test_the_duct_of_a_scene_has_the_given_dimensions():
     made = scene(throat=200e-6, bore=400e-6, straight=60e-6, slope=0.5, length=700e-6)
     duct = duct_of(made)
     assert vars(duct) == pytest.approx(vars(Duct(200e-6, 400e-6, 60e-6, 50e-6, 700e-6)))
@@ -85,7 +85,7 @@ def test_the_duct_of_a_scene_is_the_one_that_was_asked_for():
     assert made.particles.placement.volume() == pytest.approx(duct.filling().volume())
 
 
-def test_oil_is_that_of_the_source_and_its_integral_that_over_the_duct(rng):
+def test_oil_agrees_with_its_source_and_with_its_integral_over_the_duct(rng):
     points = rng.uniform((-2.6, -2.6, -4.0), (2.6, 2.6, 4.0), (300, 3))
     velocity, _ = sample((DUCT.oil(3.0),), "flow_velocity", points)
     rho = np.hypot(points[:, 0], points[:, 1])
@@ -93,7 +93,7 @@ def test_oil_is_that_of_the_source_and_its_integral_that_over_the_duct(rng):
     heights, radii = DUCT.profile()
     total = 0.0
     for low, high in itertools.pairwise(heights):
-        # Split where the oil's profile has its edge, at the radius of the constriction.
+        # The integral is split at the kink of the oil's profile, at the radius of the constriction.
         for a, b in ((0.0, 1.0), (1.0, None)):
             total += dblquad(
                 lambda r, z: 2 * np.pi * r * float(DUCT.oil_speed(np.array(r), np.array(z - 4.0))),
@@ -104,8 +104,8 @@ def test_oil_is_that_of_the_source_and_its_integral_that_over_the_duct(rng):
     assert DUCT.oil_through() == pytest.approx(total, rel=1e-4)
 
 
-def test_how_far_places_are_from_the_wall(rng):
-    """Beside the nearest of many points of it: also about its edges, where it juts out."""
+def test_distances_from_the_wall(rng):
+    """They are compared with the nearest of many points on the wall, also around its convex edges."""
     heights, radii = DUCT.profile()
     along = np.linspace(0, 8, 80_001)
     wall = np.column_stack([np.interp(along, heights, radii), along - 4.0])
@@ -116,14 +116,14 @@ def test_how_far_places_are_from_the_wall(rng):
 
 
 @pytest.mark.parametrize("grains", [COARSE, FINE_GRAINS])
-def test_the_drag_on_grains_at_rest_is_the_pressure_asked_for(grains):
+def test_the_drag_on_grains_at_rest_is_the_given_pressure(grains):
     made = scene(grains=grains, pressure=80e3)
     result = at_rest(made)
     assert drag_pressure(result) == pytest.approx(80e3, rel=0.08)
     assert pressure_at_rest(made) == pytest.approx(80e3, rel=2e-3)
 
 
-def test_the_speed_goes_as_the_pressure_and_as_the_square_of_the_grains():
+def test_the_speed_is_proportional_to_the_pressure_and_the_squared_radius():
     duct = duct_of(scene())
     one = speed_of(1e5, duct, COARSE, 0.345)
     assert speed_of(2e5, duct, COARSE, 0.345) == pytest.approx(2 * one)
@@ -131,8 +131,8 @@ def test_the_speed_goes_as_the_pressure_and_as_the_square_of_the_grains():
     assert mean_radius(equal(3e-6, 1.0)) == pytest.approx(3e-6)
 
 
-def test_what_is_compared_is_one_structure():
-    """So that all of it runs as one batch."""
+def test_compared_scenes_have_one_structure():
+    """All of them run as one batch."""
     structure = scene().structure()
     for throat in THROATS:
         assert (
@@ -148,9 +148,9 @@ def test_magnetic_laws_have_one_cut_off():
     assert moment.sweeps == 0
 
 
-def test_the_mean_radius_is_that_over_the_number_of_grains():
-    """Of a class from r to 2 r that is even over the volume, (1 - 1/2) / ((1 - 1/4) / 2) r = 4/3 r, of which
-    there are (1 - 1/4) / 2 / (r^3 rho) by mass and r; and of one of equal grains of 3 r."""
+def test_the_mean_radius_is_by_the_number_of_grains():
+    """A class that is uniform by volume from r to 2 r has the mean (1 - 1/2) / ((1 - 1/4) / 2) r = 4/3 r and
+    (1 - 1/4) / 2 / (r^3 rho) grains by mass and r. The second class has equal grains of 3 r."""
     wide = GrainClass(sizes=UniformSizes(by="volume", smallest=UM, largest=2 * UM), density=1e3)
     assert mean_radius([wide]) == pytest.approx(4 / 3 * UM)
     equal_ones = GrainClass(sizes=EqualSizes(radius=3 * UM), density=1e3)
@@ -173,10 +173,10 @@ def test_the_mean_radius_is_that_over_the_number_of_grains():
         ),
     ],
 )
-def test_what_is_no_valve_is_refused(settings, message):
+def test_invalid_valves_are_refused(settings, message):
     with pytest.raises(InputError, match=message):
         scene(**settings)
 
 
-def test_a_speed_is_taken_as_it_is():
+def test_a_given_speed_is_used():
     assert oil_of(scene(speed=3.0)).speed == 3.0

@@ -1,4 +1,4 @@
-"""The inverse problem of vibration: its fitness, its search, and that it lands on the resonance."""
+"""The inverse problem of vibration: its fitness, and a search that finds the resonance."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ DESIGNS = {
 
 @pytest.fixture(scope="module")
 def evaluator():
-    """One, so that both searches share what it compiles."""
+    """One evaluator, so that both searches share its compiled simulations."""
     batch = BatchEvaluator()
     yield batch
     batch.close()
@@ -51,7 +51,7 @@ def test_fitness_is_the_closed_form():
 
 
 def test_resonance_nearest_to_the_drive():
-    """k/m = Omega^2 -+ w Omega, the fast and the slow one."""
+    """k/m = Omega^2 -+ w Omega, the fast and the slow resonance."""
     for flux, sign in ((0.3, -1), (0.1, 1)):
         w = CHARGE * flux / MASS
         stiffness = MASS * (DRIVE**2 + sign * w * DRIVE)
@@ -76,9 +76,9 @@ def test_search_improves_and_lands_on_the_resonance_or_far_from_it(variant, eval
     assert best[-1] < best[0]
     if variant == "resonate":
         assert nearest(design) / DRIVE == pytest.approx(1.0, abs=0.01)
-        # 0.2 s at resonance: within a tenth of the best of a fine grid, 12.37 mm.
+        # At resonance for 0.2 s, the result is within a tenth of the best of a fine grid, 12.37 mm.
         assert best[-1] < -11.1
     else:
         assert not 0.5 < nearest(design) / DRIVE < 2.0
-        # The least of a fine grid is 0.131 mm.
+        # The smallest amplitude on a fine grid is 0.131 mm.
         assert best[-1] < 0.15

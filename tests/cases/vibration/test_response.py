@@ -1,4 +1,4 @@
-"""Resonance, beats and spectrum of vibration, and what is drawn of them."""
+"""Resonance, beats and spectrum of vibration, and their figures."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ CONSTANTS = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MA
 
 
 def history(ratio, duration, number):
-    """The closed form, as a history."""
+    """The closed form as a history of the centre of gravity."""
     t = np.linspace(0.0, duration, number)
     h = 1e-8
     z = response(t, omega=ratio * FAST, **CONSTANTS)
@@ -35,13 +35,13 @@ def test_beat_period_and_spectrum_of_the_closed_form():
     beating = history(0.9, 0.4, 1200)
     assert beating.beat_period() == pytest.approx(2 * np.pi / (0.1 * FAST), rel=3e-4)
     omega, lines = beating.spectrum()
-    # Free motion turns clockwise; the drive is a line on both sides.
+    # Free motion rotates clockwise; the drive has a line at both signs of the frequency.
     for expected in (-FAST, 0.9 * FAST):
         near = np.abs(omega - expected) < 40
         assert omega[near][lines[near].argmax()] == pytest.approx(expected, abs=3.0)
     plus = CONSTANTS["push"] / 2 / abs(CONSTANTS["k_m"] - (0.9 * FAST) ** 2 - CONSTANTS["w"] * 0.9 * FAST)
     assert lines[np.abs(omega - 0.9 * FAST) < 40].max() == pytest.approx(plus, rel=1e-2)
-    # What is drawn between the lines is motion, not the window's side lobes.
+    # Between the lines, side lobes of the window are below the floor of the figure.
     quiet = np.min([np.abs(omega - at) for at in (-FAST, -0.9 * FAST, 0.0, 0.9 * FAST)], axis=0) > 80
     assert lines[quiet].max() < FLOOR * lines.max()
 
@@ -54,7 +54,7 @@ def test_vertex_of_a_parabola_and_peak_of_a_long_time():
     assert peak(0.1, omega=0.8 * FAST, **CONSTANTS) == pytest.approx(exact, rel=3e-4)
 
 
-def test_constants_are_those_of_the_scene_or_none():
+def test_constants_are_read_from_the_scene_or_are_none():
     array = vibration.scene(0.3, "none", sites=2, flux=0.7, stiffness=30.0)
     parameters = constants(array)
     assert parameters["w"] == pytest.approx(0.7 * vibration.CYCLOTRON)
@@ -63,7 +63,7 @@ def test_constants_are_those_of_the_scene_or_none():
     assert parameters["omega"] == pytest.approx(0.3 * vibration.CYCLOTRON)
     assert constants(array.replace({"effects.magnetic_field.constant": [0.1, 0.0, 1.0]})) is None
     assert constants(array.without("tether")) is None
-    # Also what a picture could overlook.
+    # Changes that would hardly show in a picture are also detected.
     assert constants(array.replace({"effects.electric_field.phase": [1.0, 0.0, 0.0]})) is None
     assert constants(array.replace({"effects.electric_field.constant": [0.1, 0.0, 0.0]})) is None
     assert constants(array.replace({"effects.magnetic_field.amplitude": [0.0, 0.0, 0.1]})) is None
@@ -73,8 +73,8 @@ def test_constants_are_those_of_the_scene_or_none():
 
 
 @pytest.mark.slow
-def test_resonance_curve_of_runs_is_that_of_the_closed_form():
-    """Both resonances; that of the fast one a little below, as in so short a time."""
+def test_resonance_curve_of_runs_follows_the_closed_form():
+    """Both resonances agree; the fast one is slightly lower because of the short time."""
     fast = Sweep.of(fast_scenes(np.linspace(0.9, 1.1, 9)))
     slow = Sweep.of(slow_scenes(np.linspace(0.3, 0.7, 9)))
     assert fast.deviation < 2e-4

@@ -1,4 +1,4 @@
-"""The case of Z13: a cloud's centre of gravity follows the closed form whatever its particles do."""
+"""The case of Z13: the centre of gravity of a cloud follows the closed form for any near field."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from tisim.cases.vibration.scene import RATIOS, SPACING, near_fields, scene
     ],
 )
 def test_centre_of_gravity_follows_the_closed_form(near_field):
-    """27 particles at every ratio of Fig. 3; the printed near field throws them apart meanwhile."""
+    """There are 27 particles at every ratio of Fig. 3; the printed near field drives them apart."""
     results = simulate(
         [scene(r, near_field, duration=0.004, sites=3, error=1e-5) for r in RATIOS], worlds=8, capacity=27
     )
@@ -28,7 +28,7 @@ def test_centre_of_gravity_follows_the_closed_form(near_field):
     if near_field == "printed":
         assert (spread > 2 * SPACING * 1.5).all()
     elif near_field == "equilibrium":
-        # Alike in a uniform field: they move as one, and the near field does nothing.
+        # Equal particles in a uniform field move as one, and the near field has no effect.
         moved = [result.state["position"] - result.start["position"] for result in results]
         assert max(np.ptp(m, axis=0).max() for m in moved) < 1e-12
         assert min(np.abs(m).max() for m in moved) > 1e-5
@@ -37,8 +37,8 @@ def test_centre_of_gravity_follows_the_closed_form(near_field):
 
 
 @pytest.mark.long
-def test_error_falls_and_work_rises_with_the_accuracy_asked_for():
-    """The printed near field, before chaos: the paths of a reference two orders tighter."""
+def test_error_falls_and_work_rises_with_the_requested_accuracy():
+    """The printed near field, before chaos: the reference has a tolerance 100 times tighter."""
     tolerances = (1e-4, 1e-5, 1e-6, 1e-8)
     results = simulate(
         [scene(0.8, "printed", duration=0.001, sites=3, error=e) for e in tolerances], worlds=8, capacity=27

@@ -79,7 +79,7 @@ class Twin:
         return total
 
     def slip(self):
-        """Tangential velocity of the surface of j relative to that of i, at the point of contact."""
+        """Tangential velocity of the surface of j relative to the surface of i, at the point of contact."""
         lever = self.arm[..., None] * self.n
         surface = self.v[:, None] + np.cross(self.spin[:, None], lever)
         past = surface.transpose(1, 0, 2) - surface

@@ -148,7 +148,7 @@ def test_a_choice_stays_at_its_best_and_equally_good_ones_are_listed():
     assert set(found.choices["law"]) <= {"one", "two"}
 
 
-def test_a_problem_that_is_no_misfit_is_refused():
+def test_a_problem_without_a_misfit_is_refused():
     problem = Problem.of_function(lambda d: d["a"], [Gene("a", "", 0, 1)], code="made")
     outcome = optimize.run(problem, max_evaluations=20)
     with pytest.raises(InputError, match="must be a Misfit in a problem that is calibrated"):

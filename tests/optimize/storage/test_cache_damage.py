@@ -103,7 +103,7 @@ def test_damaged_table_is_found(path):
     assert Cache(path).table("log/below").columns == {"gen": [1, 2]}
 
 
-def test_no_flipped_bit_anywhere_goes_unnoticed(path):
+def test_every_flipped_bit_is_detected(path):
     with Cache(path) as cache:
         cache.put(fake_record(1))
         cache.put(fake_record(2))

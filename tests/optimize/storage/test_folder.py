@@ -124,7 +124,7 @@ def test_results_are_of_the_search_that_ended_last(optimize, tmp_path):
     first = contents(folder)
     assert shown() == next(iter(searches(Cache(folder / "search.h5"))))
     assert "sensitivity.csv" in first
-    # Too few designs for sensitivities; those of the search before must not remain.
+    # There are too few designs for sensitivities; the earlier sensitivities must not remain.
     assert optimize("--seed", 2, "--generations", 0, "--population", 4)[0] == 0
     now = contents(folder)
     with Cache(folder / "search.h5") as cache:

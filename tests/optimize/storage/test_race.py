@@ -17,7 +17,7 @@ DESIGNS = [{"x0": x} for x in (0.10, 0.12, 0.5, 0.9)]
 
 
 def noisy(design, seed, noise=0.1):
-    """Independent noise for every design, whatever the start."""
+    """Noise that is independent for every design and every start."""
     rng = np.random.default_rng([seed, int(1e6 * design["x0"])])
     return design["x0"] + noise * float(rng.normal())
 

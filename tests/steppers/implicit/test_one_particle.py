@@ -27,8 +27,8 @@ class Cliff(Force):
 
 @pytest.mark.parametrize("chunks", [[], [1, 1, 5]])
 def test_the_first_stuck_particle_is_named_with_time_and_force(chunks):
-    """Two particles reach the cliff at 0.5 and 0.3 s; the second is named, in whatever order launches reach
-    them.
+    """Two particles reach the cliff at 0.5 and 0.3 s; the second is named for any order in which launches
+    reach them.
 
     Other particles and worlds do not matter, and the kept state is finite.
     """
