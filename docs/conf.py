@@ -60,9 +60,8 @@ nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for 
 
 def write_pages(app):
     """Write the plots, and the pages that come from the code."""
-    folder = Path(app.srcdir) / "reference"
-    pair_plots.write(folder / "effects")
-    reference_pages.write(folder)
+    pair_plots.write()
+    reference_pages.write(Path(app.srcdir) / "reference")
 
 
 def setup(app):

@@ -1,6 +1,9 @@
 """Plots of pair forces against the distance of two grains, for the pages of the reference.
 
 The forces are those of a run: the effects of the law's snippet (snippets.py), with a world for each distance.
+The plots are kept in docs/pair_forces, and drawn again if the law, its snippet or the plot changes:
+
+    python docs/pair_plots.py
 """
 
 from __future__ import annotations
@@ -38,13 +41,21 @@ Forces that also depend on velocities or on the past, such as those of bonds and
 POINTS = 120
 
 
-def write(folder: Path) -> None:
-    """Write the plots of all laws, NAME.svg, apart from those that are there as the code has them."""
-    for name in RANGES:
-        path, version = folder / f"{name}.svg", _version(name)
-        if not path.exists() or version not in path.read_text(encoding="utf-8"):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            _draw(name, path, version)
+FOLDER = Path(__file__).parent / "pair_forces"
+
+
+def outdated(folder: Path = FOLDER) -> list[str]:
+    """Return the laws without a plot, NAME.svg, of the present version."""
+    versions = {name: _version(name) for name in RANGES}
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.svg")}
+    return [name for name, version in versions.items() if version not in texts.get(name, "")]
+
+
+def write(folder: Path = FOLDER) -> None:
+    """Write the plots that are outdated."""
+    folder.mkdir(exist_ok=True)
+    for name in outdated(folder):
+        _draw(name, folder / f"{name}.svg", _version(name))
 
 
 def force(name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -93,3 +104,7 @@ def _draw(name: str, path: Path, version: str) -> None:
         axes.set_ylabel("force (N), attraction > 0")
         axes.set_xlim(1e3 * distances[0], 1e3 * distances[-1])
         figure.savefig(path, format="svg", metadata={"Date": None, "Description": version})
+
+
+if __name__ == "__main__":
+    write()

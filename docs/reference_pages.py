@@ -191,7 +191,11 @@ def _law(entry: Entry) -> Iterator[str]:
 def _plot(entry: Entry) -> Iterator[str]:
     """The force against the distance (pair_plots.py)."""
     if entry.name in RANGES:
-        yield from (f".. image:: {entry.name}.svg", f"   :alt: {entry.name}: force against distance", "")
+        yield from (
+            f".. image:: /pair_forces/{entry.name}.svg",
+            f"   :alt: {entry.name}: force against distance",
+            "",
+        )
 
 
 def _snippet(entry: Entry) -> Iterator[str]:

@@ -55,6 +55,11 @@ def test_a_plot_shows_the_force_of_the_law(tmp_path):
     np.testing.assert_allclose(force, G * mass**2 / distance**2, rtol=1e-5)
 
 
+def test_the_plots_in_the_repository_are_up_to_date():
+    """Otherwise run ``python docs/pair_plots.py`` and look at them."""
+    assert importlib.import_module("pair_plots").outdated() == []
+
+
 def test_plots_that_are_there_are_not_drawn_again(tmp_path, monkeypatch):
     plots = importlib.import_module("pair_plots")
     drawn = []
