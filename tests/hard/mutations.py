@@ -141,7 +141,15 @@ SHARED = {
     ),
     "turned": (
         f"{LAW}/spring.py", "known *= ti.sqrt(size / flat)", "known *= 1.0",
+        "tests/effects/contact/test_turning_springs.py::test_projected_springs_equal_the_twin",
+    ),
+    "carried": (
+        f"{LAW}/spring.py", "remembered.dot(normal) * (normal + tilt)", "remembered.dot(normal) * normal",
         f"{HERTZ_MINDLIN}the_contact_history_rotates_with_the_pair",
+    ),
+    "carried_about_the_normal": (
+        f"{LAW}/spring.py", "turn * (normal.cross(known)", "turn * (0.99 * normal.cross(known)",
+        f"{HERTZ_MINDLIN}steps_equal_the_twin",
     ),
     "slipping": (
         f"{LAW}/spring.py", "known = grip - drag", "known = elastic",
@@ -156,7 +164,10 @@ SHARED = {
         f"{STEPS}[jkr]",
     ),
     "can_follow_what_slides": (
-        f"{LAW}/step_limit.py", "slides = 1.0 + TURNING", "slides = 0.5 + TURNING", f"{STEPS}[hooke]",
+        f"{LAW}/step_limit.py", "slides = 1.0 + TURNING", "slides = 0.5 + TURNING", f"{STEPS}[jkr]",
+    ),
+    "can_follow_what_slides_at_a_wall": (
+        f"{LAW}/step_limit.py", "[1.0, 1.0 + TURNING * arm", "[1.0, 0.5 + TURNING * arm", f"{STEPS}[hooke]",
     ),
     "can_follow_what_rolls": (
         f"{LAW}/step_limit.py", "rolls = TURNING * (", "rolls = 0.8 * TURNING * (", f"{STEPS}[jkr]",
