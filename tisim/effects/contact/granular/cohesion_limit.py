@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 class CohesiveLaw(Protocol):
     """A contact law with a normal force and perhaps a cohesion."""
 
-    normal: NormalForce
-    cohesion: Cohesion | None
+    @property
+    def normal(self) -> NormalForce: ...
+
+    @property
+    def cohesion(self) -> Cohesion | None: ...
 
     @property
     def label(self) -> str: ...
