@@ -6,8 +6,10 @@ import tisim
 from tests.scenes import scene
 from tisim import InputError
 from tisim.cli.main import main
-from tisim.effects import Field, Force, WorldField
+from tisim.effects import Field, WorldField
 from tisim.files import python_file
+from tisim.state.fields import resolve_fields
+from tisim.state.state import State
 from tisim.steppers import Collocation, Trapezoid
 
 TYPED_IN = """
@@ -33,7 +35,7 @@ def test_a_law_without_source_text_is_refused():
 
 LAWS = """
 from tisim.backend.taichi import ti
-from tisim.effects import Force, parameter, WorldField
+from tisim.effects import Field, Force, parameter, WorldField
 
 
 class UnknownName(Force):
@@ -68,12 +70,17 @@ class Again(Force):
 
 class OfStepper(Force):
     world_fields = (WorldField("rejections", "counter"),)
+
+
+class Taken(Force):
+    fields = (Field("capacity", ""),)
 """
 SAID = {
     "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be code that Taichi can compile; .*'kk'",
     "NotCalled": r"laws\.py, line 19, in NotCalled\.force, must be code that Taichi can compile; .*bad op",
     "Undeclared": r"laws\.py, line 25, in Undeclared\.force, must be .*'charge' must be declared in",
     "Reads": r"^name of a field must be a Python name that nothing else in the state has; received 'read'$",
+    "Taken": r"^name of .* must be a Python name that nothing else in the state has; received 'capacity'$",
     "Again": r"^name of a field must be a Python name that nothing else in the state has; received 'status'$",
 }
 
@@ -125,14 +132,11 @@ def test_only_scenes_can_be_run():
         tisim.read(3)
 
 
-@pytest.mark.parametrize("name", ["capacity", "real", "remove", "time", "a-b"])
+@pytest.mark.parametrize("name", ["capacity", "real", "remove", "a-b"])
 def test_a_particle_field_needs_a_name_of_its_own(name):
-    class Marked(Force):
-        fields = (Field(name, ""),)
-
     rule = f"^name of a field must be a Python name that nothing else in the state has; received '{name}'$"
     with pytest.raises(InputError, match=rule):
-        tisim.run(scene([[0, 0, 0]], [[0, 0, 0]], (Marked(),)))
+        resolve_fields([Field(name, "")], State.reserved())
 
 
 @pytest.mark.parametrize(
