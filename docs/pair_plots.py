@@ -23,7 +23,7 @@ from tisim.describe import reference
 from tisim.steppers import FixedStep, Verlet
 
 RADIUS, DENSITY = 1e-3, 2500.0
-"""m, kg/m^3; those of the snippets."""
+"""Radius (m) and density (kg/m^3) of the grains, as in the snippets."""
 RANGES = {
     "contact": (0.97, 1.01),
     "dipole_dipole": (1.0, 3.0),

@@ -56,7 +56,7 @@ def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
             color=colour, label=f"I = {number:.2g}",
         )  # fmt: skip
     profile.plot([0.0, 1.0], [0.0, 1.0], color="0.6", lw=0.9, ls="--", label="no slip")
-    profile.set(xlabel="velocity over that of the wall", ylabel="height over the gap", title="velocity")
+    profile.set(xlabel="velocity over wall velocity", ylabel="height over the gap", title="velocity")
     line = np.geomspace(inertial.min() / 2, inertial.max() * 1.5, 200)
     ratio.plot(line, expected_ratio(line), color="0.2", lw=1.0, label="Jop, Forterre, Pouliquen (2006)")
     ratio.scatter(inertial, [bed.ratio for bed in beds], c=colours, s=36, zorder=3, label="as run")
@@ -82,7 +82,7 @@ def sheared_grains(axis: Axes, bed: ShearedBed) -> None:
     panel(axis, bed.state, common([bed.state], box), box, TIME(part)[:, :3])
     axis.set_title(f"grains between rough walls, I = {bed.inertial_number:.2g}")
     bar = axis.figure.colorbar(ScalarMappable(cmap=TIME), ax=axis, shrink=0.72, pad=0.01)
-    bar.set_label("velocity over that of the wall")
+    bar.set_label("velocity over wall velocity")
     bar.outline.set_visible(False)
 
 

@@ -25,8 +25,8 @@ HEADINGS = (
 def table(study: Study) -> RenderableType:
     """Return a table of all settings by method, with median time, work and errors, for printing with rich.
 
-    The last column has the error for which a setting is the cheapest, in brackets if its timing is
-    indistinguishable from that of the recommended setting. Failed settings are listed below each method with
+    The last column has the error for which a setting is the cheapest, in brackets if its time
+    cannot be told from the time of the recommended setting. Failed settings are listed below each method with
     the reason.
     """
     names = [quantity.name.replace(" ", "\n") for quantity in study.quantities]

@@ -1,4 +1,4 @@
-"""The contract of loaded worlds, as observers, monitors, replays and checkpoints see a simulation."""
+"""The contract of loaded worlds: the part of a simulation that monitors, replays and checkpoints use."""
 
 from __future__ import annotations
 

@@ -31,11 +31,10 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
    it includes the velocity of a moving periodic image, which the difference of both velocities does not.
    ``interaction`` receives the contact history of a pair (``memory`` values) and returns the updated history
    with the force. The history that a particle keeps of a force, such as a wall force, is updated in ``load``
-   if ``commit`` is set; there ``load`` may also add to world fields of the kind
-   "sum". A short-ranged law acts between particles
-   of one rigid body only if it sets ``within_bodies``. A law with a cut-off far beyond contact sets
-   ``truncated`` and is summed separately from contact laws. A law that stops a world on purpose, by a force
-   that is not a number, describes the condition in ``failure_hint``.
+   if ``commit`` is set; there ``load`` may also add to world fields of the kind "sum". A short-ranged law
+   acts between particles of one rigid body only if it sets ``within_bodies``. A law with a cut-off far beyond
+   contact sets ``truncated`` and is summed separately from contact laws. A law that stops a world on purpose,
+   by a force that is not a number, describes the condition in ``failure_hint``.
 6. An effect that responds to an external field finds it with ``sources`` (see tisim/sources/base.py).
    ``requires_source`` lists quantities; a scene must have at least one source of any of them.
 7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the local
