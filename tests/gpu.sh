@@ -17,7 +17,8 @@ else
     tests=(tests/device tests/numerics)
     processes=0
 fi
-timeout 270 python -m pytest -q -rs -n "$processes" --dist worksteal -m "gpu and not slow" "${tests[@]}"
+# Interrupted tests still name those that have failed.
+timeout --signal=INT --kill-after=20 270 python -m pytest -q -rfEs -n "$processes" --dist worksteal -m "gpu and not slow" "${tests[@]}"
 tested=$?
 TISIM_DEVICE= timeout 200 python tests/benchmarks/scaling.py --device "$device" "${limits[@]}" || exit
 exit $tested

@@ -340,10 +340,14 @@ class Ensemble:
 def _may_occur(costs: np.ndarray, seen: Sequence[float], most: float) -> Sequence[float]:
     """Return the costs that may occur for a design whose own costs are all equal.
 
-    They are the two ends of a range: at most ``most`` from the design's cost, and within the costs ``seen``
-    of all designs. If fewer than three costs or no differences between starts are known, ``seen`` itself is
-    returned.
+    They are the two ends of a range: at most ``most`` from the design's cost, the largest difference between
+    starts of one design, and within the costs ``seen`` of all designs. If no starts have differed, a rare
+    cost may lie on either side, as far off as the costs of all designs are from each other: the least cost
+    seen is no bound for it. If fewer than three costs are known, ``seen`` itself is returned.
     """
-    if len(seen) < 3 or not most:
+    if len(seen) < 3:
         return seen
+    if not most:
+        spread = seen[-1] - seen[0]
+        return float(costs[0]) - spread, float(costs[0]) + spread
     return max(seen[0], float(costs[0]) - most), min(seen[-1], float(costs[0]) + most)
