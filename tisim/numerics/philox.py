@@ -1,4 +1,4 @@
-"""Counter-based random numbers: pure functions of (seed, world, particle, step), so runs repeat.
+"""Counter-based random numbers: pure functions of (seed, stream, particle, step), so runs repeat.
 
 Philox4x32-10 of J. K. Salmon, M. A. Moraes, R. O. Dror and D. E. Shaw, "Parallel random numbers: as easy
 as 1, 2, 3", SC11 (2011): ten rounds turn a 128-bit counter and a 64-bit key into 128 random bits. Nothing
