@@ -32,7 +32,9 @@ class Allocation:
     """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
-        asked = (scene.acting(), scene.stepper)
+        own = parts(scene)
+        *acting, _, _, _ = own
+        asked = (acting, scene.stepper)
         fields = resolve_fields(needed_fields(*asked), State.reserved())
         world_fields = needed_world_fields(*asked, (*State.reserved(), *(field.name for field in fields)))
         # Checked before compilation: a vector in place of a number would end the process.
@@ -43,8 +45,8 @@ class Allocation:
         require_memory(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
         self._trees: list[Tree] = []
         self.s = State(worlds, capacity, fields, world_fields, picks_pairs(*asked))
-        self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
-        bound = (self.table.bind(part) for part in parts(scene))
+        self.table = ParameterTable(own, worlds, runtime.current().real)
+        bound = (self.table.bind(part) for part in own)
         *effects, self.domain, self.stepper, self.control = bound
         self.s.domain, self.effects = self.domain, connected(effects)
         self.assemble(ListSizes())

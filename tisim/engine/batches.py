@@ -93,8 +93,8 @@ class Batches:
             failed = Status(False, reason)
             yield index, Result(scenes[index], {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
         finished_scenes = len(failures)
-        for members in groups.values():
-            with self._simulation([scenes[k] for k in members]) as simulation:
+        for structure, members in groups.items():
+            with self._simulation(structure, [scenes[k] for k in members]) as simulation:
                 for begin in range(0, len(members), simulation.worlds):
                     batch = members[begin : begin + simulation.worlds]
                     simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
@@ -109,11 +109,11 @@ class Batches:
                     finished_scenes += len(batch)
 
     @contextmanager
-    def _simulation(self, scenes: Sequence[Scene]) -> Iterator[Simulation]:
-        """Yield a compiled simulation for scenes of one structure, reserved for this caller meanwhile."""
+    def _simulation(self, structure: Any, scenes: Sequence[Scene]) -> Iterator[Simulation]:
+        """Yield a compiled simulation for scenes of this structure, reserved for this caller meanwhile."""
         capacity = max(scene.capacity() for scene in scenes)
         worlds = max(1, min(len(scenes), self.limit, BATCH_PARTICLES // capacity))
-        simulation = self._reusable(scenes[0].structure(), worlds, capacity)
+        simulation = self._reusable(structure, worlds, capacity)
         if simulation is None:
             _restart_taichi()
             capacity = rounded(capacity)

@@ -258,6 +258,8 @@ class Scene(Component):
     def replace(self, settings: Mapping[str, Any]) -> Scene:
         """Return a copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a
         list are numbered from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
+        if not settings:
+            return self
         data = self.to_dict()
         for key, value in settings.items():
             plain_data.change(data, key, value)
@@ -265,6 +267,8 @@ class Scene(Component):
 
     def without(self, *names: str) -> Scene:
         """Return a copy without some effects; raise InputError if one is absent, or needed by others."""
+        if not names:
+            return self
         data = self.to_dict()
         for name in names:
             present = ", ".join(data["effects"]) or "none, as this scene has none"
