@@ -94,6 +94,30 @@ def report_failure(s, w):
     s.ask(w, s.time[w])
 
 
+@ti.func
+def verdict_on(control: ti.template(), s, w, dt, accepted):  # type: ignore[valid-type]
+    """Return the verdict on an attempt of this length (s); after a rejected one of the shortest length there
+    is no hope."""
+    verdict = ACCEPTED
+    if not accepted:
+        verdict = ti.select(control.hopeless(s, w, dt), HOPELESS, RETRY)
+    return verdict
+
+
+@ti.func
+def conclude(control: ti.template(), s, w, accepted, factor, most):  # type: ignore[valid-type]
+    """Set the verdict on the attempt of a world, and the length of the next attempt (s).
+
+    factor : the proposed ratio of the lengths. most : the largest ratio after a rejected attempt, which would
+        fail again in the same way with the same length.
+    """
+    verdict = verdict_on(control, s, w, s.dt[w], accepted)
+    if verdict == HOPELESS:
+        report_failure(s, w)
+    s.verdict[w] = verdict
+    s.next_dt[w] = s.dt[w] * ti.select(verdict == ACCEPTED, factor, ti.min(factor, most))
+
+
 class RestoreState(PerParticle):
     """After a failed attempt this phase restores the state at the beginning of the step.
 

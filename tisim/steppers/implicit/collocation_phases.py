@@ -10,7 +10,7 @@ from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.program.scans import PerBlock
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, length, report_failure
+from tisim.steppers.implicit.attempts import ACCEPTED, SHORTER, conclude, length
 
 
 class Forget(Phase):
@@ -267,16 +267,11 @@ class JudgeStages(Phase):
     def decide(self, w, solved, contraction, error):
         """Set the verdict, and the length of the next step."""
         s = self.s
-        s.sweeping[w], s.verdict[w] = 0, RETRY
+        s.sweeping[w] = 0
         # A contraction that was only extrapolated may be outdated: it is no reason for a shorter step.
         current_contraction = ti.select(s.sweep[w] > 1 or not solved, contraction, 0.0)
         factor = self.control.factor(w, current_contraction, error, self.order)
-        if solved and self.control.accepts(w, error):
-            s.verdict[w], s.last_dt[w] = ACCEPTED, s.dt[w]
-        else:
-            # A rejected step of the same length would fail again in the same way.
-            factor = ti.min(factor, ti.select(solved, SHORTER, DIVERGED))
-            if self.control.hopeless(s, w, s.dt[w]):
-                s.verdict[w] = HOPELESS
-                report_failure(s, w)
-        s.next_dt[w] = s.dt[w] * factor
+        accepted = solved and self.control.accepts(w, error)
+        if accepted:
+            s.last_dt[w] = s.dt[w]
+        conclude(self.control, s, w, accepted, factor, ti.select(solved, SHORTER, DIVERGED))

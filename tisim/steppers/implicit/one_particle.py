@@ -13,7 +13,7 @@ from tisim.numerics.ieee import compensated_sum, finite, infinity
 from tisim.program.phases import PerParticle
 from tisim.steppers.common import SavedState, saved_fields
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER
+from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, verdict_on
 from tisim.steppers.implicit.step_control import note_excursion
 from tisim.steppers.intervals import LITTLE, beginning, duration
 from tisim.steppers.registers import Registers
@@ -233,11 +233,9 @@ class IndependentSteps(PerParticle):
                 # If the longest step stays, this branch spares the next step the wait for the factor.
                 if not (accepted and self.control.stays(w, dt, aim, ratio, k, off)):
                     target *= self.control.factor(w, aim, ratio, ti.cast(k, ti.f64), off)
-                if accepted:
-                    verdict = ACCEPTED
-                else:
+                verdict = verdict_on(self.control, s, w, dt, accepted)
+                if verdict != ACCEPTED:
                     target = ti.min(target, SHORTER * dt)
-                    verdict = ti.select(self.control.hopeless(s, w, dt), HOPELESS, RETRY)
                     solve.restore(w, i)
                 s.own_dt[w, i] = ti.cast(target, s.real)
         return verdict, k - 1

@@ -25,18 +25,15 @@ from tisim.steppers.common import (
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.anderson import accelerated, memory_of_iterates
 from tisim.steppers.implicit.attempts import (
-    ACCEPTED,
     ATTEMPTS,
-    HOPELESS,
-    RETRY,
     SHORTER,
     Begin,
     Decide,
     RestoreState,
     SaveState,
     StepAttempt,
+    conclude,
     length,
-    report_failure,
 )
 from tisim.steppers.implicit.one_particle import IndependentSteps, Solve
 from tisim.steppers.implicit.step_control import (
@@ -237,15 +234,9 @@ class JudgeIteration(Phase):
         s.solver_iteration[w] = k
         s.solver_iterations[w] += 1
         s.force_evaluations[w] += 1
-        s.verdict[w] = RETRY
         solved = self.control.solved(w, change)
         if solved or k >= self.control.iterations or not finite(change):
-            if solved and self.control.accepts(w, error):
-                s.verdict[w] = ACCEPTED
-            elif self.control.hopeless(s, w, s.dt[w]):
-                s.verdict[w] = HOPELESS
-                report_failure(s, w)
+            accepted = solved and self.control.accepts(w, error)
             factor = self.control.factor(w, self.control.aim(w), change, ti.cast(k, ti.f64), error)
-            # A rejected step of the same length would fail again in the same way.
-            s.next_dt[w] = s.dt[w] * ti.select(s.verdict[w] == ACCEPTED, factor, ti.min(factor, SHORTER))
+            conclude(self.control, s, w, accepted, factor, SHORTER)
             s.iterating[w] = 0
