@@ -134,7 +134,7 @@ def of_the_problem(identity: Mapping[str, Any]) -> dict[str, Any]:
     Searches in which it is equal share their runs. Ranges of genes, bounds of constraints, method, seed and
     all other settings may differ.
     """
-    return {name: identity[name] for name in _OF_THE_PROBLEM if name in identity}
+    return {name: identity[name] for name in _OF_THE_PROBLEM}
 
 
 def search_name(identity: Mapping[str, Any]) -> str:

@@ -21,12 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tisim import InputError
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.files import regular_file
 from tisim.files.checksum import verified, with_checksum
 from tisim.files.hdf5 import SIGNATURE
-from tisim.optimize.storage import older
-from tisim.optimize.storage.runs_table import KINDS, RunsTable, tabulated
+from tisim.optimize.storage.runs_table import KINDS, RunsTable
 from tisim.optimize.storage.table import (
     Hdf5Table,
     dataset_names,
@@ -44,7 +43,7 @@ Runs of a search for good designs, written by tisim (optimize.read reads it; so 
     genes/<name>         the design; attributes unit, low, high, scale (on which the search is uniform)
     values/<name>        what the run gave; attribute unit. Objectives have the attribute direction, which
                          says what is wanted: "smallest" or "largest". NaN where the run failed.
-    start, seed          number of the random start (-1: not known) and the seed that it was made from
+    start, seed          number of the random start and the seed that it was made from
     ok, reason           1 for a run that ended well, 0 for one that failed, and why
     wall_s, created      seconds that it took; when it was stored, in seconds since 1970 (UTC)
     work                 counts of the run, as JSON
@@ -69,7 +68,7 @@ they have become 64 KiB and a quarter of what is here, and at the end. optimize.
 """
 _MEANINGS: Mapping[str, Mapping[str, str]] = {
     "key": {"description": "SHA-256 of all that decides the values"},
-    "start": {"description": "number of the random start, -1 where it is not known"},
+    "start": {"description": "number of the random start"},
     "seed": {"description": "seed of the random start"},
     "ok": {"description": "1: ended well, 0: failed"},
     "reason": {"description": "why it failed"},
@@ -116,8 +115,8 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
             "('tisim cache --compact' keeps the readable part)"
         )
     with h5py.File(io.BytesIO(image), "r") as file:
-        if not by_cache(file):
-            raise InputError(f"{rule} one with {', '.join(file) or 'nothing in it'}")
+        found = Words(f"one of the format {file.attrs.get('format')!r}")
+        must(by_cache(file), str(path), f"a file of the format {EVALUATIONS_FORMAT!r}", found)
         try:
             yield file
         except InputError:
@@ -127,10 +126,9 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
 
 
 def by_cache(file: h5py.File) -> bool:
-    """Return whether the file was written by a cache, of this or an earlier version."""
+    """Return whether the file is of the format that a cache writes."""
     kind = file.attrs.get("format")
-    known = isinstance(kind, str) and kind in (EVALUATIONS_FORMAT, older.FORMAT)
-    return known and EVALUATIONS in file
+    return isinstance(kind, str) and kind == EVALUATIONS_FORMAT
 
 
 def read(path: Path) -> Content:
@@ -142,9 +140,6 @@ def read(path: Path) -> Content:
 def read_content(file: h5py.File) -> Content:
     """Return the content of an open file."""
     found = read_tables(file)
-    if file.attrs["format"] == older.FORMAT:
-        records, damaged = older.read_rows(file[EVALUATIONS], found)
-        return Content(tabulated([], records), found, damaged)
     parts = [read_runs(group) for group in file[EVALUATIONS].values()]
     return Content([runs for runs, _ in parts], found, [text for _, damaged in parts for text in damaged])
 

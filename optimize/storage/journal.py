@@ -19,7 +19,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from tisim.files.atomic import append_at
 from tisim.files.checksum import Scan, frame, scan
 from tisim.files.regular_file import content, file_status, open_descriptor
-from tisim.optimize.storage import older
 from tisim.optimize.storage.record import Record, plain
 from tisim.optimize.storage.table import Hdf5Table
 
@@ -178,8 +177,7 @@ def entries(scanned: Scan, tables: Mapping[str, Hdf5Table]) -> Entries:
                 if table is not None:
                     found.tables[rows.table] = table
             else:
-                newer = payload.startswith(b'{"key":')
-                found.records.append(Record.parse(payload) if newer else older.parse(payload, found.tables))
+                found.records.append(Record.parse(payload))
         except ValueError:
             damaged.append(f"journal, frame {number}: no evaluation")
     return found

@@ -16,8 +16,6 @@ from tisim.errors import must
 REASON_LENGTH = 500
 """Largest number of characters of a reason. All cells of a column have one length, so a stack trace would
 widen all rows."""
-UNKNOWN_START = -1
-"""The start number of a run whose start is not known, as in older files."""
 
 Gene = float | int | str | bool
 """The value of a gene in a design."""
@@ -72,7 +70,7 @@ class Record:
     work: Mapping[str, Any]
     wall_s: float
     created: float
-    start: int = UNKNOWN_START
+    start: int
 
     def __post_init__(self) -> None:
         text = self.reason.encode("ascii", "backslashreplace").decode().replace("\0", " ")

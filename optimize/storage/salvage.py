@@ -10,7 +10,6 @@ import contextlib
 import io
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
@@ -19,9 +18,9 @@ from tisim.errors import Words, must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.checksum import verified
 from tisim.files.regular_file import content, file_status
-from tisim.optimize.storage import hdf5_store, older
-from tisim.optimize.storage.runs_table import RunsTable, tabulated
-from tisim.optimize.storage.table import Hdf5Table, read_tables
+from tisim.optimize.storage import hdf5_store
+from tisim.optimize.storage.runs_table import RunsTable
+from tisim.optimize.storage.table import read_tables
 
 TIME_LIMIT = 300.0
 """Time limit of that process, s; reading a million rows takes a tenth of it."""
@@ -63,14 +62,12 @@ def _rebuild(old: bytes) -> bytes:
             tables = {name: table for name, table in read_tables(file).items() if table.intact}
         except (OSError, KeyError, RuntimeError, ValueError):
             tables = {}  # evaluations cost hours, tables nothing
-        return hdf5_store.build_image(_runs(file, tables), tables)
+        return hdf5_store.build_image(_runs(file), tables)
 
 
-def _runs(file: h5py.File, tables: Mapping[str, Hdf5Table]) -> list[RunsTable]:
+def _runs(file: h5py.File) -> list[RunsTable]:
     """Return the evaluations that can be read, each problem separately."""
     group = file[hdf5_store.EVALUATIONS]
-    if file.attrs["format"] == older.FORMAT:
-        return tabulated([], older.read_rows(group, tables)[0])
     found = []
     for name in group:
         with contextlib.suppress(OSError, KeyError, RuntimeError, ValueError, TypeError):

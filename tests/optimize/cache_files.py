@@ -7,6 +7,8 @@ from pathlib import Path
 
 import h5py
 
+from tisim.files.checksum import with_checksum
+
 WORKER = Path(__file__).with_name("cache_worker.py")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
@@ -31,6 +33,15 @@ def hurt(path, dataset, row):
     content = bytearray(path.read_bytes())
     content[at] ^= 1
     path.write_bytes(content)
+
+
+def of_format(kind):
+    """An undamaged HDF5 file with the checksum of a cache file, of some format."""
+    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+        file.attrs["format"] = kind
+        file.create_group("evaluations")
+        file.flush()
+        return with_checksum(bytes(file.id.get_file_image()))
 
 
 PIPE = 4096

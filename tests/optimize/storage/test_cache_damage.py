@@ -5,7 +5,7 @@ import shutil
 import h5py
 import pytest
 
-from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
+from tests.optimize.cache_files import hurt, journal_of, lock_of, of_format, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
 from tisim.files.checksum import MAGIC, frame, scan
@@ -143,6 +143,36 @@ def test_foreign_files_are_refused_and_kept(path, content):
         ):
             function(path)
     assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("kind", ["tisim evaluations 1", "tisim evaluations 3", "tisim run 1"])
+def test_files_of_another_format_are_refused_and_kept(path, kind):
+    """Undamaged files of an earlier or a later format, or of another command."""
+    path.write_bytes(of_format(kind))
+    before = path.read_bytes()
+    told = f"{path} must be a file of the format 'tisim evaluations 2'; received one of the format '{kind}'"
+    for function in (Cache, verify, existing, compact):
+        with pytest.raises(InputError) as error:
+            function(path)
+        assert str(error.value) == told
+    assert path.read_bytes() == before
+    assert [file.name for file in path.parent.iterdir() if not file.name.endswith(".lock")] == [path.name]
+
+
+def test_a_damaged_file_of_another_format_is_not_salvaged(path):
+    path.write_bytes(of_format("tisim evaluations 1")[:-5])
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=r"cache\.h5 must be a whole HDF5 file written by a cache; received"):
+        compact(path)
+    assert path.read_bytes() == before
+
+
+def test_a_journal_entry_of_another_format_is_reported(path):
+    entry = frame(b'{"created":1e9,"design":{"x":0.5},"fitness":0.5,"key":"1","problem":"bowl"}')
+    journal_of(path).write_bytes(frame(fake_record(0).payload()) + entry)
+    assert verify(path).damaged == ["journal, frame 1: no evaluation"]
+    with pytest.warns(RuntimeWarning, match=r"1 damaged evaluation\(s\) are ignored and will be run again"):
+        assert len(Cache(path)) == 1
 
 
 def test_missing_file_is_refused(path):

@@ -5,7 +5,7 @@ import os
 import h5py
 import pytest
 
-from tests.optimize.cache_files import journal_of
+from tests.optimize.cache_files import journal_of, of_format
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
@@ -86,6 +86,7 @@ DAMAGE = {
     "zeros": lambda path: path.write_bytes(bytes(5000)),
     "a journal": lambda path: path.write_bytes(frame(fake_record(1).payload())),
     "another's": another_program,
+    "another format": lambda path: path.write_bytes(of_format("tisim evaluations 1")),
     "fifo": replaced(os.mkfifo),
     "folder": replaced(lambda path: path.mkdir()),
     "link": replaced(lambda path: path.symlink_to("/dev/zero")),
