@@ -91,7 +91,8 @@ class AskTell:
         self._by_method = False  # whether the method proposed them
         self._generations = 0
         self._told: dict[Point, list[Tried]] = {}
-        self._strings: dict[Point, list[Individual]] = {}  # of told designs; the first one is the one told
+        # Individuals of told designs; the first one of a design is the one told.
+        self._individuals: dict[Point, list[Individual]] = {}
         self._not_learned: list[Point] = []
         self._file, self._content = None if file is None else Path(file), b""
         self._lines: list[list[str]] = []
@@ -105,7 +106,7 @@ class AskTell:
         """
         for _ in range(_TRIES):
             if self._open:
-                return [self.problem.genome.decode(strings[0]) for strings in self._open.values()]
+                return [self.problem.genome.decode(individuals[0]) for individuals in self._open.values()]
             self._next()
         return []
 
@@ -139,17 +140,17 @@ class AskTell:
             with naming(place):
                 read.append((row, *self._read(row)))
         lines = [self._line(row, self._same(point) in self._open) for row, point, _ in read]
-        tries, strings = self._known([(point, tried) for _, point, tried in read])
+        tries, individuals = self._known([(point, tried) for _, point, tried in read])
         self._write(lines)
-        self._take(tries, strings)
+        self._take(tries, individuals)
 
     @property
     def best(self) -> Design | None:
         """The best design by posterior mean, or the compromise of several objectives. None before a value is
         known."""
         outcome = self.outcome
-        return next((one for one, string in zip(outcome.designs, outcome.hall, strict=True)
-                     if string is outcome.best), None)  # fmt: skip
+        return next((one for one, individual in zip(outcome.designs, outcome.hall, strict=True)
+                     if individual is outcome.best), None)  # fmt: skip
 
     @property
     def designs(self) -> list[Design]:
@@ -163,11 +164,13 @@ class AskTell:
     def outcome(self) -> Outcome:
         """The results so far, as of a search, for ``to_frame`` and ``tisim.optimize.sensitivity``."""
         found = Outcome(self.problem, self.settings, identity(self.problem, self.settings, {}))
-        strings = self._ranked()
-        for string in strings:
-            (found.failures if string.failed else found.estimates)[tuple(string)] = string.estimates
-        places = len(strings) if self.problem.several else self.settings.hall_of_fame
-        found.hall = best(self.problem.genome, [s for s in strings if not s.failed], places)
+        individuals = self._ranked()
+        for individual in individuals:
+            (found.failures if individual.failed else found.estimates)[tuple(individual)] = (
+                individual.estimates
+            )
+        places = len(individuals) if self.problem.several else self.settings.hall_of_fame
+        found.hall = best(self.problem.genome, [one for one in individuals if not one.failed], places)
         return found
 
     def _next(self) -> None:
@@ -175,47 +178,47 @@ class AskTell:
         hall = HallOfFame(self.settings.hall_of_fame)
         hall.update(self._ranked())
         if self._by_method:
-            self._method.tell(self._asked, hall.strings)
+            self._method.tell(self._asked, hall.individuals)
         if self._not_learned:
-            self._method.learn([self._strings[point][0] for point in self._not_learned])
+            self._method.learn([self._individuals[point][0] for point in self._not_learned])
             self._not_learned = []
         self._by_method = bool(self._generations) or not self._starting
         self._asked = self._method.ask() if self._by_method else self._starting
         self._generations += 1
-        for string in self._asked:
-            if not string.fitness.valid:
-                self._recognise(string)
+        for individual in self._asked:
+            if not individual.fitness.valid:
+                self._recognise(individual)
 
-    def _recognise(self, string: Individual) -> None:
+    def _recognise(self, individual: Individual) -> None:
         """Give an individual the known values of its design, or list it as open. It fails if its design
         violates a design constraint."""
-        design = self.problem.genome.decode(string)
+        design = self.problem.genome.decode(individual)
         point = self._point(design)
-        if point in self._strings:
-            _become(string, self._strings[point][0])
-            self._strings[point].append(string)
+        if point in self._individuals:
+            _become(individual, self._individuals[point][0])
+            self._individuals[point].append(individual)
             return
         try:
             check_design(self.problem, design)
         except InputError as error:
             failed = FitnessEstimate.failed(0, f"infeasible: {error}")
-            string.know((failed,) * len(self.problem.objectives))
+            individual.know((failed,) * len(self.problem.objectives))
         else:
-            self._open.setdefault(point, []).append(string)
+            self._open.setdefault(point, []).append(individual)
 
     def _ranked(self) -> list[Individual]:
         """Return the individuals of all told designs; their costs rank feasible designs first."""
-        strings = [of_design[0] for of_design in self._strings.values()]
-        good = [string for string in strings if not string.failed]
+        individuals = [of_design[0] for of_design in self._individuals.values()]
+        good = [individual for individual in individuals if not individual.failed]
         if good and self.problem.result_constraints:
-            costs = [[estimate.mean for estimate in string.estimates] for string in good]
-            ordered = penalised(costs, [string.violation for string in good])
-            for string, cost in zip(good, ordered.tolist(), strict=True):
-                string.fitness.values = tuple(cost)
-            for first, *others in self._strings.values():
-                for string in others:
-                    string.fitness.values = first.fitness.values
-        return strings
+            costs = [[estimate.mean for estimate in individual.estimates] for individual in good]
+            ordered = penalised(costs, [individual.violation for individual in good])
+            for individual, cost in zip(good, ordered.tolist(), strict=True):
+                individual.fitness.values = tuple(cost)
+            for first, *others in self._individuals.values():
+                for individual in others:
+                    individual.fitness.values = first.fitness.values
+        return individuals
 
     def _known(
         self, told: Sequence[tuple[Point, Tried]]
@@ -225,28 +228,28 @@ class AskTell:
         for point, tried in told:
             same = self._same(point)
             tries.setdefault(same, [*self._told.get(same, ())]).append(tried)
-        strings = {}
+        individuals = {}
         for point, of_design in tries.items():
             values, errors, limits = zip(*of_design, strict=True)
-            strings[point] = known(self.problem, point, values, errors, np.mean(limits, axis=0).tolist())
-        return tries, strings
+            individuals[point] = known(self.problem, point, values, errors, np.mean(limits, axis=0).tolist())
+        return tries, individuals
 
-    def _take(self, tries: Mapping[Point, list[Tried]], strings: Mapping[Point, Individual]) -> None:
+    def _take(self, tries: Mapping[Point, list[Tried]], individuals: Mapping[Point, Individual]) -> None:
         """Record the trials and individuals of told designs."""
         self._told |= tries
-        for point, string in strings.items():
-            if point not in self._strings:
+        for point, individual in individuals.items():
+            if point not in self._individuals:
                 if not (self._by_method and point in self._open):
                     self._not_learned.append(point)
-                self._strings[point] = self._open.pop(point, [string])
-            for other in self._strings[point]:
-                _become(other, string)
+                self._individuals[point] = self._open.pop(point, [individual])
+            for other in self._individuals[point]:
+                _become(other, individual)
 
     def _same(self, point: Point) -> Point:
         """Return the asked or told design that agrees with this one within ``SAME``; the point itself if
         there is none."""
-        points = list(dict.fromkeys((*self._open, *self._strings)))
-        if point in self._open or point in self._strings or not points:
+        points = list(dict.fromkeys((*self._open, *self._individuals)))
+        if point in self._open or point in self._individuals or not points:
             return point
         apart = np.abs(np.array(points) - point).max(axis=1)
         return points[int(np.argmin(apart))] if apart.min() <= SAME else point
@@ -337,11 +340,11 @@ class AskTell:
             self._next()
 
 
-def _become(string: Individual, other: Individual) -> None:
+def _become(individual: Individual, other: Individual) -> None:
     """Give an individual the known values of another one with the same design."""
-    string.know(other.estimates)
-    string.limited, string.violation = other.limited, other.violation
-    string.fitness.values = other.fitness.values
+    individual.know(other.estimates)
+    individual.limited, individual.violation = other.limited, other.violation
+    individual.fitness.values = other.fitness.values
 
 
 def _by_name(value: Any, names: Sequence[str], what: str) -> dict[str, Any]:

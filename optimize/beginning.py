@@ -52,7 +52,7 @@ class Beginning:
     def first(self, problem: Problem) -> list[Individual]:
         """Return the individuals that are run before generation 0, without a fitness."""
         points = [tuple(map(float, problem.genome.encode(design))) for design in self.designs]
-        points += [tuple(string) for string in best(problem.genome, self.warm or (), RUN_AGAIN)]
+        points += [tuple(individual) for individual in best(problem.genome, self.warm or (), RUN_AGAIN)]
         return [Individual(point, len(problem.objectives)) for point in dict.fromkeys(points)]
 
     def identity(self, problem: Problem) -> dict[str, str]:
@@ -67,14 +67,14 @@ class Beginning:
         return parts
 
 
-def _plain(problem: Problem, strings: Sequence[Individual]) -> list[Any]:
+def _plain(problem: Problem, individuals: Sequence[Individual]) -> list[Any]:
     return [
         [
-            problem.genome.decode(string),
-            [[one.mean, one.std, one.starts, one.reason] for one in string.estimates],
-            list(string.limited),
+            problem.genome.decode(individual),
+            [[one.mean, one.std, one.starts, one.reason] for one in individual.estimates],
+            list(individual.limited),
         ]
-        for string in strings
+        for individual in individuals
     ]
 
 

@@ -39,18 +39,18 @@ def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
     It is an eighth of the budget for one objective, or less if the reported designs need less; a quarter for
     a front; 0 if all starts of a design are the same.
     """
-    asked, most = settings.ensemble, settings.max_evaluations
-    if most is None or ensemble.repeatable or not (asked.select or asked.confirm):
+    options, most = settings.ensemble, settings.max_evaluations
+    if most is None or ensemble.repeatable or not (options.select or options.confirm):
         return 0
     if problem.several:
         return most // 4
-    return min(most // 8, settings.hall_of_fame * (asked.select + _fresh(problem, settings)))
+    return min(most // 8, settings.hall_of_fame * (options.select + _fresh(problem, settings)))
 
 
 def _fresh(problem: Problem, settings: Settings) -> int:
     """Return the number of held-out starts of each reported design."""
-    asked = settings.ensemble.confirm
-    return max(asked, *(one.statistic.fewest_fresh for one in problem.objectives)) if asked else 0
+    starts = settings.ensemble.confirm
+    return max(starts, *(one.statistic.fewest_fresh for one in problem.objectives)) if starts else 0
 
 
 def concluded(
@@ -64,19 +64,19 @@ def concluded(
 
     The budget of the ensemble is not exceeded.
     """
-    asked = settings.ensemble
+    options = settings.ensemble
     fresh = _fresh(problem, settings)
-    if asked.select or asked.confirm:
+    if options.select or options.confirm:
         ensemble.look()
-    noise = _noise(problem, settings, ensemble, known) if asked.confirm else None
+    noise = _noise(problem, settings, ensemble, known) if options.confirm else None
     if problem.several:
         return _front(problem, ensemble, known, fresh, report, noise)
     count = settings.hall_of_fame
     if ensemble.repeatable:
         return _exact(problem, _first(met, best(problem.genome, known, count)), ensemble)
     candidates = best(problem.genome, known, count)
-    if 3 * asked.select * len(candidates) <= _left(ensemble):
-        _know(problem, candidates, ensemble, asked.select)
+    if 3 * options.select * len(candidates) <= _left(ensemble):
+        _know(problem, candidates, ensemble, options.select)
     if fresh:
         count = int(max(1, min(count, _left(ensemble) // fresh)))
     chosen = _first(met, best(problem.genome, known, count))
@@ -166,10 +166,10 @@ def _confirm(
     too_few = starts < max(one.statistic.fewest_starts for one in problem.objectives)
     if not starts or too_few or (starts * len(chosen) > _left(ensemble) and not again):
         return
-    designs = [problem.genome.decode(string) for string in chosen]
+    designs = [problem.genome.decode(individual) for individual in chosen]
     fresh = ensemble.fresh(designs, starts, progress=report, noise=noise, confidence=confidence)
-    for string, estimates in zip(chosen, fresh, strict=True):
-        string.confirmed = estimates
+    for individual, estimates in zip(chosen, fresh, strict=True):
+        individual.confirmed = estimates
 
 
 def _noise(problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual]) -> Noise:
@@ -183,10 +183,12 @@ def _noise(problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequ
 
 
 def _know(problem: Problem, candidates: Sequence[Individual], ensemble: Ensemble, starts: int) -> None:
-    designs = [problem.genome.decode(string) for string in candidates]
-    for string, estimates in zip(candidates, ensemble.more(designs, starts), strict=True):
-        string.know(estimates)
-        string.limit(problem.result_constraints, ensemble.constraint_means(problem.genome.decode(string)))
+    designs = [problem.genome.decode(individual) for individual in candidates]
+    for individual, estimates in zip(candidates, ensemble.more(designs, starts), strict=True):
+        individual.know(estimates)
+        individual.limit(
+            problem.result_constraints, ensemble.constraint_means(problem.genome.decode(individual))
+        )
 
 
 def _exact(problem: Problem, chosen: list[Individual], ensemble: Ensemble) -> list[Individual]:

@@ -39,12 +39,12 @@ def experiments(given: Given, problem: Problem, what: str = "experiments") -> tu
             check_headings(problem, row)
             point = tuple(map(float, problem.genome.encode(design_of(problem, row))))
             found.setdefault(point, []).append(row_values(problem, row))
-    strings = []
+    individuals = []
     for point, of_design in found.items():
         with naming(what):
             values, errors, limits = zip(*of_design, strict=True)
-            strings.append(known(problem, point, values, errors, np.mean(limits, axis=0).tolist()))
-    return tuple(strings)
+            individuals.append(known(problem, point, values, errors, np.mean(limits, axis=0).tolist()))
+    return tuple(individuals)
 
 
 def known(
@@ -60,16 +60,18 @@ def known(
 
     A design fails if any of its values is not a finite number.
     """
-    string = Individual(point, len(problem.objectives))
+    individual = Individual(point, len(problem.objectives))
     if not np.all(np.isfinite(values)):
-        string.know((FitnessEstimate.failed(len(values), "told to have failed"),) * len(problem.objectives))
-        return string
+        individual.know(
+            (FitnessEstimate.failed(len(values), "told to have failed"),) * len(problem.objectives)
+        )
+        return individual
     columns = zip(*(problem.costs(row) for row in values), strict=True)
-    string.know(
+    individual.know(
         tuple(combined(column, of) for column, of in zip(columns, zip(*errors, strict=True), strict=True))
     )
-    string.limit(problem.result_constraints, limits)
-    return string
+    individual.limit(problem.result_constraints, limits)
+    return individual
 
 
 def combined(values: Sequence[float], errors: Sequence[float]) -> FitnessEstimate:
@@ -97,20 +99,20 @@ def plain(values: Sequence[float] | Any) -> FitnessEstimate:
     return FitnessEstimate(float(np.mean(values)), std, math.nan, math.nan, len(values), False)
 
 
-def table_of(problem: Problem, strings: Sequence[Individual]) -> dict[str, list[Any]]:
+def table_of(problem: Problem, individuals: Sequence[Individual]) -> dict[str, list[Any]]:
     """Return a table of individuals as columns, from which ``restored`` recovers them to the last bit."""
-    designs = [problem.genome.decode(string) for string in strings]
+    designs = [problem.genome.decode(individual) for individual in individuals]
     found: dict[str, list[Any]] = {
         gene.name: [design[gene.name] for design in designs] for gene in problem.genome.searched
     }
     for k, objective in enumerate(problem.objectives):
-        mine = [string.estimates[k] for string in strings]
+        mine = [individual.estimates[k] for individual in individuals]
         found[objective.name] = [objective.sign * one.mean if one.ok else math.nan for one in mine]
         found[f"{objective.name} {DEVIATION}"] = [one.std for one in mine]
     for k, constraint in enumerate(problem.result_constraints):
-        found[constraint.name] = [s.limited[k] if s.limited else math.nan for s in strings]
-    found["starts"] = [string.estimates[0].starts for string in strings]
-    found[FAILED] = [string.estimates[0].reason for string in strings]
+        found[constraint.name] = [one.limited[k] if one.limited else math.nan for one in individuals]
+    found["starts"] = [individual.estimates[0].starts for individual in individuals]
+    found[FAILED] = [individual.estimates[0].reason for individual in individuals]
     return found
 
 
@@ -124,20 +126,20 @@ def _restored(problem: Problem, row: Mapping[str, Any]) -> Individual:
     cells = {gene: row[gene.name] for gene in problem.genome.searched}
     # A gene that mixes texts and numbers is stored as a column of texts.
     design = {gene.name: gene.parse(cell) if isinstance(cell, str) else cell for gene, cell in cells.items()}
-    string = Individual(problem.genome.encode(design), len(problem.objectives))
+    individual = Individual(problem.genome.encode(design), len(problem.objectives))
     if row[FAILED]:
-        string.know((FitnessEstimate.failed(row["starts"], row[FAILED]),) * len(problem.objectives))
-        return string
+        individual.know((FitnessEstimate.failed(row["starts"], row[FAILED]),) * len(problem.objectives))
+        return individual
     means = problem.costs([row[one.name] for one in problem.objectives])
     deviations = (row[f"{one.name} {DEVIATION}"] for one in problem.objectives)
-    string.know(
+    individual.know(
         tuple(
             FitnessEstimate(mean, std, math.nan, math.nan, row["starts"], False)
             for mean, std in zip(means, deviations, strict=True)
         )
     )
-    string.limit(problem.result_constraints, [row[one.name] for one in problem.result_constraints])
-    return string
+    individual.limit(problem.result_constraints, [row[one.name] for one in problem.result_constraints])
+    return individual
 
 
 def row_values(problem: Problem, row: Mapping[str, str]) -> tuple[Values, Values, Values]:

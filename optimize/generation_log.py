@@ -17,13 +17,13 @@ def statistics(
 ) -> dict[str, Any]:
     """Return the fitness columns of Outcome.logbook; values of the objectives, not costs."""
     best = [
-        min((s.fitness.values[k] for s in hall), default=math.inf) for k in range(len(problem.objectives))
+        min((one.fitness.values[k] for one in hall), default=math.inf) for k in range(len(problem.objectives))
     ]
     values = problem.costs(best)
     if problem.several:
         names = [best_of(objective.label) for objective in problem.objectives]
         return {"front": len(hall), **dict(zip(names, values, strict=True))}
-    good = [problem.costs(string.fitness.values)[0] for string in population if not string.failed]
+    good = [problem.costs(individual.fitness.values)[0] for individual in population if not individual.failed]
     return {
         "best": values[0],
         "mean": float(np.mean(good)) if good else math.nan,

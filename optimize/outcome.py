@@ -85,7 +85,7 @@ class Outcome:
     hall : the best different designs, best first, ranked by all information of the search (see
         optimize.conclusion; empty if none succeeded); for several objectives the front. Failed designs never
         enter.
-    estimates : estimates of each successful design, by its string (a point of the unit cube), in the order of
+    estimates : estimates of each successful design, by its point of the unit cube, in the order of
         their first estimation.
     quantities : quantities of the runs of each of these, in the order of problem.quantities, shape (starts,
         quantities).
@@ -135,19 +135,19 @@ class Outcome:
     @property
     def designs(self) -> list[Design]:
         """Return the hall of fame by name and in physical units, in its order."""
-        return [self._design(string) for string in self.hall]
+        return [self._design(individual) for individual in self.hall]
 
-    def _design(self, string: Individual) -> Design:
-        estimates = string.confirmed or string.estimates
+    def _design(self, individual: Individual) -> Design:
+        estimates = individual.confirmed or individual.estimates
         names = [objective.name for objective in self.problem.objectives]
         means = self.problem.costs([estimate.mean for estimate in estimates])
-        sure = bool(string.confirmed) or all(estimate.exact for estimate in estimates)
+        sure = bool(individual.confirmed) or all(estimate.exact for estimate in estimates)
         intervals = {
             one.name: interval_of_value(estimate, one) if sure else None
             for one, estimate in zip(self.problem.objectives, estimates, strict=True)
         }
         return Design(
-            genes=self.problem.genome.decode(string),
+            genes=self.problem.genome.decode(individual),
             values=dict(zip(names, means, strict=True)),
             intervals=intervals,
             starts=estimates[0].starts,

@@ -59,8 +59,8 @@ def search(
     Outcome.name. KeyboardInterrupt ends the search cleanly and is reported in Outcome.stopped.
     Raises InputError if the method does not support the problem, RunError if the disk is full.
     """
-    wished = settings or Settings()
-    return _Search(problem, evaluator, cache, wished, beginning, on_generation, on_progress).run()
+    settings = settings or Settings()
+    return _Search(problem, evaluator, cache, settings, beginning, on_generation, on_progress).run()
 
 
 class _Search:
@@ -110,20 +110,20 @@ class _Search:
 
     def _conclude(self) -> None:
         """Choose the best of all known designs, and evaluate them with held-out starts."""
-        if not self.hall.strings or self._out_of_time():
+        if not self.hall.individuals or self._out_of_time():
             return
         self.ensemble.budget = self._budget
         last = len(self.outcome.logbook) - 1
-        met = self.known[tuple(self.hall.strings[0])] if self.outcome.stopped == "target" else None
+        met = self.known[tuple(self.hall.individuals[0])] if self.outcome.stopped == "target" else None
         self.ranked = concluded(
             self.problem, self.settings, self.ensemble, list(self.known.values()),
             lambda fraction: self._report(last, 1.0), met,
         )  # fmt: skip
-        for string in self.known.values():  # further starts have changed some, or made them fail
-            known = self.outcome.failures if string.failed else self.outcome.estimates
-            known[tuple(string)] = string.estimates
-            if string.failed:
-                self.outcome.estimates.pop(tuple(string), None)
+        for individual in self.known.values():  # further starts have changed some, or made them fail
+            known = self.outcome.failures if individual.failed else self.outcome.estimates
+            known[tuple(individual)] = individual.estimates
+            if individual.failed:
+                self.outcome.estimates.pop(tuple(individual), None)
 
     @property
     def _budget(self) -> float:
@@ -138,26 +138,26 @@ class _Search:
             first = [] if generation else self._begin()
             asked = self.method.ask()
             fresh = len(first) + self._estimate(asked, generation)
-            asked = [string for string in asked if string.fitness.valid]
+            asked = [individual for individual in asked if individual.fitness.valid]
             kept = set(map(id, asked))
-            population = [*asked, *(string for string in first if id(string) not in kept)]
+            population = [*asked, *(individual for individual in first if id(individual) not in kept)]
             better = self.hall.update(population)
             self._race(population, generation)
             if not self.ensemble.exhausted:  # else this last generation is incomplete
-                self.method.tell(asked, self.hall.strings)
+                self.method.tell(asked, self.hall.individuals)
             self.stagnation = 0 if better else self.stagnation + 1
             self.outcome.logbook.record(
                 gen=generation,
                 designs=fresh,
                 starts=self.ensemble.requested - requested_before,
-                failed=sum(string.failed for string in population),
+                failed=sum(individual.failed for individual in population),
                 box=width,
                 recentred=self.method.moved and not self.ensemble.exhausted,
-                **statistics(self.problem, population, self.hall.strings),
+                **statistics(self.problem, population, self.hall.individuals),
             )
             self._store()
-            reasons = [string.estimates[0].reason for string in population if string.estimates]
-            failed = not self.hall.strings and reasons
+            reasons = [individual.estimates[0].reason for individual in population if individual.estimates]
+            failed = not self.hall.individuals and reasons
             if self.on_generation is not None:
                 progress = self._progress(generation, 1.0)
                 self.on_generation(replace(progress, failure=reasons[0]) if failed else progress)
@@ -177,14 +177,14 @@ class _Search:
         first = self.outcome.beginning.first(self.problem)
         if first:
             self._estimate(first, 0, part=0.0)
-        first = [string for string in first if string.fitness.valid]
-        strings = {tuple(string): string for string in first}
-        for string in self.learned:
-            ran = strings.setdefault(tuple(string), string)
-            if string.estimates[0].starts > ran.estimates[0].starts:
-                strings[tuple(string)] = string
-        if strings:
-            self.method.learn(list(strings.values()) if self.method.takes_experiments else first)
+        first = [individual for individual in first if individual.fitness.valid]
+        individuals = {tuple(individual): individual for individual in first}
+        for individual in self.learned:
+            ran = individuals.setdefault(tuple(individual), individual)
+            if individual.estimates[0].starts > ran.estimates[0].starts:
+                individuals[tuple(individual)] = individual
+        if individuals:
+            self.method.learn(list(individuals.values()) if self.method.takes_experiments else first)
         return first
 
     def _estimate(self, population: list[Individual], generation: int, part: float = 1.0) -> int:
@@ -192,49 +192,51 @@ class _Search:
 
         part : the fraction of the generation that they are, for the progress report.
         """
-        fresh = [string for string in population if not string.fitness.valid]
-        designs = [self.problem.genome.decode(string) for string in fresh]
+        fresh = [individual for individual in population if not individual.fitness.valid]
+        designs = [self.problem.genome.decode(individual) for individual in fresh]
         new_estimates = self.ensemble.estimate(
             designs, lambda fraction: self._report(generation, part * fraction)
         )
-        for string, estimates in zip(fresh, new_estimates, strict=True):
+        for individual, estimates in zip(fresh, new_estimates, strict=True):
             if estimates is not None:
-                string.know(estimates)
-                known = self.outcome.failures if string.failed else self.outcome.estimates
-                known[tuple(string)] = estimates
-                self.known.setdefault(tuple(string), string)
+                individual.know(estimates)
+                known = self.outcome.failures if individual.failed else self.outcome.estimates
+                known[tuple(individual)] = estimates
+                self.known.setdefault(tuple(individual), individual)
         self._constrain(fresh)
-        return sum(string.fitness.valid for string in fresh)
+        return sum(individual.fitness.valid for individual in fresh)
 
     def _constrain(self, fresh: list[Individual]) -> None:
         """Rank designs that violate a constraint of the result after all feasible ones, by the size of the
         violation."""
         constraints = self.problem.result_constraints
-        ran = [string for string in self.known.values() if not string.failed]
-        known = [*(string for string in self.learned if not string.failed), *ran]
+        ran = [individual for individual in self.known.values() if not individual.failed]
+        known = [*(individual for individual in self.learned if not individual.failed), *ran]
         if not constraints or not known:
             return
-        for string in (*ran, *(one for one in fresh if one.fitness.valid and not one.failed)):
-            string.limit(constraints, self.ensemble.constraint_means(self.problem.genome.decode(string)))
-        costs = [[estimate.mean for estimate in string.estimates] for string in known]
-        ordered = penalised(costs, [string.violation for string in known])
-        by_string = dict(zip(map(tuple, known), ordered.tolist(), strict=True))
-        for string in (*known, *(one for one in fresh if tuple(one) in by_string)):
-            string.fitness.values = tuple(by_string[tuple(string)])
+        for individual in (*ran, *(one for one in fresh if one.fitness.valid and not one.failed)):
+            individual.limit(
+                constraints, self.ensemble.constraint_means(self.problem.genome.decode(individual))
+            )
+        costs = [[estimate.mean for estimate in individual.estimates] for individual in known]
+        ordered = penalised(costs, [individual.violation for individual in known])
+        by_point = dict(zip(map(tuple, known), ordered.tolist(), strict=True))
+        for individual in (*known, *(one for one in fresh if tuple(one) in by_point)):
+            individual.fitness.values = tuple(by_point[tuple(individual)])
 
     def _race(self, population: list[Individual], generation: int) -> None:
         """Spend more starts on the designs of the hall of fame, and rank it by the new estimates."""
         if not self.settings.ensemble.race:
             return
-        racing = self.hall.strings
-        designs = [self.problem.genome.decode(string) for string in racing]
+        racing = self.hall.individuals
+        designs = [self.problem.genome.decode(individual) for individual in racing]
         raced = self.ensemble.race(designs, lambda fraction: self._report(generation, 1.0))
-        by_string = {tuple(string): estimates for string, estimates in zip(racing, raced, strict=True)}
-        self.outcome.estimates |= by_string
-        known = [self.known[string] for string in by_string if string in self.known]
-        for string in (*racing, *population, *known):
-            if tuple(string) in by_string:
-                string.know(by_string[tuple(string)])
+        by_point = {tuple(individual): estimates for individual, estimates in zip(racing, raced, strict=True)}
+        self.outcome.estimates |= by_point
+        known = [self.known[point] for point in by_point if point in self.known]
+        for individual in (*racing, *population, *known):
+            if tuple(individual) in by_point:
+                individual.know(by_point[tuple(individual)])
         self._constrain([*racing, *population])
         self.hall.update(population)
 
@@ -246,9 +248,9 @@ class _Search:
 
     def _stop(self, generation: int) -> Stopped:
         settings = self.settings
-        if settings.target is not None and self.hall.strings:
+        if settings.target is not None and self.hall.individuals:
             (goal,) = self.problem.costs([settings.target])
-            leader = self.hall.strings[0]
+            leader = self.hall.individuals[0]
             if leader.fitness.values[0] <= goal and tuple(leader) not in self.tried:
                 self.ensemble.budget = self._budget
                 known = list(self.known.values())
@@ -269,8 +271,10 @@ class _Search:
         return budget is not None and time.monotonic() - self.began >= budget
 
     def _progress(self, generation: int, fraction: float) -> Progress:
-        hall = self.hall.strings
-        costs = [min(column) for column in zip(*(string.fitness.values for string in hall), strict=True)]
+        hall = self.hall.individuals
+        costs = [
+            min(column) for column in zip(*(individual.fitness.values for individual in hall), strict=True)
+        ]
         return Progress(
             generation=generation,
             generations=self.settings.generations,
@@ -286,7 +290,7 @@ class _Search:
     def _store(self) -> None:
         """Update the outcome and write it to the cache file."""
         out = self.outcome
-        out.hall = list(self.hall.strings) if self.ranked is None else self.ranked
+        out.hall = list(self.hall.individuals) if self.ranked is None else self.ranked
         out.evaluations, out.hits = self.ensemble.runs.evaluations, self.ensemble.runs.hits
         out.elapsed_s = time.monotonic() - self.began
         store(self.cache, out)

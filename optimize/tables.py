@@ -18,7 +18,7 @@ FRESH_STARTS = ", fresh starts"
 ERROR, LOW, HIGH = "std. error", "95 % low", "95 % high"
 """Headings, or ends of headings."""
 Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
-"""Estimates of designs, by their strings."""
+"""Estimates of designs, by their points of the unit cube."""
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
@@ -29,10 +29,10 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
     was set). With held-out starts, each objective follows with the ends of its 95 % confidence interval. With
     several objectives, the front is sorted by the first.
     """
-    estimates = [string.estimates for string in hall]
+    estimates = [individual.estimates for individual in hall]
     number = "front" if problem.several else "rank"
     columns: dict[str, list[Any]] = {number: list(range(1, len(estimates) + 1))}
-    designs = [problem.genome.decode(string) for string in hall]
+    designs = [problem.genome.decode(individual) for individual in hall]
     for gene in problem.genome.genes:
         columns[gene.label] = [design[gene.name] for design in designs]
     for constraint in problem.design_constraints:
@@ -43,7 +43,7 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
     columns["starts"] = [of_all[0].starts for of_all in estimates]
     if any(of_all[0].converged for of_all in estimates):
         columns["converged"] = ["yes" if of_all[0].converged else "no" for of_all in estimates]
-    confirmed = [string.confirmed for string in hall if string.confirmed]
+    confirmed = [individual.confirmed for individual in hall if individual.confirmed]
     if confirmed and len(confirmed) == len(hall):
         columns |= _objectives(problem, confirmed, FRESH_STARTS)
         columns[f"starts{FRESH_STARTS}"] = [of_all[0].starts for of_all in confirmed]
@@ -94,7 +94,7 @@ def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any
     They are every gene, the mean of each objective and its standard error (NaN if the design failed), starts,
     converged, and the reason of a failure.
     """
-    designs = [problem.genome.decode(string) for string in estimates]
+    designs = [problem.genome.decode(point) for point in estimates]
     columns: dict[str, list[Any]] = {
         gene.name: [design[gene.name] for design in designs] for gene in problem.genome.genes
     }
@@ -114,13 +114,13 @@ def error_of(name: str) -> str:
     return f"{name} {ERROR}"
 
 
-def met_strings(problem: Problem, estimates: Estimates) -> list[tuple[float, ...]]:
-    """Return the strings of the designs with a fitness of ``met_at`` or better, best first; none without
+def met_points(problem: Problem, estimates: Estimates) -> list[tuple[float, ...]]:
+    """Return the points of the designs with a fitness of ``met_at`` or better, best first; none without
     ``met_at``."""
     if problem.met_at is None:
         return []
     (objective,) = problem.objectives
-    costs = {string: of_all[0].mean for string, of_all in estimates.items()}
+    costs = {point: of_all[0].mean for point, of_all in estimates.items()}
     limit = objective.sign * problem.met_at
     return sorted((one for one in costs if costs[one] <= limit), key=lambda one: (costs[one], one))
 
@@ -128,10 +128,10 @@ def met_strings(problem: Problem, estimates: Estimates) -> list[tuple[float, ...
 def met_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
     """Return every gene and the fitness of the designs with ``met_at`` or better, best first: heading ->
     values."""
-    strings, (objective,) = met_strings(problem, estimates), problem.objectives
-    designs = [problem.genome.decode(string) for string in strings]
+    points, (objective,) = met_points(problem, estimates), problem.objectives
+    designs = [problem.genome.decode(point) for point in points]
     columns = {gene.label: [design[gene.name] for design in designs] for gene in problem.genome.genes}
-    return {**columns, objective.label: [objective.sign * estimates[one][0].mean for one in strings]}
+    return {**columns, objective.label: [objective.sign * estimates[one][0].mean for one in points]}
 
 
 def logbook_columns(problem: Problem, logbook: tools.Logbook) -> dict[str, list[Any]]:

@@ -50,8 +50,8 @@ def warmed(
         stored = json.loads(attributes["identity"])
         if WARM_START in stored and {**stored, WARM_START: ""} == {**requested, WARM_START: ""}:
             return replace(beginning, warm=restored(problem, cache.table(f"{name}/{WARM_START}").columns))
-    strings = [string for part in cache.runs() for string in _of_runs(problem, part)]
-    return replace(beginning, warm=tuple(strings))
+    individuals = [individual for part in cache.runs() for individual in _of_runs(problem, part)]
+    return replace(beginning, warm=tuple(individuals))
 
 
 def _of_runs(problem: Problem, part: RunsTable) -> list[Individual]:
@@ -70,19 +70,19 @@ def _of_runs(problem: Problem, part: RunsTable) -> list[Individual]:
             continue
         values = part.record(int(row)).design
         if all(_allows(gene, values.get(gene.name)) for gene in problem.genome.genes):
-            found.append((_string(problem, part, rows), values))
-    strings = [string for string, _ in found]
-    if not strings or all(string.failed for string in strings):
+            found.append((_individual(problem, part, rows), values))
+    individuals = [individual for individual, _ in found]
+    if not individuals or all(individual.failed for individual in individuals):
         return []
     # The points are computed last, since this is the slowest step.
-    costs, _ = costs_and_noise(strings)
-    chosen = [found[k] for k in representative(costs, MOST_LEARNED, all_exact(strings))]
+    costs, _ = costs_and_noise(individuals)
+    chosen = [found[k] for k in representative(costs, MOST_LEARNED, all_exact(individuals))]
     learned = []
-    for string, values in chosen:
-        string[:] = map(float, problem.genome.encode({name: values[name] for name in genes}))
+    for individual, values in chosen:
+        individual[:] = map(float, problem.genome.encode({name: values[name] for name in genes}))
         with suppress(InputError):
-            check_design(problem, problem.genome.decode(string))
-            learned.append(string)
+            check_design(problem, problem.genome.decode(individual))
+            learned.append(individual)
     return learned
 
 
@@ -96,20 +96,20 @@ def _allows(gene: AnyGene, value: Any) -> bool:
     return isinstance(gene, DependentGene) or value in (gene.value, None)
 
 
-def _string(problem: Problem, part: RunsTable, rows: NDArray[np.intp]) -> Individual:
+def _individual(problem: Problem, part: RunsTable, rows: NDArray[np.intp]) -> Individual:
     """Return the individual of a design from the rows of its runs, without its point."""
-    string = Individual((), len(problem.objectives))
+    individual = Individual((), len(problem.objectives))
     failed = rows[part.facts["ok"][rows] == 0]
     if len(failed):
         reason = part.record(int(failed[0])).reason
-        string.know((FitnessEstimate.failed(len(rows), reason),) * len(problem.objectives))
-        return string
-    string.know(tuple(_estimate(one, part, rows) for one in problem.objectives))
-    string.limit(
+        individual.know((FitnessEstimate.failed(len(rows), reason),) * len(problem.objectives))
+        return individual
+    individual.know(tuple(_estimate(one, part, rows) for one in problem.objectives))
+    individual.limit(
         problem.result_constraints,
         [float(part.values[one.name][rows].mean()) for one in problem.result_constraints],
     )
-    return string
+    return individual
 
 
 def _estimate(objective: Objective, part: RunsTable, rows: NDArray[np.intp]) -> FitnessEstimate:

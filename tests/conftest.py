@@ -93,7 +93,7 @@ def the_runtime():
 
 
 @pytest.fixture(scope="module", autouse=True)
-def room_for_the_next_module():
+def memory_for_the_next_module():
     """Restart Taichi after a module in which it has grown: the kernels of all slow tests do not fit in one
     process, and compilation becomes slower and slower."""
     yield

@@ -21,7 +21,7 @@ from tisim.state.status import WorldStatus
 
 ACCEPTED = "accepted"
 """The message of a command in place of a run."""
-OF_THE_WORLD = WorldStatus.OUT_OF_ROOM, WorldStatus.CONTACT_OVERFLOW
+OF_THE_WORLD = WorldStatus.OUT_OF_CAPACITY, WorldStatus.CONTACT_OVERFLOW
 """Failures for lack of capacity, which name no particle or force."""
 
 

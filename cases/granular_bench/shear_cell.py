@@ -134,12 +134,12 @@ def loose(number: int, gap: float, seed: int) -> Arrays:
     d, clear = DIAMETER, 0.75 * DIAMETER
     sizes = UniformSizes(by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2)
     cloud = Cloud(number=number, grains=[GrainClass(sizes=sizes, density=DENSITY)])
-    room = Box(
+    domain = Box(
         low=(0.0, 0.0, clear),
         high=(*CELL_SIDES, gap - clear),
         periodic=(True, True, False),
     )
-    free = cloud.arrays(room, seed)
+    free = cloud.arrays(domain, seed)
     walls = np.vstack([rough_wall(0.0), rough_wall(gap)])
     n, mass = len(walls), DENSITY * np.pi / 6 * d**3
     position = np.vstack([free["position"], walls])

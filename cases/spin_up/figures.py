@@ -77,8 +77,8 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
         run = next(one for one in runs if one.magnetisation == m)
         pile = run.steps[0].asteroid.grains
         left, bottom, side = view(moved(pile, pile), NO_BOX)
-        room = (WIDER - 1) / 2 * side
-        square = (left - room, bottom - room, WIDER * side)
+        margin = (WIDER - 1) / 2 * side
+        square = (left - margin, bottom - margin, WIDER * side)
         for axis, rate in zip(row, SHOWN, strict=True):
             step = run.at(rate)
             # Centred on all grains: a view around the largest fragment would cut off other fragments.

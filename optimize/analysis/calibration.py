@@ -170,7 +170,7 @@ def calibration(outcome: Outcome) -> Calibration:
 def _evidence(outcome: Outcome, measured: Misfit) -> tuple[Array, Evidence]:
     """Return the points of the designs that did not fail, and their chi^2."""
     points = outcome.problem.genome.canonical(list(outcome.estimates))
-    off = [measured.off(outcome.quantities[string]) for string in outcome.estimates]
+    off = [measured.off(outcome.quantities[point]) for point in outcome.estimates]
     return points, Evidence.of_quantities(points, off, bool(outcome.settings.ensemble.common_starts))
 
 

@@ -143,14 +143,14 @@ def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
 
 def _known(outcome: Outcome) -> tuple[Array, Array, Array]:
     """Return points, costs and variances of the costs of the designs that a surrogate is fitted to."""
-    strings = []
+    individuals = []
     for point, estimates in outcome.estimates.items():
-        string = Individual(point, len(estimates))
-        string.know(estimates)
-        strings.append(string)
-    costs, noise = costs_and_noise(strings)
-    chosen = representative(costs, MOST_LEARNED, all_exact(strings))
-    points = outcome.problem.genome.canonical([list(string) for string in strings])
+        individual = Individual(point, len(estimates))
+        individual.know(estimates)
+        individuals.append(individual)
+    costs, noise = costs_and_noise(individuals)
+    chosen = representative(costs, MOST_LEARNED, all_exact(individuals))
+    points = outcome.problem.genome.canonical([list(individual) for individual in individuals])
     return points[chosen], costs[chosen], noise[chosen]
 
 

@@ -76,7 +76,7 @@ class SearchMethod(ABC):
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         """Learn the fitness of the individuals of the last ``ask``."""
 
-    def learn(self, strings: Sequence[Individual]) -> None:  # noqa: B027
+    def learn(self, individuals: Sequence[Individual]) -> None:  # noqa: B027
         """Learn from individuals that it did not ask for, all with a fitness and all different.
 
         A method without this function sees them only through the hall.

@@ -47,7 +47,7 @@ class Breeder:
         return [Individual(self.box.sample(self._rng)) for _ in range(count)]
 
     def _offspring(self, population: Sequence[Individual], count: int) -> list[Individual]:
-        mated = [self.toolbox.clone(string) for string in self.toolbox.select(population, count)]
+        mated = [self.toolbox.clone(individual) for individual in self.toolbox.select(population, count)]
         pairs = zip(mated[::2], mated[1::2], strict=True)
         return [Individual(child) for pair in pairs for child in self.toolbox.mate(*pair)]
 

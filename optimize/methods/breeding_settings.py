@@ -58,8 +58,8 @@ class Breeding(Checked):
         if "parents" not in data:
             # each parent has at most one offspring
             fitting = max(proportional(population or POPULATION), offspring or 0)
-            room = fitting if population is None else population - (offspring or 0)
-            follow["parents"] = max(1, min(fitting, room))
+            most = fitting if population is None else population - (offspring or 0)
+            follow["parents"] = max(1, min(fitting, most))
         parent_count = parents or follow.get("parents", PARENTS)
         total = parent_count + (parent_count if offspring is None else offspring)
         if "population" not in data and total > POPULATION:

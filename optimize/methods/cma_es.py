@@ -71,31 +71,31 @@ class CmaEs(SearchMethod):
         now, self.begun = self.strategy, True
         normal = self.rng.standard_normal((now.lambda_, now.dim))
         points = folded(now.centroid + now.sigma * normal @ now.BD.T)
-        strings = [Individual(point) for point in within(points)]
-        self.asked = {tuple(string): point for string, point in zip(strings, points, strict=True)}
-        return strings
+        individuals = [Individual(point) for point in within(points)]
+        self.asked = {tuple(individual): point for individual, point in zip(individuals, points, strict=True)}
+        return individuals
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         self.moved = False
-        if all(string.failed for string in population):
+        if all(individual.failed for individual in population):
             return  # ranks of failures only would mislead the strategy; the next individuals are others
-        self.strategy.update([self._as_drawn(string) for string in population])
+        self.strategy.update([self._as_drawn(individual) for individual in population])
         now = self.strategy
         if now.sigma * now.diagD[-1] < self.options.smallest or not now.diagD[0] > 0:
             middle = self.rng.random(now.dim)
             self.strategy = cma.Strategy(middle, self.options.sigma, lambda_=2 * now.lambda_)
             self.moved = True
 
-    def learn(self, strings: Sequence[Individual]) -> None:
-        known = [one for one in (self.start, *strings) if one is not None and not one.failed]
+    def learn(self, individuals: Sequence[Individual]) -> None:
+        known = [one for one in (self.start, *individuals) if one is not None and not one.failed]
         if known and not self.begun:
-            self.start = min(known, key=lambda string: string.fitness.values)
+            self.start = min(known, key=lambda individual: individual.fitness.values)
             self.strategy.centroid = drawn_of(np.array(self.start))
 
-    def _as_drawn(self, string: Individual) -> Individual:
+    def _as_drawn(self, individual: Individual) -> Individual:
         """Return an individual at the position that the strategy drew, with its fitness."""
-        drawn = Individual(self.asked.get(tuple(string), string))
-        drawn.fitness = string.fitness
+        drawn = Individual(self.asked.get(tuple(individual), individual))
+        drawn.fitness = individual.fitness
         return drawn
 
 
@@ -119,7 +119,7 @@ def drawn_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def folded(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points, shape (strings, genes), with values outside [-EDGE, 1 + EDGE] reflected at its ends, at
-    which the transformation is level."""
+    """Return points, shape (individuals, genes), with values outside [-EDGE, 1 + EDGE] reflected at its ends,
+    at which the transformation is level."""
     width = 1 + 2 * EDGE
     return width - np.abs(width - np.mod(points + EDGE, 2 * width)) - EDGE

@@ -65,19 +65,19 @@ class GaussianProcessSearch(SearchMethod):
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 5]))
         self.belief = Belief(genome.features)
         self.region = TrustRegion(genome)
-        self.strings: list[Individual] = []
+        self.individuals: list[Individual] = []
         self.local: int | None = None
         self.begun = False
 
     def ask(self) -> list[Individual]:
-        known = sum(not string.failed for string in self.strings)
+        known = sum(not individual.failed for individual in self.individuals)
         first = missing(self.options.first or max(10, 2 * self.genes), known, self.begun)
         self.begun = True
         if first:
             points = sobol(self.genes, first, self.rng)
             return [Individual(point, self.objectives) for point in self.genome.canonical(points)]
-        count = max(self.options.population, len(self.strings) // _GROWTH)
-        self.belief.learn(self.strings, apart=SAME_PLACE)
+        count = max(self.options.population, len(self.individuals) // _GROWTH)
+        self.belief.learn(self.individuals, apart=SAME_PLACE)
         local, self.local = np.empty((0, self.genes)), None
         if self.belief.exact and self.objectives == 1:
             proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
@@ -92,9 +92,9 @@ class GaussianProcessSearch(SearchMethod):
         if self.local:
             self.region.learn(population[: self.local])
 
-    def learn(self, strings: Sequence[Individual]) -> None:
-        known = {tuple(string) for string in self.strings}
-        self.strings += [string for string in strings if tuple(string) not in known]
+    def learn(self, individuals: Sequence[Individual]) -> None:
+        known = {tuple(individual) for individual in self.individuals}
+        self.individuals += [individual for individual in individuals if tuple(individual) not in known]
 
     def _candidates(self, worth: Worth) -> Array:
         """Return candidates over the whole range and around the best designs, and variations of the best
@@ -118,7 +118,7 @@ class GaussianProcessSearch(SearchMethod):
 
     def _new(self, points: Array) -> Array:
         """Return the points that have not run, each once, in order."""
-        known = {tuple(string) for string in self.strings}
+        known = {tuple(individual) for individual in self.individuals}
         rows = dict.fromkeys(map(tuple, points.tolist()))
         return np.array([row for row in rows if row not in known]).reshape(-1, self.genes)
 

@@ -115,7 +115,7 @@ class Genetic(SearchMethod):
         )
         plain = 20 if objectives == 1 else 40
         self.population = options.population or (8 if options.surrogate else plain)
-        self.strings: list[Individual] = []
+        self.individuals: list[Individual] = []
         self.known: set[tuple[float, ...]] = set()
         self.parents: list[Individual] = []
         self.belief, self.region = Belief(genome.features), TrustRegion(genome)
@@ -130,7 +130,7 @@ class Genetic(SearchMethod):
         usual = self.population
         if self.options.surrogate:
             usual = self.options.first or max(10, 2 * self.genes)
-        first = missing(usual, sum(not string.failed for string in self.strings), self.begun)
+        first = missing(usual, sum(not individual.failed for individual in self.individuals), self.begun)
         self.begun = True
         if first:
             points = self._first(first)
@@ -138,7 +138,7 @@ class Genetic(SearchMethod):
             points = self._worth_most()
         else:
             points = self._offspring()
-        return self._strings(points)
+        return self._individuals_at(points)
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         self.learn(population)
@@ -146,15 +146,15 @@ class Genetic(SearchMethod):
             self.region.learn(population[: self.local])
             self.local = None
 
-    def learn(self, strings: Sequence[Individual]) -> None:
-        new = [string for string in strings if tuple(string) not in self.known]
-        self.known |= {tuple(string) for string in new}
+    def learn(self, individuals: Sequence[Individual]) -> None:
+        new = [individual for individual in individuals if tuple(individual) not in self.known]
+        self.known |= {tuple(individual) for individual in new}
         if self.options.surrogate:
-            self.strings += new
+            self.individuals += new
         else:
             # A design that is not among the best now never will be.
-            good = [string for string in [*self.strings, *new] if not string.failed]
-            self.strings = self._best(good, self.population)
+            good = [individual for individual in [*self.individuals, *new] if not individual.failed]
+            self.individuals = self._best(good, self.population)
 
     def _first(self, count: int) -> Array:
         if self.options.surrogate:
@@ -167,7 +167,7 @@ class Genetic(SearchMethod):
         """Return new designs bred from the best; random ones if breeding gives none."""
         bred = np.empty((0, self.genes))
         for _ in range(_TRIES):
-            more = self.genome.canonical(self.operators.bred(self.strings, self.population))
+            more = self.genome.canonical(self.operators.bred(self.individuals, self.population))
             bred = self._new(np.vstack([bred, more]))
             if len(bred) >= self.population:
                 return bred[: self.population]
@@ -176,8 +176,8 @@ class Genetic(SearchMethod):
 
     def _worth_most(self) -> Array:
         """Return the designs with the greatest joint worth according to the surrogate."""
-        count = max(self.population, len(self.strings) // _GROWTH)
-        self.belief.learn(self.strings, apart=SAME_PLACE)
+        count = max(self.population, len(self.individuals) // _GROWTH)
+        self.belief.learn(self.individuals, apart=SAME_PLACE)
         local = np.empty((0, self.genes))
         if self.belief.exact and self.objectives == 1:
             proposed = self.region.propose(self.belief, (count + 1) // 2, self.rng)
@@ -195,7 +195,7 @@ class Genetic(SearchMethod):
         cost, and the posterior means for several.
         """
         belief, most = self.belief, _PARENTS * self.objectives
-        parents = self._best(self._strings(belief.points[belief.chosen], belief.means), most)
+        parents = self._best(self._individuals_at(belief.points[belief.chosen], belief.means), most)
         drawn = [self._open(self.rng.random((count, self.genes)))]
         for _ in range(self.options.inner):
             drawn.append(self._open(self.operators.bred(parents, count)))
@@ -203,7 +203,7 @@ class Genetic(SearchMethod):
             means, deviations = belief.predict(points)
             costs = -worth(means, deviations)[:, None] if self.objectives == 1 else means
             kept = parents if len(drawn) > 2 else []
-            parents = self._best(self._strings(points, costs) + kept, most)
+            parents = self._best(self._individuals_at(points, costs) + kept, most)
         return np.vstack(drawn)
 
     def _open(self, points: Array) -> Array:
@@ -211,20 +211,20 @@ class Genetic(SearchMethod):
         points = self.genome.canonical(points)
         return points if self.local is None else points[self.region.outside(points)]
 
-    def _best(self, strings: list[Individual], most: int) -> list[Individual]:
+    def _best(self, individuals: list[Individual], most: int) -> list[Individual]:
         """Return the individuals selected as parents, at most ``most`` of these."""
-        if not strings:
+        if not individuals:
             return []
         if self.objectives == 1:
-            return list(tools.selBest(strings, most))
-        return list(tools.selNSGA2(strings, most, nd="log"))
+            return list(tools.selBest(individuals, most))
+        return list(tools.selNSGA2(individuals, most, nd="log"))
 
-    def _strings(self, points: Array, costs: Array | None = None) -> list[Individual]:
+    def _individuals_at(self, points: Array, costs: Array | None = None) -> list[Individual]:
         """Return individuals, with costs if given."""
-        strings = [Individual(point, self.objectives) for point in points]
-        for string, values in zip(strings, () if costs is None else costs, strict=False):
-            string.fitness.values = tuple(map(float, values))
-        return strings
+        individuals = [Individual(point, self.objectives) for point in points]
+        for individual, values in zip(individuals, () if costs is None else costs, strict=False):
+            individual.fitness.values = tuple(map(float, values))
+        return individuals
 
     def _new(self, points: Array) -> Array:
         """Return the points that are not known, each once, in order."""

@@ -1,4 +1,4 @@
-"""Individuals (genetic strings) as DEAP handles them."""
+"""Individuals as DEAP handles them."""
 
 from __future__ import annotations
 

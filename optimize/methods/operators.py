@@ -102,7 +102,8 @@ class Operators:
     """A DEAP toolbox with select, mate and mutate, and its own random numbers.
 
     crossover, mutation : probabilities that a pair is mated, and that an individual is then mutated.
-    Raises InputError, before any run, if the operators do not support strings of this number of real genes.
+    Raises InputError, before any run, if the operators do not support individuals of this number of real
+    genes.
     """
 
     def __init__(
@@ -126,7 +127,7 @@ class Operators:
         """Return the offspring of parents of known fitness, (count, genes), in the unit cube."""
         with self.random:
             selected = self._selected(list(parents), count + count % 2)
-            children = [Individual(string, self.objectives) for string in selected]
+            children = [Individual(individual, self.objectives) for individual in selected]
             for i in range(0, count, 2):
                 if random.random() < self.crossover:
                     children[i : i + 2] = self.toolbox.mate(children[i], children[i + 1])
@@ -147,7 +148,7 @@ class Operators:
                 more = self.toolbox.select(random.sample(parents, fours), fours)
             else:  # Some operators return each parent at most once.
                 more = self.toolbox.select(parents, count - len(chosen))
-            must(len(more) > 0, "select", "a function that returns strings", more)
+            must(len(more) > 0, "select", "a function that returns individuals", more)
             chosen += more
         return chosen[:count]
 
@@ -161,24 +162,24 @@ class Operators:
             again = self._trial()
         except Exception as error:
             raise InputError(
-                f"operators must be fit for real-valued strings; received {dict(names)} ({error!r})"
+                f"operators must be fit for real-valued individuals; received {dict(names)} ({error!r})"
             ) from error
         finally:
             self.random.state = state
-        good = all(len(string) == self.genes and np.all(np.isfinite(string)) for string in once)
-        must(good, "operators", "fit for real-valued strings", dict(names))
+        good = all(len(individual) == self.genes and np.all(np.isfinite(individual)) for individual in once)
+        must(good, "operators", "fit for real-valued individuals", dict(names))
         must(once == again, "operators", "random by the modules random and numpy.random alone", dict(names))
 
     def _trial(self) -> list[list[float]]:
         rng = np.random.default_rng(0)
-        strings = [Individual(rng.random(self.genes), self.objectives) for _ in range(8)]
-        for rank, string in enumerate(strings):
+        individuals = [Individual(rng.random(self.genes), self.objectives) for _ in range(8)]
+        for rank, individual in enumerate(individuals):
             cost = float(rank) if rank else float("inf")
-            string.fitness.values = (cost,) * self.objectives
-            string.fitness.crowding_dist = cost
-        trial = self.bred(strings, 12).tolist()
+            individual.fitness.values = (cost,) * self.objectives
+            individual.fitness.crowding_dist = cost
+        trial = self.bred(individuals, 12).tolist()
         with self.random:
-            for string in strings:
-                trial += self.toolbox.mate(Individual(string), Individual(strings[0]))
-                trial += self.toolbox.mutate(Individual(string))
-        return [list(string) for string in trial]
+            for individual in individuals:
+                trial += self.toolbox.mate(Individual(individual), Individual(individuals[0]))
+                trial += self.toolbox.mutate(Individual(individual))
+        return [list(individual) for individual in trial]

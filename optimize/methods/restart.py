@@ -48,11 +48,11 @@ class Restart(Zohdi):
             self.best, self.stagnation = hall[0].fitness.values, 0 if better else self.stagnation + 1
         self.moved = self.stagnation >= self.options.stalled
         if not self.moved:
-            self.next_strings = self.breeder.next_generation(population)
+            self.next_population = self.breeder.next_generation(population)
             return
         self.stagnation = 0
         if self.width * self.options.recentre_factor < self.options.smallest:
             self.breeder.box = SearchBox.full(len(hall[0]))
         else:
             self.breeder.recentre(hall[0])
-        self.next_strings = [hall[0], *self.breeder.first()[1:]]
+        self.next_population = [hall[0], *self.breeder.first()[1:]]

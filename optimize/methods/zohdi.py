@@ -15,7 +15,7 @@ from tisim.optimize.problem.genome import Genome
 
 
 class Zohdi(SearchMethod):
-    """Z04 sections 7 and 8; see optimize.methods.breeding."""
+    """Z04 sections 7 and 8; see optimize.methods.breeding. An individual is Zohdi's genetic string."""
 
     name = "zohdi"
     Options = Breeding
@@ -27,21 +27,21 @@ class Zohdi(SearchMethod):
     def __init__(self, genome: Genome, objectives: int, options: Breeding, seed: int) -> None:
         self.options, self.breeder = options, Breeder(len(genome), options, seed)
         self.generation = 0
-        self.next_strings: list[Individual] = []
+        self.next_population: list[Individual] = []
 
     @property
     def width(self) -> float:  # type: ignore[override]
         return float(self.breeder.box.width.mean())
 
     def ask(self) -> list[Individual]:
-        return self.next_strings or self.breeder.first()
+        return self.next_population or self.breeder.first()
 
-    def learn(self, strings: Sequence[Individual]) -> None:
+    def learn(self, individuals: Sequence[Individual]) -> None:
         """Replace random individuals by the best of these, at most the number of parents."""
-        good = [string for string in strings if not string.failed]
+        good = [individual for individual in individuals if not individual.failed]
         best = tools.selBest(good, self.options.parents)
-        population = self.next_strings or self.breeder.first()
-        self.next_strings = [*best, *population[: len(population) - len(best)]]
+        population = self.next_population or self.breeder.first()
+        self.next_population = [*best, *population[: len(population) - len(best)]]
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         every = self.options.recentre_every
@@ -49,4 +49,4 @@ class Zohdi(SearchMethod):
         if self.moved:
             self.breeder.recentre(hall[0])
         self.generation += 1
-        self.next_strings = self.breeder.next_generation(population)
+        self.next_population = self.breeder.next_generation(population)

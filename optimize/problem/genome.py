@@ -21,7 +21,7 @@ AnyGene = Searched | FixedGene | DependentGene
 
 @dataclass(frozen=True)
 class Genome:
-    """The genetic string: an ordered tuple of genes with different names (Z04 Eq. 7.3).
+    """An ordered tuple of genes with different names (Z04 Eq. 7.3).
 
     The search works in the unit cube of the searched genes, in their order, ``len(genome)`` of them; a design
     has the values of all genes by name, in the order of the genome. InputError without a searched gene.

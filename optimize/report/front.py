@@ -50,8 +50,8 @@ def front_figure(outcome: Outcome) -> Figure:
 def others(outcome: Outcome) -> tuple[list[Estimates], list[Estimates]]:
     """Return the designs outside the front: those with at least the median number of starts of the front, and
     those with fewer."""
-    front = {tuple(string) for string in outcome.hall}
-    enough = np.median([string.estimates[0].starts for string in outcome.hall] or [1])
+    front = {tuple(individual) for individual in outcome.hall}
+    enough = np.median([individual.estimates[0].starts for individual in outcome.hall] or [1])
     good = [e for genes, e in outcome.estimates.items() if e[0].ok and genes not in front]
     return [e for e in good if e[0].starts >= enough], [e for e in good if e[0].starts < enough]
 
@@ -76,7 +76,7 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
         )  # fmt: skip
     if not outcome.hall:
         return
-    front = [string.confirmed or string.estimates for string in outcome.hall]
+    front = [individual.confirmed or individual.estimates for individual in outcome.hall]
     fresh = bool(outcome.hall[0].confirmed)
     means, widths = _values(outcome, front)
     again = "run again: " if fresh else ""
@@ -85,7 +85,7 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
         yerr=widths[:, :, y] if fresh else None, fmt="o", color=_FRONT_COLOUR, ms=4, lw=0.8, zorder=4,
         label=f"front, {again}{_starts(front)}" + ", 95 % intervals" * bool(fresh and widths.any()),
     )  # fmt: skip
-    compromise = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
+    compromise = next(k for k, individual in enumerate(outcome.hall) if individual is outcome.best)
     axis.plot(
         *means[compromise, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN_COLOUR, mew=1.5, zorder=5, ls="",
         label="nearest to the best of each",

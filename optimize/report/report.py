@@ -18,7 +18,7 @@ from tisim.console import TERMINAL_WIDTH
 from tisim.files import pictures
 from tisim.files.atomic import replace_file
 from tisim.optimize.outcome import Outcome
-from tisim.optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_strings
+from tisim.optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,7 +67,7 @@ def notes(outcome: Outcome) -> RenderableType:
     }
     if all(estimate.exact for estimate in first.estimates):
         words = {"starts": "one: all random starts of a design give the same run"}
-    if any(string.estimates[0].converged for string in outcome.hall) and ensemble.tolerance:
+    if any(individual.estimates[0].converged for individual in outcome.hall) and ensemble.tolerance:
         words["converged"] = (
             f"yes if the last start changed the mean by less than {ensemble.tolerance:g} of it"
         )
@@ -82,18 +82,17 @@ def met_table(outcome: Outcome) -> RenderableType:
     """Return the ranges of the genes over all designs with a fitness of ``met_at`` or better, for the
     terminal."""
     problem = outcome.problem
-    strings, (objective,) = met_strings(problem, outcome.estimates), problem.objectives
+    points, (objective,) = met_points(problem, outcome.estimates), problem.objectives
     bound = "at least" if objective.maximise else "at most"
-    number = f"{len(strings)} of {len(outcome.estimates)} designs"
+    number = f"{len(points)} of {len(outcome.estimates)} designs"
     title = Text(f"{number} have {objective.label} of {bound} {problem.met_at:g}", "italic")
-    if not strings:
+    if not points:
         return Group("", title)
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("over these", no_wrap=True)
     for heading in ("lowest", "highest", "part of its range"):
         table.add_column(heading, justify="right", no_wrap=True)
-    points = problem.genome.canonical(strings)
-    for gene, values in zip(problem.genome.searched, points.T, strict=True):
+    for gene, values in zip(problem.genome.searched, problem.genome.canonical(points).T, strict=True):
         if gene.kind == "category":
             met = {text(gene.decode(u)) for u in values}
             table.add_row(Text(gene.label), Text(", ".join(sorted(met))), "", f"{len(met)} of {gene.width}")

@@ -36,17 +36,17 @@ class Belief:
         self._parameters: list[Parameters | None] = []
         self.starts = 1
 
-    def learn(self, strings: Sequence[Individual], iterations: int = 30, apart: float = 0.0) -> None:
+    def learn(self, individuals: Sequence[Individual], iterations: int = 30, apart: float = 0.0) -> None:
         """Fit the processes to individuals of known fitness, at least one of which did not fail.
 
         apart : with one cost and no noise, only the best of designs that are closer than this in all genes is
             used; a cluster of almost equal designs would make the function appear constant.
         """
-        self.strings = list(strings)
-        self.points = np.array([list(string) for string in strings])
-        costs, self.noise = costs_and_noise(strings)
-        self.exact = all_exact(strings)
-        self.starts = int(np.median([string.estimates[0].starts for string in strings])) or 1
+        self.individuals = list(individuals)
+        self.points = np.array([list(individual) for individual in individuals])
+        costs, self.noise = costs_and_noise(individuals)
+        self.exact = all_exact(individuals)
+        self.starts = int(np.median([individual.estimates[0].starts for individual in individuals])) or 1
         self.costs, slopes = _transformed(costs, _SKEWED if self.exact else _SKEWED_NOISE)
         alone = np.arange(len(costs))
         if apart and self.exact and costs.shape[1] == 1:
@@ -54,7 +54,7 @@ class Belief:
         chosen = alone[representative(costs[alone], MOST_LEARNED, self.exact)]
         self.chosen = chosen
         variances = self.noise * slopes**2
-        self.one_start = np.array([pooled_variance(strings, k) for k in range(costs.shape[1])]) * np.mean(
+        self.one_start = np.array([pooled_variance(individuals, k) for k in range(costs.shape[1])]) * np.mean(
             slopes[chosen] ** 2, axis=0
         )
         at = self.features(self.points[chosen])

@@ -19,22 +19,24 @@ LEAST_DESIGNS = 10
 """Smallest number of designs with several starts for an estimate."""
 
 
-def all_exact(strings: Sequence[Individual]) -> bool:
+def all_exact(individuals: Sequence[Individual]) -> bool:
     """Return whether all costs of the individuals that did not fail are known to have no noise."""
-    return all(one.exact for string in strings if not string.failed for one in string.estimates)
+    return all(
+        one.exact for individual in individuals if not individual.failed for one in individual.estimates
+    )
 
 
-def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
-    """Return the costs of individuals and the variances of these means, both (strings, objectives)."""
-    costs = np.array([string.fitness.values for string in strings], dtype=float)
+def costs_and_noise(individuals: Sequence[Individual]) -> tuple[Array, Array]:
+    """Return the costs of individuals and the variances of these means, both (individuals, objectives)."""
+    costs = np.array([individual.fitness.values for individual in individuals], dtype=float)
     good = np.all(np.isfinite(costs), axis=1)
     for column in costs.T:
         column[~good] = column[good].max()
     noise = np.empty_like(costs)
     for k in range(costs.shape[1]):
-        pooled = pooled_variance(strings, k)
-        for i, string in enumerate(strings):
-            estimate = string.estimates[k]
+        pooled = pooled_variance(individuals, k)
+        for i, individual in enumerate(individuals):
+            estimate = individual.estimates[k]
             n, known = max(estimate.starts, 1), math.isfinite(estimate.std)
             if n == 1 and known:
                 noise[i, k] = estimate.std**2
@@ -44,12 +46,12 @@ def costs_and_noise(strings: Sequence[Individual]) -> tuple[Array, Array]:
     return costs, noise
 
 
-def pooled_variance(strings: Sequence[Individual], objective: int) -> float:
+def pooled_variance(individuals: Sequence[Individual], objective: int) -> float:
     """Return the variance of a cost between starts, pooled over all designs.
 
     If no design has two starts, it is the mean of the given squared standard errors; 0 if there are none.
     """
-    known = [string.estimates[objective] for string in strings]
+    known = [individual.estimates[objective] for individual in individuals]
     known = [estimate for estimate in known if estimate.ok and math.isfinite(estimate.std)]
     squares, freedom = 0.0, 0
     for estimate in known:
@@ -61,7 +63,7 @@ def pooled_variance(strings: Sequence[Individual], objective: int) -> float:
     return squares / freedom if freedom else 0.0
 
 
-def moments(genome: Genome, strings: Sequence[Individual]) -> tuple[Moments, ...] | None:
+def moments(genome: Genome, individuals: Sequence[Individual]) -> tuple[Moments, ...] | None:
     """Return the moments of the noise of each cost; None if too few designs have several starts.
 
     The two values of one design do not show the direction of skewness: in (0, 20) either value may be the
@@ -74,7 +76,7 @@ def moments(genome: Genome, strings: Sequence[Individual]) -> tuple[Moments, ...
     Source: M. G. Kendall and A. Stuart, The Advanced Theory of Statistics, vol. 1, 4th ed. (1977), section
     12.3.
     """
-    several = [one for one in strings if not one.failed and one.estimates[0].starts > 1]
+    several = [one for one in individuals if not one.failed and one.estimates[0].starts > 1]
     several = [one for one in several if all(math.isfinite(estimate.std) for estimate in one.estimates)]
     if len(several) < LEAST_DESIGNS:
         return None

@@ -22,30 +22,30 @@ _UNSEEN = 1e-4
 noise."""
 
 
-def posterior_means(genome: Genome, strings: Sequence[Individual]) -> NDArray[np.float64]:
-    """Return the posterior mean of each cost of designs, (strings, objectives).
+def posterior_means(genome: Genome, individuals: Sequence[Individual]) -> NDArray[np.float64]:
+    """Return the posterior mean of each cost of designs, (individuals, objectives).
 
     Its units may differ from the units of the costs, but the order of values is the same. The costs
     themselves are returned if there is no noise, or the process finds none. None of the individuals may have
     failed.
     """
-    costs = np.array([string.fitness.values for string in strings])
-    if len(strings) < 3 or all_exact(strings):
+    costs = np.array([individual.fitness.values for individual in individuals])
+    if len(individuals) < 3 or all_exact(individuals):
         return costs
     belief = Belief(genome.features)
-    belief.learn(strings, iterations=60)
+    belief.learn(individuals, iterations=60)
     seen = any(model.nugget > _UNSEEN or np.any(model.noise) for model in belief.models)
     return belief.predict(belief.points)[0] if seen else costs
 
 
-def best(genome: Genome, strings: Sequence[Individual], count: int) -> list[Individual]:
+def best(genome: Genome, individuals: Sequence[Individual], count: int) -> list[Individual]:
     """Return the best designs by posterior mean, best first.
 
     For several objectives it is the front, sorted by the first objective. If it has more than ``count``
     designs, the ends and the designs farthest from others are kept.
     """
-    ran = [string for string in strings if not string.failed]
-    good = [string for string in ran if not string.violation] or ran
+    ran = [individual for individual in individuals if not individual.failed]
+    good = [individual for individual in ran if not individual.violation] or ran
     if not good:
         return []
     means = posterior_means(genome, good)

@@ -49,8 +49,10 @@ class TrustRegion:
 
     def propose(self, belief: Belief, count: int, rng: np.random.Generator) -> Array:
         """Return the most worthwhile designs in the region, (count, genes)."""
-        strings = belief.strings if self.own is None else self.own
-        best = min((s for s in strings if not s.failed), key=lambda s: s.fitness.values, default=None)
+        individuals = belief.individuals if self.own is None else self.own
+        best = min(
+            (one for one in individuals if not one.failed), key=lambda one: one.fitness.values, default=None
+        )
         if best is None:
             self.cost = np.inf
             return rng.random((count, self.genes))
@@ -58,7 +60,7 @@ class TrustRegion:
         # The number of coefficients of a quadratic function, and some more.
         enough = max(40, min(200, (self.genes + 1) * (self.genes + 2)))
         nearest = np.argsort(((belief.points - self.centre) ** 2).sum(axis=1), kind="stable")[:enough]
-        self.belief.learn([belief.strings[i] for i in nearest])
+        self.belief.learn([belief.individuals[i] for i in nearest])
         worth = Worth(self.belief, rng)
         worth.best = self.belief.costs[0]  # the centre; designs elsewhere may be better
         low = np.maximum(self.centre - self.half_width, 0.0)
@@ -84,12 +86,12 @@ class TrustRegion:
 
     def learn(self, proposed: Sequence[Individual]) -> None:
         """Update the size of the region from the costs of the designs that it proposed."""
-        good = [string for string in proposed if string.fitness.valid and not string.failed]
+        good = [individual for individual in proposed if individual.fitness.valid and not individual.failed]
         if self.own is not None:
             self.own += good
             if np.isinf(self.cost):
                 return
-        best = min(good, key=lambda string: string.fitness.values, default=None)
+        best = min(good, key=lambda individual: individual.fitness.values, default=None)
         if best is None or best.fitness.values[0] >= self.cost:
             self.half_width *= 0.5
         else:

@@ -7,7 +7,7 @@ from tests.accuracy.scenes import oscillator
 from tisim import Result, Status, steppers
 from tisim.accuracy import timing
 from tisim.accuracy.scene_changes import in_steps_of_at_most
-from tisim.accuracy.timing import OBSERVATIONS, ROOM, ResultObserver, SimulationCache
+from tisim.accuracy.timing import FREE_TREES, OBSERVATIONS, ResultObserver, SimulationCache
 from tisim.backend import memory
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
@@ -80,10 +80,10 @@ class Memory:
 
 def test_a_study_of_many_structures_closes_the_least_recently_used_simulations(own, monkeypatch):
     monkeypatch.setattr(timing, "Simulation", Memory)
-    monkeypatch.setattr(memory, "MAX_TREES", len(memory.in_use()) + ROOM + 8)
+    monkeypatch.setattr(memory, "MAX_TREES", len(memory.in_use()) + FREE_TREES + 8)
     cache, scene = SimulationCache(), oscillator()
     first = cache.compiled(scene, 1)
-    for worlds in range(2, ROOM):
+    for worlds in range(2, FREE_TREES):
         latest = cache.compiled(scene, worlds)
         assert cache.compiled(scene, 1) is first
         assert cache.compiled(scene, worlds) is latest

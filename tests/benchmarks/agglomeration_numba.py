@@ -140,11 +140,11 @@ def drift(g, n, dt, law, settings):
 @njit(**OPTIONS)
 def world(law, settings, g, n, counts):
     """Run one world to its end; returns its number of grains, or -1 if there were too many contacts."""
-    room, half = g.b.size, settings.half_side
+    capacity, half = g.b.size, settings.half_side
     cells = (2 * int(np.ceil(np.cbrt(float(n))))) ** 3
-    index = np.empty((2, room), np.int64)
-    pair = np.empty((2, CONTACTS * room), np.int64)
-    due = np.empty(CONTACTS * room, np.float32)
+    index = np.empty((2, capacity), np.int64)
+    pair = np.empty((2, CONTACTS * capacity), np.int64)
+    due = np.empty(CONTACTS * capacity, np.float32)
     lists = Lists(np.zeros(cells + 1, np.int64), index[0], index[1], pair[0], pair[1], due)
     frame = (g.v[:, :n] * g.m[:n]).sum(axis=1) / g.m[:n].sum()
     time, moved = 0.0, False
@@ -200,14 +200,14 @@ def simulate(starts, parameters, duration, **settings):
     """
     number, both = np.array([len(s["mass"]) for s in starts]), list(zip(starts, parameters, strict=True))
     # Capacity for all original grains, and again for pieces made before merged grains are removed.
-    room = 2 * max(int(s["mass"].sum() / p["grain_mass"] + 1.5) for s, p in both)
+    capacity = 2 * max(int(s["mass"].sum() / p["grain_mass"] + 1.5) for s, p in both)
     names = ("position", "velocity", "radius", "mass", "temperature")
-    columns = [np.zeros((len(both), *((3,) if k < 2 else ()), room)) for k in range(5)]
+    columns = [np.zeros((len(both), *((3,) if k < 2 else ()), capacity)) for k in range(5)]
     for w, s in enumerate(starts):
         for name, column in zip(names, columns, strict=True):
             column[w, ..., : number[w]] = s[name].T
     laws = np.array([[float(p[key]) for key in Law._fields] for p in parameters])
-    counts, pieces = np.zeros((len(both), len(COUNTS)), np.int64), np.zeros((len(both), room), np.int64)
+    counts, pieces = np.zeros((len(both), len(COUNTS)), np.int64), np.zeros((len(both), capacity), np.int64)
     with parallel_chunksize(1):
         worlds(laws, Settings(float(duration), **settings), number, *columns, pieces, counts)
     if (number < 0).any():

@@ -36,7 +36,7 @@ def searched(size: str, runs: int, seed: int, begin: list[dict[str, float]]) -> 
             problem(size), out=Path(folder) / "s", seed=seed, max_evaluations=runs, generations=runs,
             starting_designs=begin or None,
         )  # fmt: skip
-    return [dict(found.problem.genome.decode(string)) for string in found.hall]
+    return [dict(found.problem.genome.decode(individual)) for individual in found.hall]
 
 
 def true_pi(design: dict[str, float]) -> float:

@@ -148,7 +148,7 @@ def ours(name: str, task: Task, evaluator: Evaluator, seed: int, budget: int) ->
         raise KeyboardInterrupt  # and no line is written, so that the search is repeated
     assert found.evaluations + found.hits <= budget
     several = found.problem.several
-    points = np.array([list(string) for string in (found.hall if several else found.hall[:1])])
+    points = np.array([list(individual) for individual in (found.hall if several else found.hall[:1])])
     return points, len(found.estimates)
 
 

@@ -65,7 +65,7 @@ class Environment:
     whether the environment is part of the quick tests.
     """
 
-    room: str
+    group: str
     name: str
     script: str
     code: int = 0
@@ -282,8 +282,8 @@ PYTHONS = (
 )  # fmt: skip
 
 
-def _rows(room: str, rows: tuple[tuple, ...]) -> list[Environment]:
-    return [Environment(room, row[0], row[1], **(row[2] if len(row) > 2 else {})) for row in rows]
+def _rows(group: str, rows: tuple[tuple, ...]) -> list[Environment]:
+    return [Environment(group, row[0], row[1], **(row[2] if len(row) > 2 else {})) for row in rows]
 
 
 def _python_rows() -> list[Environment]:

@@ -54,7 +54,7 @@ def test_on_a_terminal_paragraphs_and_equations_fit(tisim, monkeypatch):
 
 
 @pytest.mark.parametrize("group", ["operators", "sources", "steppers", "step_controls", "pair", "magnetic"])
-def test_a_family_or_a_room_is_listed(tisim, group):
+def test_a_family_or_a_subpackage_is_listed(tisim, group):
     code, out, err = tisim("effects", group)
     assert (code, err) == (0, "")
     members = {
@@ -78,7 +78,7 @@ def test_an_entry_prints_its_whole_description(tisim):
     assert "Vickers hardness H_0" in out
     assert "particle fields: velocity (m/s), mass (kg), radius (m)" in out
     assert reference.find("impact").toml in out
-    assert "\nsoftening " in out, "those of the room of this name"
+    assert "\nsoftening " in out, "those of the subpackage of this name"
     assert "needs: impact" in tisim("effects", "friction")[1]
 
 

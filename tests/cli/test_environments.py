@@ -103,10 +103,10 @@ def test_environment(environment, tmp_path, plain):
 def test_every_environment(tmp_path, plain, capsys):
     """One table: the environment, the outcome, and the time."""
     assert len(ENVIRONMENTS) >= 60
-    assert len({(environment.room, environment.name) for environment in ENVIRONMENTS}) == len(ENVIRONMENTS)
+    assert len({(environment.group, environment.name) for environment in ENVIRONMENTS}) == len(ENVIRONMENTS)
     wrong = {}
     with capsys.disabled():
-        print(f"\n{'room':10} {'environment':45} {'exit':>4} {'s':>5}  outcome")
+        print(f"\n{'group':10} {'environment':45} {'exit':>4} {'s':>5}  outcome")
         for number, environment in enumerate(ENVIRONMENTS):
             if "quadrants" in environment.script and importlib.util.find_spec("quadrants") is None:
                 continue
@@ -117,7 +117,7 @@ def test_every_environment(tmp_path, plain, capsys):
             took = time.monotonic() - began
             data = {True: "data there", False: "nothing begun", None: "as expected"}[environment.result]
             text = "; ".join(faults) or data
-            print(f"{environment.room:10} {environment.name:45} {code!s:>4} {took:5.1f}  {text}", flush=True)
+            print(f"{environment.group:10} {environment.name:45} {code!s:>4} {took:5.1f}  {text}", flush=True)
             if faults:
                 wrong[environment.name] = faults
     assert not wrong

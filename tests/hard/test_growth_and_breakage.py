@@ -87,7 +87,7 @@ def test_more_fragments_than_the_capacity_is_a_clear_failure():
     # Compiled for more particles; the capacity of the scene is the limit.
     broken, whole = simulate([full, fine], worlds=2, capacity=256)
     assert not broken.status.ok
-    assert "more particles than there is room for" in broken.status.reason
+    assert "more particles than the capacity" in broken.status.reason
     assert "at particle 0" in broken.status.reason
     assert "at t = " in broken.status.reason
     for name in ("position", "velocity", "mass", "radius", "temperature"):

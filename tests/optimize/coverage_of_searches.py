@@ -142,7 +142,7 @@ def coverage(kind, searches, several=False, **settings):
     for seed in range(searches):
         outcome = searched(kind, seed, several, **settings)
         holds = held(kind, outcome, several)
-        best = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
+        best = next(k for k, individual in enumerate(outcome.hall) if individual is outcome.best)
         if not np.any(np.isnan(holds)):
             first.append(holds[best].mean())
             everything.append(holds.mean())

@@ -112,8 +112,8 @@ class FakeCache:
         return {}
 
 
-def string_of(point, *costs, std=0.0, starts=1):
+def individual_of(point, *costs, std=0.0, starts=1):
     """An individual with known costs; std : standard deviation over its starts."""
-    string = Individual(point, len(costs))
-    string.know(tuple(FitnessEstimate(float(c), std, float(c), float(c), starts, True) for c in costs))
-    return string
+    individual = Individual(point, len(costs))
+    individual.know(tuple(FitnessEstimate(float(c), std, float(c), float(c), starts, True) for c in costs))
+    return individual

@@ -142,7 +142,7 @@ def test_failed_experiments_are_accepted(method):
         campaign.tell(designs, [math.nan if design["x"] > 0.6 else worth(design) for design in designs])
     failures = campaign.outcome.failures
     assert failures
-    assert all(Genome(GENES).decode(string)["x"] > 0.6 for string in failures)
+    assert all(Genome(GENES).decode(point)["x"] > 0.6 for point in failures)
     assert campaign.best.genes["x"] <= 0.6
     all_failed = AskTell(GENES, method=method, seed=1)
     first = all_failed.ask()

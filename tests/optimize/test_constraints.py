@@ -29,12 +29,12 @@ def test_the_best_design_satisfies_a_constraint_on_the_result(method):
     best = outcome.designs[0]
     assert best.genes["x"] + best.genes["y"] == pytest.approx(1.0, abs=0.05)
     assert best.genes["x"] == pytest.approx(best.genes["y"], abs=0.2)
-    assert all(string.violation == 0 and string.limited[0] >= 1.0 for string in outcome.hall)
+    assert all(individual.violation == 0 and individual.limited[0] >= 1.0 for individual in outcome.hall)
 
 
 def test_without_a_feasible_design_the_least_violation_is_best():
     outcome = optimize.run(problem(at_least=3.0), max_evaluations=80, generations=100)
-    assert outcome.hall[0].violation == min(s.violation for s in outcome.hall) > 0
+    assert outcome.hall[0].violation == min(one.violation for one in outcome.hall) > 0
     assert sum(outcome.designs[0].genes.values()) > 1.8
 
 

@@ -18,7 +18,7 @@ def run(path, evaluator):
 
 
 def contents_of(outcome):
-    return repr(list(outcome.logbook)), [(list(s), repr(s.estimates)) for s in outcome.hall]
+    return repr(list(outcome.logbook)), [(list(one), repr(one.estimates)) for one in outcome.hall]
 
 
 @pytest.fixture(scope="module")

@@ -69,16 +69,18 @@ def test_log_of_a_search(path):
         12,
     ]
     np.testing.assert_allclose(log.select("box"), [1.0] * 5 + [0.5] * 4 + [0.25] * 4)
-    assert [s.fitness.values[0] for s in outcome.hall] == sorted(s.fitness.values[0] for s in outcome.hall)
+    assert [one.fitness.values[0] for one in outcome.hall] == sorted(
+        one.fitness.values[0] for one in outcome.hall
+    )
     assert outcome.best.estimates[0].mean == min(best) == outcome.hall[0].fitness.values[0]
-    assert len({tuple(s) for s in outcome.hall}) == 6
+    assert len({tuple(one) for one in outcome.hall}) == 6
 
 
 @pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])
 def test_seed_decides_everything_and_nothing_global_does(tmp_path, settings):
     def result(file, seed):
         outcome = run(tmp_path / file, generations=3, seed=seed, ensemble=EnsembleSettings(), **settings)
-        return repr(list(outcome.logbook)), [list(s) for s in outcome.hall]
+        return repr(list(outcome.logbook)), [list(one) for one in outcome.hall]
 
     random.seed(1)
     state = random.getstate()
@@ -134,7 +136,7 @@ def test_failures_never_win(path):
     assert min(outcome.logbook.select("failed")) >= 0
     assert max(outcome.logbook.select("failed")) > 0
     assert outcome.best.estimates[0].ok
-    assert all(math.isfinite(s.estimates[0].mean) and s[0] >= 0.35 for s in outcome.hall)
+    assert all(math.isfinite(one.estimates[0].mean) and one[0] >= 0.35 for one in outcome.hall)
     assert np.all(np.isfinite(outcome.logbook.select("mean")))
 
 
@@ -179,8 +181,8 @@ def test_the_file_contains_the_settings_of_the_search(path):
     assert about["stopped"] == "generations"
     assert cache.table(f"{outcome.name}/logbook").columns["best"] == outcome.logbook.select("best")
     hall = cache.table(f"{outcome.name}/hall_of_fame").columns
-    assert hall["fitness"] == [s.estimates[0].mean for s in outcome.hall]
-    assert hall["x0 (m)"] == [s[0] for s in outcome.hall]
+    assert hall["fitness"] == [one.estimates[0].mean for one in outcome.hall]
+    assert hall["x0 (m)"] == [one[0] for one in outcome.hall]
     with Cache(path) as cache:
         redone = search(fake_problem(), FakeEvaluator(quiet_bowl), cache, settings)
     assert (redone.evaluations, list(redone.logbook), redone.name) == (0, list(outcome.logbook), outcome.name)
@@ -216,20 +218,20 @@ def test_best_designs_are_reported_from_held_out_seeds(path):
     settings = EnsembleSettings(min_starts=3, select=5, confirm=10)
     evaluator = FakeEvaluator(lambda design, seed: bowl(design, seed + int(1e9 * design["x0"]), noise=0.3))
     outcome = run(path, evaluator, generations=3, ensemble=settings)
-    designs = [outcome.problem.genome.decode(string) for string in outcome.hall]
+    designs = [outcome.problem.genome.decode(individual) for individual in outcome.hall]
     fresh = [[start_seed(1, FRESH + k, design) for k in range(10)] for design in designs]
     *before, more, last = evaluator.calls
     assert {scene.seed for call in before for scene in call} == {start_seed(1, k) for k in range(3)}
     assert {scene.seed for scene in more} == {start_seed(1, k) for k in range(3, 8)}
     assert {scene.seed for scene in last} == {seed for seeds in fresh for seed in seeds}
-    for string, design, seeds in zip(outcome.hall, designs, fresh, strict=True):
+    for individual, design, seeds in zip(outcome.hall, designs, fresh, strict=True):
         values = [evaluator.function(design, seed) for seed in seeds]
-        assert string.confirmed[0].starts == 10
-        assert string.confirmed[0].mean == pytest.approx(np.mean(values), rel=1e-12)
-        assert string.estimates[0].starts in (3, 8)
+        assert individual.confirmed[0].starts == 10
+        assert individual.confirmed[0].mean == pytest.approx(np.mean(values), rel=1e-12)
+        assert individual.estimates[0].starts in (3, 8)
     columns = Cache(path).table(f"{outcome.name}/hall_of_fame").columns
-    assert columns["fitness, fresh starts"] == [string.confirmed[0].mean for string in outcome.hall]
-    assert columns["95 % low, fresh starts"] == [string.confirmed[0].low for string in outcome.hall]
+    assert columns["fitness, fresh starts"] == [individual.confirmed[0].mean for individual in outcome.hall]
+    assert columns["95 % low, fresh starts"] == [individual.confirmed[0].low for individual in outcome.hall]
 
 
 @pytest.mark.parametrize("budget", [60, 200, 600])
@@ -238,7 +240,7 @@ def test_the_budget_includes_the_held_out_seeds(tmp_path, budget):
         tmp_path / "b.h5", FakeEvaluator(bowl), generations=1000, max_evaluations=budget, ensemble={}
     )
     assert budget - 16 < outcome.evaluations <= budget
-    assert all(string.confirmed for string in outcome.hall)
+    assert all(individual.confirmed for individual in outcome.hall)
 
 
 def test_a_search_stops_at_a_target_only_with_confidence(tmp_path):
@@ -251,13 +253,13 @@ def test_a_search_stops_at_a_target_only_with_confidence(tmp_path):
     assert never.stopped == "generations"
     met = run(tmp_path / "b.h5", evaluator, generations=30, target=0.9, **few)
     assert met.stopped == "target"
-    assert all(string.confirmed for string in met.hall)
+    assert all(individual.confirmed for individual in met.hall)
     assert met.hall[0].confirmed[0].mean < 0.9
 
 
 def test_a_function_without_noise_is_run_once(tmp_path):
     outcome = run(tmp_path / "a.h5", generations=5, ensemble={})
-    assert {string.estimates[0].starts for string in outcome.hall} == {1}
+    assert {individual.estimates[0].starts for individual in outcome.hall} == {1}
     assert outcome.evaluations == sum(outcome.logbook.select("designs")) + 2
     assert outcome.designs[0].intervals["fitness"] == (outcome.designs[0].values["fitness"],) * 2
 
@@ -274,7 +276,7 @@ def test_equal_runs_leave_an_interval_for_rare_outcomes(tmp_path):
 
 def test_unfit_operators_are_refused_before_anything_runs(path):
     evaluator = FakeEvaluator()
-    with pytest.raises(InputError, match="fit for real-valued strings"):
+    with pytest.raises(InputError, match="fit for real-valued individuals"):
         run(path, evaluator, method="genetic", options={"mate": GeneticOperator(name="cxOrdered")})
     assert evaluator.digests == []
 
@@ -309,6 +311,6 @@ def test_designs_that_fail_from_further_starts_are_not_reported(tmp_path):
 
     outcome = run(tmp_path / "a.h5", FakeEvaluator(function), generations=1, ensemble={"min_starts": 1})
     assert outcome.logbook.select("failed")[0] < 20
-    assert all(math.isfinite(string.fitness.values[0]) for string in outcome.hall)
-    assert all(not string.failed for string in outcome.hall)
+    assert all(math.isfinite(individual.fitness.values[0]) for individual in outcome.hall)
+    assert all(not individual.failed for individual in outcome.hall)
     assert not set(outcome.estimates) & set(outcome.failures)

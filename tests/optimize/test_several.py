@@ -41,10 +41,10 @@ def zdt1(design, seed, noise=0.0):
 
 
 def run(path, function=zdt1, evaluator=None, genes=3, **settings):
-    wished = Settings(**{"method": "nsga2", "seed": 1, "ensemble": ONE, "generations": 30, **settings})
+    chosen = Settings(**{"method": "nsga2", "seed": 1, "ensemble": ONE, "generations": 30, **settings})
     problem = fake_problem(genes, objective=OBJECTIVES)
     with Cache(path) as cache:
-        return search(problem, evaluator or FakeEvaluator(function), cache, wished)
+        return search(problem, evaluator or FakeEvaluator(function), cache, chosen)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def outcome(tmp_path_factory):
 
 
 def values(outcome):
-    return np.array([outcome.problem.costs(string.fitness.values) for string in outcome.hall])
+    return np.array([outcome.problem.costs(individual.fitness.values) for individual in outcome.hall])
 
 
 def test_nsga2_finds_the_front_and_spreads_along_it(outcome):
@@ -93,16 +93,18 @@ def test_compromise_is_nearest_to_the_best_of_each():
 def test_hall_of_one_objective_keeps_the_best_different_ones():
     hall = HallOfFame(2)
 
-    def string(genes, cost):
+    def individual(genes, cost):
         individual = Individual(genes)
         individual.know((FitnessEstimate(cost, 0.0, cost, cost, 4, True, "" if cost < 9 else "failed"),))
         return individual
 
-    assert hall.update([string([0.1], 3.0), string([0.1], 3.0), string([0.2], 2.0), string([0.3], 9.0)])
-    assert [list(s) for s in hall.strings] == [[0.2], [0.1]]
-    assert not hall.update([string([0.4], 2.5)])
-    assert [list(s) for s in hall.strings] == [[0.2], [0.4]]
-    assert hall.update([string([0.5], 1.0)])
+    assert hall.update(
+        [individual([0.1], 3.0), individual([0.1], 3.0), individual([0.2], 2.0), individual([0.3], 9.0)]
+    )
+    assert [list(one) for one in hall.individuals] == [[0.2], [0.1]]
+    assert not hall.update([individual([0.4], 2.5)])
+    assert [list(one) for one in hall.individuals] == [[0.2], [0.4]]
+    assert hall.update([individual([0.5], 1.0)])
 
 
 def test_log_and_report(outcome, tmp_path):
@@ -132,17 +134,17 @@ def test_designs_of_few_starts_are_distinguished_from_well_known_ones(outcome):
     """The front from 9 starts, other designs from 3 and 9."""
 
     def design(gain, starts):
-        string = Individual([gain, starts / 10], 2)
+        individual = Individual([gain, starts / 10], 2)
         of_all = tuple(
             FitnessEstimate(cost, 0.1, cost - 0.05, cost + 0.05, starts, True) for cost in (-gain, 1.0 - gain)
         )
-        string.estimates = of_all
-        return string
+        individual.estimates = of_all
+        return individual
 
     front, precise, lucky = design(0.5, 9), design(0.4, 9), design(0.9, 3)
     front.fitness.values, front.confirmed = (-0.5, 0.5), front.estimates
     other = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
-    other.estimates = {tuple(string): string.estimates for string in (front, precise, lucky)}
+    other.estimates = {tuple(individual): individual.estimates for individual in (front, precise, lucky)}
     assert others(other) == ([precise.estimates], [lucky.estimates])
     (axis,) = front_figure(other).axes
     (bars,) = axis.containers
@@ -170,13 +172,13 @@ def test_a_resumed_search_is_the_same(path, tmp_path):
     assert part.interrupted
     again = run(path, noisy, **settings)
     assert again.evaluations == whole.evaluations - 300
-    assert [(list(s), repr(s.estimates), repr(s.confirmed)) for s in again.hall] == [
-        (list(s), repr(s.estimates), repr(s.confirmed)) for s in whole.hall
+    assert [(list(one), repr(one.estimates), repr(one.confirmed)) for one in again.hall] == [
+        (list(one), repr(one.estimates), repr(one.confirmed)) for one in whole.hall
     ]
     assert repr(list(again.logbook)) == repr(list(whole.logbook))
     assert verify(path).ok
     assert max(whole.logbook.select("failed")) > 0
-    assert all(estimate.starts == 2 for string in whole.hall for estimate in string.confirmed)
+    assert all(estimate.starts == 2 for individual in whole.hall for estimate in individual.confirmed)
 
 
 def test_cache_holds_all_objectives(path):
@@ -227,7 +229,7 @@ def test_one_maximised_objective(path):
         low = search(
             fake_problem(name="low"), FakeEvaluator(), cache, Settings(seed=1, generations=3, target=0.6)
         )
-    assert [list(s) for s in high.hall] == [list(s) for s in low.hall]
+    assert [list(one) for one in high.hall] == [list(one) for one in low.hall]
     assert high.logbook.select("best") == [-best for best in low.logbook.select("best")]
     assert (high.stopped, low.stopped) == ("target", "target")
     assert report.best_csv(high).decode().splitlines()[1].split(",")[5].startswith("-0.5")

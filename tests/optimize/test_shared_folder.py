@@ -99,7 +99,7 @@ def test_a_warm_start_learns_and_runs_the_best_first(tmp_path):
         assert value == pytest.approx(np.mean(by_design[x, y]), rel=1e-12)
         assert count == len(by_design[x, y])
     assert warm.logbook[0]["designs"] == 6 + 8, "the best, and a batch by the surrogate"
-    ran = [warm.problem.genome.decode(string) for string in warm.estimates][:6]
+    ran = [warm.problem.genome.decode(point) for point in warm.estimates][:6]
     assert first.designs[0].genes in ran
     cold = searched(tmp_path / "cold", "gaussian-process", 2)
     assert cold.logbook[0]["best"] > warm.logbook[0]["best"]

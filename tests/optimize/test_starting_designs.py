@@ -60,24 +60,24 @@ def test_a_method_gets_results_of_its_own_designs_only(path, monkeypatch):
     asked, told, tell = [], [], CmaEs.tell
 
     def noted(method, population, hall):
-        told.append([tuple(string) for string in population])
+        told.append([tuple(individual) for individual in population])
         tell(method, population, hall)
 
     ask = CmaEs.ask
     monkeypatch.setattr(CmaEs, "ask", lambda method: asked.append(ask(method)) or asked[-1])
     monkeypatch.setattr(CmaEs, "tell", noted)
     outcome = run(path, beginning=Beginning((BEST,)), method="cma-es")
-    assert told == [[tuple(string) for string in population] for population in asked]
+    assert told == [[tuple(individual) for individual in population] for population in asked]
     assert outcome.designs[0].genes == BEST
 
 
 def learned(method, points):
     """The method for five genes after it has learnt from these points, and the designs it asks for."""
     made = method_named(method)
-    strings = [Individual(point) for point in points]
-    worth(strings)
-    made.learn(strings)
-    return made, [tuple(string) for string in made.ask()]
+    individuals = [Individual(point) for point in points]
+    worth(individuals)
+    made.learn(individuals)
+    return made, [tuple(individual) for individual in made.ask()]
 
 
 def test_methods_learn_from_user_designs(rng):
@@ -94,7 +94,7 @@ def test_methods_learn_from_user_designs(rng):
         made, asked = learned(method, points)
         assert not set(asked) & set(points)
         assert len(asked) == (20 if method == "nsga2" else 8), "no random ones first"
-        assert {tuple(string) for string in made.strings} <= set(points)
+        assert {tuple(individual) for individual in made.individuals} <= set(points)
         _, asked = learned(method, points[:4])
         assert len(asked) == (16 if method == "nsga2" else 6), "so many fewer random ones"
 
@@ -286,10 +286,10 @@ def test_rows_of_experiments(tmp_path):
     assert twice.fitness.values == (-5.0, 1.5)
     assert twice.estimates[0].standard_error == pytest.approx(1.0)
     assert twice.violation == pytest.approx(0.75)
-    strings = (first, failed, twice)
-    again = restored(two, table_of(two, strings))
-    assert [repr((list(s), s.estimates, s.limited, s.violation)) for s in again] == [
-        repr((list(s), s.estimates, s.limited, s.violation)) for s in strings
+    individuals = (first, failed, twice)
+    again = restored(two, table_of(two, individuals))
+    assert [repr((list(one), one.estimates, one.limited, one.violation)) for one in again] == [
+        repr((list(one), one.estimates, one.limited, one.violation)) for one in individuals
     ]
     for head, cells, message in (
         ("x0,x1,gain,price", "0,0,1,1", "columns must be of all objectives and constraints, load among them"),

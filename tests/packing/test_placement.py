@@ -290,14 +290,14 @@ def decades(low, high):
     number=st.integers(1, 12),
     radius=decades(-110, 110),
     density=decades(-300, 300),
-    room=decades(-1, 20),
+    extent=decades(-1, 20),
     away=st.one_of(st.just(0.0), decades(-3, 20)),
     kind=st.sampled_from(["ball", "box", "domain", "lattice", "cylinder"]),
 )
-def test_starts_of_any_size_have_no_overlap_or_are_refused(number, radius, density, room, away, kind):
+def test_starts_of_any_size_have_no_overlap_or_are_refused(number, radius, density, extent, away, kind):
     """Spheres of 1e-110 to 1e110 m, in any region at any distance, do not overlap, or a message gives the
     reason."""
-    side, centre = radius * room, (0.0, radius * away, 0.0)
+    side, centre = radius * extent, (0.0, radius * away, 0.0)
     low, high = ([c + s * side for c in centre] for s in (-1, 1))
     try:
         placement = {

@@ -12,7 +12,7 @@ from tisim.pairs.pair_sum import TILE
 from tisim.program.team import Teams
 
 NUMBERS = (1, TILE - 1, TILE, TILE + 1, 2 * TILE + 6)
-ROOM = max(NUMBERS)
+CAPACITY = max(NUMBERS)
 """Not a multiple of TILE, so the last tile overlaps the previous one."""
 LAW = NearField(alpha1=0.5, alpha2=0.1, strength="mass")
 
@@ -38,7 +38,7 @@ def forces(state):
 @pytest.fixture(scope="module")
 def usual():
     """Clouds of all sizes in one batch, after three steps."""
-    return simulate([cloud(n, n) for n in NUMBERS], worlds=len(NUMBERS), capacity=ROOM, schedule="world")
+    return simulate([cloud(n, n) for n in NUMBERS], worlds=len(NUMBERS), capacity=CAPACITY, schedule="world")
 
 
 def test_forces_in_every_tile_are_their_numpy_twin(usual):
@@ -51,36 +51,38 @@ def test_forces_in_every_tile_are_their_numpy_twin(usual):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("schedule", "room", "numbers"),
+    ("schedule", "capacity", "numbers"),
     [
-        ("particle", ROOM, NUMBERS),
-        ("team", ROOM, NUMBERS),
+        ("particle", CAPACITY, NUMBERS),
+        ("team", CAPACITY, NUMBERS),
         pytest.param("world", 4 * TILE, NUMBERS, marks=pytest.mark.slow),
         ("world", TILE - 1, NUMBERS[:2]),
     ],
-    ids=["a launch per phase", "a team", "more room", "too little room for a tile"],
+    ids=["a launch per phase", "a team", "more capacity", "too little capacity for a tile"],
 )
-def test_the_same_bits(usual, monkeypatch, schedule, room, numbers):
+def test_the_same_bits(usual, monkeypatch, schedule, capacity, numbers):
     """For any capacity, with and without tiles, and on all schedules, including one team for all worlds."""
     if schedule == "team":
         monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
-    again = simulate([cloud(n, n) for n in numbers], worlds=len(NUMBERS), capacity=room, schedule=schedule)
+    again = simulate(
+        [cloud(n, n) for n in numbers], worlds=len(NUMBERS), capacity=capacity, schedule=schedule
+    )
     for a, b in zip(usual, again, strict=False):
         for name, values in a.state.items():
             np.testing.assert_array_equal(values, b.state[name], err_msg=name)
 
 
-@pytest.mark.parametrize("pair", [(3, 5), (TILE - 1, TILE), (5, ROOM - 1)])
+@pytest.mark.parametrize("pair", [(3, 5), (TILE - 1, TILE), (5, CAPACITY - 1)])
 def test_coincident_particles_are_named_and_affect_no_other_world(usual, pair):
     """Both if they share a tile and if they do not."""
-    position = np.random.default_rng(1).uniform(0, 1, (ROOM, 3))
+    position = np.random.default_rng(1).uniform(0, 1, (CAPACITY, 3))
     position[pair[1]] = position[pair[0]]
     scenes = [
         cloud(NUMBERS[0], NUMBERS[0]),
-        cloud(ROOM, position=position),
+        cloud(CAPACITY, position=position),
         *(cloud(n, n) for n in NUMBERS[2:]),
     ]
-    results = simulate(scenes, worlds=len(NUMBERS), capacity=ROOM, schedule="world")
+    results = simulate(scenes, worlds=len(NUMBERS), capacity=CAPACITY, schedule="world")
     reason = results[1].status.reason
     assert not results[1].status.ok
     assert "near_field" in reason

@@ -191,13 +191,13 @@ def crowd(rng, stepper, grains=300):
 def outcome(monkeypatch):
     """Run a scene with other settings of the near list and an initial row capacity."""
 
-    def run(start, room=None, **settings):
+    def run(start, capacity=None, **settings):
         with monkeypatch.context() as patch:
             for name, value in settings.items():
                 assert hasattr(near_list, name)
                 patch.setattr(near_list, name, value)
-            if room:
-                patch.setattr(allocation, "ListSizes", lambda: ListSizes(near=room))
+            if capacity:
+                patch.setattr(allocation, "ListSizes", lambda: ListSizes(near=capacity))
             simulation = Simulation(start)
             simulation.load([start])
             simulation.run()
@@ -224,7 +224,7 @@ def test_results_do_not_depend_on_the_skin(rng, outcome):
     usual = outcome(start)
     assert usual.work["merges"] > 50
     assert usual.work["impacts"] > usual.work["merges"]
-    same(usual, outcome(start, room=2, STEPS_OF_SKIN=0.0))
+    same(usual, outcome(start, capacity=2, STEPS_OF_SKIN=0.0))
 
 
 @pytest.mark.slow

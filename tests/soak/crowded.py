@@ -1,6 +1,6 @@
-"""Trials on a full disk, in a process: ``python -m tests.soak.crowded ROOM SEED FIRST LAST FOLDER``.
+"""Trials on a full disk, in a process: ``python -m tests.soak.crowded KIND SEED FIRST LAST FOLDER``.
 
-ROOM is the way in which the disk is made full: "limit", a system limit on the size of files, or "tmpfs", a
+KIND is the way in which the disk is made full: "limit", a system limit on the size of files, or "tmpfs", a
 small file system, for which the process needs mounts of its own (``unshare -rm``). Each trial gives a command
 a random part of the space that it needs. For each trial from FIRST to LAST - 1 it prints, as lines of JSON,
 the name of the trial, and then its column of Counts ("" if it is good) and the reason.
@@ -112,10 +112,10 @@ class Bench:
                 raise Wrong("wrong", f"{path.name} is not what it is on a disk with room")
 
 
-def run(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+def run(bench: Bench, folder: Path, full_disk: Callable, rng: np.random.Generator) -> None:
     """``tisim run --frames``; with enough space again, it continues to the same end."""
     command = ("run", bench.toml, "--frames", FRAMES, "--out", folder)
-    with room(folder, _part(rng, bench.whole / "trajectory.h5", bench.whole / "cloud.png")):
+    with full_disk(folder, _part(rng, bench.whole / "trajectory.h5", bench.whole / "cloud.png")):
         code = bench.call(*command)
         bench.check(folder, code)
     names = [path.name for path in folder.iterdir()]
@@ -126,7 +126,7 @@ def run(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) ->
         raise Wrong("lost", f"the run did not go on from {names}: exit code {code}")
 
 
-def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+def checkpoint(bench: Bench, folder: Path, full_disk: Callable, rng: np.random.Generator) -> None:
     """A second checkpoint replaces a first one: the file is one of the two."""
     simulation, path = bench.simulation, folder / "checkpoint.h5"
     simulation.load([SCENE])
@@ -134,7 +134,7 @@ def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Genera
     save(simulation, path)
     steps = 10
     simulation.run(steps=10)
-    with room(folder, _part(rng, path)), contextlib.suppress(RunError):
+    with full_disk(folder, _part(rng, path)), contextlib.suppress(RunError):
         save(simulation, path)
         steps = 20
     bench.check(folder, 0)
@@ -144,7 +144,7 @@ def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Genera
         raise Wrong("lost", f"the checkpoint of step {steps}")
 
 
-def cost(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+def cost(bench: Bench, folder: Path, full_disk: Callable, rng: np.random.Generator) -> None:
     """A study is rewritten with one more row: the file has all rows or all but the last."""
     from tisim.accuracy import storage
 
@@ -152,7 +152,7 @@ def cost(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -
     storage.resume(study, folder)
     rows = damage._rows(path)
     study.rows.append(study.rows[0])
-    with room(folder, _part(rng, path)), contextlib.suppress(RunError):
+    with full_disk(folder, _part(rng, path)), contextlib.suppress(RunError):
         storage.write(study, folder)
         rows = [repr(row) for row in study.rows]
     if damage._rows(path) != rows:
@@ -162,12 +162,12 @@ def cost(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -
 def show(name: str) -> Callable:
     """A command that draws or exports a trajectory."""
 
-    def trial(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+    def trial(bench: Bench, folder: Path, full_disk: Callable, rng: np.random.Generator) -> None:
         file = bench.whole / "trajectory.h5"
         files = [
             path for path in bench.whole.iterdir() if path.name in MADE[name] or path.suffix in MADE[name]
         ]
-        with room(folder, _part(rng, *files)):
+        with full_disk(folder, _part(rng, *files)):
             code = bench.call(*EXPORTS[name](file, folder))
             bench.check(folder, code)
 
@@ -193,13 +193,15 @@ def _part(rng: np.random.Generator, *files: Path) -> int:
     return int(rng.uniform(0, 1.1) * max(file.stat().st_size for file in files))
 
 
-def trial(bench: Bench, name: str, folder: Path, room: Callable, rng: np.random.Generator) -> tuple[str, str]:
+def trial(
+    bench: Bench, name: str, folder: Path, full_disk: Callable, rng: np.random.Generator
+) -> tuple[str, str]:
     """The column of Counts of a trial and the reason; empty if it is good."""
     folder.mkdir(parents=True)
     try:
-        if room is mounted:
+        if full_disk is mounted:
             mount(folder, "size=1g")
-        TRIALS[name](bench, folder, room, rng)
+        TRIALS[name](bench, folder, full_disk, rng)
     except Wrong as wrong:
         return wrong.args
     except BaseException:
@@ -208,15 +210,15 @@ def trial(bench: Bench, name: str, folder: Path, room: Callable, rng: np.random.
 
 
 def main() -> None:
-    room, seed, first, last, folder = sys.argv[1], *map(int, sys.argv[2:5]), Path(sys.argv[5])
+    kind, seed, first, last, folder = sys.argv[1], *map(int, sys.argv[2:5]), Path(sys.argv[5])
     runtime.init()
     bench = Bench(folder)
     for k in range(first, last):
         name = list(TRIALS)[k % len(TRIALS)]
         print(json.dumps([name]), flush=True)
         rng = np.random.default_rng([seed, k])
-        room_context = {"limit": limited, "tmpfs": mounted}[room]
-        print(json.dumps(trial(bench, name, folder / str(k) / "out", room_context, rng)), flush=True)
+        full_disk = {"limit": limited, "tmpfs": mounted}[kind]
+        print(json.dumps(trial(bench, name, folder / str(k) / "out", full_disk, rng)), flush=True)
 
 
 if __name__ == "__main__":

@@ -116,38 +116,38 @@ def _fill_disks(seed: int, sizes: int, folder: Path) -> Iterator[Counts]:
     """Half of the sizes are sizes of a small file system, if one can be mounted."""
     mounts = subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
     counts: dict[str, Counts] = {}
-    for room, number in (
+    for kind, number in (
         (("limit", sizes - sizes // 2), ("tmpfs", sizes // 2)) if mounts else (("limit", sizes),)
     ):
-        _trials(room, seed, number, folder / room, counts)
+        _trials(kind, seed, number, folder / kind, counts)
     yield from counts.values()
 
 
-def _trials(room: str, seed: int, sizes: int, folder: Path, counts: dict[str, Counts]) -> None:
+def _trials(kind: str, seed: int, sizes: int, folder: Path, counts: dict[str, Counts]) -> None:
     from tests.soak.crowded import TRIALS
 
     finished, number = 0, sizes * len(TRIALS)
     while finished < number:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, column, why in _process(room, seed, finished, number, folder):
+        for name, column, why in _process(kind, seed, finished, number, folder):
             finished += 1
             one = counts.setdefault(name, Counts(f"full disk: {name}"))
             one.trials += 1
             if column:
                 setattr(one, column, getattr(one, column) + 1)
-                print(f"full disk ({room}), {name}: {column}: {why[-1500:]}", flush=True)
+                print(f"full disk ({kind}), {name}: {column}: {why[-1500:]}", flush=True)
         shutil.rmtree(folder)
 
 
-def _process(room: str, seed: int, first: int, last: int, folder: Path) -> Iterator[tuple[str, str, str]]:
+def _process(kind: str, seed: int, first: int, last: int, folder: Path) -> Iterator[tuple[str, str, str]]:
     """The trial reports of a process until it has finished them, crashes, or has to be ended."""
-    alone = ("unshare", "-rm") if room == "tmpfs" else ()
+    alone = ("unshare", "-rm") if kind == "tmpfs" else ()
     command = [
         *alone,
         sys.executable,
         "-m",
         "tests.soak.crowded",
-        room,
+        kind,
         *map(str, (seed, first, last, folder)),
     ]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -23,7 +23,7 @@ ResultCallback = Callable[[Result], None]
 OBSERVATIONS = 127
 """Number of observations of a run. It is prime, so that for a motion of any whole number of periods (except
 multiples of this number) no two observations are at the same phase."""
-ROOM = 40
+FREE_TREES = 40
 """This many field trees must be free before a simulation is created, which takes two to about ten."""
 
 
@@ -73,8 +73,8 @@ class SimulationCache:
     """Compiled simulations, one for each structure and number of worlds, because idle worlds would add to the
     time.
 
-    Simulations are kept while enough field trees are free for another (ROOM). The least recently used are
-    closed first.
+    Simulations are kept while enough field trees are free for another (FREE_TREES). The least recently used
+    are closed first.
     """
 
     def __init__(self) -> None:
@@ -86,7 +86,7 @@ class SimulationCache:
         key = scene.structure(), worlds, scene.capacity()
         simulation = self.cached.pop(key, None)
         if simulation is None:
-            while self.cached and len(memory.in_use()) > memory.MAX_TREES - ROOM:
+            while self.cached and len(memory.in_use()) > memory.MAX_TREES - FREE_TREES:
                 self.cached.pop(next(iter(self.cached))).close()
             simulation = Simulation(scene, worlds)
         self.cached[key] = simulation

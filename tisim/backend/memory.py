@@ -41,7 +41,7 @@ _lost: deque[tuple[Any, int]] = deque()
 queued, as the garbage collector may run at any time and in any thread."""
 
 
-class NoRoom(RunError):
+class OutOfMemory(RunError):
     """There is not enough memory for fields.
 
     what : the limited quantity. rule : the limit. received : the amount needed.
@@ -53,30 +53,30 @@ class NoRoom(RunError):
 
 
 def require_lists(needed: int, instead_of: int) -> None:
-    """Raise NoRoom unless there is memory for lists of this many bytes in place of existing ones."""
+    """Raise OutOfMemory unless there is memory for lists of this many bytes in place of existing ones."""
     there = int(LISTS_PART * runtime.memory()) - (bytes_in_use() - instead_of)
     if needed > there:
         rule = f"within the {max(there, 0) / 1e9:.3g} GB that are left for lists of pairs"
-        raise NoRoom("memory", rule, f"{needed / 1e9:.3g} GB")
+        raise OutOfMemory("memory", rule, f"{needed / 1e9:.3g} GB")
 
 
 def require_memory(needed: int) -> None:
-    """Raise NoRoom unless this process may have this many bytes of memory."""
+    """Raise OutOfMemory unless this process may have this many bytes of memory."""
     there = runtime.memory()
     if needed > there:
         rule = f"within the {there / 1e9:.0f} GB that this process may have"
-        raise NoRoom("memory", rule, f"{needed / 1e9:.3g} GB")
+        raise OutOfMemory("memory", rule, f"{needed / 1e9:.3g} GB")
 
 
 def _require_entries(longest: int) -> None:
     if longest > MOST_ENTRIES:
-        raise NoRoom("numbers", f"at most {MOST_ENTRIES} in each field", str(longest))
+        raise OutOfMemory("numbers", f"at most {MOST_ENTRIES} in each field", str(longest))
 
 
 class Tree:
     """A tree holds the fields of one builder in device memory.
 
-    It raises NoRoom if there is not enough memory, and RunError if too many trees are in use.
+    It raises OutOfMemory if there is not enough memory, and RunError if too many trees are in use.
     """
 
     @in_taichi_thread
@@ -86,7 +86,7 @@ class Tree:
         try:
             require_memory(self.bytes + bytes_in_use())
             _require_entries(max((entries for entries, _ in sizes), default=0))
-        except NoRoom:
+        except OutOfMemory:
             builder.abandon()
             raise
         # Finalised in any case: an unfinished builder would break every later kernel.

@@ -213,7 +213,7 @@ class Component(Checked):
         return {}
 
     @classmethod
-    def room(cls, rows: int) -> int:
+    def list_capacity(cls, rows: int) -> int:
         """Return the capacity of a list for this number of rows of this class. Capacities are rounded up, so
         that scenes with lists of similar lengths can run in one batch."""
         return max(cls.least_rows, 1 << (rows - 1).bit_length())
@@ -227,7 +227,7 @@ class Component(Checked):
         return (
             type(self),
             *fixed,
-            *((name, kind.room(len(getattr(self, name)))) for name, kind in self.lists()),
+            *((name, kind.list_capacity(len(getattr(self, name)))) for name, kind in self.lists()),
         )
 
     def lookups(self) -> dict[str, np.ndarray]:

@@ -137,8 +137,8 @@ def groups() -> dict[str, list[Entry]]:
     for entry in entries():
         groups[entry.family].append(entry)
         top, *path = entry.kind.__module__.split(".")
-        for room in path[1:-1] if top == "tisim" else ():
-            groups.setdefault(room, []).append(entry)
+        for subpackage in path[1:-1] if top == "tisim" else ():
+            groups.setdefault(subpackage, []).append(entry)
     return groups
 
 

@@ -28,7 +28,7 @@ class Allocation:
     """An allocation holds the state of a batch of worlds, their parameter table and the parts of a step.
 
     All worlds have the structure of the scene. An allocation must be made in the Taichi thread. It raises
-    NoRoom if the memory does not suffice.
+    OutOfMemory if the memory does not suffice.
     """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
@@ -54,7 +54,7 @@ class Allocation:
     def assemble(self, sizes: ListSizes) -> None:
         """Put a step together with lists of these sizes, and free the memory of the previous step.
 
-        Raise NoRoom if there is not enough memory for the lists.
+        Raise OutOfMemory if there is not enough memory for the lists.
         """
         for tree in self._trees:
             tree.destroy()

@@ -27,8 +27,8 @@ BATCH_PARTICLES = 300_000
 IDLE_SIMULATIONS = 8
 """At most this many compiled simulations are kept for later calls."""
 SPARE, WASTE = 4096, 8
-"""A kept simulation is reused only if its total room is at most SPARE particles, or WASTE times the room
-needed, because all of its room is loaded and checked."""
+"""A kept simulation is reused only if its total capacity is at most SPARE particles, or WASTE times the
+capacity needed, because all of it is loaded and checked."""
 FEW_WORLDS = 8
 """A small scene is compiled for this many worlds, because a few more worlds of it are often run later."""
 

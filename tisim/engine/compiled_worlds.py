@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tisim.backend import memory, runtime
-from tisim.backend.memory import NoRoom, Tree, collected
+from tisim.backend.memory import OutOfMemory, Tree, collected
 from tisim.backend.runtime import Runtime
 from tisim.backend.thread import in_taichi_thread
 from tisim.compiling import compiling
@@ -51,12 +51,12 @@ class CompiledWorlds:
         """Place all fields, and compile the kernels of a step."""
         try:
             self._allocate(scene, worlds, capacity)
-        except NoRoom:
+        except OutOfMemory:
             # Try again after freeing cached memory.
             memory.reclaim()
             try:
                 self._allocate(scene, worlds, capacity)
-            except NoRoom as no:
+            except OutOfMemory as no:
                 what, others = f"{no.what} for {worlds} x {capacity} particles", memory.bytes_in_use()
                 rule = f"{no.rule}, with {others / 1e9:.3g} GB that others use" if others else no.rule
                 raise InputError(f"{what} must be {rule}; received {no.received}") from None
@@ -124,14 +124,14 @@ class CompiledWorlds:
         rows += " for events and step control do not fit in memory"
         try:
             memory.require_lists(self.assembly.list_bytes(sizes), self.assembly.list_bytes(before))
-        except NoRoom as no:
+        except OutOfMemory as no:
             raise RunError(f"{rows}: {no}") from None
         began, image = time.perf_counter(), self.s.image()
         self.s.write("status", WorldStatus.ENDED)
         try:
             try:
                 self._assemble(sizes)
-            except NoRoom:
+            except OutOfMemory:
                 # Try again after freeing cached memory.
                 memory.reclaim()
                 self._assemble(sizes)

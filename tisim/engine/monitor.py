@@ -20,7 +20,7 @@ REASONS: dict[int, str] = {
     WorldStatus.RUNNING: RUNNING,
     WorldStatus.ENDED: "reached its end",
     WorldStatus.NOT_FINITE: "a quantity is not finite",
-    WorldStatus.OUT_OF_ROOM: "more particles than there is room for",
+    WorldStatus.OUT_OF_CAPACITY: "more particles than the capacity",
     WorldStatus.CONTACT_OVERFLOW: "more simultaneous contacts than there is room for",
     WorldStatus.NOT_CONVERGED: "the iteration of a self-consistent quantity does not converge",
     WorldStatus.POSITION_LOST: "a step so long or so fast that rounding loses the place in the box",

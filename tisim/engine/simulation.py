@@ -54,8 +54,8 @@ class Simulation(CompiledWorlds):
 
     def __repr__(self) -> str:
         names = ", ".join(repr(scene.name) for scene in self.scenes[:3]) + ", ..." * (len(self.scenes) > 3)
-        room = f"{self.worlds} worlds of up to {self.s.capacity} particles"
-        return f"Simulation({room}, loaded: {names or 'none'})"
+        size = f"{self.worlds} worlds of up to {self.s.capacity} particles"
+        return f"Simulation({size}, loaded: {names or 'none'})"
 
     def load(self, scenes: Scene | Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
         """Load one scene into each of the first worlds; the other worlds stay empty. Nothing is compiled.
@@ -69,12 +69,12 @@ class Simulation(CompiledWorlds):
         must(0 < len(scenes) <= self.worlds, "number of scenes", f"1 to {self.worlds}", len(scenes))
         for scene in scenes:
             must(scene.structure() == self.structure, "scene", "of the structure compiled", scene.name)
-            room = scene.capacity()
+            capacity = scene.capacity()
             must(
-                room <= self.s.capacity,
+                capacity <= self.s.capacity,
                 f"particles of scene {scene.name!r}",
                 f"at most {self.s.capacity}",
-                room,
+                capacity,
             )
         if starts is None:
             with placed_together(scenes):

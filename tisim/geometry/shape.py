@@ -28,9 +28,9 @@ class Shape(Component):
     contract: ClassVar[bool] = True
 
     @classmethod
-    def room(cls, rows: int) -> int:
+    def list_capacity(cls, rows: int) -> int:
         # A kind of shape without rows takes no memory.
-        return super().room(rows) if rows else 0
+        return super().list_capacity(rows) if rows else 0
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         """Return the distance (m) of each position (m, shape (n, 3)) from its surface, positive on the side

@@ -38,7 +38,7 @@ class FilledRegion(Effect):
         )
         return self
 
-    def check_room(self, radius: float) -> None:
+    def check_fits(self, radius: float) -> None:
         """Raise InputError unless a sphere of this radius (m) fits into the region."""
         narrowest = min(b - a for a, b in zip(self.low, self.high, strict=True))
         rule = f"at least {2 * radius:g} m from low along each axis, the diameter of its largest grain"

@@ -199,12 +199,12 @@ class SplitGrain(PerParticle):
         s, fractures, n = self.s, self.fractures, self.s.pieces[w, i]
         if n >= 2:
             s.pieces[w, i] = 0
-            upto, room = fractures.new[w, i], s.room(w)
+            upto, free = fractures.new[w, i], s.free_slots(w)
             before = upto - (n - 1)
-            if fractures.sums.total[w] <= room:
+            if fractures.sums.total[w] <= free:
                 self.fragmentation.split(s, w, i, n, before)
-            elif before <= room < upto:
-                s.fail(w, WorldStatus.OUT_OF_ROOM, i)
+            elif before <= free < upto:
+                s.fail(w, WorldStatus.OUT_OF_CAPACITY, i)
 
 
 class EndFractures(Phase):

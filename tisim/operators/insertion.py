@@ -60,7 +60,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
     @model_validator(mode="after")
     def _sound(self) -> Self:
         check_quantities(self.grains, ("position", "velocity", "mass", "radius", "id", "material"))
-        self.check_room(self.farthest())
+        self.check_fits(self.farthest())
         return self
 
     def structure(self) -> tuple[Any, ...]:
@@ -168,7 +168,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         # Members of clumps are found through a table by id, with one entry for each particle that fits into
         # memory.
         numbered = s.next_id[w] + size <= s.most[w]
-        if s.room(w) < size or not (numbered or ti.static(not self.has_clumps)):
+        if s.free_slots(w) < size or not (numbered or ti.static(not self.has_clumps)):
             tried.taken[w], tried.attempt[w] = 1, self.tries
 
     @ti.func

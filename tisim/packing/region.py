@@ -63,9 +63,9 @@ def in_domain(domain: Domain, radius: float) -> Region:
     if low is None or high is None:
         raise InputError("domain must be bounded to hold a random cloud; received an open one")
     margin = np.where(domain.joined(), 0.0, radius)
-    room = bool((high - low > 2 * margin).all())
+    fits = bool((high - low > 2 * margin).all())
     rule = f"wider than a sphere, {2 * radius:g} m, along axes that are not periodic"
-    must(room, "box", rule, (high - low).tolist())
+    must(fits, "box", rule, (high - low).tolist())
     joined = domain.joined()
     return replace(
         box(low + margin, high - margin, domain.imaged()),
@@ -77,8 +77,8 @@ def in_domain(domain: Domain, radius: float) -> Region:
 def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
     """Return the region for spheres of ``radius`` (m) completely inside a box low..high (m)."""
     low, high = np.asarray(low, float), np.asarray(high, float)
-    room = bool((high - low > 2 * radius).all())
-    must(room, "box", f"wider than a sphere, {2 * radius:g} m, in each direction", (high - low).tolist())
+    fits = bool((high - low > 2 * radius).all())
+    must(fits, "box", f"wider than a sphere, {2 * radius:g} m, in each direction", (high - low).tolist())
     return Region(low + radius, high - radius, float(np.prod(high - low)), walled=ALL_AXES)
 
 

@@ -36,7 +36,7 @@ class ExportedTerms:
         self.pairs, self.components = pairs, components
         self.columns = tuple(ti.field(pairs.s.real) for _ in range(components))
         builder = Builder()
-        builder.dense(ti.i, pairs.s.worlds).dense(ti.j, pairs.room).place(*self.columns)
+        builder.dense(ti.i, pairs.s.worlds).dense(ti.j, pairs.pair_capacity).place(*self.columns)
         self.tree = Tree(builder)
 
     def bytes(self) -> int:

@@ -50,7 +50,7 @@ class PairChunks:
         self.memories = memories
         self.chunk = CHUNK_SLOTS if runtime.current().device == "cpu" else 1
         self.chunks = -(-s.capacity // self.chunk)
-        self.room = half_list.sizes.mean * s.capacity
+        self.pair_capacity = half_list.sizes.mean * s.capacity
         self.first, self.second, self.partitioned, self.fetched, self.fetch_begin, self.fetch_count = (
             ti.field(ti.i32) for _ in range(6)
         )
@@ -58,9 +58,9 @@ class PairChunks:
         builder = Builder()
         # A pair and its history are one record, because they are read together.
         records = (self.first, self.second, *(value for one in memories for value in one.make_fields()))
-        builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)
+        builder.dense(ti.i, s.worlds).dense(ti.j, self.pair_capacity).place(*records)
         for column in (self.partitioned, self.fetched):
-            builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(column)
+            builder.dense(ti.i, s.worlds).dense(ti.j, self.pair_capacity).place(column)
         for column in (self.fetch_begin, self.fetch_count):
             builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
         for column in (self.begin, self.outer, self.end):

@@ -75,7 +75,7 @@ class PlacePairs(PerChunk):
     @ti.func
     def run(self, w, c):
         p = self.p
-        if p.ends.total[w] > p.room:
+        if p.ends.total[w] > p.pair_capacity:
             ti.atomic_max(self.s.failed[w], WorldStatus.LIST_OVERFLOW)
             p.begin[w, c], p.outer[w, c], p.end[w, c] = 0, 0, 0
         else:

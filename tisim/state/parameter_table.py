@@ -72,7 +72,7 @@ def _slots(part: Component) -> int:
     The slots hold its own parameters, for each list the length and room for the rows, the derived values of
     each row, and the slots of its members.
     """
-    lists = sum(1 + _width(kind) * kind.room(len(getattr(part, n))) for n, kind in part.lists())
+    lists = sum(1 + _width(kind) * kind.list_capacity(len(getattr(part, n))) for n, kind in part.lists())
     derived = sum(len(values) for values in part.derived_rows().values())
     return _width(type(part)) + lists + derived + sum(_slots(one) for one in part.members().values())
 
@@ -86,7 +86,7 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
         yield f"{where}.{name}", float(len(rows))
         for k, row in enumerate(rows):
             yield from _entries(row, f"{where}.{name}.{k}")
-        spare = _width(kind) * (kind.room(len(rows)) - len(rows))
+        spare = _width(kind) * (kind.list_capacity(len(rows)) - len(rows))
         yield from [(f"{where}.{name}", 0.0)] * spare
     for name, values in part.derived_rows().items():
         yield from ((f"{where}.{name}", value) for value in values)
@@ -113,7 +113,7 @@ class ParameterTable:
             slot += size
         for name, kind in part.lists():
             setattr(bound, name, self._bind_rows(kind, slot))
-            slot += 1 + _width(kind) * kind.room(len(getattr(part, name)))
+            slot += 1 + _width(kind) * kind.list_capacity(len(getattr(part, name)))
         for name, derived in part.derived_rows().items():
             setattr(bound, name, _row_reader(self.field, slot, 1, 1))
             slot += len(derived)

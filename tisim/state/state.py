@@ -100,7 +100,10 @@ class State(StateMemory):
 
     @ti.func
     def append(self, w, i):
-        """Copy particle i to a new slot, and return its index. The caller must have checked ``room``."""
+        """Copy particle i to a new slot, and return its index.
+
+        The caller must have checked ``free_slots``.
+        """
         k = self.append_uncounted(w, i, 0)
         self.lengthen(w, 1)
         return k
@@ -110,7 +113,7 @@ class State(StateMemory):
         """Copy particle i to the k-th slot after the last one in use, and return its index.
 
         The copy counts after a call of ``lengthen``. Other particles may be copied at the same time. The
-        caller must have checked ``room``.
+        caller must have checked ``free_slots``.
         """
         new = self.count[w] + k
         self.copy(w, i, new)
@@ -128,7 +131,7 @@ class State(StateMemory):
     def insert(self, w, position, velocity, radius, mass):
         """Insert a new particle, with defaults in all other fields; return its index.
 
-        The caller must have checked ``room``.
+        The caller must have checked ``free_slots``.
         """
         k = self.count[w]
         for column in ti.static(self.defaults):
@@ -159,7 +162,7 @@ class State(StateMemory):
         ti.atomic_min(self.ending_effect[w], effect)
 
     @ti.func
-    def room(self, w):
+    def free_slots(self, w):
         """Return the number of free slots within the capacity of the scene of a world.
 
         It does not depend on the capacity of the simulation, so a world ends the same way in a larger one.

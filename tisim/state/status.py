@@ -11,7 +11,7 @@ class WorldStatus(IntEnum):
     """The world has reached its end."""
     NOT_FINITE = 2
     """A quantity of a particle is not finite."""
-    OUT_OF_ROOM = 3
+    OUT_OF_CAPACITY = 3
     """There is no free slot for another particle."""
     CONTACT_OVERFLOW = 4
     """More simultaneous contacts than a particle, or a world, can store."""

@@ -68,9 +68,9 @@ def test_nothing_is_random_and_other_variants_are_refused():
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_search_improves_and_lands_on_the_resonance_or_far_from_it(variant, evaluator, tmp_path):
-    wished = {**SEARCH_SETTINGS, "generations": 6}
+    settings = {**SEARCH_SETTINGS, "generations": 6}
     with Cache(tmp_path / "search.h5") as cache:
-        outcome = search(problem(variant=variant), evaluator, cache, Settings(**wished))
+        outcome = search(problem(variant=variant), evaluator, cache, Settings(**settings))
     best = outcome.logbook.select("best")
     design = outcome.problem.genome.decode(outcome.best)
     assert best[-1] < best[0]

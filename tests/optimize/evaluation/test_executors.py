@@ -187,7 +187,7 @@ def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
     assert records == expected
     assert there.evaluations == here.evaluations == len(records)
     assert repr(list(there.logbook)) == repr(list(here.logbook))
-    assert [list(s) for s in there.hall] == [list(s) for s in here.hall]
+    assert [list(one) for one in there.hall] == [list(one) for one in here.hall]
     report = verify(tmp_path / "there.h5")
     assert (report.ok, report.duplicates) == (True, 0)
 

@@ -10,9 +10,9 @@ GENES = 5
 
 
 def rated(population):
-    for string in population:
-        if not string.fitness.valid:
-            string.fitness.values = (bowl(dict(enumerate(string)), 0, noise=0.0),)
+    for individual in population:
+        if not individual.fitness.valid:
+            individual.fitness.values = (bowl(dict(enumerate(individual)), 0, noise=0.0),)
     return population
 
 
@@ -21,27 +21,27 @@ def test_z04_generation_has_6_parents_6_offspring_8_fresh():
     population = rated(breeder.first())
     assert len(population) == 20
     for generation in range(1, 13):
-        ranked = sorted(population, key=lambda string: string.fitness.values[0])
+        ranked = sorted(population, key=lambda individual: individual.fitness.values[0])
         if generation % 4 == 0:
             breeder.recentre(ranked[0])
         population = breeder.next_generation(population)
         assert len(population) == 20
         assert population[:6] == ranked[:6]
-        assert all(string.fitness.valid for string in population[:6])
-        assert not any(string.fitness.valid for string in population[6:])
+        assert all(individual.fitness.valid for individual in population[:6])
+        assert not any(individual.fitness.valid for individual in population[6:])
         for number, child in enumerate(population[6:12]):
             pair = np.array(ranked[number - number % 2 : number - number % 2 + 2])
             assert np.all(pair.min(axis=0) <= child)
             assert np.all(child <= pair.max(axis=0))
             weight = (np.array(child) - pair[1]) / (pair[0] - pair[1])
             assert np.ptp(weight) > 1e-3, "every component has its own weight"
-        for string in population[12:]:
-            assert np.all((breeder.box.low <= string) & (string <= breeder.box.high))
+        for individual in population[12:]:
+            assert np.all((breeder.box.low <= individual) & (individual <= breeder.box.high))
         rated(population)
     np.testing.assert_allclose(breeder.box.width, 0.5**3)
 
 
-def test_same_seed_same_strings_other_seed_others():
+def test_same_seed_same_individuals_other_seed_others():
     first, again, other = (Breeder(GENES, Breeding(), seed).first() for seed in (5, 5, 6))
     assert first == again
     assert first != other

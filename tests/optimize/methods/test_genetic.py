@@ -29,22 +29,22 @@ def method(objectives=1, genome=None, seed=3, **options):
     return kind(genome, objectives, kind.Options(**options), seed)
 
 
-def told(strings, function):
+def told(individuals, function):
     """Assign costs to individuals, one number or several."""
-    for string in strings:
-        string.know(
-            tuple(FitnessEstimate.certain(float(c)) for c in np.atleast_1d(function(np.array(string))))
+    for individual in individuals:
+        individual.know(
+            tuple(FitnessEstimate.certain(float(c)) for c in np.atleast_1d(function(np.array(individual))))
         )
-    return strings
+    return individuals
 
 
 def searched(function, evaluations, **settings):
     """All designs that a method asks for when it runs on its own."""
     found, one = [], method(**settings)
     while len(found) < evaluations:
-        strings = one.ask()
-        one.tell(told(strings, function), [])
-        found += strings
+        individuals = one.ask()
+        one.tell(told(individuals, function), [])
+        found += individuals
     return found
 
 
@@ -64,18 +64,18 @@ def test_half_of_each_generation_is_in_the_trust_region():
     one = method()
     one.tell(told(one.ask(), valley), [])
     for _ in range(5):
-        strings = told(one.ask(), valley)
-        distance = np.abs(np.array(strings) - one.region.centre).max(axis=1)
+        individuals = told(one.ask(), valley)
+        distance = np.abs(np.array(individuals) - one.region.centre).max(axis=1)
         assert np.all(distance[: one.local] <= one.region.half_width + 1e-12)
         assert np.all(distance[one.local :] > 0.1)
-        one.tell(strings, [])
+        one.tell(individuals, [])
 
 
 def test_the_surrogate_saves_runs():
     """With 60 runs and three seeds it is far better than the same algorithm without a surrogate."""
     best = {
         assisted: [
-            min(s.fitness.values[0] for s in searched(valley, 60, seed=seed, surrogate=assisted))
+            min(one.fitness.values[0] for one in searched(valley, 60, seed=seed, surrogate=assisted))
             for seed in range(3)
         ]
         for assisted in (True, False)
@@ -92,12 +92,12 @@ def test_the_surrogate_saves_noisy_runs():
         for seed in range(3):
             one, found = method(seed=seed, surrogate=assisted), []
             while len(found) < 60:
-                strings = one.ask()
-                for string in strings:
-                    cost = float(np.sum((np.array(string) - 0.3) ** 2)) + 0.01 * noise.normal()
-                    string.know((FitnessEstimate(cost, 0.014, cost - 0.01, cost + 0.01, 2, True),))
-                one.tell(strings, [])
-                found += strings
+                individuals = one.ask()
+                for individual in individuals:
+                    cost = float(np.sum((np.array(individual) - 0.3) ** 2)) + 0.01 * noise.normal()
+                    individual.know((FitnessEstimate(cost, 0.014, cost - 0.01, cost + 0.01, 2, True),))
+                one.tell(individuals, [])
+                found += individuals
             last = np.array(found[-8:])
             best[assisted].append(np.median(np.sum((last - 0.3) ** 2, axis=1)))
     assert np.median(best[True]) < 0.02
@@ -110,7 +110,7 @@ def test_several_objectives_with_a_surrogate_come_nearer_to_the_front():
         found = searched(
             two_costs, 56, objectives=2, surrogate=assisted, **({} if assisted else {"population": 8})
         )
-        costs = np.array([string.fitness.values for string in found[-16:]])
+        costs = np.array([individual.fitness.values for individual in found[-16:]])
         # On the line between the centres sqrt(f1) + sqrt(f2) is their distance; elsewhere it is larger.
         excess[assisted] = np.sqrt(costs).sum(axis=1) - 0.4 * np.sqrt(GENES)
     assert np.median(excess[True]) < np.median(excess[False]) / 3
@@ -122,9 +122,9 @@ def test_each_design_is_asked_for_once_and_few_designs_are_all_found():
     for options in ({"first": 2, "population": 2}, {"surrogate": False, "population": 2}):
         one, asked = method(genome=genome, **options), []
         for _ in range(12):
-            strings = one.ask()
-            one.tell(told(strings, lambda x: float(x.sum())), [])
-            asked += [tuple(genome.decode(string).values()) for string in strings]
+            individuals = one.ask()
+            one.tell(told(individuals, lambda x: float(x.sum())), [])
+            asked += [tuple(genome.decode(individual).values()) for individual in individuals]
         assert len(set(asked)) == 6
         # generation 0 may have the same design twice
         assert len(asked) <= 6 + 2
@@ -167,9 +167,9 @@ OPERATORS = {
 def test_deap_operators_breed_within_the_range(role, name):
     operator = {role: {"name": name, "options": OPTIONS.get(name, {})}}
     found = searched(lambda x: bowl(dict(enumerate(x)), 0, noise=0.0), 100, surrogate=False, **operator)
-    assert all(isinstance(string, Individual) and len(string) == GENES for string in found)
+    assert all(isinstance(individual, Individual) and len(individual) == GENES for individual in found)
     assert np.all((np.array(found) >= 0) & (np.array(found) <= 1))
-    assert len({tuple(string) for string in found}) > 90
+    assert len({tuple(individual) for individual in found}) > 90
 
 
 def swapped(one, two, share=0.5):
@@ -180,33 +180,33 @@ def swapped(one, two, share=0.5):
     return one, two
 
 
-def moved(string, low, up, width=0.1):
+def moved(individual, low, up, width=0.1):
     """A user-defined mutation with NumPy random numbers."""
-    for i, change in enumerate(np.random.normal(0.0, width, len(string))):  # noqa: NPY002
-        string[i] = min(max(string[i] + change, low), up)
-    return (string,)
+    for i, change in enumerate(np.random.normal(0.0, width, len(individual))):  # noqa: NPY002
+        individual[i] = min(max(individual[i] + change, low), up)
+    return (individual,)
 
 
 def test_operators_of_the_user_are_called_and_draw_nothing_global():
     calls = []
 
-    def counted(string, low, up):
+    def counted(individual, low, up):
         calls.append((low, up))
-        return moved(string, low, up)
+        return moved(individual, low, up)
 
     def state():
         return random.getstate(), np.random.get_state()[1].tolist()  # noqa: NPY002
 
-    strings = []
+    individuals = []
     for _ in range(2):
         before = state()
         one = method(mate=swapped, mutate=counted, surrogate=False)
         one.tell(told(one.ask(), valley), [])
-        strings.append([list(string) for string in one.ask()])
+        individuals.append([list(individual) for individual in one.ask()])
         assert state() == before
         random.random()
         np.random.random()  # noqa: NPY002
-    assert strings[0] == strings[1]
+    assert individuals[0] == individuals[1]
     assert set(calls) == {(0.0, 1.0)}
 
 
@@ -249,11 +249,11 @@ def test_operators_are_part_of_the_search():
         ({"select": "selBest"}, 2, "operator name must be one of selTournamentDCD, .*; received 'selBest'"),
         ({"mate": "cxBlend"}, 1, r"options of cxBlend must be complete: \['alpha'\]"),
         ({"mate": {"name": "cxBlend", "options": {"beta": 2}}}, 1, "options of cxBlend must be among"),
-        ({"mate": "cxOrdered"}, 1, "fit for real-valued strings"),
-        ({"mutate": lambda string: string}, 1, "fit for real-valued strings"),
-        ({"mutate": lambda string: ([np.nan] * len(string),)}, 1, "fit for real-valued strings"),
+        ({"mate": "cxOrdered"}, 1, "fit for real-valued individuals"),
+        ({"mutate": lambda individual: individual}, 1, "fit for real-valued individuals"),
+        ({"mutate": lambda individual: ([np.nan] * len(individual),)}, 1, "fit for real-valued individuals"),
         (
-            {"mutate": lambda string: (list(np.random.default_rng().random(len(string))),)}, 1,
+            {"mutate": lambda individual: (list(np.random.default_rng().random(len(individual))),)}, 1,
             "operators must be random by the modules random and numpy.random alone",
         ),
         ({"surrogate": False, "inner": 3}, 1, "inner must be left out if surrogate is false"),
@@ -281,5 +281,5 @@ def test_nsga2_equals_the_genetic_method_without_a_surrogate():
             asked = [one.ask() for one in twins]
             assert asked[0] == asked[1]
             assert len(asked[0]) == population
-            for one, strings in zip(twins, asked, strict=True):
-                one.tell(told(strings, costs[objectives]), [])
+            for one, individuals in zip(twins, asked, strict=True):
+                one.tell(told(individuals, costs[objectives]), [])

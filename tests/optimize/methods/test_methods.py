@@ -40,13 +40,13 @@ def method_named(name, genes=5, seed=3, **options):
     return kind(fake_problem(genes).genome, 1, kind.Options(**options), seed)
 
 
-def worth(strings, function=quiet):
+def worth(individuals, function=quiet):
     """Assign costs to individuals and sort them, best first."""
-    for string in strings:
-        cost = function(dict(enumerate(string)), 0)
+    for individual in individuals:
+        cost = function(dict(enumerate(individual)), 0)
         reason = "" if np.isfinite(cost) else "failed"
-        string.know((FitnessEstimate(cost, 0.0, cost, cost, 1, True, reason),))
-    return sorted((s for s in strings if not s.failed), key=lambda s: s.fitness.values)
+        individual.know((FitnessEstimate(cost, 0.0, cost, cost, 1, True, reason),))
+    return sorted((one for one in individuals if not one.failed), key=lambda one: one.fitness.values)
 
 
 def test_methods_are_found_in_their_package():
@@ -58,13 +58,13 @@ def test_asks_within_the_unit_cube_and_by_its_seed_alone(name):
     twins = [method_named(name), method_named(name), method_named(name, seed=4)]
     for _ in range(4 if name in SURROGATE else 12):
         populations = [method.ask() for method in twins]
-        assert [list(s) for s in populations[0]] == [list(s) for s in populations[1]]
-        assert [list(s) for s in populations[0]] != [list(s) for s in populations[2]]
-        for strings, method in zip(populations, twins, strict=True):
-            assert all(isinstance(string, Individual) for string in strings)
-            assert np.all((np.array(strings) >= 0) & (np.array(strings) <= 1))
+        assert [list(one) for one in populations[0]] == [list(one) for one in populations[1]]
+        assert [list(one) for one in populations[0]] != [list(one) for one in populations[2]]
+        for individuals, method in zip(populations, twins, strict=True):
+            assert all(isinstance(individual, Individual) for individual in individuals)
+            assert np.all((np.array(individuals) >= 0) & (np.array(individuals) <= 1))
             assert 0 < method.width <= 1
-            method.tell(strings, worth(strings))
+            method.tell(individuals, worth(individuals))
             np.random.default_rng().random()
 
 
@@ -72,10 +72,10 @@ def driven(name, function, evaluations, genes, seed=3):
     """The least cost that a method finds on its own, without a cache or other parts of a search."""
     method, hall, evaluated = method_named(name, genes=genes, seed=seed), [], 0
     while evaluated < evaluations:
-        strings = method.ask()
-        evaluated += sum(not string.fitness.valid for string in strings)
-        hall = sorted([*worth(strings, function), *hall], key=lambda s: s.fitness.values)[:6]
-        method.tell(strings, hall)
+        individuals = method.ask()
+        evaluated += sum(not individual.fitness.valid for individual in individuals)
+        hall = sorted([*worth(individuals, function), *hall], key=lambda one: one.fitness.values)[:6]
+        method.tell(individuals, hall)
     return hall[0].fitness.values[0]
 
 
@@ -109,7 +109,7 @@ def test_a_resumed_search_is_the_same(path, name, after):
     settings["options"] = {"population": 8, **({"parents": 2} if name in ("zohdi", "restart") else {})}
 
     def course_of(outcome):
-        return repr(list(outcome.logbook)), [(list(s), repr(s.estimates)) for s in outcome.hall]
+        return repr(list(outcome.logbook)), [(list(one), repr(one.estimates)) for one in outcome.hall]
 
     whole = run(FakeCache(), bowl, **settings)
     with Cache(path) as cache:
@@ -151,9 +151,9 @@ def test_cma_es_finds_a_corner():
     """With reflection at the bounds it would only reach 1e-4."""
     method, least = method_named("cma-es", genes=4), np.inf
     for _ in range(50):
-        strings = method.ask()
-        hall = worth(strings, corner)
-        method.tell(strings, hall)
+        individuals = method.ask()
+        hall = worth(individuals, corner)
+        method.tell(individuals, hall)
         least = min(least, hall[0].fitness.values[0])
     assert least < 1e-6
 
@@ -178,9 +178,9 @@ def test_cma_es_restarts_with_twice_the_population_after_convergence():
     method = method_named("cma-es", genes=2, smallest=1e-2)
     sizes, moved = [], []
     for _ in range(60):
-        strings = method.ask()
-        sizes.append(len(strings))
-        method.tell(strings, worth(strings))
+        individuals = method.ask()
+        sizes.append(len(individuals))
+        method.tell(individuals, worth(individuals))
         moved.append(method.moved)
     assert sizes[0] == 6
     first = moved.index(True)
@@ -193,19 +193,19 @@ def test_a_stalled_search_restarts_around_the_best():
     method = method_named("restart", genes=3, stalled=2, smallest=0.2)
     widths, best = [], None
     for generation in range(14):
-        strings = method.ask()
-        assert len(strings) == 20
+        individuals = method.ask()
+        assert len(individuals) == 20
         if generation and method.moved:
-            assert [s.fitness.valid for s in strings] == [True] + [False] * 19, "only the best stays"
-            assert strings[0] is best
-            assert np.all(np.abs(np.array(strings) - best).max(axis=0) <= method.width)
+            assert [one.fitness.valid for one in individuals] == [True] + [False] * 19, "only the best stays"
+            assert individuals[0] is best
+            assert np.all(np.abs(np.array(individuals) - best).max(axis=0) <= method.width)
             widths.append(method.width)
         if best is None:
-            best = worth(strings)[0]
-        for string in strings:
-            if string is not best:
-                string.know((FitnessEstimate.certain(9.0),))  # never better than the first
-        method.tell(strings, [best])
+            best = worth(individuals)[0]
+        for individual in individuals:
+            if individual is not best:
+                individual.know((FitnessEstimate.certain(9.0),))  # never better than the first
+        method.tell(individuals, [best])
     assert widths == [0.5, 0.25, 1.0, 0.5, 0.25, 1.0]
 
 

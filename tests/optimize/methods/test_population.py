@@ -34,11 +34,11 @@ def generations(settings):
     """Sizes of the first two generations, and the number of new individuals in the second."""
     method = find(settings.method)(fake_problem(GENES).genome, 1, settings.options, seed=1)
     first = method.ask()
-    for rank, string in enumerate(first):
-        string.know((FitnessEstimate.certain(float(rank)),))
+    for rank, individual in enumerate(first):
+        individual.know((FitnessEstimate.certain(float(rank)),))
     method.tell(first, first[:1])
     second = method.ask()
-    return (len(first), len(second)), sum(not string.fitness.valid for string in second)
+    return (len(first), len(second)), sum(not individual.fitness.valid for individual in second)
 
 
 def settings_of(usual, method, options):

@@ -44,7 +44,7 @@ def test_a_function_that_takes_a_seed_is_called_from_several_starts():
     problem = Problem.of_function(noisy, ONE)
     assert not problem.deterministic
     outcome = optimize.run(problem, generations=2, seed=1, ensemble={"min_starts": 5, "max_starts": 5})
-    assert all(string.estimates[0].starts >= 5 for string in outcome.hall)
+    assert all(individual.estimates[0].starts >= 5 for individual in outcome.hall)
     low, high = outcome.designs[0].intervals["value"]
     assert low < outcome.designs[0].values["value"] < high
 

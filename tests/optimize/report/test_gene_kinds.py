@@ -64,8 +64,8 @@ def test_the_spread_of_designs_at_the_target_names_choices():
         ({"speed": 2.0, "blades": 2, "wall": "flat", "open": False}, 5.0),
         ({"speed": 9.0, "blades": 5, "wall": "flat", "open": True}, 16.0),
     ):
-        string = tuple(PROBLEM.genome.encode(design))
-        outcome.estimates[string] = (FitnessEstimate.certain(cost),)
+        point = tuple(PROBLEM.genome.encode(design))
+        outcome.estimates[point] = (FitnessEstimate.certain(cost),)
     rows = {line[0]: line[1:] for line in printed(report.met_table(outcome)) if line}
     assert rows["speed"] == ["(m/s)", "1", "3", "25", "%"]
     assert rows["blades"] == ["2", "3", "25", "%"]

@@ -70,13 +70,13 @@ def test_csv_holds_all_digits(outcome, tmp_path):
         ]
     )
     assert [int(row["rank"]) for row in rows] == [1, 2, 3, 4, 5, 6]
-    for row, string in zip(rows, outcome.hall, strict=True):
-        assert [float(row[f"x{i} (m)"]) for i in range(4)] == list(string)
-        assert float(row["Pi"]) == string.estimates[0].mean
-        assert float(row["std. error"]) == string.estimates[0].standard_error
-        assert float(row["Pi, fresh starts"]) == string.confirmed[0].mean
-        assert float(row["95 % low, fresh starts"]) == string.confirmed[0].low
-        assert float(row["95 % high, fresh starts"]) == string.confirmed[0].high
+    for row, individual in zip(rows, outcome.hall, strict=True):
+        assert [float(row[f"x{i} (m)"]) for i in range(4)] == list(individual)
+        assert float(row["Pi"]) == individual.estimates[0].mean
+        assert float(row["std. error"]) == individual.estimates[0].standard_error
+        assert float(row["Pi, fresh starts"]) == individual.confirmed[0].mean
+        assert float(row["95 % low, fresh starts"]) == individual.confirmed[0].low
+        assert float(row["95 % high, fresh starts"]) == individual.confirmed[0].high
         assert float(row["n_f"]) == pytest.approx(float(row["b_f/b_0"]) ** 3)
 
 
@@ -113,17 +113,17 @@ def test_terminal_table_shows_the_best_designs(outcome):
         *("Pi,", "95", "95", "b_f/b_", "n_f,", "starts"),
     ]  # fmt: skip
     assert rows[0].split() == ["rank", *"123456"]
-    assert rows[5].split() == ["Pi", *(f"{string.estimates[0].mean:.4g}" for string in outcome.hall)]
+    assert rows[5].split() == ["Pi", *(f"{individual.estimates[0].mean:.4g}" for individual in outcome.hall)]
 
 
 def agglomerations(number):
     """Designs of Z04's ten genes, with values such as 1.234e15."""
     outcome = Outcome(agglomeration("paper"), Settings(), {"problem": "agglomeration"})
     for k in range(number):
-        string = Individual([0.851234 + k / 200] * 10)
-        string.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.70123, 0.72345, 48, k % 2 == 0),)
-        string.confirmed = string.estimates
-        outcome.hall.append(string)
+        individual = Individual([0.851234 + k / 200] * 10)
+        individual.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.70123, 0.72345, 48, k % 2 == 0),)
+        individual.confirmed = individual.estimates
+        outcome.hall.append(individual)
     return outcome
 
 

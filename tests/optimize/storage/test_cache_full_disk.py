@@ -16,8 +16,8 @@ from tisim.optimize.storage.maintenance import verify
 from tisim.optimize.storage.runs_table import tabulated
 
 
-@pytest.mark.parametrize("room_left", [0, 1, 40])
-def test_disk_full_while_appending(path, monkeypatch, room_left):
+@pytest.mark.parametrize("space_left", [0, 1, 40])
+def test_disk_full_while_appending(path, monkeypatch, space_left):
     cache = Cache(path)
     cache.put(fake_record(0))
     cache.fold()
@@ -26,11 +26,11 @@ def test_disk_full_while_appending(path, monkeypatch, room_left):
     end = journal_of(path).stat().st_size
 
     def full(handle, data, offset):
-        """A disk with space for ``room_left`` more bytes."""
-        room = end + room_left - offset
-        if room <= 0:
+        """A disk with space for ``space_left`` more bytes."""
+        space = end + space_left - offset
+        if space <= 0:
             raise OSError(errno.ENOSPC, "No space left on device")
-        return write(handle, bytes(data[:room]), offset)
+        return write(handle, bytes(data[:space]), offset)
 
     with monkeypatch.context() as patch:
         patch.setattr(atomic.os, "pwrite", full)

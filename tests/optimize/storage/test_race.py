@@ -125,6 +125,6 @@ def test_search_with_races_finds_better_designs_at_equal_evaluations():
             assert 398 <= outcome.evaluations <= 400
             best.append(outcome.best)
         true[race] = np.sum((np.array(best) - 0.3) ** 2, axis=1)
-        claimed[race] = np.mean([string.estimates[0].mean for string in best])
+        claimed[race] = np.mean([individual.estimates[0].mean for individual in best])
     assert np.mean(true[16]) < 0.7 * np.mean(true[0])
     assert abs(claimed[16]) < 0.8 * abs(claimed[0])

@@ -7,7 +7,7 @@ from scipy.integrate import quad
 from scipy.optimize import check_grad
 from scipy.stats import norm
 
-from tests.optimize.fake_runs import fake_problem, string_of
+from tests.optimize.fake_runs import fake_problem, individual_of
 from tisim.optimize.surrogate import gaussian_process
 from tisim.optimize.surrogate.acquisition import Worth, log_expected_improvement
 from tisim.optimize.surrogate.belief import Belief
@@ -115,16 +115,16 @@ def test_three_costs_are_sampled():
 
 def worth_of(costs):
     belief = Belief()
-    belief.learn([string_of([0.1 + 0.2 * k] * 2, *row) for k, row in enumerate(costs)])
+    belief.learn([individual_of([0.1 + 0.2 * k] * 2, *row) for k, row in enumerate(costs)])
     return Worth(belief, np.random.default_rng(0))
 
 
 def test_a_batch_is_spread_out():
-    strings = [
-        string_of(point, value) for point, value in zip(RNG.random((30, 2)), RNG.random(30), strict=True)
+    individuals = [
+        individual_of(point, value) for point, value in zip(RNG.random((30, 2)), RNG.random(30), strict=True)
     ]
     belief = Belief()
-    belief.learn(strings)
+    belief.learn(individuals)
     points = np.random.default_rng(1).random((600, 2))
     batch = Worth(belief, np.random.default_rng(0)).batch(points, 6)
     assert len({tuple(point) for point in batch}) == 6
@@ -141,10 +141,12 @@ def test_unknown_noise_is_not_zero():
     points = rng.random((60, 2))
     truth, values = bowl(points), bowl(points) + 0.1 * rng.standard_normal(60)
     belief = Belief()
-    belief.learn([string_of(point, value, std=np.nan) for point, value in zip(points, values, strict=True)])
+    belief.learn(
+        [individual_of(point, value, std=np.nan) for point, value in zip(points, values, strict=True)]
+    )
     assert not belief.exact
     assert np.mean((belief.means[:, 0] - truth) ** 2) < 0.5 * np.mean((values - truth) ** 2)
-    belief.learn([string_of(point, value) for point, value in zip(points, truth, strict=True)])
+    belief.learn([individual_of(point, value) for point, value in zip(points, truth, strict=True)])
     assert belief.exact
     assert belief.predict(points)[0][:, 0] == pytest.approx(belief.means[:, 0], abs=1e-3)
 
@@ -166,7 +168,7 @@ def test_a_subset_of_a_large_archive_is_not_biased_by_luck():
     belief = Belief()
     belief.learn(
         [
-            string_of(point, row.mean(), std=row.std(ddof=1), starts=2)
+            individual_of(point, row.mean(), std=row.std(ddof=1), starts=2)
             for point, row in zip(points, runs, strict=True)
         ]
     )
@@ -200,11 +202,11 @@ def test_the_luckiest_of_many_is_not_the_best():
         rng = np.random.default_rng(seed)
         points = rng.random((100, 2))
         runs = bowl(points)[:, None] + 0.5 * rng.standard_normal((100, 2))
-        strings = [
-            string_of(point, row.mean(), std=row.std(ddof=1), starts=2)
+        individuals = [
+            individual_of(point, row.mean(), std=row.std(ddof=1), starts=2)
             for point, row in zip(points, runs, strict=True)
         ]
-        (chosen,) = best(genome, strings, 1)
+        (chosen,) = best(genome, individuals, 1)
         lucky = points[np.argmin(runs.mean(axis=1))]
         regrets.append([bowl(np.array([list(chosen)]))[0], bowl(lucky[None])[0]])
     posterior, luck = np.mean(regrets, axis=0)

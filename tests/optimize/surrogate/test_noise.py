@@ -20,9 +20,9 @@ def designs(draw, number=400, starts=2, seed=1):
     made = []
     for _ in range(number):
         point = rng.random(2)
-        string = Individual(point)
-        string.know((FitnessEstimate.of(BOWL, (point**2).sum() + draw(rng, starts), False),))
-        made.append(string)
+        individual = Individual(point)
+        individual.know((FitnessEstimate.of(BOWL, (point**2).sum() + draw(rng, starts), False),))
+        made.append(individual)
     return made
 
 

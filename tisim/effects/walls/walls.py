@@ -146,13 +146,13 @@ class Walls(WallContacts, UsesMaterials, Force):
 
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
         values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
-        room = {"past": Plane.room(len(self.planes)) * values, "loads": 6}
+        slots = {"past": Plane.list_capacity(len(self.planes)) * values, "loads": 6}
         if self.touches_surfaces:
-            room["surface_past"] = CONTACTS * (3 + values)
+            slots["surface_past"] = CONTACTS * (3 + values)
         if self.touches_surfaces or self.motion.moves:
-            room["clear"] = 5
-        slots = (Field(f"{self.label}_{n}", "", 1, "keep", slots=size) for n, size in room.items() if size)
-        return *slots, Field(f"{self.label}_touched", "", 1, "keep", integer=True)
+            slots["clear"] = 5
+        fields = (Field(f"{self.label}_{n}", "", 1, "keep", slots=size) for n, size in slots.items() if size)
+        return *fields, Field(f"{self.label}_touched", "", 1, "keep", integer=True)
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         laws, begin = [], 0
