@@ -24,7 +24,7 @@ SCRIPTS = {
     for page in PAGES
     if "guides" not in page and page != "docs/tutorial.md"
 }
-"""The Python code of each page; test_contributing.py has files, test_guides.py guides and the tutorial."""
+"""The Python code of each page; test_contracts.py has files, test_guides.py guides and the tutorial."""
 PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": ["control="]}
 """Parts of their output."""
 

@@ -18,6 +18,11 @@ def run_tests(name):
 PARTS = {
     "pair": (["effect", "soft_law"], "return -self.strength(w)", "return self.strength(w)"),
     "external": (["effect", "own_spring", "--kind", "external"], "return -self", "return -2.0 * self"),
+    "contact_part": (
+        ["contact_part", "own_glue"],
+        "return self.coverage(w)",
+        "return 2.0 * self.coverage(w)",
+    ),
     "operator": (["operator", "condensing"], "** 3", "** 2"),
     "source": (["source", "sheared_flow"], "0.0, 0.0, rate]", "0.0, rate, 0.0]"),
     "stepper": (["stepper", "own_euler"], "+= dt / s.mass", "+= 0.9 * dt / s.mass"),
@@ -83,6 +88,10 @@ WRONG = [
     (["case", "json"], "name must be one that no other module has; received 'json'"),
     (["effect", "gravity"], "name must be one that no other part of scenes has; received 'gravity'"),
     (["stepper", "verlet"], "name must be one that no other part of scenes has; received 'verlet'"),
+    (
+        ["effect", "my_x_law"],
+        "name must be words of two letters or more, such as my_xlaw; received 'my_x_law'",
+    ),
     (["operator", "settled"], "settled.toml must be a new file; it already exists"),
     (["effect", "there"], "there.py must be a new file; it already exists"),
     (["effect", "tested"], "test_tested.py must be a new file; it already exists"),

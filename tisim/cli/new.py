@@ -17,6 +17,7 @@ TEMPLATES = Path(__file__).with_name("templates")
 SCENE_COMMAND = "tisim run {0}.toml --plugin {0}.py"
 USES = {
     "effect": SCENE_COMMAND,
+    "contact_part": SCENE_COMMAND,
     "operator": SCENE_COMMAND,
     "source": SCENE_COMMAND,
     "stepper": SCENE_COMMAND,
@@ -40,8 +41,9 @@ Kind = Annotated[
 def new(what: What, name: Name, kind: Kind = None) -> None:
     """Write NAME.py with a part of scenes, a case or an inverse problem that runs, and test_NAME.py.
 
-    For an effect, operator, source or stepper it also writes NAME.toml, a scene that uses it. Existing files
-    are not overwritten.
+    For an effect, contact_part, operator, source or stepper it also writes NAME.toml, a scene that uses it.
+    Existing files are not overwritten. NAME.py begins with a short contract: the names that such a file must
+    define, and those that it may define.
     """
     rule = f"one of {', '.join(USES)}"
     if what not in USES:
@@ -58,20 +60,28 @@ def new(what: What, name: Name, kind: Kind = None) -> None:
         if regular_file.exists(path):
             raise InputError(f"{path} must be a new file; it already exists")
     _check_name(what, name)
-    fields = {"name": name, "Class": "".join(word.capitalize() for word in name.split("_"))}
     for path, text in files.items():
-        _write(path, Template((TEMPLATES / text).read_text(encoding="utf-8")).substitute(fields))
+        _write(path, Template((TEMPLATES / text).read_text(encoding="utf-8")).substitute(fields_of(name)))
         print(path)
     print(f"to try it: {USES[what].format(name)}; python -m pytest test_{name}.py")
 
 
+def fields_of(name: str) -> dict[str, str]:
+    """Return the values of the fields of a template: the name of the file, and of the class in it."""
+    return {"name": name, "Class": "".join(word.capitalize() for word in name.split("_"))}
+
+
 def _check_name(what: str, name: str) -> None:
     """Raise InputError if the name is already that of a Python module or of a part of scenes."""
+    from tisim.components.component import snake_case
     from tisim.describe import reference
 
     must(find_spec(name) is None, "name", "one that no other module has", name)
     of_scene = USES[what] == SCENE_COMMAND
     must(not of_scene or name not in reference.names(), "name", "one that no other part of scenes has", name)
+    # Scenes find a part by its class, whose name must lead back to the name of the file.
+    found = snake_case(fields_of(name)["Class"])
+    must(not of_scene or found == name, "name", f"words of two letters or more, such as {found}", name)
 
 
 def _write(path: Path, text: str) -> None:

@@ -31,6 +31,11 @@ LISTED = "'tisim effects'"
 """The command that lists all parts of a scene by name."""
 
 
+def snake_case(name: str) -> str:
+    """Return the name of a class in files and messages."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
 def _encodable(text: str) -> str:
     if any("\ud800" <= character <= "\udfff" for character in text):
         raise PydanticCustomError("surrogate", "text that UTF-8 can hold")
@@ -75,7 +80,7 @@ class Checked(BaseModel):
     @classmethod
     def kind(cls) -> str:
         """Return the name of this class in files and messages: snake_case."""
-        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+        return snake_case(cls.__name__)
 
 
 class Component(Checked):

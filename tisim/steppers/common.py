@@ -90,6 +90,35 @@ class BeginStep(Phase):
         s.events[w] = 0
 
 
+class MoveParticles(PerParticle):
+    """This is the base of a phase that moves each particle once, from the beginning to the end of a step.
+
+    A subclass defines ``move``. After it, operators change the particle, and it is put into the domain. The
+    distance that it has moved and the growth of its radius are recorded for the pair lists. During the phase,
+    the time of the world is the beginning of the step.
+    """
+
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.domain, self.operators = context.domain, context.operators
+
+    @ti.func
+    def move(self, s, w, i, dt):
+        """Change position and velocity of particle i alone over dt (s)."""
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        dt, end = ti.cast(s.dt[w], s.real), s.time[w] + s.dt[w]
+        before, size = s.position[w, i], s.radius[w, i]
+        self.move(s, w, i, dt)
+        for operator in ti.static(self.operators):
+            operator.particle(s, w, i, end, dt)
+        path, grown = s.position[w, i] - before, ti.cast(s.radius[w, i] - size, ti.f64)
+        moved = ti.cast(path, ti.f64) - drift(s, self.domain, w, before) * s.dt[w]
+        apply_displacement(s, self.domain, w, i, s.position[w, i], moved, grown, end)
+
+
 class FirstStep(Phase):
     """This phase sets the length of the first step, if all steps have the same length."""
 
