@@ -55,15 +55,11 @@ LAW = Granular(
     normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
 )
 
-SEARCH_SETTINGS = {
-    "method": "cma-es", "generations": 14, "options": {"population": 8, "sigma": 0.2},
-    "ensemble": {"min_starts": 1, "select": 0, "confirm": 0},
-}  # fmt: skip
+SEARCH_SETTINGS = {"generations": 20, "max_evaluations": 120, "ensemble": {"confirm": 4}}
 SMALL_SEARCH_SETTINGS = {
-    **SEARCH_SETTINGS, "generations": 14,
     # One heap with so few grains determines its angle only to 2 degrees, and the best design over a few
     # heaps is partly best by chance: held-out starts decide.
-    "ensemble": {"min_starts": 4, "confirm": 12},
+    "generations": 60, "max_evaluations": 520, "ensemble": {"confirm": 12},
 }  # fmt: skip
 
 BED = "bed"

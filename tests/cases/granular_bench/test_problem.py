@@ -77,7 +77,7 @@ def test_other_measurements_are_another_problem(tmp_path):
     with pytest.raises(InputError, match="--measured must be given for a case that is calibrated; received"):
         every()["vibration"].inverse("default", None, tmp_path / "mine.csv")
     case = every()["granular_bench"]
-    assert case.sizes["default"].search["generations"] == 14
+    assert case.sizes["default"].search["max_evaluations"] == 120
     searched = [name for name, size in case.sizes.items() if size.search is not None]
     assert [*EXAMPLES] == searched
     assert all(example.keys() == SIMULATED.keys() for example in EXAMPLES.values())
