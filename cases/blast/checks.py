@@ -8,10 +8,36 @@ from tisim import Result, run
 from tisim.cases.blast.scene import AIR, ENERGY, FLUX, MASS, RADIUS, SPECIFIC_CHARGE, SPEED, scene
 from tisim.cases.blast.shape import ellipsoid, half_axes
 from tisim.cases.case import Check
+from tisim.steppers import IterationControl, Trapezoid
+
+PAPER_STEP = 1e-4
+"""Time step of explicit Euler in Z16 section 6.1, s."""
 
 
 def _speed(result: Result) -> float:
     return float(np.linalg.norm(result.state["velocity"], axis=1).mean())
+
+
+def growth(phi: float, dt: float, duration: float) -> float:
+    """Return the speed across the field at the end over the speed at the start, without drag, which is 1 in
+    the exact solution.
+
+    phi : weight of the end of a step; 0 for explicit Euler. dt : length of all steps, s. duration : s.
+    """
+    free = scene(number=50, duration=duration).without("chow_drag")
+    stepper = Trapezoid(phi=phi, control=IterationControl(first=dt, longest=dt))
+    result = run(free.model_copy(update={"stepper": stepper}))
+    start, end = (np.linalg.norm(state["velocity"][:, 1:]) for state in (result.start, result.state))
+    return float(end / start)
+
+
+def growth_by_euler(dt: float, duration: float) -> float:
+    """Return the same for explicit Euler in closed form.
+
+    The force is across the velocity, so each step of dt (s) multiplies the speed by sqrt(1 + (w dt)^2), w = q
+    B/m.
+    """
+    return float((1 + (SPECIFIC_CHARGE * FLUX * dt) ** 2) ** (duration / dt / 2))
 
 
 def check() -> Iterator[Check]:
@@ -45,3 +71,8 @@ def check() -> Iterator[Check]:
         "half axes with contact over without: deviation from 1", float(np.abs(minimal - 1).max()), 0.0, 1e-3
     )
     yield Check("final speed with field over without", float(speed.mean() / _speed(still)), 1.0, 1e-3)
+    euler, exact = growth(0.0, PAPER_STEP, 1.0), growth_by_euler(PAPER_STEP, 1.0)
+    yield Check(
+        "speed across the field by Z16's explicit Euler, 1e-4 s, after 1 s over start", euler, exact, 1e-9
+    )
+    yield Check("the same by the trapezoidal rule", growth(0.5, PAPER_STEP, 1.0), 1.0, 1e-9)

@@ -145,6 +145,19 @@ def test_only_suitable_steppers_are_tried():
     assert not tried(drift()) & {"Boris", *implicit}
 
 
+def test_explicit_euler_is_tried_if_particles_do_not_interact():
+    """Z16 uses it for such particles only."""
+    euler = "Trapezoid(phi=0.0), IterationControl: longest, tolerance"
+    alone = charged(accurate(1e-3), 1.0)
+    assert [s.scene.stepper.phi for s in methods_of(alone)[euler].settings] == [0.0] * len(LEVELS)
+    attracted = oscillator().model_copy(
+        update={"effects": (*oscillator().effects, NearField(alpha1=1.0, alpha2=2.0, beta2=3))}
+    )
+    assert euler in methods_of(oscillator())
+    assert euler.replace("0.0", "1.0") in methods_of(attracted)
+    assert euler not in methods_of(attracted)
+
+
 def test_settings_of_alternative_steppers_are_rounded():
     """Users paste them, and 1e3 times 0.0556 is 55.599999999999994."""
     for dt in (0.0556, 7.3e-11, 4.29e-13, 123.0):

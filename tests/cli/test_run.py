@@ -137,8 +137,9 @@ def test_without_removes_an_effect_from_scene_and_kernels(tisim, impacts, tmp_pa
     with h5py.File(tmp_path / "out/flow/result.h5") as file:
         assert "impacts" not in file["work"].attrs
     code, out, _ = tisim(
-        "explain", "agglomeration", "--size", "small", "--without", "fragmentation", "--without", "cooling"
-    )
+        "explain", "agglomeration", "--size", "small", "--without", "fragmentation", "--without", "cooling",
+        "--all",
+    )  # fmt: skip
     assert code == 0
     present, left_out = " ".join(out.split()).split("Effects left out")
     assert not any(word in present for word in ("fragmentation", "cooling", "pieces", "fracture_energy"))

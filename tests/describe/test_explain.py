@@ -1,7 +1,9 @@
 """The report of explain matches the compiled program: it lists all allocated memory and nothing else."""
 
 import io
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +19,9 @@ from tisim.backend import memory
 from tisim.backend.thread import in_taichi_thread
 from tisim.cases.agglomeration.scene import BEST
 from tisim.cases.agglomeration.scene import scene as agglomeration
+from tisim.cases.case import every
 from tisim.cases.vibration.scene import scene as vibration
-from tisim.describe.explain import brief, explain, known_effects, render
+from tisim.describe.explain import COST_OF_ABSENT, brief, explain, known_effects, render
 from tisim.describe.explained_parts import explained, explained_materials
 from tisim.effects import Granular, MindlinForce, RollingEPSD, Rotation, Walls
 from tisim.engine.allocation import Allocation
@@ -29,6 +32,7 @@ from tisim.population.spatial_sort import SORTED_FROM
 from tisim.steppers import Collocation, Trapezoid
 
 pytestmark = pytest.mark.long
+ROOT = Path(__file__).parents[2]
 
 
 def text(explanation):
@@ -115,16 +119,108 @@ def test_step_memory_equals_the_allocated_memory(kind):
         tree.destroy()
 
 
-def test_the_brief_form_fits_a_screen_and_counts_the_rest():
-    explanation = explain(agglomeration(BEST, 1, grains=60))
+LINES, COLUMNS = 45, 100
+"""Of a screen."""
+CHEAP = ("agglomeration", "blast", "capture", "vibration")
+"""Cases whose scenes are explained in a moment."""
+
+
+def short(explanation):
     stream = io.StringIO()
-    Console(file=stream, width=100).print(brief(explanation))
-    output = stream.getvalue()
+    Console(file=stream, width=COLUMNS).print(brief(explanation))
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in CHEAP else pytest.mark.slow) for name in sorted(every())]
+)
+def test_the_brief_form_of_every_case_fits_a_screen(name):
+    explanation = explain(every()[name].scene("default", 0))
+    lines = short(explanation).splitlines()
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= COLUMNS
+    starts = [line.split()[0] for line in lines if line.strip()]
+    assert {part.name for part in explanation.effects} <= set(starts)
+    # In one line: the next one has another subject.
+    assert starts[starts.index("Left") + 1] == "Cost"
+
+
+def test_the_brief_form_has_values_memory_and_a_number_of_absent_effects_by_family():
+    explanation = explain(agglomeration(BEST, 1, grains=60))
+    output = short(explanation)
     assert "hardness = 265480 Pa" in output
     assert "heat_capacity = 1796.3 J/(kg K)" in output
-    assert f"{len(explanation.absent_effects)} other effects of tisim" in output
-    assert "temperature" not in output.split("Not compiled")[1]
-    assert len(output.splitlines()) < 40 < len(text(explanation).splitlines())
+    rows = {line.split()[0]: line.split() for line in output.splitlines() if line.strip()}
+    # Softening needs the same temperature (8 bytes a grain), which is counted once.
+    assert rows["heating"][1:3] == ["480", "bytes"]
+    assert rows["softening"][1] == "activation_energy"
+    assert "convection" not in rows["cooling"]
+    assert "RebuildNearList* > ClearContacts > FindContacts > Rounds* >" in " ".join(output.split())
+    assert "SearchRows" not in output
+    assert "(0, 0, 0)" not in short(explain(vibration(sites=2)))
+    named = " ".join(output.split("Left out")[1].split("Cost")[0].split())
+    counted = {name: int(number) for name, number in (item.split() for item in named.split(", "))}
+    magnetic = [kind for kind in known_effects() if ".magnetic." in kind.__module__]
+    assert counted["magnetic"] == len([kind for kind in magnetic if "sources" not in kind.__module__])
+    assert sum(counted.values()) == len(explanation.absent_effects)
+    assert "surface_energy" not in counted
+    assert len(text(explanation).splitlines()) > 2 * LINES
+
+
+def test_the_memory_of_the_brief_form_adds_up():
+    explanation = explain(agglomeration(BEST, 1, grains=60))
+    units = {"bytes": 1, "kB": 1e3}
+    found = re.findall(r"([\d.]+)\s+(bytes|kB)\b", short(explanation))
+    total, *parts = [float(number) * units[unit] for number, unit in found]
+    assert total == pytest.approx(explanation.bytes, rel=5e-3)
+    assert len(parts) > 6
+    assert sum(parts) == pytest.approx(total, rel=1e-2)
+
+
+def test_a_law_is_shown_with_its_parts_and_long_values_are_cut():
+    law = Granular(tangential=MindlinForce(), rolling=RollingEPSD(damping_ratio=0.2))
+    walls = Walls(planes=[Plane(point=(0.1 * k, 0.0, 0.0)) for k in range(3)])
+    empty = explain(pair(SHELL))
+    rubber, steel = (Material(young=2e8 * k, poisson=0.3, friction=0.1 * k) for k in (1, 2))
+    table = {"rubber-steel": MaterialPair(friction=0.7)}
+    materials = tuple(explained_materials(Materials({"rubber": rubber, "steel": steel}, table)))
+    output = short(replace(empty, effects=(explained(law), explained(walls)), materials=materials))
+    assert "mindlin_force; rolling_epsd (damping_ratio = 0.2)" in " ".join(output.split())
+    assert "planes.0.point" in output
+    assert "planes.2.point" not in output
+    assert re.search(r"; \d more", output)
+    # The other properties of the pair follow from those of the materials.
+    rows = {line.split()[0]: line.split()[1:] for line in output.splitlines() if line.strip()}
+    assert rows["rubber-steel"] == ["friction", "=", "0.7"]
+    assert "rubber-rubber" not in rows
+
+
+def test_the_cost_of_absent_effects_is_the_same_in_the_program_and_in_the_documentation():
+    for page in ("README.md", "docs/index.md", "docs/performance.md"):
+        words = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+        assert COST_OF_ABSENT in words, page
+    record = (ROOT / "docs/measurements/compiling.md").read_text(encoding="utf-8")
+    assert COST_OF_ABSENT.replace("to", "..") in record
+    assert COST_OF_ABSENT in short(explain(pair(SHELL)))
+
+
+def test_the_bytes_of_effects_that_are_present_are_as_documented():
+    """The fields of the case agglomeration over those of its impacts and agglomeration alone."""
+    whole = agglomeration(BEST, 1, grains=60)
+    alone = whole.without(*(e.kind() for e in whole.effects if e.kind() not in ("impact", "agglomeration")))
+    sizes = []
+    for one in (whole, alone):
+        simulation = Simulation(one)
+        sizes.append(sum(simulation.s.bytes().values()) / 60)
+        simulation.s.read("count")
+        simulation.close()
+    ratio, (many, few) = f"{sizes[0] / sizes[1]:.2f} times", map(int, sizes)
+    readme, page = (
+        " ".join((ROOT / file).read_text(encoding="utf-8").split())
+        for file in ("README.md", "docs/agglomeration.md")
+    )
+    assert f"[{ratio} the bytes]" in readme
+    assert f"{ratio} the bytes, {many} instead of {few} per grain" in page
 
 
 def test_parameters_have_units_and_sources():

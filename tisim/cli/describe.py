@@ -31,7 +31,7 @@ VERDICTS = {True: Text("pass", "green"), False: Text("FAIL", "bold red"), None: 
 Everything = Annotated[
     bool,
     typer.Option(
-        "--all", help="Also show memory, the phases of a step, sources and the parts that are not compiled."
+        "--all", help="Also show each field, each phase of a step, sources and the effects left out."
     ),
 ]
 
@@ -60,7 +60,7 @@ def explain(
     size: Size = None, device: Device = "cpu", precision: Precision = "f64", plugins: Plugins = None,
     everything: Everything = False, variant: SceneVariant = None,
 ) -> None:  # fmt: skip
-    """Describe a scene: its effects, materials, stepper and critical time steps, and the size of the rest."""
+    """Describe a scene: its effects with values and memory, its stepper and steps, and what is left out."""
     from tisim.describe.explain import brief, explain, render
 
     runtime.init(device, precision)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,10 @@ Row = tuple[str, str, str, str]
 """Name, value, unit and text of a number."""
 ROWS_SHOWN = 3
 """Number of rows of a list that are shown."""
+GIVEN = "given for the pair"
+"""Text of a contact property that the scene gives for a pair of materials."""
+SWITCHED_OFF = re.compile(r"none|false|0|\(0(, 0)*\)|0 in all")
+"""Values that leave something out."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +28,7 @@ class Part:
     name : name in files. summary : one line. source : origin of the law.
     parameters : name, value, unit and text of each.
     parts : nested parts, such as the parts of a granular law.
+    off : names of the parameters that are zero, false or none by default and in the scene.
     """
 
     name: str
@@ -30,6 +36,7 @@ class Part:
     source: str
     parameters: tuple[Row, ...]
     parts: tuple[Part, ...] = ()
+    off: frozenset[str] = frozenset()
 
     def all(self) -> Iterator[Part]:
         """Yield the part and all nested parts."""
@@ -52,12 +59,22 @@ def explained(spec: Component, name: str = "") -> Part:
     shown = f"{label}: {spec.kind()}" if name else label
     remarks = ((name, value, "", "") for name, value in spec.remarks().items())
     rows = (*_values(spec), *remarks)
-    return replace(explained_kind(type(spec)), name=shown, parameters=rows, parts=made_of)
+    kind, off = explained_kind(type(spec)), frozenset(_off(spec))
+    return replace(kind, name=shown, parameters=rows, parts=made_of, off=off)
 
 
 def explained_kind(kind: type[Component]) -> Part:
     """Return the description of a kind of part, without values."""
     return Part(kind.kind(), docstrings.summary(kind), docstrings.source(kind), ())
+
+
+def _off(spec: Component) -> Iterator[str]:
+    """Yield the names of the parameters that are zero, false, none or empty by default and in the scene."""
+    for name, info in type(spec).model_fields.items():
+        value = reference.shown(getattr(spec, name))
+        default = "" if info.is_required() else reference.shown(info.get_default(call_default_factory=True))
+        if value == default and SWITCHED_OFF.fullmatch(value):
+            yield name
 
 
 def _values(spec: Component, within: str = "") -> Iterator[Row]:
@@ -111,7 +128,7 @@ def _mixed(pair: Touching) -> Iterator[Row]:
 def _origin(pair: Touching, name: str) -> str:
     """Return the origin of a property of a pair."""
     if pair.given is not None and getattr(pair.given, name) is not None:
-        return "given for the pair"
+        return GIVEN
     if getattr(pair.first, name) == getattr(pair.second, name):
         return "the same for both"
     return "harmonic mean" if name in HARMONIC else "geometric mean"

@@ -78,6 +78,10 @@ class Program(ABC):
         phase."""
         return [phase.name + "*" * depth for phase, depth in nested(self.items)]
 
+    def outline(self) -> list[str]:
+        """Return the names of the items of a step, in order; a repeat is one item, with a star."""
+        return [f"{type(item).__name__}*" if isinstance(item, Repeat) else item.name for item in self.items]
+
 
 OVER = 2**30
 """The route at the end of a step."""

@@ -1,13 +1,17 @@
 """The case of Z16: numbers of its start, and the effect of the field on a small ball of particles."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tests.scenes import simulate
+from tisim.cases.blast.checks import PAPER_STEP, growth, growth_by_euler
 from tisim.cases.blast.scene import ENERGY, FLUX, NEIGHBOURS, NUMBER, SPECIFIC_CHARGE, SPEED, scene
 from tisim.cases.blast.shape import contacts, half_axes
 
 SMALL = 200
+PAGE = Path(__file__).parents[3] / "docs" / "blast.md"
 
 
 def test_start_has_the_speed_and_the_energy_of_the_paper():
@@ -34,6 +38,20 @@ def test_the_field_makes_an_ellipsoid_of_the_sphere():
     across = np.linalg.norm((field.state["position"] - field.start["position"])[:, 1:], axis=1)
     rate = SPECIFIC_CHARGE * FLUX
     assert across.max() == pytest.approx(2 * SPEED / rate * abs(np.sin(rate * 0.3 / 2)), rel=2e-3)
+
+
+@pytest.mark.long
+def test_explicit_euler_speeds_particles_up_by_its_closed_form():
+    """Z16 (6.1) with dt = 1e-4 s, whose error the paper calls negligible; no force does work on a
+    particle."""
+    assert growth(0.0, PAPER_STEP, 1.0) == pytest.approx(growth_by_euler(PAPER_STEP, 1.0), rel=1e-11)
+    assert growth(0.5, PAPER_STEP, 1.0) == pytest.approx(1.0, abs=1e-11)
+
+
+def test_the_page_has_the_growth_by_explicit_euler():
+    page = PAGE.read_text(encoding="utf-8")
+    for dt in (PAPER_STEP, PAPER_STEP / 10):
+        assert f"{growth_by_euler(dt, 1.0):.4f}" in page
 
 
 @pytest.mark.slow

@@ -99,9 +99,11 @@ class Trapezoid(Stepper):
         limits = {"first": dt, "longest": dt, "shortest": min(1e-12, three_digits(1e-3 * dt))}
         papers = IterationControl(tolerance=1e-6, **limits)
         own = ErrorControl(error=1e-4, tolerance=1e-5, **{**limits, "longest": three_digits(1e3 * dt)})
-        pair_forces = any(isinstance(effect, PairForce) for effect in effects)
-        accelerated = (cls(control=own, acceleration="anderson"),) if pair_forces else ()
-        return (cls(control=own), *accelerated, cls(control=papers), cls(phi=1.0, control=papers))
+        tried = (cls(control=papers), cls(phi=1.0, control=papers))
+        if any(isinstance(effect, PairForce) for effect in effects):
+            return (cls(control=own), cls(control=own, acceleration="anderson"), *tried)
+        # Particles that do not interact are stepped by explicit Euler in Z16 (6.1).
+        return (cls(control=own), *tried, cls(phi=0.0, control=papers))
 
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"] / (particles if independent else 1)
