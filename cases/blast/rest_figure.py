@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,7 +26,8 @@ W_TAU = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 """The values of w tau of the clouds at rest."""
 SPIRALS = (0.5, 1.0, 2.0, 4.0)
 """The values of w tau of the paths that are drawn."""
-RUN, EXACT = "o", {"ls": ":", "color": "k", "lw": 1.3}
+RUN = "o"
+EXACT: dict[str, Any] = {"ls": ":", "color": "k", "lw": 1.3}
 """The marker of runs, and the line of closed forms."""
 
 
