@@ -21,11 +21,13 @@ GENES = (
     Gene("friction", "", 0.01, 0.1),
     Gene("temperature", "K", 1e2, 1e3),
     Gene("activation_energy", "J/mol", 1e2, 1e3),
+    # The lower end cannot be read in the copy at hand; 1e6 is ours. The upper end is one of FACTORS.
     Gene("reaction", "J/m^2", 1e6, 1e7),
 )
-"""The search ranges of Z04 section 8."""
+"""The search ranges of Z04 section 7, with ends of our choice if they cannot be read in the copy at hand."""
 
-# As printed. No grain breaks anywhere in this range.
+# The upper end is as printed. The lower end cannot be read in the copy at hand; 1e6 is ours. No grain breaks
+# anywhere in this range.
 UNBREAKABLE = Gene("surface_energy", "J/m^2", 1e6, 1e16, "log")
 VARIANTS = {
     "paper": (UNBREAKABLE,),

@@ -12,7 +12,7 @@ CASE = Case(
     check=Late("tisim.cases.blast.checks", "check"),
     quantities=Late("tisim.cases.blast.shape", "quantities"),
     problem=Late("tisim.cases.blast.problem", "problem"),
-    variants=("ellipsoid",),
+    variants=("ellipsoid", "rest"),
     pictures=Late("tisim.cases.blast.figures", "pictures"),
     figures=Late("tisim.cases.blast.figures", "figures"),
 )

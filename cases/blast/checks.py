@@ -5,13 +5,43 @@ from collections.abc import Iterator
 import numpy as np
 
 from tisim import Result, run
-from tisim.cases.blast.scene import AIR, ENERGY, FLUX, MASS, RADIUS, SPECIFIC_CHARGE, SPEED, scene
-from tisim.cases.blast.shape import ellipsoid, half_axes
+from tisim.cases.blast.closed_forms import (
+    chow_distance,
+    displacement,
+    distance_after,
+    drag_rate,
+    parity_flux,
+    stokes_to_quadratic,
+)
+from tisim.cases.blast.scene import (
+    AIR,
+    DENSITY,
+    ENERGY,
+    FLUX,
+    MIXED_FLUX,
+    RADIUS,
+    REST_FLUX,
+    SIZES,
+    SPECIFIC_CHARGE,
+    SPEED,
+    TAU,
+    VISCOSITY,
+    rays,
+    resting_rays,
+    scene,
+)
+from tisim.cases.blast.shape import AGES, ellipsoid, half_axes
 from tisim.cases.case import Check
-from tisim.steppers import IterationControl, Trapezoid
+from tisim.cases.common.runs import sound
+from tisim.effects import ChowDrag, ConstantDrag
+from tisim.steppers import ErrorControl, IterationControl, Trapezoid
 
 PAPER_STEP = 1e-4
 """Time step of explicit Euler in Z16 section 6.1, s."""
+COEFFICIENT = 0.5
+"""The constant drag coefficient that Z16 4.2 compares with Chow's."""
+AFTERWARDS = 3e6
+"""A time after which Chow's drag has stopped the particles, s: 14 relaxation times in air."""
 
 
 def _speed(result: Result) -> float:
@@ -40,11 +70,81 @@ def growth_by_euler(dt: float, duration: float) -> float:
     return float((1 + (SPECIFIC_CHARGE * FLUX * dt) ** 2) ** (duration / dt / 2))
 
 
+def blast_radii() -> tuple[float, float]:
+    """Return the distances (m) of a particle after AFTERWARDS with Chow's drag and with a constant C_D."""
+    control = ErrorControl(error=1e-6, tolerance=1e-8, first=1.0, longest=1e5)
+    laws = (ChowDrag(density=AIR, viscosity=VISCOSITY), ConstantDrag(density=AIR, coefficient=COEFFICIENT))
+    scenes = [rays([(1, 0, 0)], (law,), AFTERWARDS, Trapezoid(control=control)) for law in laws]
+    chow, constant = (float(sound([run(one)])[0].state["position"][0, 0]) for one in scenes)
+    return chow, constant
+
+
+def turns(result: Result) -> np.ndarray:
+    """Return the angle by which each velocity has turned about x, radians, anticlockwise seen from +x."""
+    (before, after) = (v[:, 1] + 1j * v[:, 2] for v in (result.start["velocity"], result.state["velocity"]))
+    return np.angle(after * before.conj())
+
+
+def miss(result: Result) -> float:
+    """Return the largest distance of rays with Stokes drag from their closed form, over v tau."""
+    v = result.start["velocity"]
+    along, across = (displacement(result.time, 1.0, TAU, w) for w in (0.0, SPECIFIC_CHARGE * REST_FLUX))
+    exact = (v[:, 1] + 1j * v[:, 2]) * across
+    off = result.state["position"] - np.column_stack([v[:, 0] * along.real, exact.real, exact.imag])
+    return float(np.linalg.norm(off, axis=1).max() / (SPEED * TAU))
+
+
 def check() -> Iterator[Check]:
-    """Yield the checks of numbers of Z16, of the initial energy, and of the field's effect on the cloud."""
-    drag = 0.5 * AIR * 1.0 * SPEED * np.pi * RADIUS**2
-    ratio = SPECIFIC_CHARGE * MASS * FLUX / drag
-    yield Check("magnetic force over drag, C_D = 1 (printed: 56504.7)", float(ratio), 46126.3, 0.1)
+    """Yield the checks of numbers of Z16, of the initial energy, of the field's effect on the cloud, and of
+    its rest."""
+    yield from drags()
+    yield from circles()
+    (mixed,) = sound([run(scene(number=500, **SIZES["mixed"].scene))])
+    angle = SPECIFIC_CHARGE * MIXED_FLUX * mixed.time
+    for sign, sense in ((1, "clockwise"), (-1, "anticlockwise")):
+        turned = -sign * turns(mixed)[np.sign(mixed.start["charge"]) == sign]
+        name = f"mixed charges, sign {sign:+d}: largest deviation of a turn {sense} from w t, radians"
+        yield Check(name, float(np.abs(turned - angle).max()), 0.0, 2e-4)
+    yield from rest()
+
+
+def drags() -> Iterator[Check]:
+    """Yield the ratios of forces of Z16, and the blast radius with Chow's drag."""
+    rate = drag_rate(1.0, AIR, DENSITY, RADIUS)
+    ratio = FLUX / float(parity_flux(rate, SPEED, SPECIFIC_CHARGE))
+    yield Check("magnetic force over drag, C_D = 1 (printed: 56504.7)", ratio, 46126.3, 0.1)
+    ratio = float(stokes_to_quadratic(VISCOSITY, AIR, COEFFICIENT, 1.0, 1.0))
+    yield Check(
+        "Stokes drag over drag of C_D = 0.5, times R v, m^2/s (printed: 0.0004)", ratio, 3.527e-4, 1e-7
+    )
+    (chow, constant), rate = blast_radii(), drag_rate(COEFFICIENT, AIR, DENSITY, RADIUS)
+    exact = float(chow_distance(SPEED, AIR, VISCOSITY, DENSITY, RADIUS))
+    yield Check("distance to rest with Chow's drag over closed form", chow / exact, 1.0, 1e-4)
+    exact /= float(distance_after(AFTERWARDS, SPEED, rate))
+    name = "blast radius with Chow's drag over C_D = 0.5, 3e6 s (Z16 4.2: larger)"
+    yield Check(name, chow / constant, exact, 1e-4)
+
+
+def rest() -> Iterator[Check]:
+    """Yield the deviations of particles and of the cloud with Stokes drag from their closed forms."""
+    for time in (TAU, AGES * TAU):
+        (rested,) = sound([run(resting_rays(time))])
+        yield Check(
+            f"Stokes drag and field, {time:g} s: largest error of a place over v tau",
+            miss(rested),
+            0.0,
+            1e-11,
+        )
+    (cloud,) = sound([run(scene(**SIZES["rest"].scene))])
+    start, w = float(half_axes(cloud.start).mean()), np.array([REST_FLUX, 0.0, 0.0])
+    exact = np.sqrt(5 * np.diag(ellipsoid(w, cloud.time, start, TAU)))
+    off = float(np.abs(half_axes(cloud.state) / exact - 1).max())
+    yield Check("half axes at rest over closed form: largest deviation from 1", off, 0.0, 2e-2)
+    yield Check("speed at rest over speed at the start", _speed(cloud) / SPEED, np.exp(-10.0), 1e-6)
+
+
+def circles() -> Iterator[Check]:
+    """Yield the initial energy, and the shapes of the cloud with and without the field."""
     duration = 0.52
     still, field = (run(scene(flux, duration=duration)) for flux in (0.0, FLUX))
     kinetic = 0.5 * float((field.start["mass"] * (field.start["velocity"] ** 2).sum(axis=1)).sum())

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from tisim import Recording, run
 from tisim.cases.blast import scene as blast
+from tisim.cases.blast.rest_figure import growth, rest_figure, rest_table, rested
 from tisim.cases.blast.shape import contacts, extents, half_axes
 from tisim.cases.case import size_named
 from tisim.cases.common.csv_tables import csv_text
@@ -172,23 +173,30 @@ def envelope(history: BlastHistory) -> Figure:
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """blast.png, blast.csv: comparison of the runs of Z16, with 500 particles for the size small and
-    otherwise 2000."""
+    """blast.png, blast.csv: comparison of the runs of Z16. rest.png, rest.csv: the blast at rest. With 500
+    particles for the size small, and otherwise 2000."""
     number = int(size_named(size, blast.SIZES).scene.get("number", blast.NUMBER))
-    histories, ends = {}, {}
+    histories, ends, parts = {}, {}, len(RUNS) + 2
     for finished, name in enumerate(RUNS):
         settings = {**size_named(name, blast.SIZES).scene, "number": number}
         with TemporaryDirectory() as folder:
             path = Path(folder) / "trajectory.h5"
             result = run(
                 blast.scene(**settings),
-                progress_of_part(progress, finished, len(RUNS)),
+                progress_of_part(progress, finished, parts),
                 Recording(path, frames=50),
             )
             sound([result])
             with frames(path) as trajectory:
                 histories[name], ends[name] = BlastHistory.of(trajectory), trajectory[-1]
-    return {"blast.png": beside(histories, ends), "blast.csv": table(histories)}
+    cloud = growth(number, progress_of_part(progress, len(RUNS), parts))
+    clouds = rested(number, progress_of_part(progress, len(RUNS) + 1, parts))
+    return {
+        "blast.png": beside(histories, ends),
+        "blast.csv": table(histories),
+        "rest.png": rest_figure(cloud, clouds),
+        "rest.csv": rest_table(clouds),
+    }
 
 
 def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> Figure:

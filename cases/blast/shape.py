@@ -8,18 +8,23 @@ all directions,
     <(r_k + d_k)^2> = (<r^2> + 2 <r> d cos(psi) + d^2)/3,
 
 d = v t along the field, at psi = 0, and d = (2 v/w) |sin(w t/2)| across it, turned by psi = w t/2, w = q B/m.
-Drag reduces the speed by 1 part in 1000 in the second that Z16 shows.
+Drag reduces the speed by 1 part in 1000 in the second that Z16 shows. With Stokes drag, the same holds with
+the displacements d of ``closed_forms.displacement``, and the ellipsoid comes to rest.
 """
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tisim import Result, Scene
-from tisim.accuracy import Quantity
-from tisim.accuracy.quantity import displacement
+from tisim.accuracy import Quantity, quantity
+from tisim.cases.blast.closed_forms import displacement
 from tisim.cases.blast.scene import SPECIFIC_CHARGE, SPEED
 from tisim.effects import PairForce
+from tisim.errors import must
 from tisim.scene.initial_state import Arrays
+
+AGES = 40.0
+"""A time over the relaxation time after which particles are at rest, to rounding."""
 
 
 def moments(state: Arrays) -> np.ndarray:
@@ -40,22 +45,45 @@ def ball(tensor: np.ndarray) -> float:
     return float(np.sqrt(5 / 3 * np.trace(tensor)))
 
 
-def ellipsoid(flux: np.ndarray, time: float, start: float) -> np.ndarray:
+def ellipsoid(flux: np.ndarray, time: float, start: float, tau: float = np.inf) -> np.ndarray:
     """Return second moments in closed form, m^2, shape (3, 3): a ball of half axis start, m, in a field, T,
-    (3,)."""
+    (3,). tau : relaxation time of Stokes drag, s."""
     strength = float(np.linalg.norm(flux))
-    along, across = extents(SPECIFIC_CHARGE * strength, time, start)
+    along, across = extents(SPECIFIC_CHARGE * strength, time, start, tau)
     n = flux / strength if strength > 0 else np.array([1.0, 0.0, 0.0])
     return across * np.eye(3) + (along - across) * np.outer(n, n)
 
 
-def extents(w: float, time: np.ndarray | float, start: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return second moments along and across the field, m^2, for a uniformly filled ball."""
+def extents(
+    w: np.ndarray | float, time: np.ndarray | float, start: float, tau: np.ndarray | float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return second moments along and across the field, m^2, for a uniformly filled ball of half axis start,
+    m. tau : relaxation time of Stokes drag, s."""
     square, mean = 3 / 5 * start**2, 3 / 4 * start
-    straight, half = SPEED * np.asarray(time, float), w * np.asarray(time, float) / 2
-    chord = straight * np.sinc(half / np.pi)
-    along = (square + 2 * mean * straight + straight**2) / 3
-    return along, (square + 2 * mean * chord * np.cos(half) + chord**2) / 3
+    along, across = (displacement(time, SPEED, tau, rate) for rate in (0.0, w))
+    first, second = ((square + 2 * mean * d.real + np.abs(d) ** 2) / 3 for d in (along, across))
+    return first, second
+
+
+def at_rest(flux: np.ndarray, tau: float, start: float) -> np.ndarray:
+    """Return second moments of the cloud at rest, m^2, shape (3, 3): ``ellipsoid`` after a long time."""
+    return ellipsoid(flux, AGES * tau, start, tau)
+
+
+def strength_and_tau(along: float, across: float, start: float) -> tuple[float, float]:
+    """Return the flux density (T) and relaxation time (s) that give half axes (m) along and across the field
+    at rest.
+
+        1 + (w tau)^2 = (along^2 - start^2)/(across^2 - start^2),
+        (v tau)^2 + 3/2 start (v tau) = 3/5 (along^2 - start^2)
+
+    with v the speed and w = q B/m: the solution of ``at_rest``. start : half axis of the ball, m.
+    """
+    must(start < across <= along, "half axes", f"{start:g} < across <= along", (along, across))
+    grown = along**2 - start**2
+    tau = (np.sqrt((3 / 4 * start) ** 2 + 3 / 5 * grown) - 3 / 4 * start) / SPEED
+    w = np.sqrt(grown / (across**2 - start**2) - 1) / tau
+    return float(w / SPECIFIC_CHARGE), float(tau)
 
 
 def contacts(state: Arrays) -> int:
@@ -81,4 +109,4 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     touch, because their paths are then chaotic."""
     if any(isinstance(effect, PairForce) for effect in scene.effects):
         return (Quantity("half-axes of the cloud", of_the_end, random=True),)
-    return (Quantity("positions", displacement, returns=True),)
+    return (Quantity("positions", quantity.displacement, returns=True),)

@@ -1,6 +1,6 @@
 """Figures of the case vibration: figures of one run, and of many runs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +18,7 @@ from tisim.cases.vibration.response import (
     Sweep,
     beats,
     fast_scenes,
+    recorded,
     slow_scenes,
 )
 from tisim.engine.batches import Progress, progress_of_part
@@ -26,9 +27,17 @@ from tisim.plotting.style import empty, legend_above, letters, plain, quantity
 
 MIN_SPECTRUM_FRAMES = 9
 """Least number of frames for a spectrum."""
+HISTORY_FRAMES = 500
+"""Number of frames of each of the eight histories in 0.1 s: 18 in the shortest period of the drive."""
 FLOOR = 1e-4
 """Lower end of the drawn spectrum, as a fraction of its highest line; the side lobes of the window are below
 it."""
+PUBLISHED = {
+    "w": vibration.CYCLOTRON,
+    "k_m": vibration.STIFFNESS / vibration.MASS,
+    "push": vibration.CHARGE * vibration.FIELD / vibration.MASS,
+}
+"""Parameters of ``response`` for the particles of Z13, 1/s, 1/s^2 and m/s^2."""
 RUN_COLOUR, EXACT_COLOUR, MARK_COLOUR, OTHER_COLOUR = "#4477aa", "0.25", "#cc6677", "#228833"
 
 
@@ -85,7 +94,7 @@ def spectrum(axis: Axes, history: CentreOfGravityHistory, parameters: Mapping[st
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """resonance.png, resonance.csv: the resonance curve and beats; circles show arrays with the near field of
-    the size."""
+    the size. histories.png, histories.csv: the eight histories of Z13 Fig. 3 with this near field."""
     settings = size_named(size, vibration.SIZES).scene
     near = str(settings.get("near_field", "printed"))
     ratios = np.linspace(0.04, 2.0, 99)
@@ -95,16 +104,60 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
         slow_scenes(np.linspace(0.05, 1.0, 96)),
         fast_scenes(vibration.RATIOS, near, sites=3),
     )
+    parts = len(lots) + 1
     fast, slow, arrays = (
-        Sweep.of(scenes, progress_of_part(progress, finished, len(lots)))
-        for finished, scenes in enumerate(lots)
+        Sweep.of(scenes, progress_of_part(progress, finished, parts)) for finished, scenes in enumerate(lots)
     )
+    eight = recorded(lots[-1], HISTORY_FRAMES, progress_of_part(progress, len(lots), parts))
     return {
         "resonance.png": resonance_figure(slow, fast, arrays, near, beats()),
         "resonance.csv": table(
             ("one particle", slow), ("one particle", fast), (f"27, near field {near}", arrays)
         ),
+        "histories.png": histories_figure(eight),
+        "histories.csv": histories_table(eight),
     }
+
+
+def exact_histories(histories: Sequence[CentreOfGravityHistory]) -> list[np.ndarray]:
+    """Return the closed forms of the histories of Z13 Fig. 3, x + i y, m."""
+    return [
+        response(history.time, omega=ratio * vibration.CYCLOTRON, **PUBLISHED)
+        for ratio, history in zip(vibration.RATIOS, histories, strict=True)
+    ]
+
+
+def histories_figure(histories: Sequence[CentreOfGravityHistory]) -> Figure:
+    """Draw the displacement of the centre of gravity over time for the eight drives of Z13 Fig. 3, with its
+    closed form."""
+    figure = empty(10.4, 10.4)
+    axes = figure.subplots(4, 2, sharex=True)
+    exact = exact_histories(histories)
+    for axis, ratio, history, true in zip(axes.flat, vibration.RATIOS, histories, exact, strict=True):
+        for part, name, colour in ((np.real, "x", RUN_COLOUR), (np.imag, "y", MARK_COLOUR)):
+            axis.plot(1e3 * history.time, part(history.place), color=colour, lw=1.4, label=f"{name}, as run")
+            label = "closed form" if name == "y" else None
+            axis.plot(1e3 * history.time, part(true), ":", color="k", lw=1.0, label=label)
+        quantity(axis.yaxis, "displacement", "m")
+        axis.set_title(rf"$\Omega$ = {ratio:g} $\omega$")
+        axis.set_xlim(0.0, 1e3 * history.time[-1])
+        plain(axis)
+    for axis in axes[-1]:
+        axis.set_xlabel("time (ms)")
+    legend_above(axes[0, 1])
+    letters(axes.flat)
+    return figure
+
+
+def histories_table(histories: Sequence[CentreOfGravityHistory]) -> str:
+    """Return the largest displacement in each history, and its largest distance from the closed form, as
+    CSV."""
+    rows: list[list[object]] = [["omega_over_w", "peak_m", "largest_distance_from_closed_form_m"]]
+    exact = exact_histories(histories)
+    for ratio, history, true in zip(vibration.RATIOS, histories, exact, strict=True):
+        off = float(np.abs(history.place - true).max())
+        rows.append([ratio, float(np.abs(history.place).max()), off])
+    return csv_text(rows)
 
 
 def table(*sweeps: tuple[str, Sweep]) -> str:
@@ -124,8 +177,6 @@ def resonance_figure(
     """Draw resonance curves around both resonances, beats with their closed form, and their spectrum."""
     figure = empty(10.4, 8.4)
     (left, right), (below, lines) = figure.subplots(2, 2)
-    parameters = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
-             "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
     for axis, sweep, at, name in ((left, slow, SLOW, "slow"), (right, fast, FAST, "fast")):
         axis.semilogy(sweep.omega, sweep.exact, color=EXACT_COLOUR, lw=1.0, label="closed form")
         axis.semilogy(sweep.omega, sweep.peaks, ".", color=RUN_COLOUR, ms=5, label="one particle, as run")
@@ -151,7 +202,7 @@ def resonance_figure(
     below.set_ylabel("speed (m/s)")
     below.set_xlabel("time (ms)")
     plain(below)
-    spectrum(lines, history, {**parameters, "omega": BEAT_DRIVE * FAST})
+    spectrum(lines, history, {**PUBLISHED, "omega": BEAT_DRIVE * FAST})
     lines.set_title("spectrum of the displacement")
     letters((left, right, below, lines))
     return figure

@@ -165,13 +165,18 @@ def beats(periods: float = 6.0, frames_a_period: int = 20) -> CentreOfGravityHis
     duration = periods * 2 * np.pi / (FAST * (1 - BEAT_DRIVE))
     driven = vibration.scene(BEAT_DRIVE * FAST / CYCLOTRON, "none", duration, sites=1, observed=True)
     count = int(frames_a_period * duration * FAST / (2 * np.pi))
-    return recorded(driven, count)
+    return recorded([driven], count)[0]
 
 
-def recorded(scene: Scene, count: int) -> CentreOfGravityHistory:
-    """Run a scene, and return its history from ``count`` frames."""
+def recorded(
+    scenes: Sequence[Scene], count: int, progress: Progress | None = None
+) -> list[CentreOfGravityHistory]:
+    """Run scenes as one batch, and return their histories from ``count`` frames each."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "trajectory.h5"
-        run(scene, record=Recording(path, frames=count))
-        with frames(path) as trajectory:
-            return CentreOfGravityHistory.of(trajectory)
+        sound(run(list(scenes), progress, Recording(path, frames=count)))
+        histories = []
+        for world in range(len(scenes)):
+            with frames(path, world) as trajectory:
+                histories.append(CentreOfGravityHistory.of(trajectory))
+        return histories

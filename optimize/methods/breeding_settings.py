@@ -16,7 +16,10 @@ _WHOLE = TypeAdapter(int)
 
 
 class Breeding(Checked):
-    """Composition of a generation. Defaults are Z04 section 8.
+    """Composition of a generation. Defaults are Z04 section 8, except for recentre_factor.
+
+    Z04 restricts and rescales the search box around the best design, but does not say by how much; its factor
+    of 0.5 is chosen here.
 
     If only some of population, parents and offspring are given, the others follow in the proportions of Z04
     (20, 6 and 6).

@@ -3,11 +3,34 @@
 import numpy as np
 import pytest
 
+import tisim
 from tisim import InputError, Result, Status
 from tisim.cases.blast import CASE
 from tisim.cases.blast import scene as blast
-from tisim.cases.blast.problem import DURATION, TARGET_FLUX, details, field, misfit, problem, start
-from tisim.cases.blast.shape import ball, contacts, ellipsoid, extents, moments, principal_half_axes
+from tisim.cases.blast.closed_forms import relaxation_time
+from tisim.cases.blast.problem import (
+    DURATION,
+    REST_GENES,
+    REST_TARGET,
+    TARGET_FLUX,
+    details,
+    field,
+    fluid,
+    misfit,
+    problem,
+    rest_target,
+    start,
+)
+from tisim.cases.blast.shape import (
+    at_rest,
+    ball,
+    contacts,
+    ellipsoid,
+    extents,
+    moments,
+    principal_half_axes,
+    strength_and_tau,
+)
 from tisim.optimize.evaluation.evaluator import BatchEvaluator
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
@@ -80,8 +103,69 @@ def test_details_list_the_target_and_the_result(rng):
         )
 
 
-def test_no_other_variant_than_the_ellipsoid():
-    with pytest.raises(InputError, match="variant must be one of ellipsoid; received 'torus'"):
+def damped(r, n, flux, t, tau):
+    """Positions with Stokes drag, by integrating the rotated and decaying velocity over the time."""
+    times = (np.arange(4000) + 0.5) * t / 4000
+    w, v = blast.SPECIFIC_CHARGE * np.linalg.norm(flux), blast.SPEED * n
+    b = flux / np.linalg.norm(flux)
+    along = (v @ b)[:, None] * b
+    left, cosine, sine = (
+        (np.exp(-times / tau) * f).mean() * t for f in (1.0, np.cos(w * times), np.sin(w * times))
+    )
+    return r + left * along + cosine * (v - along) + sine * np.cross(v - along, b)
+
+
+@pytest.mark.parametrize("t", [0.5, 30.0])
+def test_ellipsoid_agrees_with_particles_that_come_to_rest(rng, t):
+    r, n = shell(rng)
+    flux = field(REST_TARGET)
+    state = {"position": damped(r, n, flux, t, 0.8), "mass": np.ones(len(r))}
+    assert misfit(moments(state), ellipsoid(flux, t, 1.0, 0.8)) < 5e-3
+    if t > 10:
+        np.testing.assert_allclose(ellipsoid(flux, t, 1.0, 0.8), at_rest(flux, 0.8, 1.0), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("strength", "tau"), [(0.02, 0.3), (0.187, 1.0), (0.5, 2.0)])
+def test_half_axes_at_rest_give_field_and_fluid(strength, tau):
+    tensor = at_rest(np.array([0.0, strength, 0.0]), tau, 0.6)
+    along, across, _ = principal_half_axes(tensor)
+    np.testing.assert_allclose(strength_and_tau(along, across, 0.6), (strength, tau), rtol=1e-9)
+    with pytest.raises(InputError, match=r"half axes must be 0\.6 < across <= along"):
+        strength_and_tau(1.0, 0.5, 0.6)
+
+
+def test_details_of_the_ellipsoid_at_rest_give_the_known_design():
+    values = fluid({"viscosity": 2.0}, rest_target(0.6), 0.6)
+    assert values["viscosity, Pa s"] == 2.0
+    assert values["viscosity wanted, Pa s"] == pytest.approx(REST_TARGET["viscosity"], rel=1e-9)
+    flux = np.linalg.norm(field(REST_TARGET))
+    assert values["strength of the field wanted, T"] == pytest.approx(flux, rel=1e-9)
+    genes = {gene.name: gene for gene in REST_GENES}
+    assert all(genes[name].low < value < genes[name].high for name, value in REST_TARGET.items())
+    thin, thick = (
+        relaxation_time(one, blast.DENSITY, blast.RADIUS)
+        for one in (genes["viscosity"].low, genes["viscosity"].high)
+    )
+    assert (thin, thick) == pytest.approx((3.889, 0.1944), rel=1e-3)
+
+
+@pytest.mark.long
+def test_fitness_of_an_ellipsoid_at_rest():
+    """Near zero at the known design or with the opposite field, and large far from it."""
+    inverse = problem("small", "rest")
+    opposite = {name: value if name == "viscosity" else -value for name, value in REST_TARGET.items()}
+    thin = {**REST_TARGET, "viscosity": 0.6 * REST_TARGET["viscosity"]}
+    turned = {**REST_TARGET, "flux_z": -REST_TARGET["flux_z"]}
+    scenes = [inverse.scene(design, 5) for design in (REST_TARGET, opposite, thin, turned)]
+    known, other, *off = (inverse.objective(result) for result in tisim.run(scenes))
+    assert known < 0.05
+    assert other == pytest.approx(known, abs=0.05)
+    assert min(off) > 0.15
+    assert "at rest" in inverse.title
+
+
+def test_no_other_variant_than_the_ellipsoids():
+    with pytest.raises(InputError, match="variant must be one of ellipsoid, rest; received 'torus'"):
         CASE.problem("default", "torus")
 
 

@@ -5,7 +5,14 @@ import pytest
 
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.closed_forms import constants, response
-from tisim.cases.vibration.figures import FLOOR, resonance_figure, table
+from tisim.cases.vibration.figures import (
+    FLOOR,
+    exact_histories,
+    histories_figure,
+    histories_table,
+    resonance_figure,
+    table,
+)
 from tisim.cases.vibration.response import (
     FAST,
     SLOW,
@@ -13,6 +20,7 @@ from tisim.cases.vibration.response import (
     Sweep,
     fast_scenes,
     peak,
+    recorded,
     slow_scenes,
     vertex,
 )
@@ -70,6 +78,30 @@ def test_constants_are_read_from_the_scene_or_are_none():
     falling = array.model_copy(update={"effects": (*array.effects, Gravity())})
     assert constants(falling) is None
     assert constants(array.replace({"particles.mean_velocity": [1.0, 0.0, 0.0]})) is None
+
+
+@pytest.mark.long
+def test_histories_of_a_batch_follow_their_closed_forms():
+    """One particle each for the eight drives of Z13 Fig. 3; the figure draws runs and closed forms."""
+    eight = recorded(fast_scenes(vibration.RATIOS), 40)
+    exact = exact_histories(eight)
+    peaks = [np.abs(one).max() for one in exact]
+    for one, true, largest in zip(eight, exact, peaks, strict=True):
+        assert len(one.time) == 41
+        np.testing.assert_allclose(one.place, true, atol=1e-3 * largest)
+    # The drive at the cyclotron frequency has the largest response.
+    assert np.argmax(peaks) == vibration.RATIOS.index(1.0)
+    rows = [row.split(",") for row in histories_table(eight).splitlines()[1:]]
+    for (ratio, largest, off), expected, one in zip(rows, vibration.RATIOS, eight, strict=True):
+        assert float(ratio) == expected
+        assert float(largest) == np.abs(one.place).max()
+        assert 0 < float(off) < 1e-3 * float(largest)
+    panels = histories_figure(eight).axes
+    assert len(panels) == 8
+    for axis, one, true in zip(panels, eight, exact, strict=True):
+        lines = [line.get_ydata() for line in axis.lines]
+        for drawn, wanted in zip(lines, (one.place.real, true.real, one.place.imag, true.imag), strict=True):
+            np.testing.assert_array_equal(drawn, wanted)
 
 
 @pytest.mark.slow
