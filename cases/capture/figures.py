@@ -85,9 +85,9 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """field.png, volume.png: field and capture volume of the magnet; capture.png, capture.csv: captured
-    fractions.
+    fractions; brownian.png: Brownian fractions.
 
-    The captured fractions are of all particle sizes, for any ``size``.
+    The fractions are of all particle sizes, for any ``size``.
     """
     return {"field.png": field(), "volume.png": volume(), **curves.figures(progress)}
 
