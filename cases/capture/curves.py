@@ -150,8 +150,8 @@ def diffusing(sizes: Sequence[Row], aspects: Sequence[Row]) -> Figure:
     """
     figure = empty(12.0, 7.2)
     grid = figure.subplots(2, 2)
-    for axis, part in zip(grid[0], ("side", "top"), strict=True):
-        brownian_by_size(axis, sizes, part)
+    brownian_by_size(grid[0, 0], sizes, "side")
+    brownian_by_size(grid[0, 1], sizes, "top")
     brownian_by_aspect(grid[1, 0], aspects)
     by_angle = [
         np.array([[brownian(one).mean() for one in group] for s, group in sizes if s["nanometres"] == n])

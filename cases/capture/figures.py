@@ -174,8 +174,8 @@ def arrow(axis: Axes, body: Cylinder) -> None:
     x, z = (
         np.array(body.magnetisation)[[0, 2]] / np.linalg.norm(body.magnetisation) * 0.5 * body.radius / MICRO
     )
-    ends = {"xy": (x, z), "xytext": (-x, -z)}
-    axis.annotate("", **ends, arrowprops={"arrowstyle": "->", "color": "black", "shrinkA": 0, "shrinkB": 0})
+    style = {"arrowstyle": "->", "color": "black", "shrinkA": 0, "shrinkB": 0}
+    axis.annotate("", xy=(x, z), xytext=(-x, -z), arrowprops=style)
 
 
 def pull(scene: Scene, points: np.ndarray) -> np.ndarray:

@@ -129,8 +129,8 @@ def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
         name = f"{m:g} A/m: moment over the sum of the grains' moments"
         beside = f"random directions: {random:.2g}; L21, 50 cm: {theirs.aligned:.2g}"
         yield Shown(name, Mean.of([one.asteroid.aligned for one in group]), beside)
-        bulk = Mean.of([m * one.magnetised_part for one in group])
-        yield Shown(f"{m:g} A/m: bulk magnetisation, A/m", bulk, f"L21, 50 cm: {theirs.magnetisation:.2g}")
+        name, beside = f"{m:g} A/m: bulk magnetisation, A/m", f"L21, 50 cm: {theirs.magnetisation:.2g}"
+        yield Shown(name, Mean.of([m * one.magnetised_part for one in group]), beside)
     strong = of_magnetisation(runs, published.MAGNETISATIONS[-1])
     bulk = [published.MAGNETISATIONS[-1] * one.magnetised_part for one in strong]
     yield Claim(
