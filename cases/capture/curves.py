@@ -1,5 +1,5 @@
-"""Captured fractions of the case capture over time and at the end, by angle, particle size and aspect
-ratio."""
+"""Captured fractions of the case capture over time and at the end, and the Brownian fractions of what is
+free, by angle, particle size and aspect ratio."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from tisim import Result
 from tisim.analysis import Mean
 from tisim.cases.capture import scene as capture
+from tisim.cases.capture.diffusing import FREE, Part, brownian, brownian_fraction
 from tisim.cases.capture.statistics import (
     ANGLES,
     ASPECTS,
@@ -39,7 +40,8 @@ Row = tuple[Settings, Sequence[Result]]
 
 
 def figures(progress: Progress) -> Mapping[str, Figure | str]:
-    """Return the files capture.png and capture.csv: captured fractions by angle, size and aspect ratio."""
+    """Return the files capture.png and capture.csv, captured fractions by angle, size and aspect ratio, and
+    brownian.png, the Brownian fractions of the same runs."""
     angles: list[Settings] = [
         {"nanometres": n, "angle": a, "aspect": 20.0, "part": part}
         for n in (75, 212) for part in ("top", "side") for a in ANGLES
@@ -54,7 +56,11 @@ def figures(progress: Progress) -> Mapping[str, Figure | str]:
     for finished, settings in enumerate((angles, sizes, aspects)):
         groups = results(settings, CURVE_REPEATS, progress_of_part(progress, finished, 3))
         parts.append(list(zip(settings, groups, strict=True)))
-    return {"capture.png": captured(*parts), "capture.csv": table([row for part in parts for row in part])}
+    return {
+        "capture.png": captured(*parts),
+        "brownian.png": diffusing(*parts[1:]),
+        "capture.csv": table([row for part in parts for row in part]),
+    }
 
 
 def captured(angles: Sequence[Row], sizes: Sequence[Row], aspects: Sequence[Row]) -> Figure:
@@ -133,6 +139,56 @@ def by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
     axis.set_xticks([2, 5, 10, 20], ["2", "5", "10", "20"])
     axis.minorticks_off()
     axis.set_title("even mean over angles; 95 % intervals")
+    legend_beside(axis)
+
+
+def diffusing(sizes: Sequence[Row], aspects: Sequence[Row]) -> Figure:
+    """Draw the Brownian fraction after 50 s, by B16 (6.24).
+
+    By angle and size for SIDE and TOP (B16 Fig. 6.8a), by angle for two aspect ratios (6.8b), and by size,
+    averaged over angles (6.9). The regions are those in which particles have started.
+    """
+    figure = empty(12.0, 7.2)
+    grid = figure.subplots(2, 2)
+    brownian_by_size(grid[0, 0], sizes, "side")
+    brownian_by_size(grid[0, 1], sizes, "top")
+    brownian_by_aspect(grid[1, 0], aspects)
+    by_angle = [
+        np.array([[brownian(one).mean() for one in group] for s, group in sizes if s["nanometres"] == n])
+        for n in SATURATION_MOMENTS
+    ]
+    radii = tuple(SATURATION_MOMENTS)
+    for average, label, line in (
+        (even, "uniform in angle", "-"),
+        (isotropic, "all directions\nequally likely", ":"),
+    ):
+        bars(grid[1, 1], radii, [Mean.of(average(one)) for one in by_angle], "#4477aa", label, line)
+    grid[1, 1].set(xlabel="radius (nm)", title="L/D = 20, mean over angles; 95 % intervals")
+    legend_beside(grid[1, 1])
+    for axis in grid.flat:
+        axis.axhline(FREE, color="0.6", lw=0.8, ls="--")
+        axis.set(ylabel="Brownian fraction after 50 s", ylim=(-0.02, 1.0))
+        plain(axis)
+    grid[0, 1].text(ANGLES[-1], FREE + 0.02, "without a magnet", ha="right", fontsize="small", color="0.4")
+    letters(grid.flat)
+    return figure
+
+
+def brownian_by_size(axis: Axes, rows: Sequence[Row], part: Part) -> None:
+    for n, colour in zip(SATURATION_MOMENTS, _colours("plasma", len(SATURATION_MOMENTS)), strict=True):
+        means = [brownian_fraction(group, part) for settings, group in rows if settings["nanometres"] == n]
+        bars(axis, ANGLES, means, colour, f"{n} nm")
+    axis.set(xlabel="angle of the axis to the field (°)", title=f"{part.upper()}, L/D = 20; 95 % intervals")
+    legend_beside(axis)
+
+
+def brownian_by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
+    for n, colour in zip(SOME, ("#228833", "#4477aa", "#cc6677"), strict=True):
+        for aspect, line in ((ASPECTS[0], "-"), (ASPECTS[2], ":")):
+            of_both = [g for s, g in rows if (s["nanometres"], s["aspect"]) == (n, aspect)]
+            means = [brownian_fraction(group) for group in of_both]
+            bars(axis, ANGLES, means, colour, f"{n} nm, L/D = {aspect:.3g}", line)
+    axis.set(xlabel="angle of the axis to the field (°)", title="both regions; 95 % intervals")
     legend_beside(axis)
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from tisim import Scene
 from tisim.cases.capture import curves
 from tisim.cases.capture import scene as capture
-from tisim.cases.common.magnetic_fibre import MICRO
+from tisim.cases.common.magnetic_fibre import MICRO, Magnetised
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames
 from tisim.plotting.style import TIME, empty, letters, plain
@@ -24,6 +24,10 @@ PLANE, SPACE = 181, 96
 counted."""
 MARKS = (-2000, 0, 2000)
 """Positions of the tick marks along both axes of the force maps, µm."""
+CYLINDERS: tuple[tuple[float, Magnetised], ...] = (
+    (0.0, "minimum"), (45.0, "minimum"), (45.0, "fixed"), (90.0, "minimum")
+)  # fmt: skip
+"""The angles (degrees) of the cylinders whose capture volumes are drawn, and how they are magnetised."""
 BEYOND = 2.5e-3
 """Upper bound of the distance of the capture volume from the cylinder for particles of 50 nm, m."""
 
@@ -81,9 +85,9 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """field.png, volume.png: field and capture volume of the magnet; capture.png, capture.csv: captured
-    fractions.
+    fractions; brownian.png: Brownian fractions.
 
-    The captured fractions are of all particle sizes, for any ``size``.
+    The fractions are of all particle sizes, for any ``size``.
     """
     return {"field.png": field(), "volume.png": volume(), **curves.figures(progress)}
 
@@ -126,14 +130,15 @@ def volume() -> Figure:
     """Draw the magnetic force on a particle of 50 nm towards the cylinder, if above LEAST_FORCE (B16 Fig.
     6.3).
 
-    The cylinder of B16's figure is magnetised along the field; here its direction follows the model of Stoner
-    and Wohlfarth.
+    The cylinder of B16's figure is magnetised along the field. The direction of least energy (Stoner and
+    Wohlfarth), as in all other sections, differs from it only between 0 and 90 degrees: at 45 degrees both
+    are drawn.
     """
-    figure = empty(10.4, 6.8)
-    grid = figure.subplots(2, 3)
+    figure = empty(13.4, 6.8)
+    grid = figure.subplots(2, len(CYLINDERS))
     for row, aspect in zip(grid, (5 / 3, 20 / 3), strict=True):
-        for axis, angle in zip(row, (0.0, 45.0, 90.0), strict=True):
-            scene = capture.scene(nanometres=50, angle=angle, aspect=aspect)
+        for axis, (angle, magnetised) in zip(row, CYLINDERS, strict=True):
+            scene = capture.scene(nanometres=50, angle=angle, aspect=aspect, magnetised=magnetised)
             body = cylinder(scene)
             points = plane(0.6 * body.length + 1.5e-3)
             inward = pull(scene, points)
@@ -143,10 +148,12 @@ def volume() -> Figure:
                 norm=LogNorm(LEAST_FORCE, 1e3 * LEAST_FORCE), rasterized=True,
             )  # fmt: skip
             outline(axis, body)
+            arrow(axis, body)
             axis.set(aspect="equal", xlim=(line[0], line[-1]), ylim=(line[0], line[-1]))
             axis.set(xticks=MARKS, yticks=MARKS)
             own = capture_volume(scene)
-            axis.set_title(f"L/D = {aspect:.3g}, {angle:.0f}°:\n{own:.1f} times its own volume")
+            turned = "" if angle in (0.0, 90.0) else f", M at {magnetised_at(body):.0f}°"
+            axis.set_title(f"L/D = {aspect:.3g}, {angle:.0f}°{turned}:\n{own:.1f} times its own volume")
     for axis in grid[-1]:
         axis.set_xlabel("x, along the field (µm)")
     for axis in grid[:, 0]:
@@ -154,6 +161,21 @@ def volume() -> Figure:
     letters(grid.flat)
     figure.colorbar(mesh, ax=grid, label="force towards the cylinder (N)", shrink=0.7)
     return figure
+
+
+def magnetised_at(body: Cylinder) -> float:
+    """Return the angle between the axis and the magnetisation of a cylinder, degrees."""
+    m = np.array(body.magnetisation)
+    return float(np.degrees(np.arccos(np.clip(m @ np.array(body.direction) / np.linalg.norm(m), -1.0, 1.0))))
+
+
+def arrow(axis: Axes, body: Cylinder) -> None:
+    """Draw the direction of the magnetisation of a cylinder at its centre."""
+    x, z = (
+        np.array(body.magnetisation)[[0, 2]] / np.linalg.norm(body.magnetisation) * 0.5 * body.radius / MICRO
+    )
+    style = {"arrowstyle": "->", "color": "black", "shrinkA": 0, "shrinkB": 0}
+    axis.annotate("", xy=(x, z), xytext=(-x, -z), arrowprops=style)
 
 
 def pull(scene: Scene, points: np.ndarray) -> np.ndarray:

@@ -2,8 +2,9 @@
 
 B16 is R. J. Baars, thesis, Utrecht University (2016): particles of table 6.1 in water about a steel cylinder
 in a field of 1 T along x, at an angle to its axis. The cylinder is saturated, in the direction given by the
-model of Stoner and Wohlfarth. The suspension is so dilute that particles do not interact; their moment is
-along the field. A particle that touches the cylinder stays there.
+model of Stoner and Wohlfarth or, for the capture volumes of section 6.4.1, in that of the field. The
+suspension is so dilute that particles do not interact; their moment is along the field. A particle that
+touches the cylinder stays there.
 
 The paper draws its start regions TOP and SIDE but does not give their width. Here they are one cylinder
 radius wide and together form the layer around the cylinder; ``part`` chooses one of them.
@@ -45,14 +46,16 @@ def scene(
     number: int = NUMBER,
     duration: float = DURATION,
     seed: int = 0,
+    magnetised: b16.Magnetised = "minimum",
 ) -> Scene:
     """Return particles of a radius of table 6.1 (nm) about a cylinder at an angle (degrees) to the field.
 
     aspect : length of the cylinder over its diameter.
     part : of the layer in which particles start: "top", beyond both ends; "side", beside the rest; or "all".
     duration : s.
+    magnetised : the cylinder, in the direction of least energy ("minimum") or along the field ("fixed").
     """
-    body = b16.fibre(angle, aspect)
+    body = b16.fibre(angle, aspect, magnetised)
     radius = nanometres * 1e-9
     return Scene(
         name="capture",

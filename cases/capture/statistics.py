@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from tisim import Result, Scene
+from tisim import Result, Scene, run
 from tisim.accuracy import Quantity
 from tisim.analysis import Mean
 from tisim.cases.capture import scene as capture
+from tisim.cases.capture.diffusing import FREE, brownian, brownian_fraction, diffuses
 from tisim.cases.case import Check, Claim
 from tisim.cases.common.magnetic_fibre import SATURATION_MOMENTS
 from tisim.cases.common.runs import grouped
@@ -27,6 +28,11 @@ ASPECTS = (5 / 3, 10 / 3, 20 / 3, 20.0)
 """The swept ratios of the cylinder's length to its diameter (B16 section 6.4.3)."""
 CHECK_REPEATS = 30
 """Number of starts of each setting in the checks, as in B16 section 6.3."""
+
+FREE_NUMBER = 4000
+"""Number of particles whose diffusion without a magnet is compared with (6.24)."""
+MAGNET = ("capture", "magnetic_cylinders")
+"""The effects that a scene without the cylinder does not have; the uniform field exerts no force."""
 
 Settings = Mapping[str, Any]
 
@@ -77,6 +83,7 @@ def check(repeats: int = CHECK_REPEATS) -> Iterator[Check | Claim]:
     yield from of_orientation(repeats)
     yield from of_aspect(repeats)
     yield from of_size(repeats)
+    yield from of_diffusion(repeats)
 
 
 def of_orientation(repeats: int) -> Iterator[Claim]:
@@ -131,6 +138,34 @@ def of_size(repeats: int) -> Iterator[Claim]:
     yield Claim("25 nm captured within 50 s, transverse, L/D 5/3", mean(by_size[25]), most=0.5)
     late = Mean.of([fraction(r.state) - fraction(r.state, 25.0) for r in by_size[25]])
     yield Claim("25 nm: fraction captured in the second half of the time", late, least=0.05)
+
+
+def of_diffusion(repeats: int) -> Iterator[Check | Claim]:
+    """Section 6.4.4: Brownian particles by region, angle and size; (6.24) without a magnet."""
+    free = run(capture.scene(number=FREE_NUMBER).without(*MAGNET))
+    name = "without a magnet: fraction that fulfils (6.24)"
+    yield Check(
+        name, float(diffuses(free.check()).mean()), FREE, 4 * np.sqrt(FREE * (1 - FREE) / FREE_NUMBER)
+    )
+    sizes = (25, 75, 212)
+    settings = [{"nanometres": n, "angle": a, "aspect": 20.0} for n in sizes for a in ANGLES]
+    groups = results(settings, repeats)
+    for k, n in enumerate(sizes):
+        rows = groups[k * len(ANGLES) : (k + 1) * len(ANGLES)]
+        side = [np.array([brownian(one, "side").mean() for one in rows[at]]) for at in (0, -1)]
+        yield Claim(
+            f"{n} nm, SIDE: Brownian, longitudinal minus transverse", Mean.of(side[0] - side[1]), least=0.0
+        )
+        top = [brownian_fraction(row, "top") for row in rows]
+        if n == 25:
+            yield Claim("25 nm, TOP: Brownian, longitudinal", top[0], least=0.1)
+            yield Claim("25 nm, SIDE: Brownian, transverse", Mean.of(side[1]), most=0.1)
+        else:
+            largest = max(top, key=lambda mean: mean.value)
+            yield Claim(f"{n} nm, TOP: Brownian, largest of all angles", largest, most=0.01)
+        by_angle = np.array([[brownian(one).mean() for one in row] for row in rows])
+        limits = {"least": 0.1} if n == 25 else {"most": 0.1}
+        yield Claim(f"{n} nm: Brownian, mean over angles (B16: below 0.1)", Mean.of(even(by_angle)), **limits)
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:

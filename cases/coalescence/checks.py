@@ -8,7 +8,7 @@ import numpy as np
 from tisim.analysis import Mean
 from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.coalescence import published
-from tisim.cases.coalescence.regime import COMPARED, regime
+from tisim.cases.coalescence.regime import COMPARED, random_moment, regime
 from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
 from tisim.cases.coalescence.scene import DEFAULT, scene
 from tisim.cases.common.rubble_pile import critical_spin, mean_density
@@ -121,6 +121,16 @@ def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
     yield _difference(
         "density, 1190 minus 0 A/m, kg/m^3", runs, lambda one: one.asteroid.density, most=-LOOSER
     )
+    grains = (runs[0].end["radius"] / runs[0].end["radius"].min()) ** 3
+    number, seed = int((grains == 1).sum()), float(grains[grains > 1].sum())
+    random = random_moment(number, seed) / (number + seed)
+    for m in published.MAGNETISATIONS[1:]:
+        group, theirs = of_magnetisation(runs, m), published.BULK[m]
+        name = f"{m:g} A/m: moment over the sum of the grains' moments"
+        beside = f"random directions: {random:.2g}; L21, 50 cm: {theirs.aligned:.2g}"
+        yield Shown(name, Mean.of([one.asteroid.aligned for one in group]), beside)
+        name, beside = f"{m:g} A/m: bulk magnetisation, A/m", f"L21, 50 cm: {theirs.magnetisation:.2g}"
+        yield Shown(name, Mean.of([m * one.magnetised_part for one in group]), beside)
     strong = of_magnetisation(runs, published.MAGNETISATIONS[-1])
     bulk = [published.MAGNETISATIONS[-1] * one.magnetised_part for one in strong]
     yield Claim(

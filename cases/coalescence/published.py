@@ -44,6 +44,23 @@ BOUND = {
 }
 """Fractions by magnetisation (A/m), for grains of 50 cm at 15 000 s; section 4.2.2.1."""
 
+
+class Bulk(NamedTuple):
+    """The sum of the moments of the grains of an asteroid.
+
+    moment : of the asteroid, A m^2. aligned : over the sum of the magnitudes.
+    magnetisation, tight : over the volume of the convex hull, and of a hull that need not be convex, A/m.
+    """
+
+    moment: float
+    aligned: float
+    magnetisation: float
+    tight: float
+
+
+BULK = {119.0: Bulk(7.3e3, 0.04, 3.0, 3.2), 1190.0: Bulk(7.1e4, 0.032, 6.4, 8.7)}
+"""By magnetisation of the grains (A/m), which are of 50 cm; section 4.2.2.4."""
+
 AXES = {
     (0.5, 500e-6, 0.0): (9.1738, 8.8680, 8.2030),
     (0.5, 500e-6, 119.0): (9.3322, 9.0238, 8.4696),

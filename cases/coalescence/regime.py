@@ -104,9 +104,38 @@ def of_clouds(d: float) -> Iterator[Shown]:
     speed = 3**0.5 * float(thermal_speed(d, np.array(sphere_mass(d, published.DENSITY))))
     yield Shown(f"{name}: thermal speed, mm/s", 1e3 * speed)
     yield Shown(f"{name}: 2 K / |U| of the cloud", virial_ratio_of_cloud(d))
+    if d == published.DIAMETERS[0]:
+        yield from of_moments(d)
     for m in published.MAGNETISATIONS[1:]:
         weight = surface_weight(d, published.DENSITY, ACCELERATION)
         yield Shown(f"{name}, {m:g} A/m: attraction of two grains over weight", attraction(d, m) / weight)
+
+
+def of_moments(d: float) -> Iterator[Shown]:
+    """Yield the moments of L21's seed particle, and of all of its grains in random directions (section
+    4.2.2.4)."""
+    ratio = (published.SEED_DIAMETER / d) ** 3
+    for m in published.MAGNETISATIONS[1:]:
+        name, grain = f"{1e2 * d:g} cm, {m:g} A/m", m * math.pi / 6 * d**3
+        beside = f"L21, asteroid: {published.BULK[m].moment:.2g}"
+        yield Shown(f"{name}: moment of the seed particle, A m^2", ratio * grain, beside)
+        alone, whole = (random_moment(published.NUMBER, seed) for seed in (0.0, ratio))
+        yield Shown(f"{name}: moment of grains in random directions, A m^2", alone * grain, beside)
+        yield Shown(f"{name}: the same with the seed particle, A m^2", whole * grain, beside)
+
+
+def random_moment(number: int, seed: float = 0.0) -> float:
+    """Return the mean magnitude of the sum of moments in random directions, divided by the moment of a grain.
+
+    number : of grains of equal moments; their sum is then normally distributed, with a variance of number/3
+    along each axis. seed : moment of the seed particle, divided by that of a grain. Without it the mean is
+    sqrt(8 number / (3 pi)).
+    """
+    s = math.sqrt(number / 3)
+    if seed == 0:
+        return s * math.sqrt(8 / math.pi)
+    normal = math.sqrt(2 / math.pi) * s * math.exp(-0.5 * (seed / s) ** 2)
+    return normal + (seed + s * s / seed) * math.erf(seed / (math.sqrt(2) * s))
 
 
 def spin_when_packed(rotation: float, diameter: float, spacing: float) -> float:

@@ -1,8 +1,10 @@
 """The magnetised fibre of B16, as a cylinder, and published values of the colloids that it attracts.
 
 B16 is R. J. Baars, thesis, Utrecht University (2016), chapter 6. The fibre is a steel cylinder in a field
-along x. It is saturated, in the direction given by the model of Stoner and Wohlfarth.
+along x. It is saturated, in the direction given by the model of Stoner and Wohlfarth or in that of the field.
 """
+
+from typing import Literal
 
 import numpy as np
 
@@ -25,13 +27,21 @@ SATURATION_MOMENTS = {
 MICRO = 1e-6
 """A micrometre, m."""
 
+Magnetised = Literal["minimum", "fixed"]
 
-def fibre(angle: float, aspect: float) -> Cylinder:
+
+def fibre(angle: float, aspect: float, magnetised: Magnetised = "minimum") -> Cylinder:
     """Return the fibre at the origin, at an angle (degrees) to the field.
 
     aspect : its length over its diameter.
+    magnetised : in the direction of least energy (Stoner and Wohlfarth), as in B16 except section 6.4.1; or
+        "fixed" along the field, at ``angle`` to the axis, as in section 6.4.1.
     """
     along = float(np.cos(np.radians(angle))), 0.0, float(np.sin(np.radians(angle)))
     radius, length = FIBRE_DIAMETER / 2, aspect * FIBRE_DIAMETER
-    m = magnetisation(along, radius, length, SATURATION_MAGNETISATION, (APPLIED_FLUX, 0.0, 0.0))
+    m = (
+        (SATURATION_MAGNETISATION, 0.0, 0.0)
+        if magnetised == "fixed"
+        else magnetisation(along, radius, length, SATURATION_MAGNETISATION, (APPLIED_FLUX, 0.0, 0.0))
+    )
     return Cylinder(axis=along, radius=radius, length=length, magnetisation=m)

@@ -84,6 +84,12 @@ class Asteroid:
         return float(np.linalg.norm(self.grains["moment"].sum(axis=0))) / self.volume
 
     @property
+    def aligned(self) -> float:
+        """Return the magnitude of the total moment over the sum of the magnitudes."""
+        moments = self.grains["moment"]
+        return float(np.linalg.norm(moments.sum(axis=0)) / np.linalg.norm(moments, axis=1).sum())
+
+    @property
     def spin(self) -> np.ndarray:
         """Return the angular velocity (rad/s) of the rigid body with its inertia and angular momentum."""
         return np.linalg.solve(inertia(self.grains), _momentum(self.grains))

@@ -5,6 +5,8 @@ does not print density and permeability of the grains; its +77.78 % and -20.99 %
 imply a permeability much larger than 1.
 """
 
+from typing import NamedTuple
+
 from tisim.cases.common.magnetorheological_fluid import MICRO
 
 # Table 2.1: particle properties; TABLE_2_1 of ``cases/common/magnetorheological_fluid.py`` has the others.
@@ -41,3 +43,33 @@ SIMULATED_YIELD = {"00:100": 44.1e3, "33:67": 56.3e3}
 """L21's simulated values for distributions by number; by volume it gives 49.6 kPa for 00:100."""
 SEED_SPREAD = 0.029
 """Standard deviation of the yield stress over seeds, divided by its mean."""
+
+
+class Cost(NamedTuple):
+    """What a step of a simulation cost L21.
+
+    step : wall time, s. cores : number in use. grains, neighbours : number of grains, and of neighbours of a
+    grain whose field it feels.
+    """
+
+    step: float
+    cores: int
+    grains: int
+    neighbours: int
+
+    @property
+    def core_time(self) -> float:
+        """Return the core time of a grain and step, s."""
+        return self.step * self.cores / self.grains
+
+
+# Section 2.4.3. The first three on Intel E5-2680v2 of 2013, the others on E5-2699V4 of 2016.
+COSTS = {
+    "l21": Cost(4.64e-3, 18, 12_000, 100),
+    "l21_monodisperse": Cost(3.90e-3, 18, 30_000, 25),
+    "l21_volume": Cost(31e-3, 60, 60_000, 500),
+    "00:100 by number, double cell": Cost(30.1e-3, 27, 93_000, 100),
+    "l21_bidisperse": Cost(72e-3, 40, 200_000, 220),
+    "33:67 by volume, a gap of 2 um": Cost(1152e-3, 40, 910_000, 300),
+}
+"""By size of the case, or in words for models that are not a size."""

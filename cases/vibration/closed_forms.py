@@ -76,7 +76,7 @@ def constants(scene: Scene) -> dict[str, float] | None:
     along_x = not any((*field.constant, *field.amplitude[1:], field.phase[0])) and field.amplitude[0] != 0
     along_z = not any((*flux.constant[:2], *flux.amplitude))
     start = scene.particles.arrays(scene.domain, scene.seed)
-    always = field.begin == flux.begin == 0
+    always = not (field.kinked or flux.kinked)
     if not (along_x and along_z and always and len(set(k)) == 1 and k[0] > 0 and _alike_at_rest(start)):
         return None
     mass, charge = float(start["mass"][0]), float(start["charge"][0])

@@ -57,6 +57,8 @@ def test_a_closed_form_is_used_only_if_it_holds():
         {"effects.electric_field.amplitude": [0.1, 0.1, 0.0]},
         {"effects.electric_field.begin": 1e-3},
         {"effects.magnetic_field.begin": 1e-3},
+        {"effects.electric_field.end": 1e-3},
+        {"effects.magnetic_field.end": 1e-3},
         {"effects.magnetic_field.constant": [1.0, 0.0, 1.0]},
         {"effects.tether.stiffness": [0.5, 0.0, 0.5]},
         {"particles.mean_velocity": [1.0, 0.0, 0.0]},

@@ -47,6 +47,7 @@ class SelfConsistentSolver(DerivedSolver):
     particles.
 
     changes : the largest change of a particle in this sweep, the last one, and the one before.
+    before : the largest value before the first sweep.
     once : whether a step makes a single sweep as long as that suffices.
     mixed : whether sweeps are mixed with the last one.
     """
@@ -66,7 +67,7 @@ class SelfConsistentSolver(DerivedSolver):
         self.mixed = effect.data.acceleration == "anderson"
         self.next, *memory = (self.column() for _ in range(3 if self.mixed else 1))
         self.pending, self.sweeps, self.unconverged = (ti.field(ti.i32) for _ in range(3))
-        self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
+        self.largest, self.before, *self.changes = (ti.field(s.real) for _ in range(5))
         builder = Builder()
         for column in (self.next, *memory):
             builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
@@ -76,7 +77,8 @@ class SelfConsistentSolver(DerivedSolver):
             builder.dense(ti.i, s.worlds).place(self.theta)
             builder.dense(ti.i, s.worlds).place(self.unsolvable)
             self.sums = BlockSums(s, MIXING_TERMS)
-        for column in (self.pending, self.sweeps, self.unconverged, self.largest, *self.changes):
+        limits = (self.largest, self.before, *self.changes)
+        for column in (self.pending, self.sweeps, self.unconverged, *limits):
             builder.dense(ti.i, s.worlds).place(column)
         self.tree = Tree(builder)
 
@@ -105,7 +107,7 @@ class BeginSweeps(AtStage, PerParticle):
         a = self.solver
         if i == 0:
             a.pending[w], a.sweeps[w], a.unconverged[w] = 1, 0, 0
-            a.largest[w] = 0.0
+            a.largest[w], a.before[w] = 0.0, 0.0
             for change in ti.static(a.changes):
                 change[w] = 0.0
         if not finite(a.size(a.value[w, i])):
@@ -168,11 +170,13 @@ class JacobiSweep(PairSum):
         a, part = self.solver, self.effect.relaxation(w)
         new = self.effect.response(self.s, w, i, a.unpacked(total), t)
         a.next[w, i] = (1.0 - part) * a.value[w, i] + part * new
-        size = a.size(new)
+        size, before = a.size(new), a.size(a.value[w, i])
+        if a.sweeps[w] == 0 and before > a.before[w]:
+            ti.atomic_max(a.before[w], before)
         largest = size
         if ti.static(a.once):
             # After a field is switched off, the previous value sets the scale of the remaining one.
-            largest = ti.max(size, a.size(a.value[w, i]))
+            largest = ti.max(size, before)
         if largest > a.largest[w]:
             ti.atomic_max(a.largest[w], largest)
         if ti.static(not self.trial):
@@ -213,10 +217,13 @@ class ReplaceValues(PerParticle):
             unsolvable = a.unsolvable[w] > 0
         if change > a.changes[0][w]:
             ti.atomic_max(a.changes[0][w], change)
-        on = change > ti.max(self.effect.relaxation(w) * self.tolerance(w), self.least) * a.largest[w]
+        relative = ti.max(self.effect.relaxation(w) * self.tolerance(w), self.least)
+        on = change > relative * a.largest[w]
         if on and not unsolvable and a.sweeps[w] + 1 < a.most:
             ti.atomic_max(a.unconverged[w], 1)
-        elif on or unsolvable:
+        # Values that vanish after a field is switched off change by the same factor in every sweep; what
+        # remains at the last one is compared with the values before.
+        elif (on and change > relative * a.before[w]) or unsolvable:
             if ti.static(self.trial):
                 # The forces are then not finite, and the step is rejected.
                 a.value[w, i] *= ti.math.nan

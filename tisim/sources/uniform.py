@@ -7,19 +7,23 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.effects.base import Effect
+from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.sources.base import Source, parameter
 
 STILL: Vector = (0.0, 0.0, 0.0)
+NO_END = 1e30
+"""s, end of a field that is never switched off."""
 
 
 class Uniform(Source):
-    """The contract of a field constant + amplitude sin(omega t + phase), each component by itself, from a
-    given time on."""
+    """The contract of a field constant + amplitude sin(omega t + phase), each component by itself, between
+    two times."""
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = True
@@ -29,11 +33,22 @@ class Uniform(Source):
         amplitude: Vector
         omega: Vector
         begin: float
+        end: float
+
+    @model_validator(mode="after")
+    def _ends_after_it_begins(self) -> Uniform:
+        must(
+            self.end > self.begin,
+            f"{self.label}.end",
+            f"after {self.label}.begin, {self.begin:g} s",
+            self.end,
+        )
+        return self
 
     @property
     def kinked(self) -> bool:  # type: ignore[override]
-        """Return whether the field is switched on in the course of a run."""
-        return self.begin > 0
+        """Return whether the field is switched on or off in the course of a run."""
+        return self.begin > 0 or self.end < NO_END
 
     def structure(self) -> tuple[Any, ...]:
         # Steppers may be compiled differently for forces with kinks.
@@ -58,7 +73,7 @@ class Uniform(Source):
             amplitude, angle = self.amplitude(w), self.omega(w) * t + self.phase(w)
             for k in ti.static(range(3)):
                 value[k] += amplitude[k] * ti.cast(elementary.sin(angle[k]), float)
-        return ti.select(t >= self.begin(w), 1.0, 0.0) * value
+        return ti.select(t >= self.begin(w) and t < self.end(w), 1.0, 0.0) * value
 
 
 class ElectricField(Uniform):
@@ -66,7 +81,7 @@ class ElectricField(Uniform):
 
         E = E_0 + E_1 sin(omega t + phase),    each component by itself
 
-    It is zero before ``begin``; the phase still refers to t = 0.
+    It is zero before ``begin`` and from ``end`` on; the phase still refers to t = 0.
 
     Source: Z13 Eqs (3)-(5), (16).
     """
@@ -77,6 +92,7 @@ class ElectricField(Uniform):
     omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
     phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)
     begin: float = parameter("s", "time from which on the field acts", 0.0, ge=0)
+    end: float = parameter("s", "time at which the field is switched off", NO_END, gt=0)
 
 
 class MagneticField(Uniform):
@@ -84,8 +100,8 @@ class MagneticField(Uniform):
 
         B = B_0 + B_1 sin(omega t + phase),    each component by itself
 
-    It is zero before ``begin``; the phase still refers to t = 0. The electric field induced by a changing B
-    (Faraday's law) is neglected, as in the paper, in which B is constant.
+    It is zero before ``begin`` and from ``end`` on; the phase still refers to t = 0. The electric field
+    induced by a changing B (Faraday's law) is neglected, as in the paper, in which B is constant.
 
     Source: Z13 Eqs (3)-(5).
     """
@@ -96,3 +112,4 @@ class MagneticField(Uniform):
     omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
     phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)
     begin: float = parameter("s", "time from which on the field acts", 0.0, ge=0)
+    end: float = parameter("s", "time at which the field is switched off", NO_END, gt=0)

@@ -67,7 +67,10 @@ def test_pictures_of_the_magnet(monkeypatch):
     assert short[0] > 2 * long[0]
     assert short[1] > 1.1 * long[1]
     titles = [axis.get_title("left") for axis in figures.volume().axes]
-    assert titles[2] == f"(c) L/D = 1.67, 90°:\n{short[1]:.1f} times its own volume"
+    assert titles[3] == f"(d) L/D = 1.67, 90°:\n{short[1]:.1f} times its own volume"
+    fixed = capture.scene(nanometres=50, angle=45.0, aspect=5 / 3, magnetised="fixed")
+    own = figures.capture_volume(fixed)
+    assert titles[2] == f"(c) L/D = 1.67, 45°, M at 45°:\n{own:.1f} times its own volume"
     field = figures.field().axes[2].collections[0]
     # At the edge of the picture |B| is nearly the applied field, 1 T along x.
     assert field.get_array().reshape(41, 41)[0, 0] == pytest.approx(APPLIED_FLUX, rel=0.1)

@@ -24,6 +24,9 @@ def test_cylinder_lies_at_its_angle_and_is_saturated_along_the_field():
     assert 0.0 < turned < 30.0
     across = fibre(90.0, 5 / 3).magnetisation
     np.testing.assert_allclose(across, (SATURATION_MAGNETISATION, 0, 0), atol=1e-6 * SATURATION_MAGNETISATION)
+    assert fibre(30.0, 20.0, "fixed") == body.model_copy(
+        update={"magnetisation": (SATURATION_MAGNETISATION, 0.0, 0.0)}
+    )
 
 
 @pytest.mark.slow

@@ -9,8 +9,8 @@ from tisim import InputError
 from tisim.cases.case import Check
 from tisim.cases.coalescence.checks import of_agglomeration, of_conservation, of_structure, of_the_cloud
 from tisim.cases.coalescence.figures import asteroids, figures, forces, growth, shells, table
-from tisim.cases.coalescence.published import MAGNETISATIONS
-from tisim.cases.coalescence.regime import COMPARED, regime, rotation_over_gravity
+from tisim.cases.coalescence.published import BULK, MAGNETISATIONS, NUMBER
+from tisim.cases.coalescence.regime import COMPARED, random_moment, regime, rotation_over_gravity
 from tisim.cases.coalescence.runs import CloudRun, Gathering, chain_length, clouds, of_magnetisation
 from tisim.cases.coalescence.scene import scene
 from tisim.cases.common.rubble_pile import Conserved
@@ -44,6 +44,12 @@ def test_claims_about_runs():
     assert (outside.value.value, outside.beside) == (1.0, "L21, 50 cm: 0.007")
     assert claims["fraction of all grains in clusters, 1190 minus 0 A/m"].mean.value == 0.0
     assert claims["1190 A/m: longest axis over shortest"].beside == "L21: 1.07"
+    # All moments of these runs are parallel; at random those of 40 grains would be 0.15 of it.
+    aligned = claims["119 A/m: moment over the sum of the grains' moments"]
+    assert (aligned.value.value, aligned.beside) == (1.0, "random directions: 0.15; L21, 50 cm: 0.04")
+    bulk = claims["119 A/m: bulk magnetisation, A/m"]
+    assert bulk.value.value == pytest.approx(119 * RUNS[2].magnetised_part)
+    assert bulk.beside == "L21, 50 cm: 3"
     ratio = RUNS[-1].asteroid.magnetisation / (0.5 * 1190.0)
     assert RUNS[-1].magnetised_part == pytest.approx(ratio)
     assert RUNS[-1].asteroid is RUNS[-1].asteroid
@@ -112,6 +118,29 @@ def test_the_regime_of_clouds():
         "default: overlap of an impact over a radius": 0.008,
     }.items():
         assert shown[name] == pytest.approx(value, rel=0.03), name
+
+
+@pytest.mark.parametrize(("number", "seed"), [(400, 0.0), (400, 8.0), (100, 200.0), (7, 0.0)])
+def test_the_moment_of_random_directions(number, seed, rng):
+    """Against the mean of 4000 draws; sqrt(8 N / (3 pi)) is for many grains, and 1 % too small for 7."""
+    draws = rng.normal(size=(4_000, number, 3))
+    total = (draws / np.linalg.norm(draws, axis=2, keepdims=True)).sum(axis=1)
+    total[:, 2] += seed
+    sizes = np.linalg.norm(total, axis=1)
+    error = 4 * sizes.std() / np.sqrt(len(sizes)) + 0.02 * sizes.mean() * (number < 10)
+    assert random_moment(number, seed) == pytest.approx(sizes.mean(), abs=error)
+
+
+def test_the_published_moment_is_that_of_the_seed_particle():
+    """L21's 7.3e3 and 7.1e4 A m^2 are within one standard deviation of the seed's moment, the spread of the
+    grains in random directions along it."""
+    shown = {item.name: item.value for item in regime()}
+    for m, theirs in BULK.items():
+        grain = m * np.pi / 6 * 0.5**3
+        alone = shown[f"50 cm, {m:g} A/m: moment of the seed particle, A m^2"]
+        assert alone == pytest.approx(1000 * grain)
+        assert abs(theirs.moment - alone) < np.sqrt(NUMBER / 3) * grain
+        assert shown[f"50 cm, {m:g} A/m: moment of grains in random directions, A m^2"] < 0.2 * theirs.moment
 
 
 @pytest.mark.slow

@@ -41,7 +41,9 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
 
     It is solved by sweeps over all particles at once (Jacobi's method). Each step starts from the values of
     the last step. Sweeps end when no particle changes by more than ``tolerance`` times the largest value, or
-    by more than rounding. A world that has not converged after ``sweeps`` sweeps fails with a message.
+    by more than rounding. A world that has not converged after ``sweeps`` sweeps fails with a message, unless
+    its values vanish, as after a field is switched off: the last change is then at most ``tolerance`` times
+    the largest value before the first sweep.
 
     With ``sweeps`` = 0 each step makes one sweep. It makes more only if that sweep changes a particle by more
     than ``largest_change`` times the largest value. This happens at the start, when particles are inserted,
