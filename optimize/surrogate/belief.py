@@ -16,6 +16,13 @@ _SKEWED, _SKEWED_NOISE = 0.5, 2.0
 """Costs with a larger skewness than this, without and with noise, are transformed: otherwise a few large
 costs would hide all differences between small ones. With noise the limit is higher, because the mean of noisy
 costs is not the mean of transformed ones."""
+_DECADES = 1e4
+"""Costs without noise whose range is larger than this, over the distance of their median from the least cost,
+are compressed first: penalties of 1e12, or a cost that grows exponentially, would leave all good designs
+equal to the last digit."""
+_WORST = 4.0
+"""Largest compressed cost, in the distance of the median from the least cost. Designs beyond it count as
+equally bad, so that no cliff of the cost hides the slope beside it."""
 
 
 class Belief:
@@ -47,7 +54,7 @@ class Belief:
         costs, self.noise = costs_and_noise(individuals)
         self.exact = all_exact(individuals)
         self.starts = int(np.median([individual.estimates[0].starts for individual in individuals])) or 1
-        self.costs, slopes = _transformed(costs, _SKEWED if self.exact else _SKEWED_NOISE)
+        self.costs, slopes = _transformed(costs, self.exact)
         alone = np.arange(len(costs))
         if apart and self.exact and costs.shape[1] == 1:
             alone = thinned(self.points, costs[:, 0], apart)
@@ -84,21 +91,38 @@ class Belief:
         return np.column_stack(means), np.column_stack(deviations)
 
 
-def _transformed(costs: Array, skewed: float) -> tuple[Array, Array]:
-    """Return costs in units with a smaller skewness than ``skewed``, and the slope of the unit.
+def _compressed(costs: Array) -> tuple[Array, Array]:
+    """Return costs of one objective, (n,), without their largest decades, and the slope of the new unit.
 
-    Columns with a smaller skewness are returned unchanged.
+    With the least cost l and the median m, a cost c becomes (m - l) min(log(1 + (c - l) / (m - l)), 4).
+    """
+    above, spread = costs - costs.min(), float(np.median(costs) - costs.min())
+    if not spread or above.max() <= _DECADES * spread:
+        return costs, np.ones_like(costs)
+    with np.errstate(divide="ignore"):
+        logarithm = np.logaddexp(0.0, np.log(above) - np.log(spread))
+    return spread * np.minimum(logarithm, _WORST), spread / (spread + above)
+
+
+def _transformed(costs: Array, exact: bool) -> tuple[Array, Array]:
+    """Return costs in units in which they are less skewed, and the slope of the unit.
+
+    Columns with a small skewness are returned unchanged.
 
     Source: I.-K. Yeo and R. A. Johnson, Biometrika 87 (2000) 954-959.
     """
+    skewed = _SKEWED if exact else _SKEWED_NOISE
     new, slopes = costs.copy(), np.ones_like(costs)
-    for k, column in enumerate(costs.T):
+    for k in range(costs.shape[1]):
+        if exact:
+            new[:, k], slopes[:, k] = _compressed(costs[:, k])
+        column = new[:, k].copy()
         deviation = column.std()
         z = (column - column.mean()) / (deviation or 1.0)
         if np.mean(z**3) < skewed:
             continue
         new[:, k], power = yeojohnson(z)
-        slopes[:, k] = np.where(
+        slopes[:, k] *= np.where(
             z < 0, (1 - np.minimum(z, 0)) ** (1 - power), (1 + np.maximum(z, 0)) ** (power - 1)
         )
         slopes[:, k] /= deviation

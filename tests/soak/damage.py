@@ -152,7 +152,7 @@ def _record(k: int):
     from tisim.optimize.storage.record import Record
 
     values = {"fitness": 1 / (k + 3)}
-    return Record(f"{k:064x}", "soak", values, True, "", k, {"x": k / 7}, {"steps": k}, 0.1, 1e9 + k)
+    return Record(f"{k:064x}", "soak", values, True, "", k, {"x": k / 7}, {"steps": k}, 0.1, 1e9 + k, k)
 
 
 def _journal(folder: Path) -> Path:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import check_grad
-from scipy.stats import norm
+from scipy.stats import norm, spearmanr
 
 from tests.optimize.fake_runs import fake_problem, individual_of
 from tisim.optimize.surrogate import gaussian_process
@@ -211,3 +211,18 @@ def test_the_luckiest_of_many_is_not_the_best():
         regrets.append([bowl(np.array([list(chosen)]))[0], bowl(lucky[None])[0]])
     posterior, luck = np.mean(regrets, axis=0)
     assert posterior < luck / 2
+
+
+@pytest.mark.parametrize("penalty", [1e12, 1e30, 1e300])
+def test_penalties_do_not_hide_the_differences_of_good_designs(penalty):
+    """A third of the designs has the penalty; the others must be ranked by their costs."""
+    points = RNG.random((60, 2))
+    costs = np.where(points[:, 0] > 0.67, penalty, bowl(points))
+    belief = Belief()
+    belief.learn([individual_of(point, cost) for point, cost in zip(points, costs, strict=True)])
+    inside = RNG.random((200, 2)) * [0.6, 1.0]
+    predicted = belief.predict(inside)[0][:, 0]
+    assert spearmanr(predicted, bowl(inside)).statistic > 0.7
+    assert np.all(np.isfinite(belief.costs))
+    order = np.argsort(costs, kind="stable")
+    assert np.all(np.diff(belief.costs[order, 0]) >= 0)
