@@ -30,7 +30,7 @@ from tisim.optimize.designs_csv import (
 )
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.experiments import Values, known, row_values
-from tisim.optimize.hall_of_fame import HallOfFame
+from tisim.optimize.hall_of_fame import hall_of_fame
 from tisim.optimize.methods.base import find
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Design, Outcome
@@ -170,12 +170,13 @@ class AskTell:
                 individual.estimates
             )
         places = len(individuals) if self.problem.several else self.settings.hall_of_fame
-        found.hall = best(self.problem.genome, [one for one in individuals if not one.failed], places)
+        good = [one for one in individuals if not one.failed]
+        found.hall.fill(best(self.problem.genome, good, places))
         return found
 
     def _next(self) -> None:
         """Tell the method the known values, and ask it for the next generation."""
-        hall = HallOfFame(self.settings.hall_of_fame)
+        hall = hall_of_fame(self.problem, self.settings.hall_of_fame)
         hall.update(self._ranked())
         if self._by_method:
             self._method.tell(self._asked, hall.individuals)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.frames import data_frame
-from tisim.optimize.hall_of_fame import compromise
+from tisim.optimize.hall_of_fame import HallOfFame, compromise, hall_of_fame
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.gene_values import Value
 from tisim.optimize.problem.problem import Problem
@@ -83,8 +83,8 @@ class Outcome:
     """The outcome of a search.
 
     hall : the best different designs, best first, ranked by all information of the search (see
-        optimize.conclusion; empty if none succeeded); for several objectives the front. Failed designs never
-        enter.
+        optimize.conclusion; empty if none succeeded), as a deap.tools.HallOfFame; for several objectives the
+        front, as a deap.tools.ParetoFront. Failed designs never enter.
     estimates : estimates of each successful design, by its point of the unit cube, in the order of
         their first estimation.
     quantities : quantities of the runs of each of these, in the order of problem.quantities, shape (starts,
@@ -94,7 +94,7 @@ class Outcome:
         requested), failed, box (mean width of the search box it drew from), recentred (box moved after it),
         best (so far; infinitely bad if there is none). For one objective also mean and std of the successful
         designs in the population (NaN if there is none); for several the number of designs in the front, and
-        best for each.
+        best for each. The columns of Settings.statistics follow.
     evaluations, hits : numbers of runs made, and of runs found in the cache.
     stopped : the rule that ended it.
     beginning : its starting designs and experiments.
@@ -105,7 +105,7 @@ class Outcome:
     settings: Settings
     identity: Mapping[str, Any]
     beginning: Beginning = NOTHING
-    hall: list[Individual] = field(default_factory=list)
+    hall: HallOfFame = field(init=False)
     estimates: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     quantities: dict[tuple[float, ...], NDArray[np.float64]] = field(default_factory=dict)
     failures: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
@@ -114,6 +114,9 @@ class Outcome:
     hits: int = 0
     elapsed_s: float = 0.0
     stopped: Stopped = ""
+
+    def __post_init__(self) -> None:
+        self.hall = hall_of_fame(self.problem, self.settings.hall_of_fame)
 
     def __repr__(self) -> str:
         counts = f"{len(self.hall)} designs from {self.evaluations + self.hits} runs"

@@ -19,8 +19,8 @@ from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.conclusion import concluded, proven, reserve
 from tisim.optimize.evaluation.ensemble import Ensemble
 from tisim.optimize.evaluation.runs import Evaluator
-from tisim.optimize.generation_log import statistics
-from tisim.optimize.hall_of_fame import HallOfFame
+from tisim.optimize.generation_log import OwnStatistics, statistics
+from tisim.optimize.hall_of_fame import hall_of_fame
 from tisim.optimize.methods.base import find
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Outcome, Progress, Stopped
@@ -83,7 +83,8 @@ class _Search:
         self.method = find(settings.method)(
             problem.genome, len(problem.objectives), settings.options, settings.seed
         )
-        self.hall = HallOfFame(settings.hall_of_fame)
+        self.hall = hall_of_fame(problem, settings.hall_of_fame)
+        self.statistics = OwnStatistics(problem, settings.statistics)
         self.known: dict[tuple[float, ...], Individual] = {}
         self.ranked: list[Individual] | None = None
         self.tried: set[tuple[float, ...]] = set()  # designs that were checked and did not meet the target
@@ -155,6 +156,7 @@ class _Search:
                 recentred=self.method.moved and not self.ensemble.exhausted,
                 **statistics(self.problem, population, self.hall.individuals),
             )
+            self.statistics.add(self.outcome.logbook, population)
             self._store()
             reasons = [individual.estimates[0].reason for individual in population if individual.estimates]
             failed = not self.hall.individuals and reasons
@@ -290,7 +292,7 @@ class _Search:
     def _store(self) -> None:
         """Update the outcome and write it to the cache file."""
         out = self.outcome
-        out.hall = list(self.hall.individuals) if self.ranked is None else self.ranked
+        out.hall.fill(self.hall.individuals if self.ranked is None else self.ranked)
         out.evaluations, out.hits = self.ensemble.runs.evaluations, self.ensemble.runs.hits
         out.elapsed_s = time.monotonic() - self.began
         store(self.cache, out)

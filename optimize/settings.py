@@ -13,6 +13,7 @@ from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.optimize.beginning import Beginning
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.generation_log import OwnStatistics
 from tisim.optimize.methods.base import SearchMethod, code_of, every, find
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.record import canonical
@@ -31,6 +32,9 @@ class Settings(Checked):
     generations : number of generations after generation 0, the random initial population.
     ensemble : averaging over starts.
     hall_of_fame : number of best designs kept; a front is always kept whole.
+    statistics : further columns of the logbook, a deap.tools.Statistics or MultiStatistics; see
+        optimize.generation_log. They do not change the course of a search, and are not stored with its
+        settings.
 
     Stopping rules are checked after each generation; None disables a rule.
     target : stop when the best fitness is at least as good.
@@ -47,6 +51,7 @@ class Settings(Checked):
     generations: int = Field(25, ge=0)
     ensemble: EnsembleSettings = EnsembleSettings()
     hall_of_fame: int = Field(6, ge=1)
+    statistics: Any = Field(None, exclude=True, repr=False)
     target: float | None = None
     patience: int | None = Field(None, ge=1)
     max_evaluations: int | None = Field(None, ge=1)
@@ -163,8 +168,9 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
 
 
 def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None) -> None:
-    """Raise InputError if the method, a stopping rule or the number of starts does not suit the objectives or
-    the beginning of the search."""
+    """Raise InputError if the method, a stopping rule, the statistics or the number of starts does not suit
+    the objectives or the beginning of the search."""
+    OwnStatistics(problem, settings.statistics)
     for objective in problem.objectives:
         fewest = objective.statistic.fewest_starts
         must(

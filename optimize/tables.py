@@ -9,6 +9,7 @@ from typing import Any
 from deap import tools
 
 from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.generation_log import chapter_column
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.calls import constraint_value
 from tisim.optimize.problem.objective import Objective
@@ -135,9 +136,13 @@ def met_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
 
 
 def logbook_columns(problem: Problem, logbook: tools.Logbook) -> dict[str, list[Any]]:
-    """Return the logbook and the derived values of each generation's best: heading -> values by
-    generation."""
+    """Return the logbook with its chapters, and the derived values of each generation's best: heading ->
+    values by generation."""
     columns = {name: list(logbook.select(name)) for name in (logbook[0] if logbook else {})}
+    for chapter, rows in logbook.chapters.items():
+        columns |= {
+            chapter_column(chapter, name): list(rows.select(name)) for name in rows[0] if name != "gen"
+        }
     for heading, function in problem.derived.items() if columns else ():
         columns[heading] = [float(function(best)) for best in columns["best"]]
     return columns

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tisim import optimize
 from tisim.describe.docstrings import PUBLICATIONS
 from tisim.version import __version__
 
@@ -25,8 +26,14 @@ SCRIPTS = {
     if "guides" not in page and page != "docs/tutorial.md"
 }
 """The Python code of each page; test_contracts.py has files, test_guides.py guides and the tutorial."""
+FOUND = {"docs/inverse_design.md": "out/throw"}
+"""Folders of a search that the scripts of a page read."""
 PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": ["control="]}
 """Parts of their output."""
+
+
+def drop(design):
+    return (design["height"] - 1.5) ** 2
 
 
 @pytest.mark.long
@@ -41,6 +48,9 @@ PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": 
 def test_the_scripts_of_a_page_run_as_printed(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names = {}
+    if page in FOUND:
+        problem = optimize.Problem.of_function(drop, [optimize.Gene("height", "m", 1.0, 2.0)], name="throw")
+        optimize.run(problem, out=FOUND[page], method="random", generations=0)
     for script in SCRIPTS[page]:
         exec(compile(script, page, "exec"), names)
     printed = capsys.readouterr().out

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from deap import tools
@@ -14,7 +14,7 @@ from tisim.errors import must
 from tisim.optimize.methods.base import SearchMethod
 from tisim.optimize.methods.gaussian_process import missing, sobol
 from tisim.optimize.methods.individual import Individual
-from tisim.optimize.methods.operators import GeneticOperator, Operators
+from tisim.optimize.methods.operators import GeneticOperator, Operators, registered
 from tisim.optimize.problem.genome import Genome
 from tisim.optimize.surrogate.acquisition import Worth
 from tisim.optimize.surrogate.belief import Belief
@@ -41,7 +41,8 @@ class BreedingOptions(Checked):
         objectives).
     select, mate, mutate : operators of deap.tools by name, with their options, or functions with the same
         signature. select None: tournaments of two, by rank and crowding for several objectives. mutate None:
-        polynomial, of each gene with probability 1/2 with a surrogate and 1/genes without.
+        polynomial, of each gene with probability 1/2 with a surrogate and 1/genes without. ``toolbox``, a
+        deap.base.Toolbox, may be given in place of the operators that it has.
     crossover_probability : probability that a pair is mated.
     mutation_probability : probability that an individual is then mutated.
     """
@@ -57,6 +58,20 @@ class BreedingOptions(Checked):
     def kind(cls) -> str:
         """Return the name of these settings in messages, as in ``--set search.options.population=60``."""
         return "search.options"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_toolbox(cls, data: Any) -> Any:
+        """Return the settings with the operators of a toolbox in place of it."""
+        if not isinstance(data, Mapping) or "toolbox" not in data:
+            return data
+        given = {name: value for name, value in data.items() if name != "toolbox"}
+        found = registered(data["toolbox"])
+        for role in found:
+            must(
+                role not in given, f"search.options.{role}", "left out if the toolbox has it", given.get(role)
+            )
+        return given | found
 
 
 class GeneticOptions(BreedingOptions):

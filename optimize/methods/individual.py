@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cache
 
-from deap import base
+from deap import base, creator
 
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.problem.constraint import InequalityConstraint
@@ -14,8 +14,12 @@ from tisim.optimize.problem.feasibility import total_violation
 
 @cache
 def minimised(objectives: int) -> type:
-    """Return the DEAP fitness class for this number of costs."""
-    return type(f"Minimised{objectives}", (base.Fitness,), {"weights": (-1.0,) * objectives})
+    """Return the fitness class for this number of costs, which DEAP's creator makes, so that individuals can
+    be pickled."""
+    name = f"TisimFitness{objectives}"
+    creator.create(name, base.Fitness, weights=(-1.0,) * objectives)
+    kind: type = getattr(creator, name)
+    return kind
 
 
 class Individual(list[float]):

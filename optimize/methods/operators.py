@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import random
 from collections.abc import Callable, Mapping, Sequence
@@ -66,6 +67,9 @@ class GeneticOperator(Checked):
         InputError unless name and arguments are valid.
         """
         function = self.function or self._of_deap(role, objectives)
+        name = getattr(_innermost(function), "__name__", "")
+        if getattr(tools, name, None) is _innermost(function):
+            _check_name(name, role, objectives)
         free = _parameters(function)[_ARITY[role] :]
         given = set(self.options)
         names = [parameter.name for parameter in free]
@@ -78,18 +82,43 @@ class GeneticOperator(Checked):
 
     def _of_deap(self, role: str, objectives: int) -> Callable[..., Any]:
         must(not self.checksum, role, "the function itself, from Python", Words(f"{self.name}, its name"))
-        unfit = _LARGEST | _FRONT if objectives == 1 else {}
-        names = [name for name in dir(tools) if name.startswith(_PREFIXES[role]) and name not in unfit]
-        if role == "select" and objectives > 1:
-            names = list(_SEVERAL)
-        why = f" ({self.name} {unfit[self.name]})" if self.name in unfit else ""
-        must(self.name in names, "operator name", f"one of {', '.join(names)}{why}", self.name)
+        _check_name(self.name, role, objectives)
         function: Callable[..., Any] = getattr(tools, self.name)
         return function
 
 
+def registered(toolbox: Any) -> dict[str, Callable[..., Any]]:
+    """Return the operators that a toolbox of DEAP has, by role. InputError if it has none."""
+    what = "search.options.toolbox"
+    rule = f"a deap.base.Toolbox with one or more of {', '.join(_PREFIXES)}"
+    must(isinstance(toolbox, base.Toolbox), what, rule, toolbox)
+    found = {role: getattr(toolbox, role) for role in _PREFIXES if hasattr(toolbox, role)}
+    must(bool(found), what, rule, Words(f"one with {', '.join(vars(toolbox))}"))
+    return found
+
+
+def _check_name(name: str, role: str, objectives: int) -> None:
+    """Raise InputError unless deap.tools has an operator of this name that is fit for the role."""
+    unfit = _LARGEST | _FRONT if objectives == 1 else {}
+    names = [one for one in dir(tools) if one.startswith(_PREFIXES[role]) and one not in unfit]
+    if role == "select" and objectives > 1:
+        names = list(_SEVERAL)
+    why = f" ({name} {unfit[name]})" if name in unfit else ""
+    must(name in names, "operator name", f"one of {', '.join(names)}{why}", name)
+
+
+def _innermost(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the function that a toolbox has registered or decorated."""
+    while isinstance(function, functools.partial) or hasattr(function, "__wrapped__"):
+        function = function.func if isinstance(function, functools.partial) else function.__wrapped__
+    return function
+
+
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
     """Return the parameters that can be given by name; none for a C function without a signature."""
+    if isinstance(function, functools.partial):
+        # A toolbox copies ``__wrapped__`` of a decorated function, whose signature lacks the given arguments.
+        function = functools.partial(function.func, *function.args, **function.keywords)
     try:
         parameters = inspect.signature(function).parameters.values()
     except ValueError:
@@ -138,7 +167,7 @@ class Operators:
 
     def _selected(self, parents: list[Individual], count: int) -> list[Individual]:
         """Return ``count`` selected parents, with repetition if there are fewer."""
-        tournament = self.toolbox.select.func is tools.selTournamentDCD
+        tournament = _innermost(self.toolbox.select) is tools.selTournamentDCD
         if tournament and len(parents) < 4:
             parents = parents * (4 // len(parents) + 1)
         chosen: list[Individual] = []

@@ -1,9 +1,11 @@
 """Several objectives: the front is found and kept whole, and its search can be resumed."""
 
 import csv
+import pickle
 
 import numpy as np
 import pytest
+from deap import creator, tools
 from matplotlib.image import imread
 
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
@@ -105,6 +107,27 @@ def test_hall_of_one_objective_keeps_the_best_different_ones():
     assert not hall.update([individual([0.4], 2.5)])
     assert [list(one) for one in hall.individuals] == [[0.2], [0.4]]
     assert hall.update([individual([0.5], 1.0)])
+    # keys and items correspond as in DEAP, so that its own functions work
+    assert [key.values for key in hall.keys] == [(2.0,), (1.0,)]
+    hall.insert(individual([0.6], 1.5))
+    assert [one.fitness.values for one in hall] == [(1.0,), (1.5,), (2.0,)]
+    hall.remove(0)
+    assert [one.fitness for one in reversed(hall)] == hall.keys == [one.fitness for one in hall][::-1]
+    assert (len(hall), hall[0], hall[-1]) == (2, [0.6], [0.2])
+
+
+def test_the_front_is_a_pareto_front_of_deap(outcome):
+    assert isinstance(outcome.hall, tools.ParetoFront)
+    assert [key.values for key in outcome.hall.keys] == [one.fitness.values for one in outcome.hall][::-1]
+    front = tools.ParetoFront()
+    front.update(list(outcome.hall))
+    assert list(front) == list(outcome.hall)
+    for one in outcome.hall:
+        assert one.fitness.valid
+        assert type(one.fitness) is creator.TisimFitness2
+        assert one.fitness.weights == (-1.0, -1.0)
+    again = pickle.loads(pickle.dumps(outcome.hall))
+    assert [one.fitness.values for one in again] == [one.fitness.values for one in outcome.hall]
 
 
 def test_log_and_report(outcome, tmp_path):
@@ -143,7 +166,8 @@ def test_designs_of_few_starts_are_distinguished_from_well_known_ones(outcome):
 
     front, precise, lucky = design(0.5, 9), design(0.4, 9), design(0.9, 3)
     front.fitness.values, front.confirmed = (-0.5, 0.5), front.estimates
-    other = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
+    other = Outcome(outcome.problem, outcome.settings, {})
+    other.hall.fill([front])
     other.estimates = {tuple(individual): individual.estimates for individual in (front, precise, lucky)}
     assert others(other) == ([precise.estimates], [lucky.estimates])
     (axis,) = front_figure(other).axes

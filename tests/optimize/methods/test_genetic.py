@@ -223,6 +223,72 @@ def test_operators_of_a_toolbox_of_deap():
     assert by_toolbox == by_name
 
 
+def toolbox_of(**operators):
+    toolbox = base.Toolbox()
+    for role, (function, options) in operators.items():
+        toolbox.register(role, function, **options)
+    return toolbox
+
+
+BLEND, POLYNOMIAL = (tools.cxBlend, {"alpha": 0.3}), (tools.mutPolynomialBounded, {"eta": 5.0, "indpb": 0.5})
+
+
+def test_a_whole_toolbox_of_deap():
+    select = (tools.selTournament, {"tournsize": 3})
+    toolbox = toolbox_of(select=select, mate=BLEND, mutate=POLYNOMIAL, evaluate=(valley, {}))
+    by_name = {
+        "select": {"name": "selTournament", "options": {"tournsize": 3}},
+        "mate": {"name": "cxBlend", "options": {"alpha": 0.3}},
+        "mutate": {"name": "mutPolynomialBounded", "options": {"eta": 5.0, "indpb": 0.5}},
+    }
+    for surrogate in (False, True):
+        found = searched(valley, 40, surrogate=surrogate, toolbox=toolbox)
+        assert found == searched(valley, 40, surrogate=surrogate, **by_name)
+        assert found != searched(valley, 40, surrogate=surrogate)
+    nsga2 = find("nsga2")
+    options = nsga2.Options(toolbox=toolbox_of(mate=BLEND), population=12)
+    assert nsga2(fake_problem(GENES).genome, 1, options, 3).operators.toolbox.mate.func.keywords == BLEND[1]
+
+
+def test_the_selection_of_nsga2_in_a_toolbox_takes_any_number_of_parents():
+    costs = functools.partial(searched, two_costs, 60, objectives=2, surrogate=False, population=10)
+    assert costs(toolbox=toolbox_of(select=(tools.selTournamentDCD, {}))) == costs()
+
+
+def test_decorators_of_a_toolbox():
+    calls = []
+
+    def kept(function):
+        @functools.wraps(function)
+        def wrapped(*arguments, **options):
+            calls.append(options)
+            children = function(*arguments, **options)
+            for child in children:
+                child[:] = [0.5 * gene for gene in child]
+            return children
+
+        return wrapped
+
+    toolbox = toolbox_of(mate=BLEND, mutate=POLYNOMIAL)
+    plain = searched(valley, 60, surrogate=False, toolbox=toolbox)
+    toolbox.decorate("mate", kept)
+    decorated = searched(valley, 60, surrogate=False, toolbox=toolbox)
+    assert calls[0] == BLEND[1]
+    assert np.mean(decorated[20:]) < np.mean(plain[20:]) - 0.05
+
+
+def test_the_operators_of_a_toolbox_are_part_of_the_search():
+    def made(alpha):
+        toolbox = toolbox_of(mate=(tools.cxBlend, {"alpha": alpha}))
+        settings = Settings(method="genetic", options={"toolbox": toolbox})
+        return identity(fake_problem(GENES), settings, {})["search"]["options"]
+
+    assert made(0.3) == made(0.3)
+    assert made(0.3) != made(0.4)
+    assert made(0.3)["mate"]["name"] == "cxBlend"
+    assert "toolbox" not in made(0.3)
+
+
 def test_operators_are_part_of_the_search():
     def made(**options):
         return identity(fake_problem(GENES), Settings(method="genetic", options=options), {})
@@ -258,6 +324,19 @@ def test_operators_are_part_of_the_search():
         ),
         ({"surrogate": False, "inner": 3}, 1, "inner must be left out if surrogate is false"),
         ({"parents": 3}, 1, "search.options.parents must be a known key"),
+        ({"toolbox": "mine"}, 1, "search.options.toolbox must be a deap.base.Toolbox .*; received 'mine'"),
+        (
+            {"toolbox": toolbox_of(evaluate=(valley, {}))}, 1,
+            "with one or more of select, mate, mutate; received one with clone, map, evaluate",
+        ),
+        (
+            {"toolbox": toolbox_of(mate=BLEND), "mate": "cxOnePoint"}, 1,
+            "search.options.mate must be left out if the toolbox has it; received 'cxOnePoint'",
+        ),
+        ({"toolbox": toolbox_of(mate=(tools.cxBlend, {}))}, 1, r"must be complete: \['alpha'\]"),
+        ({"toolbox": toolbox_of(mate=(tools.cxOrdered, {}))}, 1, "fit for real-valued individuals"),
+        ({"toolbox": toolbox_of(mate=(tools.cxESBlend, BLEND[1]))}, 1, "no attribute 'strategy'"),
+        ({"toolbox": toolbox_of(select=(tools.selNSGA2, {}))}, 2, "one of selTournamentDCD, .*'selNSGA2'"),
     ],
 )  # fmt: skip
 def test_unfit_settings_are_refused_before_anything_runs(options, objectives, message):

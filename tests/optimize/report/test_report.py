@@ -119,11 +119,13 @@ def test_terminal_table_shows_the_best_designs(outcome):
 def agglomerations(number):
     """Designs of Z04's ten genes, with values such as 1.234e15."""
     outcome = Outcome(agglomeration("paper"), Settings(), {"problem": "agglomeration"})
+    individuals = []
     for k in range(number):
         individual = Individual([0.851234 + k / 200] * 10)
         individual.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.70123, 0.72345, 48, k % 2 == 0),)
         individual.confirmed = individual.estimates
-        outcome.hall.append(individual)
+        individuals.append(individual)
+    outcome.hall.fill(individuals)
     return outcome
 
 
