@@ -34,7 +34,7 @@ from pydantic import BaseModel
 
 from tisim.errors import InputError, abbreviated
 from tisim.files.python_file import is_own, sha256
-from tisim.optimize.problem.lookups import ENVIRONMENT, ANY_ATTRIBUTE, Lookups
+from tisim.optimize.problem.lookups import ANY_ATTRIBUTE, ENVIRONMENT, Lookups
 
 BY_REPR = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
 """Types whose values are fully described by ``repr``."""
@@ -83,7 +83,7 @@ class _Fingerprint:
         kind = type(value)
         yield f"{kind.__module__}.{kind.__qualname__}"
         if self.reused and (value is os.getenv or value is getattr(os, "getenvb", None)):
-            raise self.refusal(value.__name__)
+            raise self.refusal("getenv")
         if isinstance(value, types.FunctionType):
             yield from self.function(value)
         elif isinstance(value, functools.partial):
@@ -109,7 +109,7 @@ class _Fingerprint:
         elif isinstance(value, Path):
             yield str(value)
         elif isinstance(value, BY_REPR):  # of a class of the user
-            basis = next(one for one in BY_REPR if isinstance(value, one))
+            basis: Any = next(one for one in BY_REPR if isinstance(value, one))
             yield basis.__repr__(value)
             yield from self.own(value)
         elif hasattr(value, "__wrapped__"):
