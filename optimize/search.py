@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,9 +31,10 @@ from tisim.optimize.search_records import searches, store
 from tisim.optimize.settings import Settings, fit, identity
 from tisim.optimize.storage.cache import Cache
 
+MOST_ALIKE = 60
+"""A search ends if its first designs, this number or more, have all failed for the same reason."""
 MOST_REFUSED = 200
-"""A search ends if the scene function has refused its first designs, this number or more, and accepted
-none."""
+"""It ends if this number or more have all been refused, for whatever reasons."""
 
 
 class _OutOfTime(Exception):
@@ -88,7 +90,7 @@ class _Search:
         self.known: dict[tuple[float, ...], Individual] = {}
         self.ranked: list[Individual] | None = None
         self.tried: set[tuple[float, ...]] = set()  # designs that were checked and did not meet the target
-        self.stagnation = self.refused = 0
+        self.stagnation = 0
         self.learned = copy.deepcopy(beginning.learned)  # individuals with known values that were not run
         identified = identity(problem, settings, evaluator.settings, beginning)
         self.outcome = Outcome(problem, settings, identified, beginning)
@@ -163,15 +165,29 @@ class _Search:
             if self.on_generation is not None:
                 progress = self._progress(generation, 1.0)
                 self.on_generation(replace(progress, failure=reasons[0]) if failed else progress)
-            self.refused += len(reasons)
-            last = generation == self.settings.generations
-            if failed and not self.ensemble.runs.requested and (last or self.refused >= MOST_REFUSED):
-                raise RunError(
-                    f"the scene function refused all of the first {self.refused} designs; one is {reasons[0]}"
-                )
             self.outcome.stopped = self._stop(generation)
+            if failed:
+                self._give_up()
             if self.outcome.stopped:
                 return
+
+    def _give_up(self) -> None:
+        """Raise RunError if so many designs have failed, and none has succeeded, that more would fail, too.
+        Refusals count in the same way whether a scene, a function or a constraint makes them."""
+        reasons = [
+            re.sub(r"^start \d+ \(seed \d+\): ", "", estimates[0].reason)
+            for estimates in self.outcome.failures.values()
+        ]
+        kinds = {re.sub(r"[-+]?\d+(\.\d*)?(e[-+]?\d+)?", "N", reason) for reason in reasons}
+        refused = all(kind.startswith("infeasible: ") for kind in kinds)
+        most = MOST_ALIKE if len(kinds) == 1 else MOST_REFUSED if refused else math.inf
+        ended = refused and self.outcome.stopped not in ("", "wall clock")
+        if len(reasons) >= most or ended:
+            raise RunError(
+                f"search must find a design that succeeds; received {len(reasons)} that failed, the first as "
+                f"{reasons[0]}. Change the ranges of the genes, or start from a design that succeeds "
+                "(--start-from FILE, starting_designs=)"
+            )
 
     def _begin(self) -> list[Individual]:
         """Run the starting designs as far as the budget allows, and tell the method their values and the

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from tisim import InputError, RunError
-from tisim.optimize.problem.calls import FaultyProblem, constraint_value, make_scene, values_of
+from tisim.optimize.problem.calls import FaultyProblem, check_refusal, constraint_value, make_scene, values_of
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.record import Record, canonical, evaluation_key
@@ -191,7 +191,9 @@ class Runs:
         ok, reason = result.status.ok, result.status.reason or "failed without a reason"
         names = [*problem.quantities, *(one.name for one in problem.result_constraints)]
         values = dict.fromkeys(names, math.nan)
-        if ok:
+        if not ok:
+            check_refusal(result, problem)
+        else:
             for objective in problem.objectives:
                 values |= values_of(objective, result, problem)
             values |= {one.name: constraint_value(one, result, problem) for one in problem.result_constraints}

@@ -5,12 +5,8 @@ from __future__ import annotations
 
 import functools
 import numbers
-import os
-import sys
-import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,18 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tisim.errors import InputError, Words, abbreviated, must, printable
-from tisim.files.python_file import own_folders
+from tisim.optimize.problem.outside import Outside, is_of_user, noticed
 
 if TYPE_CHECKING:
     from tisim import Scene
     from tisim.optimize.problem.constraint import InequalityConstraint
     from tisim.optimize.problem.objective import Objective
     from tisim.optimize.problem.problem import Problem
-
-SOURCES = (".py", ".pyc", ".so", ".pyd")
-"""Endings of files that are opened by imports."""
-SYSTEM = tuple(map(Path, ("/usr", "/lib", "/etc", "/dev", "/proc", "/sys")))
-"""System folders, which contain no data of a user."""
 
 
 def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scene:
@@ -83,20 +74,44 @@ def constraint_value(constraint: InequalityConstraint, of: Any, problem: Problem
     return _number(what, _called(what, "a number", constraint.of, of, problem))
 
 
-def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, frozenset[Path]]:
-    """Return the value of a plain function of a design, and the user's files that it read.
+def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, Outside]:
+    """Return the value of a plain function of a design, or the InputError with which it refuses the design;
+    and what it read.
 
-    InputError if it refuses the design; FaultyProblem if it fails.
+    FaultyProblem if it fails.
     """
     try:
-        with _files_read() as read:
+        with noticed() as read:
             value = of(*arguments)
-    except InputError:
-        raise
+    except InputError as error:
+        return error, read
     except Exception as error:
         rule = f"function {function_name(of)} must return numbers, or raise InputError to refuse a design"
         raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
-    return value, frozenset(read)
+    return value, read
+
+
+def check_reads(what: str, read: Outside, problem: Problem) -> None:
+    """Raise FaultyProblem if a function has read anything else than the files of the problem."""
+    known = {Path(file).resolve() for file in problem.files}
+    if unknown := sorted(map(str, read.files - known)):
+        raise FaultyProblem(
+            f"{what} must read no file but those in Problem(files=[...]), as its values "
+            f"are used again while these are the same; received {printable(unknown[0])}"
+        )
+    if read.sources and not (problem.files or problem.code):
+        raise FaultyProblem(
+            f"{what} must start no program and open no connection, as its values are used again; "
+            f"received {printable(read.sources[0])}. Or list the files that it reads in "
+            "Problem(files=[...]), or give Problem(code=...), a text that you change with its answers"
+        )
+
+
+def check_refusal(result: Any, problem: Problem) -> None:
+    """Check what a plain function has read before it refused a design. The objectives, which check this too,
+    are not called for a refused design."""
+    if problem.function is not None and isinstance(read := getattr(result, "read", None), Outside):
+        check_reads(f"function {function_name(problem.function.of)}", read, problem)
 
 
 def function_name(of: Callable[..., Any]) -> str:
@@ -109,20 +124,16 @@ def function_name(of: Callable[..., Any]) -> str:
 def _called(what: str, wanted: str, of: Callable[[Any], Any], argument: Any, problem: Problem) -> Any:
     """Return the value of a function of the problem for a result or a design."""
     rule = f"{what} must return {wanted}"
-    known = {Path(file).resolve() for file in problem.files}
     try:
-        with _files_read() as read:
+        with noticed() as read:
             value: Any = of(argument)
     except FaultyProblem:
         raise
     except Exception as error:
         raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
-    # A plain function read its files earlier, when it was called.
-    if unknown := sorted(str(path) for path in (read | getattr(argument, "files_read", read)) - known):
-        raise FaultyProblem(
-            f"{what} must read no file but those in Problem(files=[...]), as its values "
-            f"are used again while these are the same; received {printable(unknown[0])}"
-        )
+    check_reads(what, read, problem)
+    if isinstance(earlier := getattr(argument, "read", None), Outside):
+        check_reads(what, earlier, problem)  # by a plain function, when it was called
     return value
 
 
@@ -146,57 +157,6 @@ class FaultyProblem(InputError):
 def error_told(error: Exception) -> str:
     """Return an error in a user's function as one line, with its place in the user's file."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [one for one in frames if _is_of_user(Path(one.filename))]
+    own = [one for one in frames if is_of_user(Path(one.filename))]
     place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
     return printable(f"{type(error).__name__}: {' '.join(str(error).split())}") + printable(place)
-
-
-_reading = threading.local()
-
-
-def _note(event: str, arguments: tuple[Any, ...]) -> None:
-    """Record a file that is opened for reading while an objective runs in this thread."""
-    files: set[Path] | None = getattr(_reading, "files", None)
-    if files is None or event != "open":
-        return
-    path, _mode, flags = arguments
-    if not isinstance(path, str | bytes) or not isinstance(flags, int):
-        return
-    name = path.decode(errors="surrogateescape") if isinstance(path, bytes) else path
-    writes = flags & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-    if writes:
-        # A file that is read back later was written by the objective itself.
-        _reading.written.add(Path(name).absolute())
-    elif not name.endswith(SOURCES) and Path(name).absolute() not in _reading.written:
-        files.add(Path(name).absolute())
-
-
-_hook: list[Callable[..., Any]] = []
-
-
-@contextmanager
-def _files_read() -> Iterator[set[Path]]:
-    """Collect the paths of the user's files that are opened for reading in the block, links resolved."""
-    if not _hook:
-        # An audit hook cannot be removed.
-        sys.addaudithook(_note)
-        _hook.append(_note)
-    found: set[Path] = set()
-    _reading.files, _reading.written = found, set()
-    try:
-        yield found
-    finally:
-        _reading.files = None
-        read = {path.resolve() for path in filter(_is_of_user, found) if path.is_file()}
-        found.clear()
-        found.update(read)
-
-
-def _is_of_user(path: Path) -> bool:
-    """Return whether a file is neither installed, nor part of the system, nor in a program's folder in the
-    home."""
-    installed = Path(sys.prefix), Path(sys.base_prefix), *own_folders()
-    home = os.environ.get("HOME") or os.environ.get("USERPROFILE") or "."
-    kept = tuple(Path(home) / name for name in (".cache", ".config", ".local", ".matplotlib"))
-    metadata = any(part.endswith((".egg-info", ".dist-info")) for part in path.parts)
-    return not metadata and not any(path.is_relative_to(base) for base in (*installed, *SYSTEM, *kept))

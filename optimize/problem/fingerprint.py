@@ -5,19 +5,26 @@ includes the code of the function and everything that it is bound to: arguments 
 variables of enclosing functions, default values, attributes of objects, the global variables that it names,
 and the same for each function that it calls. Equal fingerprints mean equal functions, in any process. An
 object that cannot be compared by value is refused.
+
+Values that were computed earlier do not count: caches of functions are emptied, so that a data file behind
+them is read again, and noticed (outside.py).
 """
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import functools
 import hashlib
+import importlib.util
 import inspect
+import os
 import pickle
 import site
 import sys
 import sysconfig
 import types
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -27,32 +34,35 @@ from pydantic import BaseModel
 
 from tisim.errors import InputError, abbreviated
 from tisim.files.python_file import is_own, sha256
+from tisim.optimize.problem.lookups import ANY_ATTRIBUTE, ENVIRONMENT, Lookups
 
 BY_REPR = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), range, slice)
 """Types whose values are fully described by ``repr``."""
 
 
-def fingerprint(value: Any, what: str = "") -> str:
+def fingerprint(value: Any, what: str = "", reused: bool = False) -> str:
     """Return the fingerprint of a function, or of another value, hex.
 
     what : name of the value in the InputError that is raised if it is bound to an object that cannot be
         compared. If it is empty, no error is raised, and only the class of such an object counts.
+    reused : whether values of the function are stored and used again. Code that finds values by a name
+        unknown in advance is then refused; environment variables and modules that it names count.
     """
-    return _Fingerprint(what).of(value).hex()
+    return _Fingerprint(what, reused).of(value).hex()
 
 
 class _Fingerprint:
     """A recursive walk through the parts of a value; an object that contains itself is entered once."""
 
-    def __init__(self, what: str) -> None:
-        self.what = what
+    def __init__(self, what: str, reused: bool) -> None:
+        self.what, self.reused = what, reused
         self.depths: dict[int, int] = {}
         # The object is kept, too: otherwise a later object could get the same id.
         self.known: dict[int, tuple[Any, bytes]] = {}
 
     def of(self, value: Any) -> bytes:
         """Return the digest of a value."""
-        if isinstance(value, BY_REPR):
+        if isinstance(value, BY_REPR) and (type(value) in BY_REPR or not _of_user(type(value))):
             return _digest(type(value).__name__, repr(value))
         if isinstance(value, np.generic | np.ndarray) and not value.dtype.hasobject:
             array = np.asarray(value)
@@ -72,26 +82,55 @@ class _Fingerprint:
         """Yield the parts of a value."""
         kind = type(value)
         yield f"{kind.__module__}.{kind.__qualname__}"
+        if self.reused and (value is os.getenv or value is getattr(os, "getenvb", None)):
+            raise self.refusal("getenv")
         if isinstance(value, types.FunctionType):
             yield from self.function(value)
         elif isinstance(value, functools.partial):
             yield from (self.of(part) for part in (value.func, value.args, value.keywords))
+            yield from self.attributes(vars(value))
         elif isinstance(value, types.MethodType):
             yield from (self.of(value.__func__), self.of(value.__self__))
         elif isinstance(value, type | types.ModuleType | types.BuiltinFunctionType | np.ufunc):
             yield from self.named(value)
         elif isinstance(value, list | tuple | np.ndarray):
             yield from map(self.of, np.atleast_1d(value) if isinstance(value, np.ndarray) else value)
+            yield from self.own(value)
         elif isinstance(value, Mapping):
             yield from self.unordered((key, item) for key, item in value.items())
+            if isinstance(value, defaultdict):
+                yield self.of(value.default_factory)
+            yield from self.own(value)
         elif isinstance(value, set | frozenset):
             yield from self.unordered(value)
-        elif isinstance(value, enum.Enum | Path):
+            yield from self.own(value)
+        elif isinstance(value, enum.Enum):
+            yield from (str(value), self.of(value.value))
+        elif isinstance(value, Path):
             yield str(value)
+        elif isinstance(value, BY_REPR):  # of a class of the user
+            basis: Any = next(one for one in BY_REPR if isinstance(value, one))
+            yield basis.__repr__(value)
+            yield from self.own(value)
         elif hasattr(value, "__wrapped__"):
+            if self.reused and hasattr(value, "cache_clear") and _of_user(value):
+                value.cache_clear()
             yield self.of(value.__wrapped__)
+            if _of_user(kind):
+                yield from self.object(value)
         else:
             yield from self.object(value)
+
+    def own(self, value: Any) -> Iterator[bytes]:
+        """Yield what a user's class adds to a container or number: its members, and attributes."""
+        if _of_user(type(value)):
+            yield self.of(type(value))
+            yield from self.attributes(getattr(value, "__dict__", {}))
+
+    def attributes(self, given: Mapping[str, Any]) -> Iterator[bytes]:
+        """Yield the attributes of an object that usually has none; nothing if there are none."""
+        if more := {name: value for name, value in given.items() if name != "__wrapped__"}:
+            yield self.of(more)
 
     def unordered(self, items: Iterable[Any]) -> Iterator[bytes]:
         """Yield the digests of items, sorted."""
@@ -140,23 +179,64 @@ class _Fingerprint:
                 continue  # A variable that is not set yet.
             yield self.of(content)
         if _of_user(function):
-            names: set[str] = set()
-            yield from self.code(function.__code__, names)
+            lookups = Lookups()
+            yield from self.code(function.__code__, lookups)
+            yield from self.attributes(vars(function))
+            if self.reused and lookups.hidden:
+                raise self.refusal(min(lookups.hidden), function)
+            names = lookups.names
+            whole = self.reused and not names.isdisjoint(ANY_ATTRIBUTE)
             for name in sorted(names & function.__globals__.keys()):
                 value = function.__globals__[name]
+                if self.reused and name in ENVIRONMENT and _of_os(value):
+                    continue
                 yield from (name, self.of(value))
-                if isinstance(value, types.ModuleType) and _of_user(value):
-                    # The attributes that the code names, such as ``target`` in ``settings.target``.
-                    for attribute in sorted(names & vars(value).keys()):
-                        yield from (attribute, self.of(vars(value)[attribute]))
+                if isinstance(value, types.ModuleType):
+                    yield from self.module(value, names, whole)
+            if self.reused:
+                yield from self.looked_up(function, lookups, whole)
 
-    def code(self, code: types.CodeType, names: set[str]) -> Iterator[bytes | str]:
-        """Yield a code object without its line numbers, and add the names that it uses to ``names``."""
-        names.update(code.co_names)
+    def module(
+        self, module: types.ModuleType, names: set[str], whole: bool, seen: tuple[str, ...] = ()
+    ) -> Iterator[bytes | str]:
+        """Yield the attributes of a user's module that code names, such as ``target`` in ``settings.target``;
+        or all of them."""
+        if not _of_user(module) or module.__name__ in seen:
+            return
+        named = [name for name in vars(module) if not name.startswith("__")] if whole else names
+        for name in sorted(vars(module).keys() & named):
+            value = vars(module)[name]
+            yield from (name, self.of(value))
+            if isinstance(value, types.ModuleType):
+                yield from self.module(value, names, whole, (*seen, module.__name__))
+
+    def looked_up(self, function: types.FunctionType, lookups: Lookups, whole: bool) -> Iterator[bytes | str]:
+        """Yield the environment variables that a function reads, and the user's modules that it imports."""
+        for name in sorted(lookups.variables):
+            yield from (name, self.of(os.environ.get(name)))
+        for name in lookups.modules(function.__globals__.get("__package__") or ""):
+            if module := _imported(name):
+                yield from (name, self.of(module))
+                yield from self.module(module, lookups.names, whole)
+
+    def refusal(self, received: str, function: types.FunctionType | None = None) -> InputError:
+        """Return the error for code that finds values by a name unknown in advance."""
+        place = "" if function is None else f" ({function.__qualname__})"
+        rule = "must read values by names that its code shows"
+        if received in ENVIRONMENT:
+            rule = "must name each environment variable by a constant, os.environ['NAME']"
+        return InputError(
+            f"{self.what or 'function'} {rule}, as its values are used again; received {received}{place}. Or "
+            "give Problem(code=...), a text that you change with these values"
+        )
+
+    def code(self, code: types.CodeType, lookups: Lookups) -> Iterator[bytes | str]:
+        """Yield a code object without its line numbers, and add what it looks up."""
+        lookups.add(code)
         yield from (code.co_code, repr(code.co_names), repr(code.co_varnames), repr(code.co_freevars))
         for constant in code.co_consts:
             if isinstance(constant, types.CodeType):
-                yield from self.code(constant, names)
+                yield from self.code(constant, lookups)
             else:
                 yield self.of(constant)
 
@@ -169,16 +249,22 @@ class _Fingerprint:
             if _of_user(type(value)):
                 yield self.of([value.__pydantic_private__, value.__pydantic_extra__])
             return
-        if hasattr(value, "__dict__") and _plain_attributes(type(value)):
-            computed = {
-                name
-                for kind in type(value).__mro__
-                for name, member in vars(kind).items()
-                if isinstance(member, functools.cached_property)
-            }
-            slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
+        kinds = type(value).__mro__[::-1]
+        members = {name: member for kind in kinds for name, member in vars(kind).items()}
+        slotted = [one for kind in kinds if "__slots__" in vars(kind) for one in vars(kind).items()]
+        slots = [name for name, one in slotted if isinstance(one, types.MemberDescriptorType)]
+        if (hasattr(value, "__dict__") or slots) and _plain_attributes(type(value)):
             given = {name: getattr(value, name) for name in slots if hasattr(value, name)}
-            yield self.of(given | {k: v for k, v in vars(value).items() if k not in computed})
+            given |= getattr(value, "__dict__", {})
+            for name, member in members.items():
+                if isinstance(member, functools.cached_property):
+                    given.pop(name, None)
+                    # A value that was computed before the search may be of an old file, so it counts. It is
+                    # computed if it was not yet: its fingerprint should not change when it is first used.
+                    if self.reused and _of_user(type(value)):
+                        with contextlib.suppress(Exception):
+                            given[name] = getattr(value, name)
+            yield self.of(given)
             return
         try:
             yield pickle.dumps(value, protocol=4)
@@ -205,8 +291,31 @@ def _plain_attributes(kind: type) -> bool:
     """Return whether all classes of an object are defined in Python, so that its attributes describe it
     completely."""
     return kind.__reduce__ is object.__reduce__ and all(
-        base is object or base.__flags__ & (1 << 9) for base in kind.__mro__
+        base is object or base.__flags__ & (3 << 8) == 1 << 9 for base in kind.__mro__
     )
+
+
+def _of_os(value: Any) -> bool:
+    """Return whether a value is one of the means of Python to read the environment."""
+    return any(value is getattr(os, name, None) for name in ENVIRONMENT)
+
+
+def _imported(name: str) -> types.ModuleType | None:
+    """Return a user's module that a function imports; None if it is not a user's, or cannot be imported."""
+    root = name.partition(".")[0]
+    if is_own(root) or root in sys.stdlib_module_names:
+        return None
+    try:
+        found = importlib.util.find_spec(root)
+        if found is None or (found.origin and _is_installed(found.origin)):
+            return None
+        return importlib.import_module(name)
+    except Exception:
+        return None  # as in a function that does without it
+
+
+def _is_installed(path: str) -> bool:
+    return any(Path(path).is_relative_to(folder) for folder in _installed())
 
 
 def _of_user(item: Callable[..., Any] | type | types.ModuleType) -> bool:
@@ -218,7 +327,7 @@ def _of_user(item: Callable[..., Any] | type | types.ModuleType) -> bool:
         return False
     module = sys.modules.get(whose)
     path = getattr(module, "__file__", None)
-    return path is None or not any(Path(path).is_relative_to(folder) for folder in _installed())
+    return path is None or not _is_installed(path)
 
 
 @functools.cache

@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ import numpy as np
 from tisim.engine.result import Status
 from tisim.errors import InputError, abbreviated, must
 from tisim.optimize.problem.calls import FaultyProblem, call_function
+from tisim.optimize.problem.outside import Outside
 
 
 @dataclass(frozen=True)
@@ -73,28 +73,25 @@ class FunctionCall:
         """Call the function. A refused design gives a failed result; FaultyProblem if the function fails."""
         begun = time.perf_counter()
         arguments = (dict(self.design),) if self.seed is None else (dict(self.design), self.seed)
-        try:
-            value, read = call_function(self.of, *arguments)
-        except FaultyProblem:
-            raise
-        except InputError as error:
-            status = Status(False, f"infeasible: {error}")
-            return FunctionResult(self.design, None, status, time.perf_counter() - begun)
-        return FunctionResult(self.design, value, Status(True, ""), time.perf_counter() - begun, read)
+        value, read = call_function(self.of, *arguments)
+        refused = isinstance(value, InputError)
+        status = Status(False, f"infeasible: {value}") if refused else Status(True, "")
+        wall_s = time.perf_counter() - begun
+        return FunctionResult(self.design, None if refused else value, status, wall_s, read)
 
 
 @dataclass(frozen=True)
 class FunctionResult:
     """The result of a plain function.
 
-    value : the returned value. status, wall_s, work : as in ``tisim.Result``. files_read : user's files read.
+    value : the returned value. status, wall_s, work : as in ``tisim.Result``. read : what the function read.
     """
 
     design: Mapping[str, Any]
     value: Any
     status: Status
     wall_s: float
-    files_read: frozenset[Path] = frozenset()
+    read: Outside = field(default_factory=Outside)
     work: dict[str, int] = field(default_factory=dict)
 
 

@@ -192,11 +192,11 @@ class Problem:
 
     def _run_checksums(self) -> dict[str, str]:
         """Return checksums of the functions that determine the value of a run, by name."""
-        checksums = {o.name: checksum_of(o.of, f"objective {o.name}") for o in self.objectives}
+        checksums = {o.name: checksum_of(o.of, f"objective {o.name}", True) for o in self.objectives}
         functions = {f"constraint {one.name}": one.of for one in self.result_constraints}
         if self.function is not None:
             functions[f"function {function_name(self.function.of)}"] = self.function.of
-        return checksums | {what: checksum_of(of, what) for what, of in functions.items()}
+        return checksums | {what: checksum_of(of, what, True) for what, of in functions.items()}
 
     @property
     def several(self) -> bool:
@@ -209,13 +209,14 @@ class Problem:
         return tuple(o.sign * value for o, value in zip(self.objectives, values, strict=True))
 
 
-def checksum_of(function: Callable[..., Any], what: str = "") -> str:
+def checksum_of(function: Callable[..., Any], what: str = "", reused: bool = False) -> str:
     """Return a checksum of a function, of the files that define it and of all that it is bound to.
 
-    what : the name of the function in error messages, as in ``fingerprint``.
+    what : the name of the function in error messages; reused : whether its values are; as in
+    ``fingerprint``.
     """
     files = python_file.module_checksums(function)
-    return _checksum([fingerprint(function, what), *files.values()])
+    return _checksum([fingerprint(function, what, reused), *files.values()])
 
 
 def _checksum(value: Any) -> str:

@@ -5,7 +5,9 @@ import pytest
 
 from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError, RunError
+from tisim.optimize import Gene, Problem
 from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings
 from tisim.optimize.storage.cache import Cache
@@ -76,11 +78,61 @@ def refused(design, seed):
     raise InputError("speed must be below 1 m/s; received 2.0")
 
 
+HINT = r"Change the ranges of the genes, or start from a design that succeeds \(--start-from FILE, star.*\)$"
+NO_SUCCESS = r"^search must find a design that succeeds; received {} that failed, the first as {}\. " + HINT
+
+
 def test_a_search_without_valid_designs_ends_with_the_reason(tmp_path):
-    with pytest.raises(
-        RunError, match=r"^the scene function refused all of the first 24 designs; .* speed must"
-    ):
+    message = NO_SUCCESS.format(18, r"infeasible: speed must be below 1 m/s; received 2\.0")
+    with pytest.raises(RunError, match=message):
         run(tmp_path, scene=refused)
+
+
+def test_a_function_that_refuses_every_design_ends_as_a_scene_does(tmp_path):
+    message = NO_SUCCESS.format(18, r"infeasible: speed must be below 1 m/s; received 2\.0")
+    problem = Problem.of_function(refused, [Gene("x", "", 0.0, 1.0)])
+    with Cache(tmp_path / "search.h5") as cache, pytest.raises(RunError, match=message):
+        search(problem, FunctionEvaluator(), cache, SETTINGS)
+
+
+def speed_refused(design, seed):
+    raise InputError(f"speed must be below 1 m/s; received {1 + design['x0']}")
+
+
+def refused_in_turn(design, seed):
+    raise InputError("speed must be low" if design["x0"] < 0.5 else "mass must be small")
+
+
+LONG = Settings(method="random", generations=60, options={"population": 6}, ensemble=SETTINGS.ensemble)
+HOPELESS = {
+    "one reason, with other numbers": ({"scene": speed_refused}, FakeEvaluator(), 60, "infeasible: speed"),
+    "several reasons": ({"scene": refused_in_turn}, FakeEvaluator(), 204, "infeasible: (speed|mass)"),
+    "failed runs": ({}, FakeEvaluator(lambda design, seed: f"lost at {seed} s"), 60, r"lost at \d+ s"),
+}
+
+
+@pytest.mark.parametrize("name", HOPELESS)
+def test_a_search_in_which_everything_fails_ends_early(tmp_path, name):
+    changes, evaluator, designs, reason = HOPELESS[name]
+    generations = []
+    message = NO_SUCCESS.format(designs, f"{reason}.*")
+    with Cache(tmp_path / "search.h5") as cache, pytest.raises(RunError, match=message):
+        search(fake_problem(**changes), evaluator, cache, LONG, on_generation=generations.append)
+    assert len(generations) == designs // 6
+
+
+def test_a_search_with_a_late_success_continues(tmp_path):
+    """The only valid design of the first 60 is the last one."""
+    seen = []
+
+    def last(design, seed):
+        seen.extend([design] if design not in seen else [])
+        return FakeScene(design, seed) if design in seen[59:60] else refused(design, seed)
+
+    with Cache(tmp_path / "search.h5") as cache:
+        outcome = search(fake_problem(scene=last), FakeEvaluator(), cache, LONG)
+    assert outcome.stopped == "generations"
+    assert outcome.best is not None
 
 
 def test_a_search_with_some_refused_designs_continues(tmp_path):

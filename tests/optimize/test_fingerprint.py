@@ -1,11 +1,16 @@
 """Objective values are reused for the same function bound to the same data, and for no other."""
 
+import enum
 import functools
 import importlib
+import os
+import sqlite3
 import subprocess
 import sys
 import threading
+from collections import defaultdict
 from dataclasses import dataclass, replace
+from os import environ
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -175,6 +180,13 @@ def test_incomparable_objects_are_refused():
     assert fingerprint(of_closure(lock)) == fingerprint(of_closure(threading.Lock()))
 
 
+def test_an_object_whose_content_is_hidden_is_refused():
+    """A class of the user that is derived from one in C has attributes that Python does not show."""
+    for kind in (sqlite3.Connection, type("Own", (sqlite3.Connection,), {})):
+        with pytest.raises(InputError, match=r"^objective R must use only values that can be compared; "):
+            fingerprint(of_closure(kind(":memory:")), "objective R", True)
+
+
 def test_an_explicit_code_replaces_the_comparison():
     """As the message recommends."""
     made = replace(problem("default", ""), objective=of_closure(threading.Lock()))
@@ -182,6 +194,201 @@ def test_an_explicit_code_replaces_the_comparison():
         _ = made.objective_identity
     assert replace(made, code="1").objective_identity == replace(made, code="1").objective_identity
     assert replace(made, code="1").identity != replace(made, code="2").identity
+
+
+def with_attribute(value):
+    def of_attribute(result):
+        return abs(result - of_attribute.target)
+
+    of_attribute.target = value
+    return of_attribute
+
+
+class Slots:
+    __slots__ = ("__hidden", "function")
+
+    def __init__(self, value):
+        self.__hidden, self.function = value, of_closure(value)
+
+
+class Number(float):
+    def __repr__(self):
+        return "number"
+
+
+class Record(dict):
+    pass
+
+
+class Scaled:
+    """A decorator with a value of its own."""
+
+    def __init__(self, function, scale):
+        functools.update_wrapper(self, function)
+        self.scale = scale
+
+
+class Kept:
+    """A property that another value was assigned to, or that was computed from an old file."""
+
+    def __init__(self, value):
+        self.target = value
+
+    target = functools.cached_property(lambda self: 0.0)
+
+
+def record_with(value):
+    record = Record(a=1)
+    record.target = value
+    return record
+
+
+MORE_MAKERS = {
+    "attribute of a function": with_attribute,
+    "attribute of the function in a closure": lambda value: of_closure(with_attribute(value)),
+    "slots": lambda value: of_closure(Slots(value)),
+    "number of an own class": lambda value: of_closure(Number(value)),
+    "attribute of a dictionary": lambda value: of_closure(record_with(value)),
+    "class of a list": lambda value: of_closure(type("Own", (list,), {"target": value})()),
+    "default of a dictionary": lambda value: of_closure(defaultdict(lambda: value)),
+    "value of an enumeration": lambda value: of_closure(enum.Enum("Kind", {"A": value}).A),
+    "decorator": lambda value: of_closure(Scaled(miss, value)),
+    "cached property": lambda value: of_closure(Kept(value)),
+    "mutable default": lambda value: with_default([value]),
+}
+
+
+@pytest.mark.parametrize("name", MORE_MAKERS)
+def test_less_usual_places_of_data_count(name):
+    make = MORE_MAKERS[name]
+    first, again, other = (fingerprint(make(value), name, True) for value in (0.5, 0.5, 1.5))
+    assert first == again
+    assert first != other
+
+
+VARIABLES = {
+    "subscript": lambda result: float(os.environ["TISIM_TEST"]),
+    "get": lambda result: float(os.environ.get("TISIM_TEST", 0.0)),
+    "getenv": lambda result: float(os.getenv("TISIM_TEST", default=0.0)),
+    "contains": lambda result: "TISIM_TEST" in os.environ,
+    "imported name": lambda result: float(environ["TISIM_TEST"]),
+    "nested function": lambda result: [float(os.environ["TISIM_TEST"]) for _ in range(2)],
+}
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_environment_variables_that_code_names_count(name, monkeypatch):
+    def now():
+        return fingerprint(VARIABLES[name], "objective R", True)
+
+    prints = [now()]
+    for value in ("1.0", "1.0", "2.0"):
+        monkeypatch.setenv("TISIM_TEST", value)
+        prints.append(now())
+    monkeypatch.setenv("TISIM_OTHER", "3.0")
+    assert prints[1] == prints[2]
+    assert len(set(prints)) == 3
+    assert now() == prints[3], "other variables do not count"
+
+
+KEY, GET = "TISIM_TEST", os.getenv
+IN_PARTS = {
+    "a variable": lambda result: os.environ[KEY],
+    "an expression": lambda result: os.getenv("TISIM" + result),
+    "the dictionary": lambda result: dict(os.environ),
+    "an argument": lambda result, part="": os.environ.get(f"TISIM_{part}"),
+    "an alias": lambda result: GET("TISIM_TEST"),
+    "a default": lambda result, get=os.getenv: get("TISIM_TEST"),
+}
+
+
+@pytest.mark.parametrize("name", IN_PARTS)
+def test_environment_variables_without_constant_names_are_refused(name):
+    with pytest.raises(InputError) as refused:
+        fingerprint(IN_PARTS[name], "objective R", True)
+    got = "getenv" if name in ("an expression", "an alias", "a default") else "environ"
+    place = "" if name in ("an alias", "a default") else " (<lambda>)"
+    assert str(refused.value) == (
+        "objective R must name each environment variable by a constant, os.environ['NAME'], as its values "
+        f"are used again; received {got}{place}. Or give Problem(code=...), a text that you change with "
+        "these values"
+    )
+
+
+HIDDEN = {
+    "globals": lambda result: globals()["LEVEL"],
+    "eval": lambda result: eval("LEVEL"),
+    "exec": lambda result: exec("LEVEL"),
+    "__import__": lambda result: __import__("sys").LEVEL,
+    "import_module": lambda result: importlib.import_module("own_levels").LEVEL,
+    "modules": lambda result: sys.modules["own_levels"].LEVEL,
+    "f_globals": lambda result: sys._getframe().f_globals["LEVEL"],
+    "__globals__": lambda result: of_global.__globals__["LEVEL"],
+}
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_code_that_finds_values_by_any_name_is_refused(name):
+    with pytest.raises(InputError) as refused:
+        fingerprint(HIDDEN[name], "objective R", True)
+    assert str(refused.value) == (
+        "objective R must read values by names that its code shows, as its values are used again; received "
+        f"{name} (<lambda>). Or give Problem(code=...), a text that you change with these values"
+    )
+    assert fingerprint(HIDDEN[name], "method M"), "nothing is used again"
+    made = replace(problem("default", ""), objective=HIDDEN[name], code="1")
+    assert made.objective_identity != replace(made, code="2").objective_identity
+
+
+def test_values_of_modules_found_by_name_or_imported_late_count(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "own_package").mkdir()
+    (tmp_path / "own_package/__init__.py").write_text("")
+    (tmp_path / "own_package/own_values.py").write_text("T = 1.0\n")
+    module = importlib.import_module("own_package.own_values")
+    names = {"own_package": importlib.import_module("own_package"), "own_values": module}
+    texts = (
+        "def f(r): return getattr(own_values, 'T')", "def f(r, n='T'): return getattr(own_values, n)",
+        "def f(r): return vars(own_values)['T']", "def f(r): return own_values.__dict__['T']",
+        "def f(r): return own_package.own_values.T",
+        "def f(r):\n    from own_package.own_values import T\n    return T",
+        "def f(r):\n    import own_package.own_values as v\n    return v.T",
+        "def f(r):\n    from own_package import own_values as v\n    return v.T",
+    )  # fmt: skip
+    for text in texts:
+        exec(text, names)
+        before = fingerprint(names["f"], "x", True)
+        assert fingerprint(names["f"], "x", True) == before
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "T", 2.0)
+            assert fingerprint(names["f"], "x", True) != before, text
+    for name in ("own_package", "own_package.own_values"):
+        monkeypatch.delitem(sys.modules, name)
+
+
+def test_values_kept_from_an_old_file_are_not_used(tmp_path):
+    """The cache of the function is emptied, so that the file is read again, and noticed."""
+    file = tmp_path / "target.txt"
+
+    @functools.lru_cache
+    def target():
+        return float(file.read_text())
+
+    def away(design):
+        return (design["x"] - target()) ** 2
+
+    def of(value, **more):
+        file.write_text(str(value))
+        return optimize.Problem.of_function(away, [optimize.Gene("x", "", 0.0, 1.0)], **more)
+
+    settings = {"method": "random", "generations": 1, "options": {"population": 4}}
+    for value in (0.25, 0.75):
+        made = of(value)
+        target()
+        with pytest.raises(InputError, match=r"^objective value must read no file but .*target\.txt$"):
+            optimize.run(made, out=tmp_path / "a", **settings)
+        best = optimize.run(of(value, files=[file]), out=tmp_path / str(value), **settings).designs[0]
+        assert best.values["value"] == (best.genes["x"] - value) ** 2
 
 
 SCRIPT = """

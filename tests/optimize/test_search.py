@@ -141,11 +141,11 @@ def test_failures_never_win(path):
 
 
 def test_all_failed_is_an_outcome_without_a_best(path):
-    outcome = run(path, FakeEvaluator(lambda design, seed: "broken"), generations=5)
+    outcome = run(path, FakeEvaluator(lambda design, seed: "broken"), generations=1)
     assert outcome.best is None
-    assert outcome.logbook.select("failed") == [20] * 6
-    assert outcome.logbook.select("recentred") == [False] * 6
-    assert outcome.logbook.select("best") == [math.inf] * 6
+    assert outcome.logbook.select("failed") == [20] * 2
+    assert outcome.logbook.select("recentred") == [False] * 2
+    assert outcome.logbook.select("best") == [math.inf] * 2
 
 
 def test_callbacks_report_the_progress_of_the_search(path):

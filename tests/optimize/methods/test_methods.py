@@ -131,9 +131,9 @@ def test_some_failures_and_only_failures(name):
     assert max(outcome.logbook.select("failed")) > 0
     assert outcome.best[0] > 0.5
     assert outcome.best.estimates[0].mean < 0.7
-    outcome = run(FakeCache(), lambda design, seed: "lost", method=name, generations=3)
+    outcome = run(FakeCache(), lambda design, seed: "lost", method=name, generations=1)
     assert outcome.best is None
-    assert len(outcome.logbook) == 4
+    assert len(outcome.logbook) == 2
 
 
 def test_cma_es_follows_a_valley_that_the_genetic_algorithm_does_not():

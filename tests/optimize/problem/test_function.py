@@ -171,11 +171,14 @@ def test_designs_that_fail_or_give_no_number_are_excluded():
     assert 0.75 <= outcome.designs[0].genes["x"] < 0.76
 
 
-def test_a_search_without_successful_designs_has_no_best():
+def test_a_function_without_successful_designs_ends_the_search():
     def refuse(design):
         raise InputError("x must be large; received little")
 
-    assert optimize.run(Problem.of_function(refuse, ONE), generations=2).best is None
+    with pytest.raises(
+        RunError, match=r"^search must find a design .* infeasible: x must be large; received little\."
+    ):
+        optimize.run(Problem.of_function(refuse, ONE), generations=2)
 
 
 def test_a_file_read_by_a_function_must_be_declared(tmp_path):
@@ -224,5 +227,5 @@ def test_a_gene_is_fixed_in_a_problem():
 def test_the_error_explains_that_no_design_is_feasible():
     far = optimize.DesignConstraint("far", lambda design: design["x"], "m", at_most=-1)
     problem = Problem.of_function(lambda design: 0.0, ONE, name="p", constraints=[far])
-    with pytest.raises(RunError, match=r"infeasible: far must be at most -1 m; received 0\.\d+ m$"):
+    with pytest.raises(RunError, match=r"infeasible: far must be at most -1 m; received 0\.\d+ m\. "):
         optimize.run(problem, generations=2)
