@@ -17,13 +17,15 @@ def statistics(
 ) -> dict[str, Any]:
     """Return the fitness columns of Outcome.logbook; values of the objectives, not costs."""
     best = [
-        min((one.fitness.values[k] for one in hall), default=math.inf) for k in range(len(problem.objectives))
+        min((one.fitness.values[k] for one in hall if not one.violation), default=math.inf)
+        for k in range(len(problem.objectives))
     ]
     values = problem.costs(best)
     if problem.several:
         names = [best_of(objective.label) for objective in problem.objectives]
         return {"front": len(hall), **dict(zip(names, values, strict=True))}
-    good = [problem.costs(individual.fitness.values)[0] for individual in population if not individual.failed]
+    # The fitness of a design that violates a constraint is penalised.
+    good = [problem.costs(one.fitness.values)[0] for one in population if not (one.failed or one.violation)]
     return {
         "best": values[0],
         "mean": float(np.mean(good)) if good else math.nan,

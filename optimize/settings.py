@@ -12,7 +12,8 @@ from pydantic import Field, SerializeAsAny, model_validator
 from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.optimize.beginning import Beginning
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.conclusion import least_evaluations
+from tisim.optimize.evaluation.ensemble import EnsembleSettings, fewest_starts
 from tisim.optimize.methods.base import SearchMethod, code_of, every, find
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.record import canonical
@@ -180,6 +181,10 @@ def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None
     if beginning is not None and beginning.experiments:
         able = [name for name, method in every().items() if method.takes_experiments]
         must(settings.method in able, "method", f"for experiments: {', '.join(able)}", settings.method)
+    if settings.max_evaluations is not None:
+        least, starts = least_evaluations(problem, settings), fewest_starts(problem, settings.ensemble)
+        rule = f"{least} or more, as each design runs from {starts} random starts"
+        must(settings.max_evaluations >= least, "max_evaluations", rule, settings.max_evaluations)
     if beginning is not None and settings.max_evaluations is not None:
         first = len(beginning.designs)
         rule = f"at most max_evaluations = {settings.max_evaluations}, as each of them is run"
