@@ -9,23 +9,19 @@ constraints of the result.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 from tisim.numerics.skewed import Moments
 from tisim.numerics.statistics import CONFIDENCE
-from tisim.optimize.evaluation.ensemble import LOOKED_AT, Ensemble, fewest_starts
+from tisim.optimize.evaluation.ensemble import Ensemble
 from tisim.optimize.hall_of_fame import not_dominated
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.feasibility import excess, feasible
 from tisim.optimize.problem.problem import Problem
+from tisim.optimize.settings import Settings, fresh_starts, reserved
 from tisim.optimize.surrogate.noise import moments
 from tisim.optimize.surrogate.ranking import best
-
-if TYPE_CHECKING:
-    from tisim.optimize.settings import Settings
 
 FEWEST_FRESH = 4
 """Held-out starts of each design of a front, if the budget does not allow more."""
@@ -47,34 +43,7 @@ def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
     design are the same.
     """
     most = settings.max_evaluations
-    return 0 if most is None or ensemble.repeatable else _reserved(problem, settings, most)
-
-
-def least_evaluations(problem: Problem, settings: Settings) -> int:
-    """Return the smallest budget from which a search can run a design from all its random starts."""
-    if problem.deterministic:
-        return 1
-    starts = fewest_starts(problem, settings.ensemble)
-    # Other designs may have run from two starts by then, to check whether the starts matter.
-    needed = starts if starts <= 2 else starts + 2 * (LOOKED_AT - 1)
-    budgets = itertools.count(needed)
-    return next(most for most in budgets if most - _reserved(problem, settings, most) >= needed)
-
-
-def _reserved(problem: Problem, settings: Settings, most: int) -> int:
-    options = settings.ensemble
-    if not (options.select or options.confirm):
-        return 0
-    if problem.several:
-        return most // 4
-    part = most // 4 if problem.result_constraints else most // 8
-    return min(part, settings.hall_of_fame * (options.select + _fresh(problem, settings)))
-
-
-def _fresh(problem: Problem, settings: Settings) -> int:
-    """Return the number of held-out starts of each reported design."""
-    starts = settings.ensemble.confirm
-    return max(starts, *(one.statistic.fewest_fresh for one in problem.objectives)) if starts else 0
+    return 0 if most is None or ensemble.repeatable else reserved(problem, settings, most)
 
 
 def concluded(
@@ -89,7 +58,7 @@ def concluded(
     The budget of the ensemble is not exceeded.
     """
     options = settings.ensemble
-    fresh = _fresh(problem, settings)
+    fresh = fresh_starts(problem, settings)
     if options.select or options.confirm:
         ensemble.look()
     noise = _noise(problem, settings, ensemble, known) if options.confirm else None

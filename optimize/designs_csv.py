@@ -109,8 +109,9 @@ def _headings(problem: Problem) -> Iterator[str]:
     yield from (*COUNTS, ERROR, LOW, HIGH, *problem.derived)
     for named in (*problem.genome.genes, *problem.objectives, *problem.constraints):
         yield from (named.label, named.name)
-    for value in (*problem.objectives, *problem.constraints):
-        yield from (f"{value.name} {end}" for end in (ERROR, LOW, HIGH))
+    names = [one.name for one in problem.objectives] + [one.name for one in problem.constraints]
+    for name in names:
+        yield from (f"{name} {end}" for end in (ERROR, LOW, HIGH))
 
 
 def _of_file(path: Path) -> list[Row]:

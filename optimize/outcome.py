@@ -212,8 +212,8 @@ class Outcome:
     def _units(self) -> dict[str, str]:
         """The unit of each gene, objective and constraint by name, "" if it has none."""
         genes = {gene.name: gene.unit for gene in self.problem.genome.genes}
-        values = (*self.problem.objectives, *self.problem.constraints)
-        return genes | {one.name: one.unit for one in values}
+        constraints = {one.name: one.unit for one in self.problem.constraints}
+        return genes | {objective.name: objective.unit for objective in self.problem.objectives} | constraints
 
     def to_frame(self, *, hall: bool = False) -> DataFrame:
         """Return all designs of the search as a pandas data frame.
@@ -229,8 +229,8 @@ class Outcome:
         """
         if hall:
             return data_frame(best_columns(self.problem, self.hall), units(self.problem))
-        values = (*self.problem.objectives, *self.problem.result_constraints)
-        intervals = {error_of(one.name): one.unit for one in values}
+        intervals = {error_of(one.name): one.unit for one in self.problem.objectives}
+        intervals |= {error_of(one.name): one.unit for one in self.problem.result_constraints}
         columns = design_columns(self.problem, {**self.estimates, **self.failures}, self.limits)
         return data_frame(columns, self._units | intervals)
 

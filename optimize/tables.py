@@ -11,7 +11,7 @@ from deap import tools
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.calls import constraint_value
-from tisim.optimize.problem.feasibility import VERDICTS, feasible
+from tisim.optimize.problem.feasibility import ANSWERS, feasible
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
 
@@ -39,7 +39,7 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
     designs = [problem.genome.decode(individual) for individual in hall]
     constraints = problem.result_constraints
     if constraints:
-        columns[FEASIBLE] = [VERDICTS[feasible(constraints, one.reported_limits)] for one in hall]
+        columns[FEASIBLE] = [ANSWERS[feasible(constraints, one.reported_limits)] for one in hall]
     for gene in problem.genome.genes:
         columns[gene.label] = [design[gene.name] for design in designs]
     for constraint in problem.design_constraints:
@@ -144,7 +144,7 @@ def design_columns(problem: Problem, estimates: Estimates, limits: Estimates) ->
         errors = [of_all[k].standard_error if of_all else math.nan for of_all in good]
         columns[error_of(constraint.name)] = errors
     if constraints:
-        columns[FEASIBLE] = [VERDICTS[feasible(constraints, of_all)] if of_all else "" for of_all in good]
+        columns[FEASIBLE] = [ANSWERS[feasible(constraints, of_all)] if of_all else "" for of_all in good]
     first = [of_all[0] for of_all in estimates.values()]
     columns["starts"] = [e.starts for e in first]
     columns["converged"] = [e.converged for e in first]

@@ -287,7 +287,7 @@ class Ensemble:
         for k, name in enumerate(names):
             by_sample = [np.array([row[k] for row in sample.limited]) for sample in samples]
             good = [values for values, one in zip(by_sample, samples, strict=True) if not one.reason]
-            known = [[row[k] for row in one.limited] for one in self._known.values() if one.limited]
+            known = [np.array([row[k] for row in one.limited]) for one in self._known.values() if one.limited]
             skewness = shared_skewness(good)
             seen = np.unique(np.concatenate([*good, *known])).tolist()
             most = max((float(np.ptp(values)) for values in [*good, *known]), default=0.0)

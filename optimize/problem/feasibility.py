@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tisim.optimize.evaluation.estimate import FitnessEstimate
     from tisim.optimize.problem.constraint import InequalityConstraint
 
-VERDICTS = {True: "yes", None: "unproven", False: "no"}
+ANSWERS = {True: "yes", None: "unproven", False: "no"}
 """The results of ``feasible``, as in tables."""
 
 
