@@ -156,7 +156,8 @@ class AskTell:
     def designs(self) -> list[Design]:
         """The best designs, best first, or the front of several objectives.
 
-        Their values are biased towards good ones, because the designs were chosen by these values.
+        Their values are biased towards good ones, because the designs were chosen by these values. Without a
+        feasible design they are the ones with the least violation; see Design.feasible.
         """
         return self.outcome.designs
 
@@ -170,8 +171,11 @@ class AskTell:
                 individual.estimates
             )
         places = len(individuals) if self.problem.several else self.settings.hall_of_fame
-        good = [one for one in individuals if not one.failed]
-        found.hall.fill(best(self.problem.genome, good, places))
+        found.limits = {tuple(individual): individual.limits for individual in individuals}
+        # Values that were told once count as exact.
+        repeated = any(limit.starts > 1 for individual in individuals for limit in individual.limits)
+        constraints = self.problem.result_constraints if repeated else ()
+        found.hall.fill(best(self.problem.genome, individuals, places, constraints))
         return found
 
     def _next(self) -> None:
@@ -232,7 +236,7 @@ class AskTell:
         individuals = {}
         for point, of_design in tries.items():
             values, errors, limits = zip(*of_design, strict=True)
-            individuals[point] = known(self.problem, point, values, errors, np.mean(limits, axis=0).tolist())
+            individuals[point] = known(self.problem, point, values, errors, limits)
         return tries, individuals
 
     def _take(self, tries: Mapping[Point, list[Tried]], individuals: Mapping[Point, Individual]) -> None:
@@ -344,7 +348,7 @@ class AskTell:
 def _become(individual: Individual, other: Individual) -> None:
     """Give an individual the known values of another one with the same design."""
     individual.know(other.estimates)
-    individual.limited, individual.violation = other.limited, other.violation
+    individual.limits, individual.violation = other.limits, other.violation
     individual.fitness.values = other.fitness.values
 
 

@@ -3,7 +3,8 @@
 The best of many noisy means is partly lucky, so the values by which a design is chosen are biased. The search
 therefore has three separate stages. During the search, many designs get few starts each. Then the best of
 them by posterior mean get some more starts, and are ranked again. Finally, reported values and intervals are
-computed from held-out starts, which were used in neither stage.
+computed from held-out starts, which were used in neither stage. They also show whether a design satisfies the
+constraints of the result.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from tisim.numerics.statistics import CONFIDENCE
 from tisim.optimize.evaluation.ensemble import Ensemble
 from tisim.optimize.hall_of_fame import not_dominated
 from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.feasibility import excess, feasible
 from tisim.optimize.problem.problem import Problem
-from tisim.optimize.settings import Settings
+from tisim.optimize.settings import Settings, fresh_starts, reserved
 from tisim.optimize.surrogate.noise import moments
 from tisim.optimize.surrogate.ranking import best
 
@@ -36,21 +38,12 @@ Noise = Sequence[Moments] | None
 def reserve(problem: Problem, settings: Settings, ensemble: Ensemble) -> int:
     """Return the number of runs that are reserved for the end of a search.
 
-    It is an eighth of the budget for one objective, or less if the reported designs need less; a quarter for
-    a front; 0 if all starts of a design are the same.
+    It is an eighth of the budget for one objective, or less if the reported designs need less; a quarter with
+    constraints of the result, where the first design may fail; a quarter for a front; 0 if all starts of a
+    design are the same.
     """
-    options, most = settings.ensemble, settings.max_evaluations
-    if most is None or ensemble.repeatable or not (options.select or options.confirm):
-        return 0
-    if problem.several:
-        return most // 4
-    return min(most // 8, settings.hall_of_fame * (options.select + _fresh(problem, settings)))
-
-
-def _fresh(problem: Problem, settings: Settings) -> int:
-    """Return the number of held-out starts of each reported design."""
-    starts = settings.ensemble.confirm
-    return max(starts, *(one.statistic.fewest_fresh for one in problem.objectives)) if starts else 0
+    most = settings.max_evaluations
+    return 0 if most is None or ensemble.repeatable else reserved(problem, settings, most)
 
 
 def concluded(
@@ -65,23 +58,66 @@ def concluded(
     The budget of the ensemble is not exceeded.
     """
     options = settings.ensemble
-    fresh = _fresh(problem, settings)
+    fresh = fresh_starts(problem, settings)
     if options.select or options.confirm:
         ensemble.look()
     noise = _noise(problem, settings, ensemble, known) if options.confirm else None
     if problem.several:
         return _front(problem, ensemble, known, fresh, report, noise)
-    count = settings.hall_of_fame
+    count, constraints = settings.hall_of_fame, problem.result_constraints
     if ensemble.repeatable:
         return _exact(problem, _first(met, best(problem.genome, known, count)), ensemble)
-    candidates = best(problem.genome, known, count)
+    candidates = best(problem.genome, known, count, constraints)
     if 3 * options.select * len(candidates) <= _left(ensemble):
         _know(problem, candidates, ensemble, options.select)
     if fresh:
         count = int(max(1, min(count, _left(ensemble) // fresh)))
-    chosen = _first(met, best(problem.genome, known, count))
-    _confirm(problem, chosen, ensemble, int(min(fresh, _left(ensemble))), report, noise)
-    return chosen
+    chosen = _first(met, best(problem.genome, known, count, constraints))
+    starts = int(min(fresh, _left(ensemble)))
+    _confirm(problem, chosen, ensemble, starts, report, noise)
+    if not constraints or not chosen or not chosen[0].confirmed:
+        return chosen
+    groups = [(chosen, starts)]
+    others = [one for one in best(problem.genome, known, 2 * settings.hall_of_fame, constraints, allowed=True)
+              if all(one is not other for other in chosen)]  # fmt: skip
+    while others and all(_excess(problem, one) for group, _ in groups for one in group):
+        starts = int(min(fresh, _left(ensemble)))
+        following = others.pop(0)
+        if starts >= FEWEST_FRESH:
+            _confirm(problem, [following], ensemble, starts, report, noise)
+        if not following.confirmed:
+            break
+        groups.append(([following], starts))
+    return _feasible_first(problem, settings, ensemble, groups, report, noise)
+
+
+def _feasible_first(
+    problem: Problem,
+    settings: Settings,
+    ensemble: Ensemble,
+    groups: Sequence[tuple[Sequence[Individual], int]],
+    report: Report,
+    noise: Noise,
+) -> list[Individual]:
+    """Return designs in their order, but with those in front that satisfy the constraints by their held-out
+    starts; the others follow, ordered by the size of the violation.
+
+    groups : designs that were confirmed together, and their number of held-out starts.
+
+    The designs in front are selected by these starts, so the intervals are corrected as those of a front.
+    """
+    tried = [one for group, _ in groups for one in group]
+    good = sum(not _excess(problem, one) for one in tried)
+    if 0 < good < len(tried):
+        confidence = 1.0 - (1.0 - CONFIDENCE) * good / len(tried)
+        for group, starts in groups:
+            _confirm(problem, group, ensemble, starts, report, noise, confidence)
+    return sorted(tried, key=lambda one: _excess(problem, one))[: settings.hall_of_fame]
+
+
+def _excess(problem: Problem, individual: Individual) -> float:
+    """Return the total violation of a design, by its held-out starts if it has any."""
+    return excess(problem.result_constraints, individual.reported_limits)
 
 
 def _front(
@@ -92,7 +128,8 @@ def _front(
     report: Report,
     noise: Noise,
 ) -> list[Individual]:
-    """Return the front, in which no design is dominated according to the means of held-out starts.
+    """Return the front, in which no design is dominated according to the means of held-out starts. If none
+    of its designs satisfies the constraints of the result, it is the one with the least violation.
 
     confirm : held-out starts of each design.
 
@@ -101,20 +138,22 @@ def _front(
 
     Source: Y. Benjamini and D. Yekutieli, J. Am. Stat. Assoc. 100 (2005) 71-81.
     """
-    front = best(problem.genome, known, len(known))
+    constraints = problem.result_constraints
     if ensemble.repeatable:
-        return _exact(problem, front, ensemble)
+        return _exact(problem, best(problem.genome, known, len(known)), ensemble)
+    front = best(problem.genome, known, len(known), constraints)
     if not confirm or not front:
         return front
     left = _left(ensemble)
     if not math.isinf(left):
         fewest = max(FEWEST_FRESH, *(one.statistic.fewest_starts for one in problem.objectives))
         confirm = max(min(confirm, int(left) // len(front)), min(confirm, fewest))
-        front = best(problem.genome, known, max(1, int(left) // confirm))
+        front = best(problem.genome, known, max(1, int(left) // confirm), constraints)
     _confirm(problem, front, ensemble, confirm, report, noise)
     if not front[0].confirmed:
         return front
-    left_over = not_dominated(front)
+    good = [one for one in front if not _excess(problem, one)]
+    left_over = not_dominated(good or [min(front, key=lambda one: _excess(problem, one))])
     confidence = 1.0 - (1.0 - CONFIDENCE) * len(left_over) / len(front)
     _confirm(problem, front, ensemble, confirm, report, noise, confidence)
     return left_over
@@ -130,7 +169,7 @@ def proven(
     tried: int,
 ) -> bool:
     """Return whether a design meets a goal, a cost, with confidence: its upper interval end is at most the
-    goal.
+    goal, and its intervals of the constraints of the result lie within their bounds.
 
     The interval is computed from starts that only this check uses.
 
@@ -145,10 +184,10 @@ def proven(
         return False
     chance = WRONGLY_MET / ((tried + 1) * (tried + 2))
     noise = _noise(problem, settings, ensemble, known)
-    ((estimate,),) = ensemble.fresh(
+    (((estimate,), limits),) = ensemble.fresh(
         [problem.genome.decode(leader)], _STARTS_OF_PROOF, _PROOF, noise=noise, confidence=1.0 - 2.0 * chance
     )
-    return estimate.high <= goal
+    return estimate.high <= goal and feasible(problem.result_constraints, limits) is True
 
 
 def _confirm(
@@ -168,8 +207,8 @@ def _confirm(
         return
     designs = [problem.genome.decode(individual) for individual in chosen]
     fresh = ensemble.fresh(designs, starts, progress=report, noise=noise, confidence=confidence)
-    for individual, estimates in zip(chosen, fresh, strict=True):
-        individual.confirmed = estimates
+    for individual, (estimates, limits) in zip(chosen, fresh, strict=True):
+        individual.confirmed, individual.confirmed_limits = estimates, limits
 
 
 def _noise(problem: Problem, settings: Settings, ensemble: Ensemble, known: Sequence[Individual]) -> Noise:
@@ -186,9 +225,7 @@ def _know(problem: Problem, candidates: Sequence[Individual], ensemble: Ensemble
     designs = [problem.genome.decode(individual) for individual in candidates]
     for individual, estimates in zip(candidates, ensemble.more(designs, starts), strict=True):
         individual.know(estimates)
-        individual.limit(
-            problem.result_constraints, ensemble.constraint_means(problem.genome.decode(individual))
-        )
+        individual.limit(problem.result_constraints, ensemble.limits(problem.genome.decode(individual)))
 
 
 def _exact(problem: Problem, chosen: list[Individual], ensemble: Ensemble) -> list[Individual]:

@@ -18,13 +18,13 @@ from tisim.files import regular_file
 from tisim.optimize.problem.gene_values import Named
 from tisim.optimize.problem.given_genes import FixedGene
 from tisim.optimize.problem.problem import Problem
-from tisim.optimize.tables import ERROR, FRESH_STARTS, HIGH, LOW
+from tisim.optimize.tables import ERROR, FEASIBLE, FRESH_STARTS, HIGH, LOW
 
 MOST_ROWS = 10_000
 """The largest number of designs that are read from a file."""
 GENERATION, WHETHER_ASKED = "generation", "asked"
 """Headings of the additional columns in the file of an ask-and-tell campaign."""
-COUNTS = ("rank", "front", "starts", "converged", "failed", GENERATION, WHETHER_ASKED)
+COUNTS = ("rank", "front", FEASIBLE, "starts", "converged", "failed", GENERATION, WHETHER_ASKED)
 """Headings of further columns in result files, which are ignored."""
 Row = tuple[str, Mapping[str, str]]
 """The position of a row, in words, and its cells by heading."""
@@ -109,8 +109,9 @@ def _headings(problem: Problem) -> Iterator[str]:
     yield from (*COUNTS, ERROR, LOW, HIGH, *problem.derived)
     for named in (*problem.genome.genes, *problem.objectives, *problem.constraints):
         yield from (named.label, named.name)
-    for objective in problem.objectives:
-        yield from (f"{objective.name} {end}" for end in (ERROR, LOW, HIGH))
+    names = [one.name for one in problem.objectives] + [one.name for one in problem.constraints]
+    for name in names:
+        yield from (f"{name} {end}" for end in (ERROR, LOW, HIGH))
 
 
 def _of_file(path: Path) -> list[Row]:

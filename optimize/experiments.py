@@ -43,20 +43,20 @@ def experiments(given: Given, problem: Problem, what: str = "experiments") -> tu
     for point, of_design in found.items():
         with naming(what):
             values, errors, limits = zip(*of_design, strict=True)
-            individuals.append(known(problem, point, values, errors, np.mean(limits, axis=0).tolist()))
+            individuals.append(known(problem, point, values, errors, limits))
     return tuple(individuals)
 
 
 def known(
     problem: Problem, point: Sequence[float], values: Sequence[Values], errors: Sequence[Values],
-    limits: Sequence[float] = (),
+    limits: Sequence[Values] = (),
 ) -> Individual:  # fmt: skip
     """Return the individual of a design from all its values.
 
     point : of the unit cube.
     values, errors : for each trial the value of each objective, in its unit, and its standard error; NaN if
         there is none.
-    limits : mean of each constraint of the result.
+    limits : for each trial the value of each constraint of the result.
 
     A design fails if any of its values is not a finite number.
     """
@@ -70,7 +70,12 @@ def known(
     individual.know(
         tuple(combined(column, of) for column, of in zip(columns, zip(*errors, strict=True), strict=True))
     )
-    individual.limit(problem.result_constraints, limits)
+    exact = problem.deterministic and len(limits) == 1
+    columns = zip(*limits, strict=True)
+    individual.limit(
+        problem.result_constraints,
+        [FitnessEstimate.certain(float(column[0])) if exact else plain(column) for column in columns],
+    )
     return individual
 
 
@@ -138,7 +143,9 @@ def _restored(problem: Problem, row: Mapping[str, Any]) -> Individual:
             for mean, std in zip(means, deviations, strict=True)
         )
     )
-    individual.limit(problem.result_constraints, [row[one.name] for one in problem.result_constraints])
+    individual.limit(
+        problem.result_constraints, [plain([row[one.name]]) for one in problem.result_constraints]
+    )
     return individual
 
 

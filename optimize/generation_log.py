@@ -29,18 +29,18 @@ def statistics(
 ) -> dict[str, Any]:
     """Return the fitness columns of Outcome.logbook; values of the objectives, not costs."""
     of_hall = tools.Statistics(lambda individual: individual.fitness.values)
-    if problem.several:
-        of_hall.register("front", len)
     for k, objective in enumerate(problem.objectives):
         name = best_of(objective.label) if problem.several else "best"
         of_hall.register(name, _best, k, objective.sign)
-    columns: dict[str, Any] = of_hall.compile(hall)
+    # The fitness of a design that violates a constraint is penalised.
+    columns: dict[str, Any] = of_hall.compile([one for one in hall if not one.violation])
     if problem.several:
-        return columns
+        return {"front": len(hall), **columns}
     of_population = tools.Statistics(lambda individual: problem.costs(individual.fitness.values)[0])
     of_population.register("mean", _of_any, np.mean)
     of_population.register("std", _of_any, np.std)
-    return columns | of_population.compile(_successful(population))
+    good = [individual for individual in _successful(population) if not individual.violation]
+    return columns | of_population.compile(good)
 
 
 def best_of(label: str) -> str:
@@ -143,7 +143,7 @@ class OwnStatistics:
         for number, point in enumerate(points):
             individual = Individual(point, len(self.problem.objectives))
             individual.know((FitnessEstimate.certain(1.0 + number),) * len(self.problem.objectives))
-            individual.limited = (0.0,) * len(self.problem.result_constraints)
+            individual.limits = (FitnessEstimate.certain(0.0),) * len(self.problem.result_constraints)
             individuals.append(individual)
         return individuals
 

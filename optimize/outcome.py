@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,6 +16,8 @@ from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.frames import data_frame
 from tisim.optimize.hall_of_fame import HallOfFame, compromise, hall_of_fame
 from tisim.optimize.methods.individual import Individual
+from tisim.optimize.problem.calls import constraint_value
+from tisim.optimize.problem.feasibility import feasible, violated
 from tisim.optimize.problem.gene_values import Value
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.settings import Settings, search_name
@@ -44,6 +47,8 @@ class Progress:
     evaluations, hits : numbers of runs made, and of runs found in the cache.
     elapsed_s : wall time since the search began, s.
     failure : reason why a design of this generation failed, as long as no design has succeeded.
+    violated : the constraints of the result that the best design violates, in words, if no design satisfies
+        all.
     """
 
     generation: int
@@ -56,6 +61,7 @@ class Progress:
     hits: int
     elapsed_s: float
     failure: str = ""
+    violated: str = ""
 
 
 @dataclass(frozen=True)
@@ -65,8 +71,12 @@ class Design:
     genes : the value of each gene, by name, in its unit: a number, a text or a flag.
     values : mean of each objective over random starts, by name, in its unit; over the held-out starts if
         there are any.
-    intervals : the ends of their 95 % confidence intervals; None without held-out starts, because the starts
-        that chose a design bias its values.
+    intervals : the ends of the 95 % confidence intervals of values and constraints, by name; None without
+        held-out starts, because the starts that chose a design bias its values.
+    constraints : the value of each constraint, by name, in its unit; of a constraint of the result the mean
+        over the same starts.
+    feasible : True if the intervals of all constraints lie within their bounds; False if a value does not;
+        None if an interval contains a bound, or is not known.
     starts : number of these starts.
     converged : whether the last start changed the mean by less than the given tolerance.
     """
@@ -76,6 +86,8 @@ class Design:
     intervals: dict[str, tuple[float, float] | None]
     starts: int
     converged: bool
+    constraints: dict[str, float] = field(default_factory=dict)
+    feasible: bool | None = True
 
 
 @dataclass(repr=False)
@@ -90,6 +102,7 @@ class Outcome:
     quantities : quantities of the runs of each of these, in the order of problem.quantities, shape (starts,
         quantities).
     failures : estimates of each failed design, with the reason.
+    limits : estimates of the constraints of the result, of each design.
     logbook : one row for each finished generation: gen, designs (newly estimated), starts (evaluations
         requested), failed, box (mean width of the search box it drew from), recentred (box moved after it),
         best (so far; infinitely bad if there is none). For one objective also mean and std of the successful
@@ -109,6 +122,7 @@ class Outcome:
     estimates: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     quantities: dict[tuple[float, ...], NDArray[np.float64]] = field(default_factory=dict)
     failures: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
+    limits: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0
     hits: int = 0
@@ -120,7 +134,8 @@ class Outcome:
 
     def __repr__(self) -> str:
         counts = f"{len(self.hall)} designs from {self.evaluations + self.hits} runs"
-        return f"<search of {self.problem.name}: {counts}, stopped by {self.stopped or 'nothing yet'}>"
+        none = ", none of them feasible" if self.violated else ""
+        return f"<search of {self.problem.name}: {counts}{none}, stopped by {self.stopped or 'nothing yet'}>"
 
     @property
     def name(self) -> str:
@@ -136,6 +151,17 @@ class Outcome:
         return self.hall[0] if self.hall else None
 
     @property
+    def violated(self) -> str:
+        """Return the constraints of the result that the first design violates, in words; "" if its means
+        satisfy all.
+
+        Feasible designs come first, so that none of the designs is feasible if this one is not.
+        """
+        if not self.hall:
+            return ""
+        return violated(self.problem.result_constraints, self.hall[0].reported_limits)
+
+    @property
     def designs(self) -> list[Design]:
         """Return the hall of fame by name and in physical units, in its order."""
         return [self._design(individual) for individual in self.hall]
@@ -149,12 +175,26 @@ class Outcome:
             one.name: interval_of_value(estimate, one) if sure else None
             for one, estimate in zip(self.problem.objectives, estimates, strict=True)
         }
+        genes = self.problem.genome.decode(individual)
+        of_design = [
+            FitnessEstimate.certain(constraint_value(one, genes, self.problem))
+            for one in self.problem.design_constraints
+        ]
+        constraints = (*self.problem.design_constraints, *self.problem.result_constraints)
+        limits = (*of_design, *individual.reported_limits)
+        limited = {one.name: limit for one, limit in zip(constraints, limits, strict=True)}
+        intervals |= {
+            name: None if math.isnan(limit.low) else (limit.low, limit.high)
+            for name, limit in limited.items()
+        }
         return Design(
-            genes=self.problem.genome.decode(individual),
+            genes=genes,
             values=dict(zip(names, means, strict=True)),
             intervals=intervals,
             starts=estimates[0].starts,
             converged=estimates[0].converged,
+            constraints={name: limit.mean for name, limit in limited.items()},
+            feasible=feasible(constraints, limits),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -173,16 +213,18 @@ class Outcome:
 
     @property
     def _units(self) -> dict[str, str]:
-        """The unit of each gene and objective by name, "" if it has none."""
+        """The unit of each gene, objective and constraint by name, "" if it has none."""
         genes = {gene.name: gene.unit for gene in self.problem.genome.genes}
-        return genes | {objective.name: objective.unit for objective in self.problem.objectives}
+        constraints = {one.name: one.unit for one in self.problem.constraints}
+        return genes | {objective.name: objective.unit for objective in self.problem.objectives} | constraints
 
     def to_frame(self, *, hall: bool = False) -> DataFrame:
         """Return all designs of the search as a pandas data frame.
 
-        It has a row for each design: its genes by name, the mean of each objective over random starts, its
-        standard error, the number of starts, whether the mean converged, and the reason of a failure ("" if
-        it did not fail). ``frame.attrs["units"]`` has the unit of each column that has one.
+        It has a row for each design: its genes by name, the mean of each objective and of each constraint of
+        the result over random starts, their standard errors, whether it is feasible by these means, the
+        number of starts, whether the mean converged, and the reason of a failure ("" if it did not fail).
+        ``frame.attrs["units"]`` has the unit of each column that has one.
 
         hall : return the hall of fame instead, with the columns of best.csv.
 
@@ -191,7 +233,8 @@ class Outcome:
         if hall:
             return data_frame(best_columns(self.problem, self.hall), units(self.problem))
         intervals = {error_of(one.name): one.unit for one in self.problem.objectives}
-        columns = design_columns(self.problem, {**self.estimates, **self.failures})
+        intervals |= {error_of(one.name): one.unit for one in self.problem.result_constraints}
+        columns = design_columns(self.problem, {**self.estimates, **self.failures}, self.limits)
         return data_frame(columns, self._units | intervals)
 
     @property

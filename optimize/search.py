@@ -25,7 +25,7 @@ from tisim.optimize.hall_of_fame import hall_of_fame
 from tisim.optimize.methods.base import find
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Outcome, Progress, Stopped
-from tisim.optimize.problem.feasibility import penalised
+from tisim.optimize.problem.feasibility import penalised, violated
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.search_records import searches, store
 from tisim.optimize.settings import Settings, fit, identity
@@ -107,6 +107,7 @@ class _Search:
         except _OutOfTime:
             self.outcome.stopped = "wall clock"
         decode = self.problem.genome.decode
+        self.outcome.limits = {one: individual.limits for one, individual in self.known.items()}
         self.outcome.quantities = {one: self.ensemble.values(decode(one)) for one in self.outcome.estimates}
         self._store()
         return self.outcome
@@ -233,9 +234,7 @@ class _Search:
         if not constraints or not known:
             return
         for individual in (*ran, *(one for one in fresh if one.fitness.valid and not one.failed)):
-            individual.limit(
-                constraints, self.ensemble.constraint_means(self.problem.genome.decode(individual))
-            )
+            individual.limit(constraints, self.ensemble.limits(self.problem.genome.decode(individual)))
         costs = [[estimate.mean for estimate in individual.estimates] for individual in known]
         ordered = penalised(costs, [individual.violation for individual in known])
         by_point = dict(zip(map(tuple, known), ordered.tolist(), strict=True))
@@ -269,7 +268,8 @@ class _Search:
         if settings.target is not None and self.hall.individuals:
             (goal,) = self.problem.costs([settings.target])
             leader = self.hall.individuals[0]
-            if leader.fitness.values[0] <= goal and tuple(leader) not in self.tried:
+            met = not leader.violation and leader.fitness.values[0] <= goal
+            if met and tuple(leader) not in self.tried:
                 self.ensemble.budget = self._budget
                 known = list(self.known.values())
                 met = proven(self.problem, settings, self.ensemble, known, leader, goal, len(self.tried))
@@ -290,9 +290,11 @@ class _Search:
 
     def _progress(self, generation: int, fraction: float) -> Progress:
         hall = self.hall.individuals
-        costs = [
-            min(column) for column in zip(*(individual.fitness.values for individual in hall), strict=True)
-        ]
+        of_hall = [tuple(individual.fitness.values) for individual in hall]
+        words = violated(self.problem.result_constraints, hall[0].limits) if hall else ""
+        if words:  # the fitness is the violation
+            of_hall = [tuple(estimate.mean for estimate in hall[0].estimates)]
+        costs = [min(column) for column in zip(*of_hall, strict=True)]
         return Progress(
             generation=generation,
             generations=self.settings.generations,
@@ -303,6 +305,7 @@ class _Search:
             evaluations=self.ensemble.runs.evaluations,
             hits=self.ensemble.runs.hits,
             elapsed_s=time.monotonic() - self.began,
+            violated=words,
         )
 
     def _store(self) -> None:

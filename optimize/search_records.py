@@ -15,9 +15,9 @@ from tisim.optimize.experiments import table_of
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.cache import Cache
-from tisim.optimize.storage.hdf5_store import GENES_TABLE, OBJECTIVES_TABLE
+from tisim.optimize.storage.hdf5_store import CONSTRAINTS_TABLE, GENES_TABLE, OBJECTIVES_TABLE
 from tisim.optimize.storage.record import canonical
-from tisim.optimize.tables import best_columns, logbook_columns, units
+from tisim.optimize.tables import attributes, best_columns, logbook_columns
 
 WARM_START = "warm_start"
 """Name of the table of the known designs of a warm start; its checksum has this key in an identity."""
@@ -30,7 +30,7 @@ def store(cache: Cache, outcome: Outcome) -> None:
     HDF5 file.
     """
     problem, name = outcome.problem, outcome.name
-    attributes = {
+    of_search = {
         "problem": problem.name,
         "title": problem.title,
         "identity": canonical(outcome.identity).decode(),
@@ -42,13 +42,15 @@ def store(cache: Cache, outcome: Outcome) -> None:
         cache.put_table(f"{name}/{below}", columns)
     cache.put_table(f"{name}/{GENES_TABLE}", genes(problem))
     cache.put_table(f"{name}/{OBJECTIVES_TABLE}", objectives(problem))
+    if problem.constraints:
+        cache.put_table(f"{name}/{CONSTRAINTS_TABLE}", constraints(problem))
     for below, columns in (
         ("hall_of_fame", best_columns(problem, outcome.hall)),
         ("logbook", logbook_columns(problem, outcome.logbook)),
     ):
-        about = {heading: {"unit": unit} for heading, unit in units(problem).items() if heading in columns}
+        about = {heading: one for heading, one in attributes(problem).items() if heading in columns}
         cache.put_table(f"{name}/{below}", columns, about=about)
-    cache.put_table(name, {}, attributes)
+    cache.put_table(name, {}, of_search)
     if outcome.stopped or not outcome.logbook:
         cache.fold()
 
@@ -84,6 +86,21 @@ def objectives(problem: Problem) -> dict[str, list[Any]]:
             "description": problem.meanings.get(objective.name, ""),
         }
         for objective in problem.objectives
+    ]
+    return _columns(rows)
+
+
+def constraints(problem: Problem) -> dict[str, list[Any]]:
+    """Return the columns of a table with a row for each constraint: name, unit, bounds, what it limits."""
+    rows = [
+        {
+            "name": constraint.name,
+            "unit": constraint.unit,
+            "at_least": constraint.at_least,
+            "at_most": constraint.at_most,
+            "of": constraint.kind,
+        }
+        for constraint in problem.constraints
     ]
     return _columns(rows)
 

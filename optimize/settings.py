@@ -4,6 +4,7 @@ file."""
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,7 +13,7 @@ from pydantic import Field, SerializeAsAny, model_validator
 from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.optimize.beginning import Beginning
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.ensemble import LOOKED_AT, EnsembleSettings, fewest_starts
 from tisim.optimize.generation_log import OwnStatistics
 from tisim.optimize.methods.base import SearchMethod, code_of, every, find
 from tisim.optimize.problem.problem import Problem
@@ -167,6 +168,35 @@ def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, An
     return {**usual, "options": options}
 
 
+def least_evaluations(problem: Problem, settings: Settings) -> int:
+    """Return the smallest budget from which a search can run a design from all its random starts."""
+    if problem.deterministic:
+        return 1
+    starts = fewest_starts(problem, settings.ensemble)
+    # Other designs may have run from two starts by then, to check whether the starts matter.
+    needed = starts if starts <= 2 else starts + 2 * (LOOKED_AT - 1)
+    budgets = itertools.count(needed)
+    return next(most for most in budgets if most - reserved(problem, settings, most) >= needed)
+
+
+def reserved(problem: Problem, settings: Settings, most: int) -> int:
+    """Return the number of runs of a budget that are reserved for the end of a search; see
+    conclusion.reserve."""
+    options = settings.ensemble
+    if not (options.select or options.confirm):
+        return 0
+    if problem.several:
+        return most // 4
+    part = most // 4 if problem.result_constraints else most // 8
+    return min(part, settings.hall_of_fame * (options.select + fresh_starts(problem, settings)))
+
+
+def fresh_starts(problem: Problem, settings: Settings) -> int:
+    """Return the number of held-out starts of each reported design."""
+    starts = settings.ensemble.confirm
+    return max(starts, *(one.statistic.fewest_fresh for one in problem.objectives)) if starts else 0
+
+
 def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None) -> None:
     """Raise InputError if the method, a stopping rule, the statistics or the number of starts does not suit
     the objectives or the beginning of the search."""
@@ -186,6 +216,10 @@ def fit(problem: Problem, settings: Settings, beginning: Beginning | None = None
     if beginning is not None and beginning.experiments:
         able = [name for name, method in every().items() if method.takes_experiments]
         must(settings.method in able, "method", f"for experiments: {', '.join(able)}", settings.method)
+    if settings.max_evaluations is not None:
+        least, starts = least_evaluations(problem, settings), fewest_starts(problem, settings.ensemble)
+        rule = f"{least} or more, as each design runs from {starts} random starts"
+        must(settings.max_evaluations >= least, "max_evaluations", rule, settings.max_evaluations)
     if beginning is not None and settings.max_evaluations is not None:
         first = len(beginning.designs)
         rule = f"at most max_evaluations = {settings.max_evaluations}, as each of them is run"

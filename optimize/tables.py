@@ -12,6 +12,7 @@ from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.generation_log import chapter_column
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.calls import constraint_value
+from tisim.optimize.problem.feasibility import ANSWERS, feasible
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
 
@@ -20,26 +21,35 @@ ERROR, LOW, HIGH = "std. error", "95 % low", "95 % high"
 """Headings, or ends of headings."""
 Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
 """Estimates of designs, by their points of the unit cube."""
+FEASIBLE = "feasible"
+"""Heading of the column that says whether a design satisfies the constraints of the result."""
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
     """Return the columns of Z04's tables 1 to 3 in one: heading -> values, best design first.
 
-    They are rank, every gene in its unit, each constraint, each objective as estimated by the search with its
-    standard error, the derived columns of the problem, starts, and whether the mean converged (if a tolerance
-    was set). With held-out starts, each objective follows with the ends of its 95 % confidence interval. With
+    They are rank, whether the design is feasible (with constraints of the result), every gene in its unit,
+    each constraint, each objective as estimated by the search with its standard error, the derived columns of
+    the problem, starts, and whether the mean converged (if a tolerance was set). With held-out starts, each
+    objective and each constraint of the result follows with the ends of its 95 % confidence interval. With
     several objectives, the front is sorted by the first.
     """
     estimates = [individual.estimates for individual in hall]
     number = "front" if problem.several else "rank"
     columns: dict[str, list[Any]] = {number: list(range(1, len(estimates) + 1))}
     designs = [problem.genome.decode(individual) for individual in hall]
+    constraints = problem.result_constraints
+    if constraints:
+        columns[FEASIBLE] = [ANSWERS[feasible(constraints, one.reported_limits)] for one in hall]
     for gene in problem.genome.genes:
         columns[gene.label] = [design[gene.name] for design in designs]
     for constraint in problem.design_constraints:
         columns[constraint.label] = [constraint_value(constraint, one, problem) for one in designs]
-    for k, constraint in enumerate(problem.result_constraints):
-        columns[constraint.label] = [one.limited[k] if one.limited else math.nan for one in hall]
+    for k, constraint in enumerate(constraints):
+        limits = [individual.limits[k] for individual in hall]
+        columns[constraint.label] = [limit.mean for limit in limits]
+        if any(limit.std for limit in limits):
+            columns[error_of(constraint.name)] = [limit.standard_error for limit in limits]
     columns |= _objectives(problem, estimates, "")
     columns["starts"] = [of_all[0].starts for of_all in estimates]
     if any(of_all[0].converged for of_all in estimates):
@@ -47,6 +57,11 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
     confirmed = [individual.confirmed for individual in hall if individual.confirmed]
     if confirmed and len(confirmed) == len(hall):
         columns |= _objectives(problem, confirmed, FRESH_STARTS)
+        for k, constraint in enumerate(constraints):
+            limits = [individual.confirmed_limits[k] for individual in hall]
+            columns[f"{constraint.label}{FRESH_STARTS}"] = [limit.mean for limit in limits]
+            columns[f"{constraint.name} {LOW}{FRESH_STARTS}"] = [limit.low for limit in limits]
+            columns[f"{constraint.name} {HIGH}{FRESH_STARTS}"] = [limit.high for limit in limits]
         columns[f"starts{FRESH_STARTS}"] = [of_all[0].starts for of_all in confirmed]
     return columns
 
@@ -86,14 +101,34 @@ def units(problem: Problem) -> dict[str, str]:
         fresh = (objective.label, f"{name}{LOW}", f"{name}{HIGH}")
         headings = (objective.label, f"{name}{ERROR}", *progress, *(f"{one}{FRESH_STARTS}" for one in fresh))
         found |= dict.fromkeys(headings, objective.unit)
+    for constraint in problem.constraints:
+        name = constraint.name
+        fresh = (constraint.label, f"{name} {LOW}", f"{name} {HIGH}")
+        headings = (constraint.label, error_of(name), *(f"{one}{FRESH_STARTS}" for one in fresh))
+        found |= dict.fromkeys(headings, constraint.unit)
     return {heading: unit for heading, unit in found.items() if unit}
 
 
-def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
+def attributes(problem: Problem) -> dict[str, dict[str, Any]]:
+    """Return the attributes of each column of these tables that has some: its unit, and the bounds of a
+    constraint."""
+    found: dict[str, dict[str, Any]] = {heading: {"unit": unit} for heading, unit in units(problem).items()}
+    for constraint in problem.constraints:
+        ends = {"at_least": constraint.at_least, "at_most": constraint.at_most}
+        bounds = {side: float(bound) for side, bound in ends.items() if bound is not None}
+        for heading in (constraint.label, f"{constraint.label}{FRESH_STARTS}"):
+            found[heading] = found.get(heading, {}) | bounds
+    return found
+
+
+def design_columns(problem: Problem, estimates: Estimates, limits: Estimates) -> dict[str, list[Any]]:
     """Return the columns of designs by the names of genes and objectives.
 
-    They are every gene, the mean of each objective and its standard error (NaN if the design failed), starts,
-    converged, and the reason of a failure.
+    They are every gene, the mean of each objective and of each constraint of the result, their standard
+    errors (NaN if the design failed), whether it is feasible ("" if it failed), starts, converged, and the
+    reason of a failure.
+
+    estimates : of the objectives. limits : of the constraints of the result.
     """
     designs = [problem.genome.decode(point) for point in estimates]
     columns: dict[str, list[Any]] = {
@@ -103,6 +138,14 @@ def design_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any
         mine = [of_all[k] for of_all in estimates.values()]
         columns[objective.name] = [objective.sign * e.mean if e.ok else math.nan for e in mine]
         columns[error_of(objective.name)] = [e.standard_error for e in mine]
+    constraints = problem.result_constraints
+    good = [limits[one] if of_all[0].ok else () for one, of_all in estimates.items()]
+    for k, constraint in enumerate(constraints):
+        columns[constraint.name] = [of_all[k].mean if of_all else math.nan for of_all in good]
+        errors = [of_all[k].standard_error if of_all else math.nan for of_all in good]
+        columns[error_of(constraint.name)] = errors
+    if constraints:
+        columns[FEASIBLE] = [ANSWERS[feasible(constraints, of_all)] if of_all else "" for of_all in good]
     first = [of_all[0] for of_all in estimates.values()]
     columns["starts"] = [e.starts for e in first]
     columns["converged"] = [e.converged for e in first]

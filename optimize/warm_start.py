@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tisim.errors import InputError, is_number
 from tisim.optimize.beginning import Beginning
 from tisim.optimize.evaluation.estimate import FitnessEstimate
-from tisim.optimize.experiments import restored
+from tisim.optimize.experiments import plain, restored
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.calls import check_design
 from tisim.optimize.problem.genes import Choice, Gene
@@ -107,7 +107,7 @@ def _individual(problem: Problem, part: RunsTable, rows: NDArray[np.intp]) -> In
     individual.know(tuple(_estimate(one, part, rows) for one in problem.objectives))
     individual.limit(
         problem.result_constraints,
-        [float(part.values[one.name][rows].mean()) for one in problem.result_constraints],
+        [plain([part.values[one.name][rows].mean()]) for one in problem.result_constraints],
     )
     return individual
 

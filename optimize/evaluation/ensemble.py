@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,8 @@ class EnsembleSettings(Checked):
         none, and no intervals); raised if the interval of a statistic needs more.
 
     An eighth of max_evaluations, or less if that suffices, is reserved for select and confirm; with several
-    objectives a quarter. If the reserve is not enough, fewer designs are reported.
+    objectives, or with constraints of the result, a quarter. If the reserve is not enough, fewer designs are
+    reported.
     """
 
     min_starts: int = Field(2, ge=1)
@@ -71,6 +73,11 @@ class EnsembleSettings(Checked):
             self.min_starts,
         )
         return self
+
+
+def fewest_starts(problem: Problem, settings: EnsembleSettings) -> int:
+    """Return the number of starts of every design: the setting, or more if the statistics need more."""
+    return max(settings.min_starts, *(one.statistic.fewest_starts for one in problem.objectives))
 
 
 class Ensemble:
@@ -99,7 +106,7 @@ class Ensemble:
         self.budget = math.inf
         self.exhausted = False
         self.repeatable: bool | None = True if problem.deterministic else None
-        self.min_starts = max(settings.min_starts, *(one.statistic.fewest_starts for one in self.objectives))
+        self.min_starts = fewest_starts(problem, settings)
         self._known: dict[bytes, Sample] = {}
 
     @property
@@ -227,8 +234,9 @@ class Ensemble:
         progress: Report | None = None,
         noise: Sequence[Moments] | None = None,
         confidence: float = CONFIDENCE,
-    ) -> list[tuple[FitnessEstimate, ...]]:
-        """Return the estimates of each design from held-out starts, which are its own and not used elsewhere.
+    ) -> list[tuple[tuple[FitnessEstimate, ...], tuple[FitnessEstimate, ...]]]:
+        """Return the estimates of each design from held-out starts, which are its own and not used elsewhere:
+        of its objectives, and of the constraints of its result.
 
         The values of a selected design are biased by lucky starts; held-out starts remove this bias. The
         skewness of the noise is estimated from all designs together, because rare outcomes occur in only some
@@ -251,12 +259,49 @@ class Ensemble:
         ]
         searched = [self._costs(sample) for sample in self._known.values() if sample.used]
         ranges = self._ranges([*searched, *by_design])
-        return [self._summary(sample, skewness, ranges, confidence) for sample in samples]
+        estimates = [self._summary(sample, skewness, ranges, confidence) for sample in samples]
+        return list(zip(estimates, self._fresh_limits(samples, confidence), strict=True))
 
-    def constraint_means(self, design: Design) -> tuple[float, ...]:
-        """Return the mean of each result constraint over the starts of a design that has run."""
-        limited = self._sample(design).limited
-        return tuple(float(np.mean(column)) for column in zip(*limited, strict=True))
+    def limits(self, design: Design) -> tuple[FitnessEstimate, ...]:
+        """Return the estimate of each result constraint from the starts of a design that has run.
+
+        It has no interval unless all starts are the same, because these starts also choose the design.
+        """
+        return tuple(self._limit(column) for column in zip(*self._sample(design).limited, strict=True))
+
+    def _limit(self, values: Sequence[float]) -> FitnessEstimate:
+        if self.repeatable:
+            return FitnessEstimate.certain(values[0])
+        std = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
+        return FitnessEstimate(float(np.mean(values)), std, math.nan, math.nan, len(values), False)
+
+    def _fresh_limits(
+        self, samples: Sequence[Sample], confidence: float
+    ) -> list[tuple[FitnessEstimate, ...]]:
+        """Return the estimates of the result constraints of each sample, with intervals.
+
+        If a start of a sample has failed, its values are not known, which counts as a violation.
+        """
+        names = [one.name for one in self.runs.problem.result_constraints]
+        columns: list[list[FitnessEstimate]] = [[] for _ in samples]
+        for k, name in enumerate(names):
+            by_sample = [np.array([row[k] for row in sample.limited]) for sample in samples]
+            good = [values for values, one in zip(by_sample, samples, strict=True) if not one.reason]
+            known = [np.array([row[k] for row in one.limited]) for one in self._known.values() if one.limited]
+            skewness = shared_skewness(good)
+            seen = np.unique(np.concatenate([*good, *known])).tolist()
+            most = max((float(np.ptp(values)) for values in [*good, *known]), default=0.0)
+            mean = Objective(name, float)
+            for column, values, sample in zip(columns, by_sample, samples, strict=True):
+                if sample.reason:
+                    failed = FitnessEstimate.failed(len(values), sample.reason)
+                    column.append(replace(failed, mean=math.nan))
+                elif self.repeatable:
+                    column.append(FitnessEstimate.certain(float(values[0])))
+                else:
+                    others = Others(_may_occur(values, seen, most), skewness)
+                    column.append(FitnessEstimate.of(mean, values, False, others, confidence))
+        return [tuple(column) for column in columns]
 
     def values(self, design: Design) -> np.ndarray:
         """Return the quantities of each start in a design's estimate, shape (starts, quantities)."""

@@ -27,8 +27,8 @@ class Individual(list[float]):
 
     estimates, confirmed : estimates of the cost of each objective, from the search and from held-out starts;
         () if there are none.
-    limited : the mean of each constraint of the result.
-    violation : total constraint violation, 0 for a feasible design.
+    limits, confirmed_limits : the same of each constraint of the result, in its unit.
+    violation : total constraint violation by the means of the search, 0 for a feasible design.
     """
 
     def __init__(self, genes: Iterable[float], objectives: int = 1) -> None:
@@ -36,7 +36,8 @@ class Individual(list[float]):
         self.fitness = minimised(objectives)()
         self.estimates: tuple[FitnessEstimate, ...] = ()
         self.confirmed: tuple[FitnessEstimate, ...] = ()
-        self.limited: tuple[float, ...] = ()
+        self.limits: tuple[FitnessEstimate, ...] = ()
+        self.confirmed_limits: tuple[FitnessEstimate, ...] = ()
         self.violation = 0.0
 
     def know(self, estimates: tuple[FitnessEstimate, ...]) -> None:
@@ -44,11 +45,21 @@ class Individual(list[float]):
         self.estimates = estimates
         self.fitness.values = tuple(estimate.mean for estimate in estimates)
 
-    def limit(self, constraints: Sequence[InequalityConstraint], means: Sequence[float]) -> None:
-        """Set these means of the constraints of the result, in order."""
-        self.limited = tuple(means)
-        parts = [one.violation(mean) for one, mean in zip(constraints, means, strict=True)]
+    def limit(self, constraints: Sequence[InequalityConstraint], limits: Iterable[FitnessEstimate]) -> None:
+        """Set these estimates of the constraints of the result, in order."""
+        self.limits = tuple(limits)
+        parts = [one.violation(mean) for one, mean in zip(constraints, self.limited, strict=True)]
         self.violation = float(total_violation(parts))
+
+    @property
+    def limited(self) -> tuple[float, ...]:
+        """The mean of each constraint of the result over the starts of the search."""
+        return tuple(estimate.mean for estimate in self.limits)
+
+    @property
+    def reported_limits(self) -> tuple[FitnessEstimate, ...]:
+        """The estimates of the constraints of the result: from held-out starts, if it has any."""
+        return self.confirmed_limits or self.limits
 
     @property
     def failed(self) -> bool:

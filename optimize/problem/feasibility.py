@@ -13,8 +13,48 @@ et al., IEEE Trans. Evol. Comput. 6 (2002) 182-197, section VI.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from tisim.optimize.evaluation.estimate import FitnessEstimate
+    from tisim.optimize.problem.constraint import InequalityConstraint
+
+ANSWERS = {True: "yes", None: "unproven", False: "no"}
+"""The results of ``feasible``, as in tables."""
+
+
+def feasible(
+    constraints: Sequence[InequalityConstraint], estimates: Sequence[FitnessEstimate]
+) -> bool | None:
+    """Return whether a design satisfies all constraints, from the estimates of their values.
+
+    False if a mean violates its bounds; True if all intervals lie within the bounds; None otherwise: an
+    interval contains a bound, or is not known.
+    """
+    pairs = list(zip(constraints, estimates, strict=True))
+    if any(one.violation(estimate.mean) > 0 for one, estimate in pairs):
+        return False
+    ends = [one.violation(end) for one, estimate in pairs for end in (estimate.low, estimate.high)]
+    return None if any(end > 0 for end in ends) else True
+
+
+def excess(constraints: Sequence[InequalityConstraint], estimates: Sequence[FitnessEstimate]) -> float:
+    """Return the total violation of a design from the means of its constraints."""
+    parts = [one.violation(estimate.mean) for one, estimate in zip(constraints, estimates, strict=True)]
+    return float(total_violation(parts))
+
+
+def violated(constraints: Sequence[InequalityConstraint], estimates: Sequence[FitnessEstimate]) -> str:
+    """Return the constraints that the means of a design violate, in words; "" if there is none."""
+    return "; ".join(
+        f"{one.name} is {estimate.mean:.4g} {one.unit}".rstrip() + f" and must be {one.rule}"
+        for one, estimate in zip(constraints, estimates, strict=True)
+        if one.violation(estimate.mean) > 0
+    )
 
 
 def total_violation(violations: ArrayLike) -> NDArray[np.float64]:

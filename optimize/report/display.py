@@ -64,6 +64,9 @@ class Display:
         if not where.best:
             return f"best none yet; the first failed: {where.failure}" if where.failure else "best none yet"
         pairs = zip(self.problem.objectives, where.best, strict=True)
+        if where.violated:
+            values = "".join(f"  {o.name} {value:.4g} {o.unit}".rstrip() for o, value in pairs)
+            return f"no feasible design yet ({where.violated}){values}"
         if self.problem.several:
             best = "".join(f"  {o.name} {value:.4g} {o.unit}".rstrip() for o, value in pairs)
             return f"front of {where.designs}  ideal point{best}"

@@ -18,7 +18,8 @@ from tisim.console import TERMINAL_WIDTH
 from tisim.files import pictures
 from tisim.files.atomic import replace_file
 from tisim.optimize.outcome import Outcome
-from tisim.optimize.tables import ERROR, HIGH, LOW, best_columns, met_columns, met_points
+from tisim.optimize.problem.feasibility import feasible
+from tisim.optimize.tables import ERROR, FEASIBLE, HIGH, LOW, best_columns, met_columns, met_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,11 +57,19 @@ def best_table(outcome: Outcome) -> RenderableType:
 
 
 def notes(outcome: Outcome) -> RenderableType:
-    """Return explanations of the headings of ``best_table``, a line each; empty if there is no design."""
+    """Return a line if no design satisfies the constraints, and explanations of the headings of
+    ``best_table``, a line each; empty if there is no design."""
     problem, ensemble = outcome.problem, outcome.settings.ensemble
     if not outcome.hall:
         return Group()
     first = outcome.hall[0]
+    warnings = []
+    if outcome.violated:
+        warnings.append(f"no design satisfies the constraints; of the first one, {outcome.violated}")
+    elif feasible(problem.result_constraints, first.reported_limits) is None:
+        warnings.append(
+            "the first design may violate a constraint: an interval contains a bound, or is not known"
+        )
     words = {
         "starts": "number of random starts in the mean",
         ERROR: "standard error of that mean; it does not include the bias from choosing the best designs",
@@ -74,8 +83,17 @@ def notes(outcome: Outcome) -> RenderableType:
     if first.confirmed:
         words["fresh starts"] = "held-out starts, not used to choose the designs"
         words[f"{LOW}, {HIGH}"] = "ends of the 95 % confidence interval of the mean"
+    if problem.result_constraints:
+        words[FEASIBLE] = (
+            "yes if the intervals of all constraints lie within the bounds; no if a mean does not; unproven "
+            "if an interval contains a bound, or is not known"
+        )
     meanings = {**problem.meanings, **words}
-    return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in meanings.items()))
+    return Group(
+        "",
+        *(Text(warning, "bold") for warning in warnings),
+        *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in meanings.items()),
+    )
 
 
 def met_table(outcome: Outcome) -> RenderableType:

@@ -42,7 +42,8 @@ Runs of a search for good designs, written by tisim (optimize.read reads it; so 
 /evaluations/<problem>   a row for each run of a design from one random start, in columns of equal length:
     genes/<name>         the design; attributes unit, low, high, scale (on which the search is uniform)
     values/<name>        what the run gave; attribute unit. Objectives have the attribute direction, which
-                         says what is wanted: "smallest" or "largest". NaN where the run failed.
+                         says what is wanted: "smallest" or "largest"; constraints have at_least and at_most,
+                         the bounds of their values. NaN where the run failed.
     start, seed          number of the random start and the seed that it was made from
     ok, reason           1 for a run that ended well, 0 for one that failed, and why
     wall_s, created      seconds that it took; when it was stored, in seconds since 1970 (UTC)
@@ -54,6 +55,7 @@ Runs of a search for good designs, written by tisim (optimize.read reads it; so 
 /searches/<name>         a search. Attributes: problem; settings, identity (all that decides its course) and
                          versions, as JSON; stopped, the rule that ended it (empty while it goes on)
     genes, objectives    what it varies and what it wants: names, units, ranges, directions
+    constraints          what it demands besides, if anything: names, units, bounds
     starting_designs     designs that it was told to run first
     experiments          designs that it learnt from as it began, as they were measured
     warm_start           the same of designs that other searches in this file had run by then
@@ -77,8 +79,8 @@ _MEANINGS: Mapping[str, Mapping[str, str]] = {
     "work": {"description": "counts of the run, as JSON"},
     "crc": {"description": "CRC-32 of the cells of the row"},
 }
-GENES_TABLE, OBJECTIVES_TABLE = "genes", "objectives"
-"""Names of the tables, below a search, that describe the genes and objectives of its problem."""
+GENES_TABLE, OBJECTIVES_TABLE, CONSTRAINTS_TABLE = "genes", "objectives", "constraints"
+"""Names of the tables, below a search, that describe the genes, objectives and constraints of its problem."""
 
 
 @dataclass(frozen=True)
@@ -171,13 +173,13 @@ def _numbered(problems: Sequence[str]) -> list[str]:
 
 
 def descriptions(tables: Mapping[str, Hdf5Table]) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return the searches' descriptions of genes and objectives: problem, name, attributes.
+    """Return the searches' descriptions of genes, objectives and constraints: problem, name, attributes.
 
     NaN and "" stand for attributes that a gene does not have.
     """
     about: dict[str, dict[str, dict[str, Any]]] = {}
     for name, search in tables.items():
-        for kind in (GENES_TABLE, OBJECTIVES_TABLE):
+        for kind in (GENES_TABLE, OBJECTIVES_TABLE, CONSTRAINTS_TABLE):
             table = tables.get(f"{name}/{kind}")
             if table is None or not table.intact or "problem" not in search.attrs:
                 continue
@@ -194,14 +196,16 @@ def _write_runs(group: h5py.Group, part: RunsTable, about: Mapping[str, Mapping[
     columns: dict[str, NDArray[Any]] = {**part.facts, "crc": part.checksums()}
     for name, column in columns.items():
         write_column(group, name, column).attrs.update(_MEANINGS[name])
-    for kind, table, parts in (
-        ("genes", GENES_TABLE, part.genes),
-        ("values", OBJECTIVES_TABLE, part.values),
+    for kind, tables, parts in (
+        ("genes", (GENES_TABLE,), part.genes),
+        ("values", (OBJECTIVES_TABLE, CONSTRAINTS_TABLE), part.values),
     ):
         below, names = group.create_group(kind), dataset_names(parts)
         group.attrs[kind] = json.dumps(list(parts))
         for name, column in parts.items():
-            write_column(below, names[name], column).attrs.update(about.get(f"{table}/{name}", {}))
+            written = write_column(below, names[name], column)
+            for table in tables:
+                written.attrs.update(about.get(f"{table}/{name}", {}))
 
 
 def read_runs(group: h5py.Group) -> tuple[RunsTable, list[str]]:

@@ -1,10 +1,27 @@
-"""Constraints on results: the best design satisfies them, for the mean over its starts."""
+"""Constraints on results: the best design satisfies them, for the mean over its starts, or is marked."""
 
+import io
+
+import h5py
 import numpy as np
 import pytest
+from rich.console import Console
 
-from tisim import optimize
-from tisim.optimize import Gene, Objective, Problem, ResultConstraint
+from tests.optimize.fake_runs import FakeCache
+from tisim import InputError, optimize
+from tisim.optimize import AskTell, Gene, Objective, Problem, ResultConstraint
+from tisim.optimize.designs_csv import check_headings
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
+from tisim.optimize.experiments import plain
+from tisim.optimize.methods.individual import Individual
+from tisim.optimize.report.display import Display
+from tisim.optimize.report.report import notes
+from tisim.optimize.search import search
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
+from tisim.optimize.surrogate.ranking import best
+from tisim.optimize.tables import best_columns
 
 GENES = (Gene("x", "m", 0.0, 1.0), Gene("y", "m", 0.0, 1.0))
 
@@ -47,3 +64,161 @@ def test_a_range_of_few_designs_is_searched_to_its_end():
         outcome = optimize.run(few, method=method, generations=12)
         assert outcome.designs[0].genes == {"n": 3}
         assert len(outcome.estimates) == 6
+
+
+def noisy(design, seed):
+    """Least value at the smallest x; the constraint of its load is as noisy as it is tight."""
+    rng = np.random.default_rng(seed)
+    value = design["x"] + 0.1 * (design["y"] - 0.5) ** 2 + 0.02 * rng.normal()
+    return {"value": value, "load": design["x"] + 0.3 * rng.normal()}
+
+
+VALUE = Objective("value", lambda result: result.value["value"])
+LOAD = ResultConstraint("load", lambda result: result.value["load"], "N", at_least=0.5)
+NOISY = Problem.of_function(noisy, GENES, (VALUE,), constraints=(LOAD,), code="1")
+
+
+def of_random(seed, runs=120, **ensemble):
+    settings = Settings(
+        method="random", seed=seed, max_evaluations=runs, generations=1000, hall_of_fame=3, ensemble=ensemble
+    )
+    return search(NOISY, FunctionEvaluator(), FakeCache(), settings)
+
+
+def test_a_true_violation_is_never_reported_as_feasible():
+    """By the means of the search alone, the first design would violate the constraint in half of them."""
+    violations = 0
+    for seed in range(12):
+        outcome = of_random(seed, common_starts=bool(seed % 2), confirm=10)
+        assert outcome.evaluations + outcome.hits <= 120
+        first, *others = outcome.designs
+        assert others
+        violations += first.genes["x"] < 0.5
+        for design in outcome.designs:
+            low, high = design.intervals["load"]
+            assert low < design.constraints["load"] < high
+            below = design.constraints["load"] < 0.5
+            assert design.feasible is (False if below else True if low >= 0.5 else None)
+            assert design.genes["x"] >= 0.5 or design.feasible is not True
+        verdicts = [design.feasible is False for design in outcome.designs]
+        assert verdicts == sorted(verdicts)  # the ones that violate it are last
+    assert violations <= 4
+
+
+def test_the_next_design_is_confirmed_if_the_first_one_fails():
+    """Its budget is for one design with all its held-out starts."""
+    tried = 0
+    for seed in range(12):
+        outcome = of_random(seed, 96, common_starts=True)
+        assert outcome.evaluations + outcome.hits <= 96
+        starts = [individual.confirmed_limits[0].starts for individual in outcome.hall]
+        assert sorted(starts) in ([16], [8, 16])
+        failed = any(design.feasible is False for design in outcome.designs)
+        assert failed == (len(starts) == 2)
+        tried += failed
+    assert tried
+
+
+def test_the_interval_of_a_constraint_is_in_the_tables(path):
+    with Cache(path) as cache:
+        settings = Settings(method="random", seed=1, max_evaluations=120, generations=1000)
+        outcome = search(NOISY, FunctionEvaluator(), cache, settings)
+    label = "load, at least 0.5 N"
+    columns = best_columns(NOISY, outcome.hall)
+    design = outcome.designs[0]
+    fresh = columns[f"{label}, fresh starts"], columns["load 95 % low, fresh starts"]
+    assert [column[0] for column in fresh] == [design.constraints["load"], design.intervals["load"][0]]
+    assert columns["load 95 % high, fresh starts"][0] == design.intervals["load"][1]
+    assert columns["feasible"][0] == {True: "yes", None: "unproven", False: "no"}[design.feasible]
+    assert min(columns["load std. error"]) > 0
+    check_headings(NOISY, columns)
+    frame = outcome.to_frame()
+    assert set(frame["feasible"]) == {"unproven", "no"}
+    assert list(frame["load"] >= 0.5) == list(frame["feasible"] == "unproven")
+    assert frame.attrs["units"]["load"] == frame.attrs["units"]["load std. error"] == "N"
+    with h5py.File(path) as file:
+        told = {"unit": "N", "at_least": 0.5}
+        hall = file[outcome.name]["hall_of_fame"]
+        assert dict(hall[label].attrs) == dict(hall[f"{label}, fresh starts"].attrs) == told
+        assert told.items() <= dict(file["evaluations/noisy/values/load"].attrs).items()
+        assert "at_least" in file.attrs["README"]
+
+
+def impossible(**fields):
+    far = ResultConstraint("far", lambda result: result.design["x"], "m", at_least=2)
+    return Problem.of_function(lambda design: -design["x"], GENES, ("height",), constraints=(far,), **fields)
+
+
+def shown(renderable):
+    console = Console(width=200, file=io.StringIO())
+    console.print(renderable)
+    return console.file.getvalue()
+
+
+def test_a_search_without_a_feasible_design_says_so():
+    console = Console(width=200, file=io.StringIO())
+    problem, settings = impossible(), Settings(generations=2, target=1.0)
+    with Display(problem, settings, console) as display:
+        outcome = search(
+            problem, FunctionEvaluator(), FakeCache(), settings, on_generation=display.generation
+        )
+    best = outcome.designs[0]
+    assert (outcome.stopped, best.feasible) == ("generations", False)
+    assert best.constraints == {"far": best.genes["x"]}
+    assert best.intervals["far"] == (best.genes["x"],) * 2
+    words = f"far is {best.genes['x']:.4g} m and must be at least 2 m"
+    assert f"no design satisfies the constraints; of the first one, {words}" in shown(notes(outcome))
+    assert "none of them feasible" in repr(outcome)
+    line = console.file.getvalue().splitlines()[-1]
+    assert f"no feasible design yet ({words})  height {best.values['height']:.4g}" in console.file.getvalue()
+    assert line
+    assert set(outcome.to_frame()["feasible"]) == {"no"}
+    assert np.isinf(outcome.logbook.select("best")).all()
+    feasible = optimize.run(Problem.of_function(lambda design: design["x"], GENES), generations=1)
+    assert feasible.designs[0].feasible is True
+    assert "constraint" not in shown(notes(feasible))
+
+
+def test_a_campaign_without_a_feasible_design_says_so():
+    campaign = AskTell(impossible())
+    designs = campaign.ask()
+    campaign.tell(designs, [[-design["x"], design["x"]] for design in designs])
+    assert campaign.best.feasible is False
+    assert campaign.best.constraints["far"] == max(design["x"] for design in designs)
+    assert "none of them feasible" in repr(campaign.outcome)
+    assert set(campaign.outcome.to_frame()["feasible"]) == {"no"}
+    campaign.tell({"x": 0.5, "y": 0.5}, {"height": 1.0, "far": 2.5})
+    assert campaign.best.feasible is True
+    noisy_campaign = AskTell(NOISY)
+    noisy_campaign.tell({"x": 0.5, "y": 0.5}, [0.5, 0.6])
+    assert noisy_campaign.best.feasible is None
+
+
+def test_one_lucky_pair_of_starts_does_not_make_a_design_feasible():
+    """The values of the other designs show that the constraint is violated at x = 0.3."""
+    individuals = []
+    for k, x in enumerate(np.linspace(0, 1, 41)):
+        individual = Individual((x, 0.5))
+        noise = 0.3 * np.random.default_rng(k).normal(size=2)
+        loads = np.full(2, 0.7) if k == 12 else x + noise
+        individual.know((FitnessEstimate(x, 0.01, np.nan, np.nan, 2, False),))
+        individual.limit((LOAD,), [plain(loads)])
+        individuals.append(individual)
+    genome = NOISY.genome
+    lucky = individuals[12]
+    assert lucky.violation == 0
+    assert lucky in best(genome, individuals, 40)
+    assert lucky not in best(genome, individuals, 40, (LOAD,))
+
+
+@pytest.mark.parametrize(("given", "least"), [({}, 2), ({"min_starts": 8}, 11), ({"min_starts": 1}, 1)])
+def test_a_budget_for_less_than_a_design_is_refused(given, least):
+    plain_noisy = Problem.of_function(
+        lambda design, seed: design["x"] + np.random.default_rng(seed).normal(), GENES
+    )
+    if least > 1:
+        rule = f"max_evaluations must be {least} or more, .* received {least - 1}"
+        with pytest.raises(InputError, match=rule):
+            optimize.run(plain_noisy, max_evaluations=least - 1, ensemble=given)
+    assert optimize.run(plain_noisy, max_evaluations=least, ensemble=given).hall
+    assert optimize.run(impossible(), max_evaluations=1).hall
