@@ -94,9 +94,14 @@ class Belief:
 def _compressed(costs: Array) -> tuple[Array, Array]:
     """Return costs of one objective, (n,), without their largest decades, and the slope of the new unit.
 
-    With the least cost l and the median m, a cost c becomes (m - l) min(log(1 + (c - l) / (m - l)), 4).
+    With the least cost l and the median m, a cost c becomes (m - l) min(log(1 + (c - l) / (m - l)), 4). If most
+    costs are penalties, m is the quantile 0.2.
     """
-    above, spread = costs - costs.min(), float(np.median(costs) - costs.min())
+    above = costs - costs.min()
+    fifth, spread = np.quantile(above, (0.2, 0.5), method="lower")
+    if spread > _DECADES * fifth > 0:
+        # More than half of the designs have a penalty.
+        spread = fifth
     if not spread or above.max() <= _DECADES * spread:
         return costs, np.ones_like(costs)
     with np.errstate(divide="ignore"):

@@ -213,16 +213,19 @@ def test_the_luckiest_of_many_is_not_the_best():
     assert posterior < luck / 2
 
 
-@pytest.mark.parametrize("penalty", [1e12, 1e30, 1e300])
-def test_penalties_do_not_hide_the_differences_of_good_designs(penalty):
-    """A third of the designs has the penalty; the others must be ranked by their costs."""
-    points = RNG.random((60, 2))
-    costs = np.where(points[:, 0] > 0.67, penalty, bowl(points))
-    belief = Belief()
-    belief.learn([individual_of(point, cost) for point, cost in zip(points, costs, strict=True)])
-    inside = RNG.random((200, 2)) * [0.6, 1.0]
-    predicted = belief.predict(inside)[0][:, 0]
-    assert spearmanr(predicted, bowl(inside)).statistic > 0.7
-    assert np.all(np.isfinite(belief.costs))
-    order = np.argsort(costs, kind="stable")
-    assert np.all(np.diff(belief.costs[order, 0]) >= 0)
+@pytest.mark.parametrize("penalty", [1e12, 1e300])
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_penalties_do_not_hide_the_differences_of_good_designs(share, penalty):
+    """A share of the designs has the penalty; the order of the others must still be predicted."""
+    found = []
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        points = rng.random((60, 2))
+        costs = np.where(points[:, 0] > 1 - share, penalty, bowl(points))
+        belief = Belief()
+        belief.learn([individual_of(point, cost) for point, cost in zip(points, costs, strict=True)])
+        inside = rng.random((200, 2)) * [0.9 - share, 1.0]
+        found.append(spearmanr(belief.predict(inside)[0][:, 0], bowl(inside)).statistic)
+        order = np.argsort(costs, kind="stable")
+        assert np.all(np.diff(belief.costs[order, 0]) >= 0)
+    assert np.median(found) > 0.8
