@@ -94,8 +94,8 @@ class Belief:
 def _compressed(costs: Array) -> tuple[Array, Array]:
     """Return costs of one objective, (n,), without their largest decades, and the slope of the new unit.
 
-    With the least cost l and the median m, a cost c becomes (m - l) min(log(1 + (c - l) / (m - l)), 4). If most
-    costs are penalties, m is the quantile 0.2.
+    With the least cost l and the median m, a cost c becomes (m - l) min(log(1 + (c - l) / (m - l)), 4). If
+    most costs are penalties, m is the quantile 0.2.
     """
     above = costs - costs.min()
     fifth, spread = np.quantile(above, (0.2, 0.5), method="lower")
