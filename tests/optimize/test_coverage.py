@@ -54,8 +54,8 @@ def test_intervals_have_their_coverage(kind):
     fractions."""
     chance = 1.96 * math.sqrt(0.05 * 0.95 / SEARCHES)
     for way, settings in {**WAYS, **WAYS_TO_FRONTS}.items():
-        if "one of 20" in kind and "common" in way:
-            continue  # an outcome that no single design has shown cannot be known
+        if "20 deviations" in kind and "common" in way:
+            continue  # 18 different starts do not show a rare outcome, and the others look like all there is
         first, everything, error, _ = coverage(kind, SEARCHES, several="front" in way, **settings)
         print(f"{kind}, {way}: best {first:.3f}, all {everything:.3f} +- {1.96 * error:.3f}")
         assert first > 0.93 - chance
