@@ -104,7 +104,8 @@ def _feasible_first(
 
     groups : designs that were confirmed together, and their number of held-out starts.
 
-    The designs in front are selected by these starts, so the intervals are corrected as those of a front.
+    The designs in front are selected by these starts, so the intervals are corrected like intervals of a
+    front.
     """
     tried = [one for group, _ in groups for one in group]
     good = sum(not _excess(problem, one) for one in tried)

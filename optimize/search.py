@@ -173,7 +173,7 @@ class _Search:
                 return
 
     def _give_up(self) -> None:
-        """Raise RunError if so many designs have failed, and none has succeeded, that more would fail, too.
+        """Raise RunError if no design has succeeded and enough have failed to expect the same of the others.
         Refusals count in the same way whether a scene, a function or a constraint makes them."""
         reasons = [
             re.sub(r"^start \d+ \(seed \d+\): ", "", estimates[0].reason)

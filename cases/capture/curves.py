@@ -1,5 +1,5 @@
-"""Captured fractions of the case capture over time and at the end, and the Brownian fractions of what is
-free, by angle, particle size and aspect ratio."""
+"""Captured fractions of the case capture over time and at the end, and the Brownian fractions of the free
+particles, by angle, particle size and aspect ratio."""
 
 from collections.abc import Iterable, Mapping, Sequence
 

@@ -65,8 +65,8 @@ def started_in(result: Result, part: Part) -> np.ndarray:
 def brownian_fraction(group: Sequence[Result], part: Part = "all", free: bool = True) -> Mean:
     """Return the Brownian fraction of the particles of a start region, a ratio of means over the starts.
 
-    Its interval is that of the mean of b - f n over the starts, divided by the mean of n, with b Brownian
-    ones among n particles of the region and f the fraction.
+    A start has b Brownian particles among the n of the region. The fraction is f = mean(b) / mean(n), and the
+    half width of its interval is the half width for the mean of b - f n, divided by mean(n).
     """
     found = [brownian(result, part, free) for result in group]
     number, number_brownian = (np.array([f(one) for one in found], float) for f in (len, np.sum))

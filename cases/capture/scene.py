@@ -1,10 +1,10 @@
 """Magnetic colloids that a magnetised fibre captures (B16 chapter 6).
 
 B16 is R. J. Baars, thesis, Utrecht University (2016): particles of table 6.1 in water about a steel cylinder
-in a field of 1 T along x, at an angle to its axis. The cylinder is saturated, in the direction given by the
-model of Stoner and Wohlfarth or, for the capture volumes of section 6.4.1, in that of the field. The
-suspension is so dilute that particles do not interact; their moment is along the field. A particle that
-touches the cylinder stays there.
+in a field of 1 T along x, at an angle to its axis. The cylinder is saturated. Its magnetisation has the
+direction given by the model of Stoner and Wohlfarth; for the capture volumes of section 6.4.1 it may instead
+have the direction of the field. The suspension is so dilute that particles do not interact; their moment is
+along the field. A particle that touches the cylinder stays there.
 
 The paper draws its start regions TOP and SIDE but does not give their width. Here they are one cylinder
 radius wide and together form the layer around the cylinder; ``part`` chooses one of them.

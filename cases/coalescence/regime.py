@@ -128,8 +128,8 @@ def random_moment(number: int, seed: float = 0.0) -> float:
     """Return the mean magnitude of the sum of moments in random directions, divided by the moment of a grain.
 
     number : of grains of equal moments; their sum is then normally distributed, with a variance of number/3
-    along each axis. seed : moment of the seed particle, divided by that of a grain. Without it the mean is
-    sqrt(8 number / (3 pi)).
+    along each axis. seed : moment of the seed particle, divided by the moment of a grain. Without it the mean
+    is sqrt(8 number / (3 pi)).
     """
     s = math.sqrt(number / 3)
     if seed == 0:

@@ -1,7 +1,8 @@
 """The magnetised fibre of B16, as a cylinder, and published values of the colloids that it attracts.
 
 B16 is R. J. Baars, thesis, Utrecht University (2016), chapter 6. The fibre is a steel cylinder in a field
-along x. It is saturated, in the direction given by the model of Stoner and Wohlfarth or in that of the field.
+along x. It is saturated. Its magnetisation has the direction given by the model of Stoner and Wohlfarth, or
+the direction of the field.
 """
 
 from typing import Literal

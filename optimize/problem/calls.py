@@ -76,7 +76,7 @@ def constraint_value(constraint: InequalityConstraint, of: Any, problem: Problem
 
 def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, Outside]:
     """Return the value of a plain function of a design, or the InputError with which it refuses the design;
-    and what it read.
+    and the files and programs that it used.
 
     FaultyProblem if it fails.
     """

@@ -311,7 +311,9 @@ def _imported(name: str) -> types.ModuleType | None:
             return None
         return importlib.import_module(name)
     except Exception:
-        return None  # as in a function that does without it
+        # The function then fails too, or does without the module. Once the module can be imported, it counts,
+        # and the key changes.
+        return None
 
 
 def _is_installed(path: str) -> bool:

@@ -84,7 +84,8 @@ class FunctionCall:
 class FunctionResult:
     """The result of a plain function.
 
-    value : the returned value. status, wall_s, work : as in ``tisim.Result``. read : what the function read.
+    value : the returned value. status, wall_s, work : as in ``tisim.Result``. read : files and
+    programs that the function used.
     """
 
     design: Mapping[str, Any]

@@ -39,7 +39,7 @@ class Lookups:
     hidden: set[str] = field(default_factory=set)
 
     def add(self, code: types.CodeType) -> None:
-        """Add those of a code object, without the ones inside it."""
+        """Add the lookups of a code object, without the code objects inside it."""
         own = set(code.co_names)
         self.names |= own
         steps = [step for step in dis.get_instructions(code) if step.opname not in _SILENT]

@@ -55,7 +55,7 @@ Runs of a search for good designs, written by tisim (optimize.read reads it; so 
 /searches/<name>         a search. Attributes: problem; settings, identity (all that decides its course) and
                          versions, as JSON; stopped, the rule that ended it (empty while it goes on)
     genes, objectives    what it varies and what it wants: names, units, ranges, directions
-    constraints          what it demands besides, if anything: names, units, bounds
+    constraints          further conditions on designs, if there are any: names, units, bounds
     starting_designs     designs that it was told to run first
     experiments          designs that it learnt from as it began, as they were measured
     warm_start           the same of designs that other searches in this file had run by then

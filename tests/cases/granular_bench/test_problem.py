@@ -105,6 +105,7 @@ def test_a_known_design_is_found_again():
     outcome = optimize.run(calibration_to(measured, "small"), **search)
     found = {gene.name: gene for gene in optimize.calibration(outcome).genes}
     for name, interval in INTERVALS.items():
+        print(name, outcome.designs[0].genes[name], found[name])  # for docs/granular_bench.md
         assert outcome.designs[0].genes[name] == pytest.approx(KNOWN[name], abs=interval)
         assert found[name].estimate == pytest.approx(KNOWN[name], abs=interval)
         assert found[name].low <= KNOWN[name] <= found[name].high
