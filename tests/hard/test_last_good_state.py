@@ -10,7 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity, Impact, parameter
 from tisim.engine import monitor
 from tisim.engine.checkpoint import restore, save
-from tisim.operators.base import Operator
+from tisim.operators import AddsParticles
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 
 WHEN = 0.783
@@ -209,7 +209,7 @@ def test_a_checkpoint_keeps_the_reasons_of_failures(batch, tmp_path, steps):
         same(result, expected)
 
 
-class Doubles(Operator):
+class Doubles(AddsParticles):
     """After five steps, inserts a grain where there already is one."""
 
     @ti.func

@@ -20,6 +20,7 @@ from tisim.errors import InputError, Words, abbreviated, must
 from tisim.files import python_file
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Material, MaterialPair, Materials
+from tisim.operators.base import adding
 from tisim.scene import plain_data, plugins
 from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source
@@ -200,7 +201,7 @@ class Scene(Component):
         """Return the largest number of particles that may exist at once."""
         masses = self.particles.masses(self.seed)
         n = len(masses)
-        return n + sum(effect.capacity(masses) - n for effect in self.effects)
+        return n + sum(effect.capacity(masses) - n for effect in adding(self.effects))
 
     def digest(self) -> str:
         """Return a hash, in hex, of everything that determines the result: physics version, all parameters
