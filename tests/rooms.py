@@ -5,7 +5,8 @@
 
 A room is a package or a module of tisim: the longest name in ``ROOMS`` with which the name of a module
 begins. A module imports from its own room and from earlier ones. This holds for imports within functions too.
-Imports for type checkers do not count.
+Imports for type checkers alone are counted separately, because the program does not make them: two classes
+that hold each other may name each other's types.
 """
 
 import ast
@@ -13,6 +14,10 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 ROOMS = (
     "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.compiling", "tisim.streams", "tisim.console",
@@ -60,26 +65,30 @@ def room(module: str) -> int:
     return ROOMS.index("tisim.cases.*" if home == "tisim.cases" != module else home)
 
 
-def imports(folder: Path) -> tuple[Imports, Imports]:
-    """The imports of each module from the others: at import, and when its functions are called."""
+def imports(folder: Path) -> tuple[Imports, Imports, Imports]:
+    """The imports of each module from the others: at import, when its functions are called, and for type
+    checkers alone."""
     module_files = modules(folder)
-    early: Imports = {name: set() for name in module_files}
-    late: Imports = {name: set() for name in module_files}
+    kinds: dict[str, Imports] = {
+        kind: {name: set() for name in module_files} for kind in ("early", "late", "typed")
+    }
     for name, file in module_files.items():
-        for node, later in _statements(ast.parse(file.read_text(encoding="utf-8")), False):
-            imported = {one for one in _named(node, module_files) if one != name}
-            (late if later else early)[name] |= imported
-    return early, late
+        for node, kind in _statements(ast.parse(file.read_text(encoding="utf-8")), "early"):
+            kinds[kind][name] |= {one for one in _named(node, module_files) if one != name}
+    return kinds["early"], kinds["late"], kinds["typed"]
 
 
-def _statements(node: ast.AST, later: bool) -> Iterator[tuple[ast.AST, bool]]:
-    """The imports below a node, and whether they are in a function; without imports for type checkers."""
+def _statements(node: ast.AST, kind: str) -> Iterator[tuple[ast.AST, str]]:
+    """The imports below a node, each with its kind."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import | ast.ImportFrom):
-            yield child, later
-        typing = isinstance(child, ast.If) and getattr(child.test, "id", "") == "TYPE_CHECKING"
-        if not typing:
-            yield from _statements(child, later or isinstance(child, ast.FunctionDef | ast.Lambda))
+            yield child, kind
+        of_child = kind
+        if isinstance(child, ast.If) and getattr(child.test, "id", "") == "TYPE_CHECKING":
+            of_child = "typed"
+        elif isinstance(child, ast.FunctionDef | ast.Lambda) and kind == "early":
+            of_child = "late"
+        yield from _statements(child, of_child)
 
 
 def _named(node: ast.AST, module_files: dict[str, Path]) -> Iterator[str]:
@@ -104,6 +113,22 @@ def floors(early: Imports) -> list[str]:
         return chains[name]
 
     return max((chain(name, ()) for name in sorted(early)), key=len)
+
+
+def circles(*graphs: Imports) -> list[set[str]]:
+    """The circles of imports in all graphs together: groups of modules each of which reaches all others."""
+    names = sorted(graphs[0])
+    pairs = {(name, other) for graph in graphs for name in names for other in graph[name]}
+    rows, columns = np.array([[names.index(name) for name in pair] for pair in pairs], int).reshape(-1, 2).T
+    links = csr_array((np.ones(len(pairs)), (rows, columns)), shape=(len(names), len(names)))
+    _, group = connected_components(links, connection="strong")
+    return [{names[i] for i in np.flatnonzero(group == k)} for k in np.flatnonzero(np.bincount(group) > 1)]
+
+
+def above(graph: Imports) -> set[tuple[str, str]]:
+    """(module, imported module) for imports from a later room."""
+    pairs = {(module, other) for module, others in graph.items() for other in others}
+    return {(module, other) for module, other in pairs if room(other) > room(module)}
 
 
 def figures(folder: Path) -> Iterator[str]:
@@ -166,22 +191,29 @@ def passages(folder: Path) -> Iterator[str]:
 
 
 def main() -> None:
-    """Print modules of each room, the longest chain and figures; or the passages."""
+    """Print modules of each room, the longest chain, circles and figures; or the passages."""
     folder = Path(__file__).parents[1]
     if "--run" in sys.argv:
         sys.path.insert(0, str(folder))
         print(*passages(folder), sep="\n")
         return
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else folder
-    early, late = imports(folder)
+    early, late, typed = imports(folder)
     for k, name in enumerate(ROOMS):
         inside = [module for module in early if room(module) == k]
         below = sorted({ROOMS[room(o)] for m in inside for o in early[m]} - {name}, key=ROOMS.index)
         print(f"{name:26s} {len(inside):3d} modules, on {', '.join(below) or 'nothing'}")
     longest = floors(early)
     print(f"longest chain of imports: {len(longest)} modules: {' > '.join(longest)}")
-    upward = sum(room(other) > room(module) for module, others in late.items() for other in others)
-    print(f"imports from above, when a function is called: {upward}")
+    for kind, graph in (("at import", early), ("in functions", late), ("for type checkers", typed)):
+        names = "; ".join(f"{module} > {other}" for module, other in sorted(above(graph)))
+        print(f"imports from above, {kind}: {len(above(graph))} {names}".rstrip())
+    for kind, graphs in (("of the program", (early, late)), ("with types", (early, late, typed))):
+        found = circles(*graphs)
+        print(f"circles of imports, {kind}: {len(found)}")
+        for circle in found:
+            print(f"    {len(circle)} modules: {', '.join(sorted(circle))}")
+    print(f"rooms: {len(ROOMS)}")
     print(*figures(folder), sep="\n")
 
 

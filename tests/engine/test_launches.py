@@ -12,8 +12,8 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.program import team
 from tisim.program.launched_program import LaunchedProgram
-from tisim.program.launches import tasks_of
 from tisim.program.phases import Phase, Repeat
+from tisim.program.tasks import tasks_of
 from tisim.program.team import FIRST_ALONE, TRIAL_COST, Teams, TeamTrials
 from tisim.program.world_program import in_pieces, in_shares, world_programs
 from tisim.state.fields import CORE, CORE_OF_WORLDS, WorldField
