@@ -11,6 +11,7 @@ that hold each other may name each other's types.
 
 import ast
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
@@ -150,8 +151,8 @@ def figures(folder: Path) -> Iterator[str]:
 
 
 class Passage:
-    """The Python code through which a call passes in its thread: the files, and the number of changes of
-    room."""
+    """The Python code through which a call passes, in all threads: the files, and the number of changes of
+    room. The calling thread waits while the thread of kernels works."""
 
     def __init__(self, folder: Path) -> None:
         self.rooms = {str(file): room(name) for name, file in modules(folder).items()}
@@ -167,11 +168,15 @@ class Passage:
 
     def __str__(self) -> str:
         crossed = len({self.rooms[name] for name in self.files})
-        return f"{len(self.files)} files in {crossed} rooms, which change {self.changes} times"
+        return f"{len(self.files)} files in {crossed} rooms, {self.changes} changes of room"
 
 
 def passages(folder: Path) -> Iterator[str]:
-    """The passages of a run of agglomeration (its second run), and of a search of one design."""
+    """The passages of a run of agglomeration and of a search of one design, each called twice; the second
+    call compiles nothing."""
+    passage = Passage(folder)
+    # Before tisim starts its thread.
+    threading.setprofile(lambda *call: passage(*call))
     import tisim
     from tisim import optimize
     from tisim.cases.case import every
@@ -179,15 +184,16 @@ def passages(folder: Path) -> Iterator[str]:
     tisim.init("cpu", threads=1)
     case = every()["agglomeration"]
     problem, _ = case.inverse("small", None)
-    for what, call in (
+    for name, call in (
         ("tisim.run", lambda: tisim.run(case.scene("small", 1))),
         ("a search of one design", lambda: optimize.run(problem, max_evaluations=20, generations=0)),
     ):
-        call()
-        sys.setprofile(passage := Passage(folder))
-        call()
-        sys.setprofile(None)
-        yield f"{what}: {passage}"
+        for which in ("first", "second"):
+            passage = Passage(folder)
+            sys.setprofile(passage)
+            call()
+            sys.setprofile(None)
+            yield f"{name}, {which} call: {passage}"
 
 
 def main() -> None:

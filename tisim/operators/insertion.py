@@ -13,8 +13,8 @@ from tisim.components.component import Vector
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Materials
 from tisim.numerics import philox
-from tisim.numerics.quaternions import random_orientation
 from tisim.numerics.random_streams import INSERTION
+from tisim.numerics.vectors import random_orientation
 from tisim.operators.base import AddsParticles, option, parameter
 from tisim.operators.filled_region import FilledRegion
 from tisim.operators.grain_shapes import GrainShapes

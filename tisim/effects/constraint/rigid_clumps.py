@@ -21,7 +21,7 @@ from tisim.effects.constraint.clump_fields import (
 )
 from tisim.effects.constraint.rigid_rotation import angular_velocity, free_rotation
 from tisim.errors import must
-from tisim.numerics.quaternions import brought, rotated
+from tisim.numerics.vectors import brought, rotated
 from tisim.operators.base import largest_inserted
 
 INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
