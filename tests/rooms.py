@@ -5,14 +5,20 @@
 
 A room is a package or a module of tisim: the longest name in ``ROOMS`` with which the name of a module
 begins. A module imports from its own room and from earlier ones. This holds for imports within functions too.
-Imports for type checkers do not count.
+Imports for type checkers alone are counted separately, because the program does not make them: two classes
+that hold each other may name each other's types.
 """
 
 import ast
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 ROOMS = (
     "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.compiling", "tisim.streams", "tisim.console",
@@ -60,26 +66,30 @@ def room(module: str) -> int:
     return ROOMS.index("tisim.cases.*" if home == "tisim.cases" != module else home)
 
 
-def imports(folder: Path) -> tuple[Imports, Imports]:
-    """The imports of each module from the others: at import, and when its functions are called."""
+def imports(folder: Path) -> tuple[Imports, Imports, Imports]:
+    """The imports of each module from the others: at import, when its functions are called, and for type
+    checkers alone."""
     module_files = modules(folder)
-    early: Imports = {name: set() for name in module_files}
-    late: Imports = {name: set() for name in module_files}
+    kinds: dict[str, Imports] = {
+        kind: {name: set() for name in module_files} for kind in ("early", "late", "typed")
+    }
     for name, file in module_files.items():
-        for node, later in _statements(ast.parse(file.read_text(encoding="utf-8")), False):
-            imported = {one for one in _named(node, module_files) if one != name}
-            (late if later else early)[name] |= imported
-    return early, late
+        for node, kind in _statements(ast.parse(file.read_text(encoding="utf-8")), "early"):
+            kinds[kind][name] |= {one for one in _named(node, module_files) if one != name}
+    return kinds["early"], kinds["late"], kinds["typed"]
 
 
-def _statements(node: ast.AST, later: bool) -> Iterator[tuple[ast.AST, bool]]:
-    """The imports below a node, and whether they are in a function; without imports for type checkers."""
+def _statements(node: ast.AST, kind: str) -> Iterator[tuple[ast.AST, str]]:
+    """The imports below a node, each with its kind."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import | ast.ImportFrom):
-            yield child, later
-        typing = isinstance(child, ast.If) and getattr(child.test, "id", "") == "TYPE_CHECKING"
-        if not typing:
-            yield from _statements(child, later or isinstance(child, ast.FunctionDef | ast.Lambda))
+            yield child, kind
+        of_child = kind
+        if isinstance(child, ast.If) and getattr(child.test, "id", "") == "TYPE_CHECKING":
+            of_child = "typed"
+        elif isinstance(child, ast.FunctionDef | ast.Lambda) and kind == "early":
+            of_child = "late"
+        yield from _statements(child, of_child)
 
 
 def _named(node: ast.AST, module_files: dict[str, Path]) -> Iterator[str]:
@@ -106,6 +116,22 @@ def floors(early: Imports) -> list[str]:
     return max((chain(name, ()) for name in sorted(early)), key=len)
 
 
+def circles(*graphs: Imports) -> list[set[str]]:
+    """The circles of imports in all graphs together: groups of modules each of which reaches all others."""
+    names = sorted(graphs[0])
+    pairs = {(name, other) for graph in graphs for name in names for other in graph[name]}
+    rows, columns = np.array([[names.index(name) for name in pair] for pair in pairs], int).reshape(-1, 2).T
+    links = csr_array((np.ones(len(pairs)), (rows, columns)), shape=(len(names), len(names)))
+    _, group = connected_components(links, connection="strong")
+    return [{names[i] for i in np.flatnonzero(group == k)} for k in np.flatnonzero(np.bincount(group) > 1)]
+
+
+def above(graph: Imports) -> set[tuple[str, str]]:
+    """(module, imported module) for imports from a later room."""
+    pairs = {(module, other) for module, others in graph.items() for other in others}
+    return {(module, other) for module, other in pairs if room(other) > room(module)}
+
+
 def figures(folder: Path) -> Iterator[str]:
     """Files and lines of the three folders and of the tests, and the fraction of lines that are imports."""
     for name in ("tisim", "optimize", "cases", "tests"):
@@ -125,8 +151,8 @@ def figures(folder: Path) -> Iterator[str]:
 
 
 class Passage:
-    """The Python code through which a call passes in its thread: the files, and the number of changes of
-    room."""
+    """The Python code through which a call passes, in all threads: the files, and the number of changes of
+    room. The calling thread waits while the thread of kernels works."""
 
     def __init__(self, folder: Path) -> None:
         self.rooms = {str(file): room(name) for name, file in modules(folder).items()}
@@ -142,11 +168,15 @@ class Passage:
 
     def __str__(self) -> str:
         crossed = len({self.rooms[name] for name in self.files})
-        return f"{len(self.files)} files in {crossed} rooms, which change {self.changes} times"
+        return f"{len(self.files)} files in {crossed} rooms, {self.changes} changes of room"
 
 
 def passages(folder: Path) -> Iterator[str]:
-    """The passages of a run of agglomeration (its second run), and of a search of one design."""
+    """The passages of a run of agglomeration and of a search of one design, each called twice; the second
+    call compiles nothing."""
+    passage = Passage(folder)
+    # Before tisim starts its thread.
+    threading.setprofile(lambda *call: passage(*call))
     import tisim
     from tisim import optimize
     from tisim.cases.case import every
@@ -154,34 +184,42 @@ def passages(folder: Path) -> Iterator[str]:
     tisim.init("cpu", threads=1)
     case = every()["agglomeration"]
     problem, _ = case.inverse("small", None)
-    for what, call in (
+    for name, call in (
         ("tisim.run", lambda: tisim.run(case.scene("small", 1))),
         ("a search of one design", lambda: optimize.run(problem, max_evaluations=20, generations=0)),
     ):
-        call()
-        sys.setprofile(passage := Passage(folder))
-        call()
-        sys.setprofile(None)
-        yield f"{what}: {passage}"
+        for which in ("first", "second"):
+            passage = Passage(folder)
+            sys.setprofile(passage)
+            call()
+            sys.setprofile(None)
+            yield f"{name}, {which} call: {passage}"
 
 
 def main() -> None:
-    """Print modules of each room, the longest chain and figures; or the passages."""
+    """Print modules of each room, the longest chain, circles and figures; or the passages."""
     folder = Path(__file__).parents[1]
     if "--run" in sys.argv:
         sys.path.insert(0, str(folder))
         print(*passages(folder), sep="\n")
         return
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else folder
-    early, late = imports(folder)
+    early, late, typed = imports(folder)
     for k, name in enumerate(ROOMS):
         inside = [module for module in early if room(module) == k]
         below = sorted({ROOMS[room(o)] for m in inside for o in early[m]} - {name}, key=ROOMS.index)
         print(f"{name:26s} {len(inside):3d} modules, on {', '.join(below) or 'nothing'}")
     longest = floors(early)
     print(f"longest chain of imports: {len(longest)} modules: {' > '.join(longest)}")
-    upward = sum(room(other) > room(module) for module, others in late.items() for other in others)
-    print(f"imports from above, when a function is called: {upward}")
+    for kind, graph in (("at import", early), ("in functions", late), ("for type checkers", typed)):
+        names = "; ".join(f"{module} > {other}" for module, other in sorted(above(graph)))
+        print(f"imports from above, {kind}: {len(above(graph))} {names}".rstrip())
+    for kind, graphs in (("of the program", (early, late)), ("with types", (early, late, typed))):
+        found = circles(*graphs)
+        print(f"circles of imports, {kind}: {len(found)}")
+        for circle in found:
+            print(f"    {len(circle)} modules: {', '.join(sorted(circle))}")
+    print(f"rooms: {len(ROOMS)}")
     print(*figures(folder), sep="\n")
 
 

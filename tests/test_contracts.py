@@ -19,7 +19,8 @@ from tisim.effects import Cohesion, Force, PairForce
 from tisim.effects.base import Pairwise
 from tisim.effects.contact.granular import parts
 from tisim.materials.materials import Touching
-from tisim.operators import Operator
+from tisim.operators import AddsParticles, Operator
+from tisim.operators import base as operators
 from tisim.program import phases
 from tisim.scene import plugins
 from tisim.sources import Source
@@ -33,7 +34,7 @@ BASES = {
     "pair_force": (PairForce, Pairwise),
     "contact_part": (parts.ContactPart,),
     "source": (Source,),
-    "operator": (Operator,),
+    "operator": (Operator, AddsParticles),
     "stepper": (Stepper,),
     "case": (case.Case,),
 }
@@ -50,7 +51,7 @@ NOT_WRITTEN = {
 }
 """Names that tisim derives from others, or that only its own parts set."""
 PREFIXES = {"s": State, "pair": Touching, "context": StepContext}
-MODULES = (common, verlet, phases, fields, case)
+MODULES = (common, verlet, phases, fields, case, operators)
 
 
 def members(kind):
@@ -80,10 +81,10 @@ def described(part):
     for row in rows(part):
         for text in concepts.names(row):
             prefix, name = text.partition("(")[0].rpartition(".")[0], bare(text)
-            kind = getattr(parts, row["base class"]) if row["base class"] else BASES[part][0]
-            kind = PREFIXES.get(prefix, kind)
+            kinds = (getattr(parts, row["base class"]),) if row["base class"] else BASES[part]
+            kinds = (PREFIXES[prefix],) if prefix in PREFIXES else kinds
             if name != "NAME" and prefix not in ("self", "self.sums"):
-                yield text, name, kind if has(kind, name) else None
+                yield text, name, next((kind for kind in kinds if has(kind, name)), None)
 
 
 @pytest.mark.parametrize("part", BASES)

@@ -8,18 +8,30 @@ import pytest
 
 from tests import rooms
 
-EARLY, LATE = rooms.imports(Path(__file__).parents[1])
-
-
-def above(imports):
-    """(module, imported module) for imports from a later room."""
-    pairs = {(module, other) for module, others in imports.items() for other in others}
-    return {(module, other) for module, other in pairs if rooms.room(other) > rooms.room(module)}
+EARLY, LATE, TYPED = rooms.imports(Path(__file__).parents[1])
 
 
 def test_nothing_is_imported_from_a_later_room():
-    assert above(EARLY) == set()
-    assert above(LATE) == set()
+    assert rooms.above(EARLY) == set()
+    assert rooms.above(LATE) == set()
+
+
+TYPES_FROM_ABOVE = {
+    ("tisim.engine.batches", "tisim.io.recording"),
+    ("tisim.optimize.problem.feasibility", "tisim.optimize.evaluation.estimate"),
+}
+"""Types from a later room: ``tisim.run`` takes a Recording, and an estimate is judged by the problem."""
+CIRCLES_OF_TYPES = (
+    {"tisim.engine.simulation", "tisim.engine.observer"},
+    {f"tisim.optimize.problem.{name}" for name in ("calls", "function", "genome", "given_genes", "problem")},
+)
+"""Modules whose classes hold each other: a simulation calls its observers, which read the simulation."""
+
+
+def test_types_from_later_rooms_and_in_circles_are_known():
+    assert rooms.above(TYPED) <= TYPES_FROM_ABOVE
+    for circle in rooms.circles(EARLY, LATE, TYPED):
+        assert any(circle <= known for known in CIRCLES_OF_TYPES), circle
 
 
 def test_every_room_exists():
@@ -27,7 +39,9 @@ def test_every_room_exists():
 
 
 def test_no_imports_go_in_circles():
+    """Neither those of modules nor those of functions."""
     assert rooms.floors(EARLY)
+    assert rooms.circles(EARLY, LATE) == []
 
 
 CASES = {name for name in EARLY if name.startswith("tisim.cases.") and f"{name}.scene" in EARLY}
@@ -87,6 +101,23 @@ def test_the_folders_beside_tisim_are_imported_as_parts_of_it():
 def test_a_circle_is_found():
     with pytest.raises(ValueError, match=r"circle: a > b > a"):
         rooms.floors({"a": {"b"}, "b": {"a"}})
+    graph = {"a": {"b"}, "b": {"c"}, "c": set(), "d": {"a"}}
+    assert rooms.circles(graph) == []
+    assert rooms.circles(graph, {"a": set(), "b": set(), "c": {"a"}, "d": set()}) == [{"a", "b", "c"}]
+
+
+def test_imports_are_told_apart(tmp_path):
+    """Those of modules, of functions and for type checkers."""
+    (tmp_path / "tisim").mkdir()
+    for name in ("early", "late", "typed"):
+        (tmp_path / f"tisim/{name}.py").touch()
+    (tmp_path / "tisim/user.py").write_text(
+        "from tisim import early\n"
+        "if TYPE_CHECKING:\n    from tisim import typed\n"
+        "class User:\n    def method(self):\n        from tisim import late\n"
+    )
+    graphs = rooms.imports(tmp_path)
+    assert [graph["tisim.user"] for graph in graphs] == [{"tisim.early"}, {"tisim.late"}, {"tisim.typed"}]
 
 
 def test_class_names_are_unique():

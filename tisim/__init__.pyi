@@ -30,9 +30,9 @@ from . import (
 )
 from .backend.runtime import init as init
 from .engine.batches import run as run
-from .engine.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .engine.observer import MeasureSeries as MeasureSeries
 from .engine.observer import Observer as Observer
+from .engine.observer import PeriodicCheckpoint as PeriodicCheckpoint
 from .engine.result import Result as Result
 from .engine.result import Status as Status
 from .engine.simulation import Simulation as Simulation

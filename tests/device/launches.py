@@ -6,7 +6,7 @@ import pytest
 
 from tisim.backend.launcher import Launcher
 from tisim.backend.taichi import ti
-from tisim.program.launches import Visit
+from tisim.program.launched_program import Visit
 from tisim.state.state import State
 
 

@@ -12,8 +12,8 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import DipoleDipole, Force, NearField, parameter
 from tisim.numerics import elementary
+from tisim.numerics.elementary import power
 from tisim.numerics.ieee import compensated_sum, finite, infinity, same
-from tisim.numerics.powers import power
 from tisim.sources import Cylinder, MagneticCylinders, sample
 
 pytestmark = pytest.mark.long

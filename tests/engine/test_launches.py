@@ -4,6 +4,7 @@ of worlds that are asked after each launch."""
 import numpy as np
 import pytest
 
+from tests.compare import same_arrays
 from tests.conftest import elsewhere_with
 from tisim.backend import runtime
 from tisim.backend.layout import Builder
@@ -12,8 +13,8 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.program import team
 from tisim.program.launched_program import LaunchedProgram
-from tisim.program.launches import tasks_of
 from tisim.program.phases import Phase, Repeat
+from tisim.program.tasks import tasks_of
 from tisim.program.team import FIRST_ALONE, TRIAL_COST, Teams, TeamTrials
 from tisim.program.world_program import in_pieces, in_shares, world_programs
 from tisim.state.fields import CORE, CORE_OF_WORLDS, WorldField
@@ -122,11 +123,6 @@ def ends(made, schedule, asks=False, threads=1, number=1, steps=STEPS):
     return {**s.snapshot(("trace", "steps", "status", "outer", "inner")), "mixed": np.array(mixed)}, looks
 
 
-def same(found, expected, what):
-    for name, values in expected.items():
-        np.testing.assert_array_equal(found[name], values, err_msg=f"{name}, {what}")
-
-
 def test_phases_common_to_steps_form_their_own_pieces():
     a, b, c, d = (Phase() for _ in range(4))
     pieces, spans = in_pieces(((a, b, c, a), (d, d, b), ()))
@@ -141,7 +137,7 @@ def test_all_schedules_take_the_same_steps(made):
     assert len(set(expected["trace"])) == WORLDS
     for asks in (True, False):
         found, looks = ends(made, "particle", asks)
-        same(found, expected, f"asks: {asks}")
+        same_arrays(found, expected, f"asks: {asks}")
         # A world waits in every other step, which takes more queries than pair lists do.
         assert len(looks) < STEPS if not asks else not looks
 
@@ -162,7 +158,7 @@ def of_eight_threads():
     for threads, number, late, steps in TEAMS:
         team.LOOKS_WHEN_LATE = late
         try:
-            same(ends(made, "team", False, threads, number, steps)[0], expected[steps], "")
+            same_arrays(ends(made, "team", False, threads, number, steps)[0], expected[steps], "")
         except AssertionError as difference:
             wrong.append(f"{threads} threads in {number} teams, {late}: {difference}")
     return wrong
@@ -179,12 +175,12 @@ def test_a_parted_team_is_tried_again(made, monkeypatch):
     expected, _ = ends(made, "world", threads=2, number=2)
     monkeypatch.setattr(team, "TIMES_LATE", 0)
     found, launches = ends(made, "team", False, 2, 1)
-    same(found, expected, "parting")
+    same_arrays(found, expected, "parting")
     assert len(launches) > STEPS * WORLDS / 50
     # A thread that no other waits for does not belong to the team.
     monkeypatch.setattr(team, "LOOKS_WHEN_LATE", -1)
     found, _ = ends(made, "team", False, 64, 1)
-    same(found, expected, "without each other")
+    same_arrays(found, expected, "without each other")
 
 
 def test_phases_with_one_item_are_not_shared():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.compare import same_results
 from tests.scenes import compiled, flow
 from tisim import InputError, Observer, PeriodicCheckpoint
 
@@ -29,13 +30,6 @@ def whole():
     sim.load(FLOWS)
     sim.run()
     return sim.results(), np.array(times).T
-
-
-def same(results, expected):
-    for result, other in zip(results, expected, strict=True):
-        assert (result.time, result.work, result.status) == (other.time, other.work, other.status)
-        for name, values in result.state.items():
-            np.testing.assert_array_equal(values, other.state[name], err_msg=name)
 
 
 def first_end(times, pause):
@@ -69,7 +63,7 @@ def test_until_stops_at_the_next_step_end_and_runs_continue(simulation, whole):
     simulation.run(until=5e-4)
     assert [r.time for r in simulation.results()] == [first_end(times[0], 5e-4), FLOWS[1].duration]
     simulation.run()
-    same(simulation.results(), results)
+    same_results(simulation.results(), results)
 
 
 def test_worlds_wait_for_the_earliest_of_all_observers(simulation, whole):
@@ -77,7 +71,7 @@ def test_worlds_wait_for_the_earliest_of_all_observers(simulation, whole):
     one, other = Waits([1.1e-4, 3e-4], [2.2e-4]), Waits([2e-4], [])
     simulation.run(until=2.5e-4, observers=[one, other])
     simulation.run(observers=[one, other])
-    same(simulation.results(), results)
+    same_results(simulation.results(), results)
     for observer in (one, other):
         observed_times = np.array(observer.observed)
         for w, pauses in ((0, (0.0, 1.1e-4, 2e-4, 2.5e-4, 3e-4, 1.0)), (1, (0.0, 2.2e-4, 2.5e-4, 1.0))):
@@ -96,7 +90,7 @@ def test_past_pauses_are_ignored(simulation, whole):
 
     stubborn = Stubborn()
     simulation.run(observers=[stubborn])
-    same(simulation.results(), whole[0])
+    same_results(simulation.results(), whole[0])
     assert stubborn.observed >= 3
 
 
@@ -119,7 +113,7 @@ def test_an_observer_that_raises_stops_between_two_steps(simulation, whole):
         simulation.run(observers=[stop])
     assert simulation.fraction() > 0
     simulation.run()
-    same(simulation.results(), whole[0])
+    same_results(simulation.results(), whole[0])
 
 
 def test_periodic_checkpoints(simulation, whole, tmp_path):
@@ -133,7 +127,7 @@ def test_periodic_checkpoints(simulation, whole, tmp_path):
     simulation.restore(path)
     assert [r.time for r in simulation.results()] == [first_end(whole[1][w], 2e-4) for w in range(2)]
     simulation.run()
-    same(simulation.results(), whole[0])
+    same_results(simulation.results(), whole[0])
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ unchanged."""
 import numpy as np
 import pytest
 
+from tests.compare import same_result
 from tests.scenes import compiled, fixed, flow
 from tisim import Box, InputError, Particles, Scene
 from tisim.effects import Mie
@@ -34,12 +35,6 @@ def simulation():
     sim = compiled(FLOWS[0], 2, CAPACITY)
     sim.load(FLOWS)
     return sim
-
-
-def same(actual, expected):
-    assert (actual.time, actual.work, actual.status) == (expected.time, expected.work, expected.status)
-    for name, values in actual.state.items():
-        np.testing.assert_array_equal(values, expected.state[name], err_msg=name)
 
 
 def test_the_state_equals_a_result(simulation):
@@ -79,7 +74,7 @@ def test_a_written_state_continues_as_a_start():
     np.testing.assert_array_equal(result.start["position"], crystal().particles.arrays(None, 0)["position"])
     simulation.load([crystal(1)])
     simulation.run(steps=130)
-    same(untouched, simulation.results()[0])
+    same_result(untouched, simulation.results()[0])
     assert "edited" not in simulation.results()[0].settings
     assert simulation.results()[0].start["id"].tolist() == list(range(len(result.start["mass"])))
 
@@ -118,7 +113,7 @@ def test_writing_the_same_values_changes_nothing(simulation):
         simulation.states[1][name] = simulation.states[1][name]
     simulation.run()
     for result, other in zip(simulation.results(), expected, strict=True):
-        same(result, other)
+        same_result(result, other)
     assert simulation.results()[1].work["merges"] > 0
 
 
@@ -132,7 +127,7 @@ def test_a_checkpoint_includes_written_values(simulation, tmp_path):
     simulation.restore(tmp_path / "c.h5")
     simulation.run()
     for result, other in zip(simulation.results(), expected, strict=True):
-        same(result, other)
+        same_result(result, other)
         assert result.settings == other.settings
     assert "velocity at t = " in simulation.results()[0].settings["edited"]
 
@@ -172,7 +167,7 @@ def test_invalid_writes_are_refused(simulation, name, values, message):
     before = simulation.results()[0]
     with pytest.raises(InputError, match=message):
         simulation.states[0][name] = values
-    same(simulation.results()[0], before)
+    same_result(simulation.results()[0], before)
 
 
 def test_a_finished_world_cannot_be_changed(simulation):

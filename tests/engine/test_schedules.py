@@ -4,6 +4,7 @@ compiler."""
 import numpy as np
 import pytest
 
+from tests.compare import same_result
 from tests.effects.test_contract import kicked
 from tests.scenes import GRAIN, compiled, flow, simulate
 from tisim import InputError, Simulation
@@ -49,16 +50,6 @@ def usual():
     return results
 
 
-def same(a, b):
-    """Assert equality bit for bit, including the counts of work."""
-    assert b.status.ok
-    assert a.work == b.work
-    assert a.time == b.time
-    assert a.state.keys() == b.state.keys()
-    for name, values in a.state.items():
-        np.testing.assert_array_equal(values, b.state[name], err_msg=name)
-
-
 def test_a_run_in_portions_is_the_same(usual):
     """Three steps at a time: an interruption of a run does not change it."""
     simulation = compiled(WORLDS[0], BATCH, 200, "world")
@@ -67,7 +58,7 @@ def test_a_run_in_portions_is_the_same(usual):
         simulation.run(steps=3)
     simulation.run()
     for a, b in zip(usual, pick(simulation.results()), strict=True):
-        same(a, b)
+        same_result(a, b)
 
 
 @pytest.mark.long
@@ -75,7 +66,7 @@ def test_a_launch_for_each_phase(usual):
     """A launch for each phase over all particles, against a thread that runs all phases of a world."""
     launched = simulate(WORLDS, worlds=len(WORLDS), capacity=200, schedule="particle")
     for a, b in zip(usual, launched, strict=True):
-        same(a, b)
+        same_result(a, b)
 
 
 @pytest.mark.long
@@ -93,7 +84,7 @@ def test_a_team_of_threads(usual, monkeypatch, worlds, times):
     simulation.run(steps=3)
     simulation.run()
     for a, b in zip(usual, simulation.results(), strict=False):
-        same(a, b)
+        same_result(a, b)
     simulation.close()
 
 
@@ -103,7 +94,7 @@ def test_alone_and_in_a_batch_of_240(usual):
     capacity = max(scene.capacity() for scene in WORLDS)
     for a, scene in zip(usual, WORLDS, strict=True):
         (alone,) = simulate([scene], worlds=1, capacity=capacity)
-        same(a, alone)
+        same_result(a, alone)
 
 
 @pytest.mark.long

@@ -6,6 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from tests.compare import same_result
 from tests.scenes import compiled, scene
 from tisim import Particles, Scene, Simulation
 from tisim.backend.taichi import ti
@@ -74,13 +75,6 @@ def in_launches(setup, monkeypatch, attempts):
     return Simulation(setup, worlds=2)
 
 
-def same(actual, expected):
-    """Equal status, time, work and state, to the bit."""
-    assert (actual.status, actual.time, actual.work) == (expected.status, expected.time, expected.work)
-    for name, values in expected.state.items():
-        np.testing.assert_array_equal(actual.state[name], values, err_msg=name)
-
-
 @BOTH
 def test_the_state_is_from_the_last_step_of_the_failing_particle(make, tmp_path):
     """All particles are returned at that time; a run that continues from there fails at once."""
@@ -108,7 +102,7 @@ def test_the_state_is_from_the_last_step_of_the_failing_particle(make, tmp_path)
     simulation.load([fails, ends])
     restore(simulation, tmp_path / "c.h5")
     for result, expected in zip(simulation.results(), (bad, good), strict=True):
-        same(result, expected)
+        same_result(result, expected)
 
 
 @pytest.mark.long
@@ -138,13 +132,13 @@ def test_launches_that_end_within_a_step(make, monkeypatch, tmp_path):
             simulation.load([fails, ends])
             restore(simulation, tmp_path / "c.h5")
             for result, other in zip(simulation.results(), before, strict=True):
-                same(result, other)
+                same_result(result, other)
             assert simulation.fraction() == fractions[-1]
     assert len(fractions) > 10
     assert (np.diff(fractions) > 0).all()
     assert fractions[-1] == 1
     for result, other in zip(simulation.results(), expected, strict=True):
-        same(result, other)
+        same_result(result, other)
 
 
 @BOTH

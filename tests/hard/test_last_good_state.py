@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.compare import same_result
 from tests.operators.test_filling import StickingSpring
 from tests.scenes import compiled, fixed, scene
 from tisim import Simulation
@@ -10,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity, Impact, parameter
 from tisim.engine import monitor
 from tisim.engine.checkpoint import restore, save
-from tisim.operators.base import Operator
+from tisim.operators import AddsParticles
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 
 WHEN = 0.783
@@ -108,13 +109,6 @@ def test_the_state_is_from_the_last_step_before_the_failure(make, monkeypatch):
     assert simulation.results()[0].status == failures[0].status
 
 
-def same(actual, expected):
-    """Equal status, time, work and state, to the bit."""
-    assert (actual.status, actual.time, actual.work) == (expected.status, expected.time, expected.work)
-    for name, values in expected.state.items():
-        np.testing.assert_array_equal(actual.state[name], values)
-
-
 def several():
     """Worlds of 300 steps: three fail, in step 1, 110 and 200, and one does not."""
     return [
@@ -146,7 +140,7 @@ def test_worlds_that_fail_in_one_batch_end_as_they_do_alone(batch, stretch):
     while simulation.fraction() < 1:
         simulation.run(steps=stretch)
     for result, expected in zip(simulation.results(), alone, strict=True):
-        same(result, expected)
+        same_result(result, expected)
 
 
 def test_worlds_that_fail_together_are_rerun_together(batch, monkeypatch):
@@ -189,7 +183,7 @@ def test_ctrl_c_during_the_rerun_leaves_the_batch_unchanged(batch, monkeypatch):
     np.testing.assert_array_equal(simulation.s.read("steps"), reached[0])
     simulation.run()
     for result, expected in zip(simulation.results(), alone, strict=True):
-        same(result, expected)
+        same_result(result, expected)
 
 
 @pytest.mark.parametrize("steps", [150, 250])
@@ -203,13 +197,13 @@ def test_a_checkpoint_keeps_the_reasons_of_failures(batch, tmp_path, steps):
     simulation.load(scenes)
     restore(simulation, tmp_path / "c.h5")
     for result, expected in zip(simulation.results(), before, strict=True):
-        same(result, expected)
+        same_result(result, expected)
     simulation.run()
     for result, expected in zip(simulation.results(), alone, strict=True):
-        same(result, expected)
+        same_result(result, expected)
 
 
-class Doubles(Operator):
+class Doubles(AddsParticles):
     """After five steps, inserts a grain where there already is one."""
 
     @ti.func

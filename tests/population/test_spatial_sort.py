@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from tests.compare import same_result
 from tests.effects.contact import sheared
 from tests.effects.contact.grains import heap
 from tests.scenes import by_id
@@ -65,12 +66,6 @@ def ends(simulation, scenes):
     return results
 
 
-def same(found, expected):
-    assert found.work == expected.work
-    for name, values in expected.state.items():
-        np.testing.assert_array_equal(found.state[name], values, err_msg=name)
-
-
 @pytest.fixture(scope="module")
 def usual(simulation):
     return ends(simulation, [bed(1), bed(2, 140)])
@@ -99,7 +94,7 @@ def test_neighbours_lie_near_each_other(simulation, usual):
 
 
 def test_batches_and_restarts_do_not_change_bits(simulation, usual, tmp_path):
-    same(ends(simulation, [bed(2, 140), bed(1)])[1], usual[0])
+    same_result(ends(simulation, [bed(2, 140), bed(1)])[1], usual[0])
     for stop in (EVERY, EVERY + 7):
         simulation.load([bed(1), bed(2, 140)])
         simulation.run(steps=stop)
@@ -109,7 +104,7 @@ def test_batches_and_restarts_do_not_change_bits(simulation, usual, tmp_path):
         simulation.restore(tmp_path / "half.h5")
         simulation.run()
         for found, expected in zip(simulation.results(), usual, strict=True):
-            same(found, expected)
+            same_result(found, expected)
         for state, expected in zip(checkpoint.snapshot(tmp_path / "half.h5").states, kept, strict=True):
             np.testing.assert_array_equal(state["position"], expected.state["position"])
 
@@ -146,7 +141,7 @@ def test_grains_are_removed_from_a_sorted_world(simulation, unsorted, tmp_path):
     assert 20 < alone.work["outflow"] == GRAINS - len(alone.state["id"]) < GRAINS - 100
     assert alone.measures["passed_mass"] == alone.measures["outflow_mass"] > 0
     alike(alone, ends(unsorted, [leaving])[0])
-    same(ends(simulation, [bed(1), leaving])[1], alone)
+    same_result(ends(simulation, [bed(1), leaving])[1], alone)
     simulation.load([leaving])
     simulation.run(steps=EVERY + 7)
     assert 0 < simulation.results()[0].work["outflow"] < alone.work["outflow"]
@@ -154,7 +149,7 @@ def test_grains_are_removed_from_a_sorted_world(simulation, unsorted, tmp_path):
     simulation.run(steps=3)
     simulation.restore(tmp_path / "half.h5")
     simulation.run()
-    same(simulation.results()[0], alone)
+    same_result(simulation.results()[0], alone)
 
 
 def test_a_failure_after_a_sort_names_the_particle_and_keeps_the_state(simulation, usual):
@@ -171,12 +166,12 @@ def test_a_failure_after_a_sort_names_the_particle_and_keeps_the_state(simulatio
         return simulation.results()
 
     failed, other = thrown()
-    same(other, usual[1])
+    same_result(other, usual[1])
     assert simulation.s.read("id")[0, THROWN] != THROWN
     assert not failed.status.ok
     assert f"at particle {THROWN}" in failed.status.reason
     good = failed.work["steps"] - EVERY - 1
-    same(thrown(good)[0], failed)
+    same_result(thrown(good)[0], failed)
 
 
 def test_states_written_between_runs_reach_the_right_particles(simulation, usual):
@@ -195,7 +190,7 @@ def test_both_schedules_have_the_same_bits(usual):
     with pytest.MonkeyPatch.context() as patch:
         other = made(patch, "particle", 150)
     for found, expected in zip(ends(other, [bed(1), bed(2, 140)]), usual, strict=True):
-        same(found, expected)
+        same_result(found, expected)
     other.close()
 
 

@@ -31,7 +31,7 @@ from tisim.cli.options import (
     Threads,
 )
 from tisim.console import err, out, plain_table, print_stopping, progress_bar
-from tisim.engine.observer import Observer
+from tisim.engine.observer import Observer, PeriodicCheckpoint
 from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
@@ -70,7 +70,7 @@ def run(
             _restore(simulation, out_folder.checkpoint)
         observer_context = recording.observer(simulation, resume) if recording else nullcontext()
         seconds = scene_arguments.checkpoint_seconds()
-        checkpoints = checkpoint.PeriodicCheckpoint(out_folder.checkpoint, seconds)
+        checkpoints = PeriodicCheckpoint(out_folder.checkpoint, seconds)
         try:
             with observer_context as recorder:
                 if resume:

@@ -8,6 +8,7 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected, require_memory
 from tisim.engine.assembly import Assembly, needed_fields, needed_world_fields, picks_pairs
 from tisim.engine.loading import check_inserted
+from tisim.operators.base import adding
 from tisim.pairs.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.state.bound import connected
@@ -38,7 +39,7 @@ class Allocation:
         fields = resolve_fields(needed_fields(*asked), State.reserved())
         world_fields = needed_world_fields(*asked, (*State.reserved(), *(field.name for field in fields)))
         # Checked before compilation: a vector in place of a number would end the process.
-        for effect in scene.effects:
+        for effect in adding(scene.effects):
             check_inserted(fields, effect)
         real = 8 if runtime.current().precision == "f64" else 4
         # Checked before allocation: the compiler cannot refuse a request that is too large.

@@ -20,12 +20,18 @@ from tisim.effects.base import (
     SelfConsistentQuantity,
 )
 from tisim.forces.failure_attribution import FailureAttribution
-from tisim.forces.force_sum import SumForces, SumTrialForces, turning
+from tisim.forces.force_sum import (
+    AdvanceParticles,
+    SumForces,
+    SumTrialForces,
+    advance_phases,
+    turning,
+)
 from tisim.forces.loads import FORCE, TORQUE
 from tisim.operators.base import Operator
 from tisim.pairs.contact_memory import ContactMemory, memory_fields
 from tisim.pairs.half_list import HalfList, ListSizes
-from tisim.pairs.listed_pairs import AdvanceParticles, ExportedTerms, advance_phases, fuse, sum_phases
+from tisim.pairs.listed_pairs import ExportedTerms, fuse, sum_phases
 from tisim.pairs.lists import NeighbourLists
 from tisim.pairs.near_list import NearList, update_near_list
 from tisim.pairs.pair_chunks import PairChunks

@@ -13,11 +13,10 @@ memory.
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -25,15 +24,11 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.engine.loading import check_field
 from tisim.engine.monitor import Monitor, MonitoredWorlds
-from tisim.engine.observer import Observer
 from tisim.errors import Words, must
 from tisim.files import checksum
 from tisim.scene.initial_state import Arrays
 from tisim.state.fields import CORE_OF_WORLDS, Field, names_of
 from tisim.state.status import WorldStatus
-
-if TYPE_CHECKING:
-    from tisim.engine.simulation import Simulation
 
 CHECKPOINT_FORMAT = "tisim checkpoint 5"
 BEFORE_STEP = "before"
@@ -150,23 +145,6 @@ def _read(group: h5py.Group, names: Iterable[str]) -> Arrays:
             Words("one without"),
         )
     return {name: np.asarray(group[name]) for name in names}
-
-
-class PeriodicCheckpoint(Observer):
-    """An observer that saves a checkpoint at intervals, so that a killed run can be resumed from the last
-    one.
-
-    seconds : wall time between two checkpoints, s.
-    """
-
-    def __init__(self, path: str | Path, seconds: float = 60.0) -> None:
-        must(seconds >= 0, "seconds between checkpoints", "at least 0", seconds)
-        self.path, self.seconds, self.last_saved = Path(path), seconds, time.monotonic()
-
-    def observe(self, simulation: Simulation) -> None:
-        if time.monotonic() - self.last_saved > self.seconds:
-            save(simulation, self.path)
-            self.last_saved = time.monotonic()
 
 
 def _require_equal(name: str, value: Any, received: Any) -> None:

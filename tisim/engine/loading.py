@@ -9,8 +9,9 @@ import numpy as np
 
 from tisim.backend import runtime
 from tisim.components.ranges import WHOLE
-from tisim.effects.base import Constraint, Effect, PairEvent, Pairwise
+from tisim.effects.base import Constraint, PairEvent, Pairwise
 from tisim.errors import InputError, Words, must
+from tisim.operators.base import AddsParticles, adding, largest_inserted
 from tisim.pairs.pair_chunks import PairChunks
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -86,13 +87,13 @@ def check_held(scene: Scene, start: Arrays) -> None:
             by += held
         rule = f"held by one of {', '.join(one.label for one in constraints)}"
         must(bool((by <= 1).all()), "particles", rule, Words(f"one held by {by.max(initial=0)}"))
-        for effect in scene.effects:
+        for effect in adding(scene.effects):
             where = f"quantities of grains of effects.{effect.label}"
             rule = f"without {constraint.mark}, as effects.{constraint.label} does not hold inserted grains"
             must(constraint.mark not in (effect.inserted_quantities() or ()), where, rule, constraint.mark)
 
 
-def check_inserted(fields: Sequence[Field], effect: Effect) -> None:
+def check_inserted(fields: Sequence[Field], effect: AddsParticles) -> None:
     """Raise InputError unless the particles that an effect inserts have the fields that the scene needs and
     no others, with the shape and range required of an initial state."""
     given = effect.inserted_quantities()
@@ -112,8 +113,7 @@ def check_inserted(fields: Sequence[Field], effect: Effect) -> None:
 
 def radii(scene: Scene, start: Arrays) -> np.ndarray:
     """Return the radii (m) of an initial state, then those of the largest insertable particles."""
-    later = (effect.largest_inserted()["radius"] for effect in scene.acting())
-    return np.concatenate([start["radius"], *later])
+    return np.concatenate([start["radius"], largest_inserted(scene.acting())["radius"]])
 
 
 def check_sides(scene: Scene, start: Arrays) -> None:

@@ -6,7 +6,9 @@ They are passed to ``Simulation.run`` and do not change its results.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -140,3 +142,20 @@ class MeasureSeries(Observer):
         if not rows:
             return 0.0
         return next_due(rows[-1]["time"], self.interval)
+
+
+class PeriodicCheckpoint(Observer):
+    """An observer that saves a checkpoint at intervals, so that a killed run can be resumed from the last
+    one.
+
+    seconds : wall time between two checkpoints, s.
+    """
+
+    def __init__(self, path: str | Path, seconds: float = 60.0) -> None:
+        must(seconds >= 0, "seconds between checkpoints", "at least 0", seconds)
+        self.path, self.seconds, self.last_saved = Path(path), seconds, time.monotonic()
+
+    def observe(self, simulation: Simulation) -> None:
+        if time.monotonic() - self.last_saved > self.seconds:
+            simulation.checkpoint(self.path)
+            self.last_saved = time.monotonic()

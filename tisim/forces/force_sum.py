@@ -1,4 +1,4 @@
-"""The sum of forces and torques on every particle."""
+"""The sum of forces and torques on every particle, and the contact history after steps found by trial."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -9,8 +9,10 @@ from tisim.forces.loads import Loads
 from tisim.numerics.ieee import finite
 from tisim.numerics.roots import estimates_roots
 from tisim.numerics.vectors import piece
+from tisim.pairs.listed_pairs import ComputePairs, ExportedTerms
 from tisim.pairs.pair_sum import ListedLaws, PairSum
 from tisim.program.evaluation_stage import EvaluationStage
+from tisim.program.phases import PerParticle, Phase
 from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:
@@ -237,3 +239,37 @@ class SumTrialForces(SumForces):
     @ti.func
     def check(self, w, i, total):
         pass
+
+
+class AdvanceParticles(PerParticle):
+    """This phase updates the memory of single particles after a step found by trial."""
+
+    def __init__(self, total: SumForces) -> None:
+        super().__init__(total.s)
+        self.total = total
+
+    @ti.func
+    def run(self, w, i):
+        self.total.external_load(w, i, self.s.time[w])
+
+
+def advance_phases(total: SumForces, exported: ExportedTerms) -> tuple[Phase, ...]:
+    """Return the phases that update the contact history."""
+    return tuple(AdvancePairs(total, exported, laws) for laws in total.listed_laws() if laws.remembering)
+
+
+class AdvancePairs(ComputePairs):
+    """This phase updates the contact history after a step found by trial."""
+
+    @ti.func
+    def run(self, w, c):
+        self.note_memory(w)
+        self.compute_pairs(w, c)
+
+    @ti.func
+    def process_pair(self, w, c, m, values):
+        self.total.write_memory(self.laws, w, m, values)
+
+    @ti.func
+    def process_distant_pair(self, w, c, m):
+        self.total.out_of_reach(self.laws, w, m)

@@ -1,4 +1,5 @@
 from .at_rest import AtRest as AtRest
+from .base import AddsParticles as AddsParticles
 from .base import Operator as Operator
 from .base import WorldAction as WorldAction
 from .capture import Capture as Capture

@@ -10,7 +10,10 @@ one thread long follows in phases of its own, ``world_action``. If an operator d
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
@@ -18,7 +21,7 @@ from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound
 from tisim.state.state import State
 
-__all__ = ["Operator", "WorldAction", "option", "parameter"]
+__all__ = ["AddsParticles", "Operator", "WorldAction", "option", "parameter"]
 
 
 class Operator(Effect):
@@ -71,3 +74,45 @@ class Operator(Effect):
         ``self.sums.total(w)`` are the sums of the ``terms``, always summed in the same order. Loops over
         particles belong in ``each``.
         """
+
+
+NONE_INSERTED: Mapping[str, np.ndarray] = {
+    "radius": np.zeros(0),
+    "material": np.zeros(0, int),
+    "length": np.zeros(0),
+}
+"""The largest inserted particles of an operator that inserts none, or only copies."""
+
+
+class AddsParticles(Operator):
+    """An operator that adds particles in the course of a run."""
+
+    contract: ClassVar[bool] = True
+
+    def capacity(self, masses: np.ndarray) -> int:
+        """Return the largest number of particles that may exist at once, given the masses at the start
+        (kg)."""
+        raise NotImplementedError
+
+    def inserted_quantities(self) -> Mapping[str, np.ndarray] | None:
+        """Return the fields that it sets on inserted particles beyond the common ones: SI values by field
+        name, one row per class of particles. None, the default, if it inserts only copies."""
+        return None
+
+    def largest_inserted(self) -> Mapping[str, np.ndarray]:
+        """Return the largest particles that it may insert: ``radius`` (m) and ``material`` (index) of the
+        largest two of each class, or of one if it inserts only one, and ``length`` (m) of their clumps; by
+        default none, for particles that are no larger than those present. Laws are checked against all pairs
+        of them."""
+        return NONE_INSERTED
+
+
+def adding(effects: Iterable[Effect]) -> list[AddsParticles]:
+    """Return the effects that add particles."""
+    return [effect for effect in effects if isinstance(effect, AddsParticles)]
+
+
+def largest_inserted(effects: Iterable[Effect]) -> Mapping[str, np.ndarray]:
+    """Return the largest particles that effects may insert, as ``AddsParticles.largest_inserted`` does."""
+    each = [NONE_INSERTED, *(effect.largest_inserted() for effect in adding(effects))]
+    return {name: np.concatenate([one[name] for one in each]) for name in NONE_INSERTED}

@@ -17,7 +17,7 @@ from tisim.effects.impact.impact import Impact
 from tisim.effects.impact.law import ImpactLaw
 from tisim.errors import must
 from tisim.numerics import elementary
-from tisim.operators.base import Operator, parameter
+from tisim.operators.base import AddsParticles, parameter
 from tisim.program.phases import Item, PerParticle, Phase, Repeat, WorldAction
 from tisim.program.scans import PrefixSum
 from tisim.state.bound import Bound, Peers
@@ -26,7 +26,7 @@ from tisim.state.state import State
 from tisim.state.status import WorldStatus
 
 
-class Fragmentation(ImpactLaw, Operator):
+class Fragmentation(ImpactLaw, AddsParticles):
     """A grain that absorbs much kinetic energy in an impact breaks into equal pieces.
 
         b = b_0 / (dK / (4 pi gamma b_0^2) + 1)       radius of pieces whose surface costs dK     (5.2)

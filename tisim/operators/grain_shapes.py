@@ -10,7 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Component
 from tisim.effects.base import Effect, option
 from tisim.effects.constraint.rigid_clumps import RigidClumps
-from tisim.numerics.quaternions import rotated
+from tisim.numerics.vectors import rotated
 from tisim.packing.clump import length
 from tisim.packing.grains import GrainClass
 

@@ -13,9 +13,9 @@ from tisim.components.component import Vector
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Materials
 from tisim.numerics import philox
-from tisim.numerics.quaternions import random_orientation
 from tisim.numerics.random_streams import INSERTION
-from tisim.operators.base import Operator, option, parameter
+from tisim.numerics.vectors import random_orientation
+from tisim.operators.base import AddsParticles, option, parameter
 from tisim.operators.filled_region import FilledRegion
 from tisim.operators.grain_shapes import GrainShapes
 from tisim.operators.tried_place import TriedPlace
@@ -30,7 +30,7 @@ MOST_TRIES = 20_000
 generator."""
 
 
-class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
+class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
     """An insertion adds grains at random places of a region, without overlap with the grains already there.
 
     Grains come one after another. The class of each is drawn at random, and its velocity is v = velocity +

@@ -13,7 +13,7 @@ from tisim.geometry import round_box
 from tisim.numerics import philox
 from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
 from tisim.packing.region import Region
-from tisim.program.launches import iterations_of_task
+from tisim.program.tasks import iterations_of_task
 
 MAX_CONSECUTIVE_FAILURES = 5_000
 """After this number of consecutive failures, trials are made only in the remaining free space."""
@@ -47,7 +47,7 @@ def _add(
         spheres placed.
     regions : corner and sides of the region of the largest sphere, and of the smallest, and for each axis
         whether it is periodic, round and walled.
-    task : smallest number of loop iterations that a thread takes (tisim/program/launches.py).
+    task : smallest number of loop iterations that a thread takes (tisim/program/tasks.py).
     """
     for iteration in range(packings.shape[0] * task):
         if iteration % task == 0:

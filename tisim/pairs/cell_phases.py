@@ -171,18 +171,18 @@ class SortCells(OfCells):
     @ti.func
     def run(self, w, c):
         g = self.g
-        sort_row(g.order, w, g.cell_start[w, c], g.cell_start[w, c + 1])
+        sort_row(g.order, ti.Vector([w]), g.cell_start[w, c], g.cell_start[w, c + 1])
 
 
 @ti.func
-def sort_row(column: ti.template(), w, begin, end):  # type: ignore[valid-type]
-    """Sort column[w, begin:end], a few integers, by insertion."""
+def sort_row(column: ti.template(), row, begin, end):  # type: ignore[valid-type]
+    """Sort column[row, begin:end], a few integers, by insertion; ``row`` : vector of the other indices."""
     for a in range(begin + 1, end):
-        value, b = column[w, a], a - 1
+        value, b = column[row, a], a - 1
         while b >= begin:
-            if column[w, b] > value:
-                column[w, b + 1] = column[w, b]
+            if column[row, b] > value:
+                column[row, b + 1] = column[row, b]
                 b -= 1
             else:
                 break
-        column[w, b + 1] = value
+        column[row, b + 1] = value

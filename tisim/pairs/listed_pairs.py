@@ -19,7 +19,6 @@ from tisim.program.evaluation_stage import EvaluationStage
 from tisim.program.phases import Item, PerParticle, Phase
 
 if TYPE_CHECKING:
-    from tisim.forces.force_sum import SumForces
     from tisim.pairs.pair_sum import ListedLaws, PairSum
 
 
@@ -254,37 +253,3 @@ def sum_phases(total: "PairSum", exported: ExportedTerms | None) -> tuple[Phase,
     parts = enumerate(total.listed_laws())
     added = tuple(AddPairs(total, exported, laws, first=k == 0) for k, laws in parts)
     return *before, *added, CloseSum(total, exported)
-
-
-class AdvanceParticles(PerParticle):
-    """This phase updates the memory of single particles after a step found by trial."""
-
-    def __init__(self, total: "SumForces") -> None:
-        super().__init__(total.s)
-        self.total = total
-
-    @ti.func
-    def run(self, w, i):
-        self.total.external_load(w, i, self.s.time[w])
-
-
-def advance_phases(total: "SumForces", exported: ExportedTerms) -> tuple[Phase, ...]:
-    """Return the phases that update the contact history."""
-    return tuple(AdvancePairs(total, exported, laws) for laws in total.listed_laws() if laws.remembering)
-
-
-class AdvancePairs(ComputePairs):
-    """This phase updates the contact history after a step found by trial."""
-
-    @ti.func
-    def run(self, w, c):
-        self.note_memory(w)
-        self.compute_pairs(w, c)
-
-    @ti.func
-    def process_pair(self, w, c, m, values):
-        self.total.write_memory(self.laws, w, m, values)
-
-    @ti.func
-    def process_distant_pair(self, w, c, m):
-        self.total.out_of_reach(self.laws, w, m)

@@ -21,6 +21,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.domains.domain import Domain
 from tisim.numerics.ieee import far_away
 from tisim.pairs.cell_grid import LEVELS, CellGrid, OfBlocks, OfGrid, OfParticles, next_number
+from tisim.pairs.cell_phases import sort_row
 from tisim.program.phases import Phase
 from tisim.state.bound import Bound
 from tisim.state.state import State
@@ -270,20 +271,7 @@ class EndRows(OfBlocks):
                 self.s.fail(w, WorldStatus.LIST_OVERFLOW, i)
                 n.size[w, i] = n.row
             if ti.static(n.ordered):
-                self.order(w, i, n.size[w, i])
+                sort_row(n.index, ti.Vector([w, i]), 0, n.size[w, i])
         ti.atomic_add(n.total[w], total)
         if longest > n.longest[w]:
             ti.atomic_max(n.longest[w], longest)
-
-    @ti.func
-    def order(self, w, i, size):
-        n = self.n
-        for a in range(1, size):
-            value, b = n.index[w, i, a], a - 1
-            while b >= 0:
-                if n.index[w, i, b] > value:
-                    n.index[w, i, b + 1] = n.index[w, i, b]
-                    b -= 1
-                else:
-                    break
-            n.index[w, i, b + 1] = value

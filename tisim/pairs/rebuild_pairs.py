@@ -126,7 +126,8 @@ class SortFetches(PerChunk):
     def run(self, w, c):
         p = self.p
         for i in range(c * p.chunk, ti.min((c + 1) * p.chunk, self.s.count[w])):
-            sort_row(p.fetched, w, p.fetch_begin[w, i], p.fetch_begin[w, i] + p.fetch_count[w, i])
+            begin = p.fetch_begin[w, i]
+            sort_row(p.fetched, ti.Vector([w]), begin, begin + p.fetch_count[w, i])
 
 
 class EndRebuild(PerWorld):

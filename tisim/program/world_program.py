@@ -5,9 +5,9 @@ import time
 from tisim.backend.launcher import Launcher
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.program.launches import TASK
 from tisim.program.phases import Item, Phase, Repeat
 from tisim.program.program import Items, Program, StepRules
+from tisim.program.tasks import TASK
 from tisim.program.team import Teams, TeamTrials
 from tisim.state.state import State
 from tisim.state.status import NEVER, WorldStatus

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tisim.components import serialization
 from tisim.components.component import Component
@@ -16,28 +16,6 @@ from tisim.scene import plugins
 from tisim.scene.initial_state import Start
 from tisim.steppers.base import Stepper
 from tisim.steppers.verlet import Verlet
-
-if TYPE_CHECKING:
-    from tisim.scene.scene import Scene
-
-
-def scene_table(scene: Scene, particles: dict[str, Any]) -> dict[str, Any]:
-    """Return the plain data of a scene, given the plain data of its particles."""
-    stepper: dict[str, Any] = {"accuracy": scene.accuracy}
-    if "stepper" in scene.model_fields_set:
-        stepper = {"stepper": serialization.to_dict(scene.stepper)}
-    return {
-        "name": scene.name,
-        "duration": scene.duration,
-        **({} if scene.skin is None else {"skin": scene.skin}),
-        "seed": scene.seed,
-        "particles": particles,
-        **_tables("materials", scene.materials),
-        **_tables("material_pairs", scene.material_pairs),
-        "domain": serialization.to_dict(scene.domain),
-        **stepper,
-        "effects": {effect.label: _effect_table(effect) for effect in scene.effects},
-    }
 
 
 def scene_fields(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -72,13 +50,13 @@ def change(data: dict[str, Any], key: str, value: Any) -> None:
     place[last if isinstance(place, dict) else _step(place, last, key, ".".join(path))] = value
 
 
-def _tables(key: str, parts: Mapping[str, Component]) -> dict[str, Any]:
+def tables(key: str, parts: Mapping[str, Component]) -> dict[str, Any]:
     """Return a key with a table of each part by name; an empty dictionary if there are no parts."""
     tables = {name: serialization.to_dict(part, named=False) for name, part in parts.items()}
     return {key: tables} if tables else {}
 
 
-def _effect_table(effect: Effect) -> dict[str, Any]:
+def effect_table(effect: Effect) -> dict[str, Any]:
     """Return the parameters of an effect, with its kind if that is not the name of its table."""
     values = serialization.to_dict(effect, named=effect.label != effect.kind())
     return {key: value for key, value in values.items() if key != "name"}

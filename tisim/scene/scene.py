@@ -20,6 +20,7 @@ from tisim.errors import InputError, Words, abbreviated, must
 from tisim.files import python_file
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Material, MaterialPair, Materials
+from tisim.operators.base import adding
 from tisim.scene import plain_data, plugins
 from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source
@@ -200,7 +201,7 @@ class Scene(Component):
         """Return the largest number of particles that may exist at once."""
         masses = self.particles.masses(self.seed)
         n = len(masses)
-        return n + sum(effect.capacity(masses) - n for effect in self.effects)
+        return n + sum(effect.capacity(masses) - n for effect in adding(self.effects))
 
     def digest(self) -> str:
         """Return a hash, in hex, of everything that determines the result: physics version, all parameters
@@ -208,7 +209,7 @@ class Scene(Component):
         order = [effect.label for effect in self.effects]
         files = python_file.module_checksums(*dict.fromkeys(map(type, self.parts())))
         digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
-        data = plain_data.scene_table(self, serialization.to_dict(self.particles, arrays=True))
+        data = self._table(serialization.to_dict(self.particles, arrays=True))
         for name in ("skin", "accuracy"):
             data.pop(name, None)
         data["stepper"] = serialization.to_dict(self.stepper)
@@ -219,7 +220,25 @@ class Scene(Component):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, as in a TOML file; ``from_dict`` is the inverse."""
-        return plain_data.scene_table(self, serialization.to_dict(self.particles))
+        return self._table(serialization.to_dict(self.particles))
+
+    def _table(self, particles: dict[str, Any]) -> dict[str, Any]:
+        """Return plain data, given the plain data of the particles."""
+        stepper: dict[str, Any] = {"accuracy": self.accuracy}
+        if "stepper" in self.model_fields_set:
+            stepper = {"stepper": serialization.to_dict(self.stepper)}
+        return {
+            "name": self.name,
+            "duration": self.duration,
+            **({} if self.skin is None else {"skin": self.skin}),
+            "seed": self.seed,
+            "particles": particles,
+            **plain_data.tables("materials", self.materials),
+            **plain_data.tables("material_pairs", self.material_pairs),
+            "domain": serialization.to_dict(self.domain),
+            **stepper,
+            "effects": {effect.label: plain_data.effect_table(effect) for effect in self.effects},
+        }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], folder: str | Path = "") -> Scene:

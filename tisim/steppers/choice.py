@@ -24,7 +24,7 @@ from tisim.components.accuracy_parameter import three_digits
 from tisim.domains.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent, PairForce, kinks
 from tisim.errors import Words, must
-from tisim.operators.base import Operator
+from tisim.operators.base import Operator, largest_inserted
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
 from tisim.steppers.boris import Boris
@@ -74,7 +74,7 @@ def choose(
         rule = f"given, because the step length is part of the law of effects.{effect.label}"
         must(not effect.step_dependent, "scene.stepper", rule, Words("none"))
         rule = f"given, because effects.{effect.label} inserts particles later, of sizes unknown here"
-        must(not len(effect.largest_inserted()["radius"]), "scene.stepper", rule, Words("none"))
+        must(not len(largest_inserted([effect])["radius"]), "scene.stepper", rule, Words("none"))
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
     steps = {effect.label: effect.critical_step(start, speed, effects) for effect in effects}

@@ -1,4 +1,4 @@
-"""Agglomeration with charges and fields: forces against a NumPy twin, closed forms, conservation laws."""
+"""Agglomeration with charges and fields: forces beside NumPy, closed forms, conservation laws."""
 
 import itertools
 

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from tests.compare import same_arrays
 from tests.device.launches import assert_launches
 from tests.effects.contact.grains import heap, twin
 from tests.scenes import by_id
@@ -68,11 +69,6 @@ def ends(simulation, scenes):
     return [by_id(result) for result in results]
 
 
-def same(found, expected):
-    for name, values in expected.items():
-        np.testing.assert_array_equal(found[name], values, err_msg=name)
-
-
 @pytest.fixture(scope="module")
 def simulation():
     made = simulated("particle")
@@ -88,7 +84,7 @@ def usual(simulation):
 
 @pytest.mark.long
 def test_the_same_bits_alone_in_a_batch_and_restarted(simulation, usual, tmp_path):
-    same(ends(simulation, [bed(2)])[0], usual[2])
+    same_arrays(ends(simulation, [bed(2)])[0], usual[2])
     simulation.load([bed(k) for k in range(3)])
     simulation.run(steps=STEPS // 2)
     simulation.checkpoint(tmp_path / "half.h5")
@@ -98,14 +94,14 @@ def test_the_same_bits_alone_in_a_batch_and_restarted(simulation, usual, tmp_pat
     simulation.run()
     for result, expected in zip(simulation.results(), usual, strict=True):
         assert result.work["steps"] == STEPS
-        same(by_id(result), expected)
+        same_arrays(by_id(result), expected)
 
 
 def test_the_same_bits_with_any_skin(simulation, usual):
     """Lists are built at other times, and contain other pairs."""
     skins = (2e-3, 2e-2, 0.1)
     for found in ends(simulation, [bed(2).model_copy(update={"skin": skin}) for skin in skins]):
-        same(found, usual[2])
+        same_arrays(found, usual[2])
     assert [skin_of(simulation, w) for w in range(3)] == list(skins)
 
 
@@ -129,7 +125,7 @@ def test_the_same_bits_on_all_schedules(usual, monkeypatch, schedule):
         monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
     simulation = simulated(schedule)
     for found, expected in zip(ends(simulation, [bed(k) for k in range(3)]), usual, strict=True):
-        same(found, expected)
+        same_arrays(found, expected)
     simulation.close()
 
 

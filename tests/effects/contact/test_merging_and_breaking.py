@@ -7,7 +7,7 @@ from tests.effects.contact.grains import heap, twin
 from tests.scenes import by_id, simulate
 from tisim.backend.taichi import ti
 from tisim.effects import parameter
-from tisim.operators import Operator
+from tisim.operators import AddsParticles
 
 # Grains overlap deeply at the start here, on purpose.
 pytestmark = [
@@ -20,7 +20,7 @@ PIECE = 0.15
 """m; distance between a grain and the piece that breaks off it."""
 
 
-class MergeAndBreak(Operator):
+class MergeAndBreak(AddsParticles):
     """At a given time, once, one grain is merged into another, and half of a third breaks off."""
 
     when: float = parameter("s", "time", ge=0)

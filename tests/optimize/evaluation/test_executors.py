@@ -15,9 +15,9 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
+from tests.compare import same_result
 from tests.optimize.cache_files import worker
 from tests.optimize.drift_case import problem, scene
 from tests.optimize.evaluation import light_worker
@@ -82,12 +82,9 @@ def same(results, others):
     assert sorted(results) == sorted(others)
     for index, result in results.items():
         other = others[index]
-        assert result.status == other.status
-        assert (result.time, result.work, result.measures) == (other.time, other.work, other.measures)
+        same_result(result, other)
+        assert result.measures == other.measures
         assert result.scene == other.scene
-        assert set(result.state) == set(other.state)
-        for name in result.state:
-            np.testing.assert_array_equal(result.state[name], other.state[name])
 
 
 @pytest.mark.long

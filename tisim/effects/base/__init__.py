@@ -42,7 +42,8 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
    depends on the values of all other particles. A ``LongRange`` effect sums over all particles by other means
    than pairs, such as a tree of cells or waves. Its phases run before forces are summed, or in each sweep of
    a ``SelfConsistentQuantity``; its ``force`` or ``response`` reads the result from ``self.sum``.
-8. An ``Operator`` changes the state between steps (see tisim/operators/base.py).
+8. An ``Operator`` changes the state between steps, and an ``AddsParticles`` also adds particles (see
+   tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It receives each pair in ``contact`` with exclusive access
    to both, earliest first (see tisim/collisions/collision_rounds.py), and may remove either particle.
 10. A ``Constraint`` moves the particles that it holds, in place of the stepper, regardless of the forces.
@@ -51,8 +52,7 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
     come later in the scene. ``check`` rejects a domain, or settings of other effects, that do not fit;
     ``check_start`` rejects initial states. ``beside`` adopts the settings of another effect when an
     approximate effect is tried. No code depends on the name of an effect.
-12. ``at_start`` fills in values that depend on the start; ``capacity`` returns the largest number of
-    particles that may exist at once, given the start.
+12. ``at_start`` fills in values that depend on the start.
 13. The following serve scenes that name no stepper (see tisim/steppers/choice.py): ``critical_step`` gives
     the longest stable step of a leapfrog, and ``part_of_critical_step`` the part of it for an accuracy;
     ``kinked`` says that forces have kinks or jumps; ``leapfrog`` says that only explicit steppers keep their

@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.domains.domain import Domain
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.pair_event import PairEvent
-from tisim.numerics.quaternions import turned
+from tisim.numerics.vectors import turned
 from tisim.state.fields import Field
 
 BODY_MASS = Field("body_mass", "kg", 1, "keep", default="mass", minimum=0.0)

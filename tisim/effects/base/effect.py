@@ -175,17 +175,6 @@ class Effect(Component):
         constraints that it requires."""
         return type(constraint) in self.required_effects()
 
-    def inserted_quantities(self) -> Mapping[str, np.ndarray] | None:
-        """Return the fields that it sets on inserted particles beyond the common ones: SI values by field
-        name, one row per class of particles. None if it inserts no particles, or only copies."""
-        return None
-
-    def largest_inserted(self) -> Mapping[str, np.ndarray]:
-        """Return the largest particles that it may insert: ``radius`` (m) and ``material`` (index) of the
-        largest two of each class, or of one if it inserts only one, and ``length`` (m) of their clumps; empty
-        by default. Laws are checked against all pairs of them."""
-        return {"radius": np.zeros(0), "material": np.zeros(0, int), "length": np.zeros(0)}
-
     def at_start(self, masses: np.ndarray) -> Self:
         """Return a copy with values that depend on the masses of the start (kg) filled in; by default
         itself."""
@@ -195,11 +184,6 @@ class Effect(Component):
         """Return further fields of the particles of a start, given their quantities (SI) and the seed of the
         scene: arrays by field name, a row for each particle; by default none."""
         return {}
-
-    def capacity(self, masses: np.ndarray) -> int:
-        """Return the largest number of particles that may exist at once, given the masses at the start (kg);
-        by default the number at the start."""
-        return len(masses)
 
     def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
         """Return quantities for a Result, by name, computed from the particles; world fields of the

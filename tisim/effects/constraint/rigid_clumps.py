@@ -21,7 +21,8 @@ from tisim.effects.constraint.clump_fields import (
 )
 from tisim.effects.constraint.rigid_rotation import angular_velocity, free_rotation
 from tisim.errors import must
-from tisim.numerics.quaternions import brought, rotated
+from tisim.numerics.vectors import brought, rotated
+from tisim.operators.base import largest_inserted
 
 INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
 """Slot k holds the present index of clump member number k; it does not describe the particle that occupies
@@ -62,10 +63,10 @@ class RigidClumps(Constraint):
         touching = any(isinstance(effect, PairForce) and effect.short_ranged for effect in effects)
         if low is None or high is None or not imaged.any() or not touching:
             return
-        later = [effect.largest_inserted() for effect in effects]
+        later = largest_inserted(effects)
         own = longest_clump(start) if len(start["mass"]) else 0.0
-        lengths = np.concatenate([[own], *(one["length"] for one in later)])
-        radii = np.concatenate([start["radius"], *(one["radius"] for one in later)])
+        lengths = np.concatenate([[own], later["length"]])
+        radii = np.concatenate([start["radius"], later["radius"]])
         # Another particle may touch both of its ends, one of them in an image.
         taken = float(lengths.max() + 2 * radii.max(initial=0.0))
         rule = f"at least {taken:g} m wide where it is periodic, longest clump plus largest diameter"

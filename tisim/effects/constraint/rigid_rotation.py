@@ -12,7 +12,7 @@ has it: T. F. Miller III et al., J. Chem. Phys. 116 (2002) 8649 (NO_SQUISH).
 
 from tisim.backend.taichi import ti
 from tisim.numerics import elementary
-from tisim.numerics.quaternions import conjugate, product, rotated
+from tisim.numerics.vectors import conjugate, product, rotated
 
 TURNS = ((2, 0.5), (1, 0.5), (0, 1.0), (1, 0.5), (2, 0.5))
 """Axes of the rotations, in order, with the part of the step that each lasts."""

@@ -6,7 +6,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import option, parameter
 from tisim.effects.contact.normal import area, slip, strain
 from tisim.effects.contact.surface import SurfaceContact
-from tisim.numerics.powers import Exponent, power
+from tisim.numerics.elementary import Exponent, power
 
 
 class ContactBond(SurfaceContact):

@@ -10,7 +10,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
 from tisim.effects.contact.normal import NormalContact, area, strain
-from tisim.numerics.powers import Exponent, power
+from tisim.numerics.elementary import Exponent, power
 from tisim.state.bound import Peers
 
 

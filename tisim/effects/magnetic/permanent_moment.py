@@ -13,8 +13,8 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint, Effect, PairForce, parameter
 from tisim.effects.magnetic.moment import MOMENT, Moment
 from tisim.errors import Words, must
-from tisim.numerics.quaternions import turned
 from tisim.numerics.random_streams import MOMENTS
+from tisim.numerics.vectors import turned
 from tisim.operators.base import Operator
 from tisim.sources.base import Source
 from tisim.state.bound import Peers

@@ -13,7 +13,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, PairForce, option, parameter
 from tisim.effects.base.critical_step import critical_step, impact_stiffness, smallest_grains
 from tisim.errors import must
-from tisim.numerics.powers import Exponent, power
+from tisim.numerics.elementary import Exponent, power
 
 
 class Mie(PairForce):

@@ -22,7 +22,7 @@ from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects.base import Effect, PairForce, option, parameter
 from tisim.effects.base.critical_step import critical_step
-from tisim.numerics.powers import Exponent, power
+from tisim.numerics.elementary import Exponent, power
 from tisim.state.fields import Field
 
 CUTOFF_PARTS = (0.1, 0.2, 0.5, 1.0)

@@ -30,6 +30,7 @@ from tisim.geometry.surface import Surface
 from tisim.geometry.triangles import TriangulatedSurface
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Materials
+from tisim.operators.base import largest_inserted
 from tisim.state.bound import Peers
 from tisim.state.fields import WorldField
 
@@ -94,8 +95,7 @@ class Walls(WallContacts, UsesMaterials, Force):
         for law in effects:
             if isinstance(law, GranularContact):
                 law.check_wall(start, effects, self.material_index(self._materials), self.label)
-        later = [effect.largest_inserted()["radius"] for effect in effects]
-        radii = np.concatenate([start["radius"], *later])
+        radii = np.concatenate([start["radius"], largest_inserted(effects)["radius"]])
         reach = float(radii.max(initial=0.0))
         check_faces(self._named_shapes(), self.motion, scene.domain, reach, scene.duration)
 

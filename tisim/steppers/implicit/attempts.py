@@ -83,6 +83,13 @@ def length(s, control: ti.template(), w):  # type: ignore[valid-type]
 
 
 @ti.func
+def relative(change, moved):
+    """Return a change or an error over the displacement. If nothing changes, nothing moves: 0/0 is no
+    error."""
+    return change / ti.select(change > 0.0, moved, 1.0)
+
+
+@ti.func
 def report_failure(s, w):
     """Record the particle whose last iterate changed most, and request a search for the force on it that
     fails (see failure_attribution.py)."""

@@ -10,7 +10,7 @@ from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.program.scans import PerBlock
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.attempts import ACCEPTED, SHORTER, conclude, length
+from tisim.steppers.implicit.attempts import ACCEPTED, SHORTER, conclude, length, relative
 
 
 class Forget(Phase):
@@ -230,12 +230,7 @@ class JudgeStages(Phase):
     def judge(self, w, total):
         """Judge a sweep at its end."""
         s = self.s
-        change, error = s.stage_change[w], ti.cast(0.0, ti.f64)
-        # If nothing changes, nothing moves: 0/0 is no error.
-        if change > 0.0:
-            change /= total[2]
-        if total[1] > 0.0:
-            error = total[1] / total[2]
+        change, error = relative(s.stage_change[w], total[2]), relative(total[1], total[2])
         first = s.sweep[w] == 1
         contraction = self.foreseen(w)
         if not first and s.last_change[w] > 0.0:

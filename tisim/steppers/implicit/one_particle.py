@@ -9,11 +9,11 @@ number of intervals or attempts in a launch does not affect the motion.
 """
 
 from tisim.backend.taichi import ti
-from tisim.numerics.ieee import compensated_sum, finite, infinity
+from tisim.numerics.ieee import compensated_sum, infinity
 from tisim.program.phases import PerParticle
 from tisim.steppers.common import SavedState, saved_fields
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, verdict_on
+from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, relative, verdict_on
 from tisim.steppers.implicit.step_control import note_excursion
 from tisim.steppers.intervals import LITTLE, beginning, duration
 from tisim.steppers.registers import Registers
@@ -117,6 +117,37 @@ class Solve(SavedState):
         """Return whether the place that a particle with v' reaches is finite and can be represented."""
         return self.sound(w, self.s.position_before[w, i] + self.displacement(w, i, v, dt))
 
+    @ti.func
+    def predict(self, w, i, dt, t):
+        """Compute the first iterate, K = 1, with the force at the beginning of the step; t : time (s) at its
+        end. Return v' (m/s)."""
+        v = self.velocity(w, i, dt, self.jacobian(w, i, t))
+        if not self.reachable(w, i, v, dt):
+            v = self.s.velocity_before[w, i]
+        self.advance(w, i, v, dt)
+        return v
+
+    @ti.func
+    def correct(self, w, i, last, dt, jacobian):
+        """Compute the next iterate from the last one, v_K = ``last`` (m/s), and the force at it. Return v'
+        (m/s) and the displacement of the surface by rotation (m).
+
+        If the new place cannot be reached, the particle stays and the displacement is infinite.
+        """
+        v = self.velocity(w, i, dt, jacobian)
+        turned = ti.cast(infinity(self.s.count[w]), self.s.real)
+        if self.reachable(w, i, v, dt):
+            turned = self.advance(w, i, v, dt)
+        else:
+            v = last
+        return v, turned
+
+    @ti.func
+    def lengths(self, control: ti.template(), w, i, v, dt):  # type: ignore[valid-type]
+        """Return the displacement in the step, its error, and the scale of this error (m)."""
+        moved = self.displacement(w, i, v, dt).norm()
+        return moved, self.error(w, i, dt), control.scale(self.s, w, i, moved, dt)
+
 
 class IndependentSteps(PerParticle):
     """This phase takes each particle through the intervals of a launch."""
@@ -203,32 +234,21 @@ class IndependentSteps(PerParticle):
         """Attempt one step of this length (s). Return the verdict, and the number of iterations."""
         s, solve = self.own, self.solve
         step, end = ti.cast(dt, s.real), t + dt
-        v = solve.velocity(w, i, step, solve.jacobian(w, i, end))
-        if not solve.reachable(w, i, v, step):
-            v = s.velocity_before[w, i]
-        solve.advance(w, i, v, step)
+        v = solve.predict(w, i, step, end)
         k, verdict, iterating = 1, RETRY, 1
         while iterating > 0:
             # Before the force is written, so that common subexpressions are computed once.
             jacobian = solve.jacobian(w, i, end)
             self.force_sum.single_particle(w, i, end)
-            new = solve.velocity(w, i, step, jacobian)
+            new, turned = solve.correct(w, i, v, step, jacobian)
+            change = solve.phi(w) * step * (new - v).norm() + turned
+            v = new
             k += 1
-            change, error = ti.cast(infinity(s.count[w]), s.real), ti.cast(0.0, s.real)
-            if solve.reachable(w, i, new, step):
-                change = solve.phi(w) * step * (new - v).norm()
-                v = new
-                change += solve.advance(w, i, v, step)
-                moved = solve.displacement(w, i, v, step).norm()
-                # If nothing changes, nothing moves: 0/0 is no error.
-                change = change / ti.select(change > 0.0, moved, 1.0)
-                error = solve.error(w, i, step)
-                error = error / ti.select(error > 0.0, self.control.scale(s, w, i, moved, step), 1.0)
-            ratio, off = ti.cast(change, ti.f64), ti.cast(error, ti.f64)
-            solved = self.control.solved(w, ratio)
-            if solved or k >= self.control.iterations or not finite(ratio):
+            moved, error, scale = solve.lengths(self.control, w, i, v, step)
+            ratio, off = ti.cast(relative(change, moved), ti.f64), ti.cast(relative(error, scale), ti.f64)
+            if self.control.ends(w, ratio, k):
                 iterating = 0
-                accepted = solved and self.control.accepts(w, off)
+                accepted = self.control.solved(w, ratio) and self.control.accepts(w, off)
                 target = dt
                 # If the longest step stays, this branch spares the next step the wait for the factor.
                 if not (accepted and self.control.stays(w, dt, aim, ratio, k, off)):

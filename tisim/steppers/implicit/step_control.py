@@ -17,6 +17,7 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.errors import must
 from tisim.numerics import elementary
+from tisim.numerics.ieee import finite
 from tisim.program.phases import PerParticle
 from tisim.state.fields import Field
 from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
@@ -176,6 +177,11 @@ class IterationControl(ImplicitControl):
     def solved(self, w, change):
         """Return whether the iteration may end after this last relative change."""
         return change <= self.tolerance(w)
+
+    @ti.func
+    def ends(self, w, change, k):
+        """Return whether the iteration ends after iterate K = k, solved or given up."""
+        return self.solved(w, change) or k >= self.iterations or not finite(change)
 
     @ti.func
     def accepts(self, w, error):

@@ -9,7 +9,6 @@ from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.forces.force_sum import turning
 from tisim.forces.loads import FORCE
-from tisim.numerics.ieee import finite, infinity
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.fields import Field, WorldField
@@ -34,6 +33,7 @@ from tisim.steppers.implicit.attempts import (
     StepAttempt,
     conclude,
     length,
+    relative,
 )
 from tisim.steppers.implicit.one_particle import IndependentSteps, Solve
 from tisim.steppers.implicit.step_control import (
@@ -183,10 +183,7 @@ class PredictEnd(PerParticle):
     def run(self, w, i):
         s, solve = self.s, self.solve
         dt = ti.cast(s.dt[w], s.real)
-        v = solve.velocity(w, i, dt, solve.jacobian(w, i, s.time[w]))
-        if not solve.reachable(w, i, v, dt):
-            v = s.velocity_before[w, i]
-        solve.advance(w, i, v, dt)
+        v = solve.predict(w, i, dt, s.time[w])
         moved = ti.cast(solve.displacement(w, i, v, dt), ti.f64)
         note_displacement(s, w, moved - s.axes(s.frame, w) * s.dt[w])
 
@@ -204,15 +201,12 @@ class Correct(PerBlock):
         s, solve = self.s, self.solve
         dt = ti.cast(s.dt[w], s.real)
         last = s.velocity[w, i]
-        v = solve.velocity(w, i, dt, solve.jacobian(w, i, s.time[w]))
-        change = ti.cast(infinity(s.count[w]), s.real)
-        if solve.reachable(w, i, v, dt):
-            step = solve.phi(w) * dt * (v - last)
-            change = step.norm() + solve.advance(w, i, v, dt)
-            note_displacement(s, w, ti.cast(step, ti.f64))
+        v, turned = solve.correct(w, i, last, dt, solve.jacobian(w, i, s.time[w]))
+        step = solve.phi(w) * dt * (v - last)
+        change = step.norm() + turned
+        note_displacement(s, w, ti.cast(step, ti.f64))
         s.iterate_change[w, i] = change
-        moved = solve.displacement(w, i, v, dt).norm()
-        error, scale = solve.error(w, i, dt), self.control.scale(s, w, i, moved, dt)
+        moved, error, scale = solve.lengths(self.control, w, i, v, dt)
         return ti.cast(ti.Vector([change, moved, error, scale]), ti.f64)
 
 
@@ -226,19 +220,13 @@ class JudgeIteration(Phase):
     def run(self, w, _k):
         s = self.s
         total = self.sums.total(w)
-        change, error = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        # If nothing changes, nothing moves: 0/0 is no error.
-        if total[0] != 0.0:
-            change = total[0] / total[1]
-        if total[2] > 0.0:
-            error = total[2] / total[3]
+        change, error = relative(total[0], total[1]), relative(total[2], total[3])
         k = s.solver_iteration[w] + 1
         s.solver_iteration[w] = k
         s.solver_iterations[w] += 1
         s.force_evaluations[w] += 1
-        solved = self.control.solved(w, change)
-        if solved or k >= self.control.iterations or not finite(change):
-            accepted = solved and self.control.accepts(w, error)
+        if self.control.ends(w, change, k):
+            accepted = self.control.solved(w, change) and self.control.accepts(w, error)
             factor = self.control.factor(w, self.control.aim(w), change, ti.cast(k, ti.f64), error)
             conclude(self.control, s, w, accepted, factor, SHORTER)
             s.iterating[w] = 0

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from tisim.errors import must
+from tisim.operators.base import largest_inserted
 
 if TYPE_CHECKING:
     from tisim.effects.base import Effect
@@ -32,9 +33,11 @@ class CohesiveLaw(Protocol):
 def with_inserted(start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> dict[str, np.ndarray]:
     """Return radius (m) and material of the grains of a start and of the largest grains that effects
     insert."""
-    first = start.get("material", np.zeros(len(start["radius"]), int))
-    all_of_them = ({"radius": start["radius"], "material": first}, *(e.largest_inserted() for e in effects))
-    return {name: np.concatenate([one[name] for one in all_of_them]) for name in ("radius", "material")}
+    later, material = largest_inserted(effects), start.get("material", np.zeros(len(start["radius"]), int))
+    return {
+        "radius": np.concatenate([start["radius"], later["radius"]]),
+        "material": np.concatenate([material, later["material"]]),
+    }
 
 
 def largest_radii(grains: Mapping[str, np.ndarray]) -> dict[int, list[float]]:
