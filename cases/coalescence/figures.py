@@ -67,7 +67,7 @@ def growth(runs: Sequence[CloudRun]) -> Figure:
     shown = sorted(
         {int(np.rint(x)) for line in right.lines for x in line.get_xdata()[np.isfinite(line.get_ydata())]}
     )
-    right.set(xticks=shown, xlim=(shown[0] - 0.5, shown[-1] + 0.5), title="room of a grain")
+    right.set(xticks=shown, xlim=(shown[0] - 0.5, shown[-1] + 0.5), title="space of a grain")
     left.legend(frameon=False, fontsize=8, title="as in L21's cloud")
     for axis in (left, middle, right):
         plain(axis)

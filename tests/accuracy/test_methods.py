@@ -375,14 +375,17 @@ WRONG = [
     ({"repeats": 0}, "repeats must be a whole number, at least 1; received 0"),
     ({"coarser": 1.5}, "coarser must be a whole number of decades; received 1.5"),
     ({"coarser": 1, "finer": -2}, "must be at least 0; received -1"),
-    ({"precisions": ("f32",)}, "precisions must be f64 and others"),
+    ({"precisions": ("f32",)}, "precisions must be a list that begins with f64"),
     ({"arithmetics": ("fast",)}, "arithmetics must be strict, or strict and fast"),
     ({"precisions": ("f64", "f16")}, "precision must be f64 or f32; received 'f16'"),
-    ({"starts": (8, 4)}, "starts must be given from few to many"),
+    ({"starts": (8, 4)}, "starts must be in increasing order"),
     ({"starts": (1, 4)}, "starts must be at least 2"),
     ({"budget": 0.0}, "budget must be greater than 0"),
-    ({"quantities": (KNOWN, type(KNOWN)("mean", KNOWN.value, random=True))}, "must be all random, or none"),
-    ({"quantities": (UNKNOWN, UNKNOWN)}, "quantities must be of different names"),
+    (
+        {"quantities": (KNOWN, type(KNOWN)("mean", KNOWN.value, random=True))},
+        "must be all random or",
+    ),
+    ({"quantities": (UNKNOWN, UNKNOWN)}, "quantities must be quantities with different names"),
 ]
 
 

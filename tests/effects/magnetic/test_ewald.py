@@ -277,7 +277,7 @@ def test_settings_minimise_cost_and_suit_the_box():
 
 FINE = {"cutoff": 1.6, "waves": WAVES}
 WRONG = {
-    "box must be one in which particles see images of each other along two axes or three, with "
+    "box must be periodic along two or three axes, with "
     "effects.ewald_dipole_dipole; received (True, False, False)": (FINE, {"periodic": (True, False, False)}),
     "effects.ewald_dipole_dipole.waves must be at least (11, 14, 13) in this box; received (11, 13, 12)": (
         {**FINE, "accuracy": 1e-4},
