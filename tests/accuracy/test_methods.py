@@ -481,6 +481,14 @@ def test_failed_settings_are_in_the_legend():
     assert 0 < low < high
 
 
+def test_the_legend_has_the_cause_of_a_failure_alone():
+    reason = "a quantity is not finite, by effects.floor, at particle 61"
+    failed = Row(
+        "never", "", "", "", "f64", 1, failed=f"found at t = 0.003 s: {reason} (a hint); kept t = 0 s"
+    )
+    assert pictured(failed)[0] == [f"never; failed: {reason}"]
+
+
 def test_a_method_has_one_colour_in_all_precisions_and_arithmetics():
     numbers = (("f64", "strict"), ("f32", "strict"), ("f64", "fast"), ("f32", "fast"))
     rows = [row("other", 1.0, 1e-2)]
@@ -529,7 +537,7 @@ def test_an_accuracy_that_no_setting_reaches_is_refused():
         "further); received 0.0001"
     )
     cost_study.rows = [Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")]
-    with pytest.raises(RunError, match=r"there is none: a quantity is not finite"):
+    with pytest.raises(RunError, match=r"received no setting that ran: a quantity is not finite"):
         cost_study.cheapest(1.0)
 
 

@@ -271,7 +271,7 @@ def test_settings_minimise_cost_and_suit_the_box():
     for settings in (few, many, ewald_settings(box((6.0, 9.0, 3.0), (True, False, True)), 50)):
         EwaldDipoleDipole(**settings)
     assert ewald_settings(box(), 10)["cutoff"] == pytest.approx(0.4 * 4.0)
-    with pytest.raises(InputError, match=r"^open must be one in which particles see images"):
+    with pytest.raises(InputError, match=r"^open must be a periodic box with images"):
         ewald_settings(Open(), 10)
 
 
