@@ -32,7 +32,7 @@ LAST_NUMBER = re.compile(r"(?<=[\w*']) [\d.]+(?:e[+-]?\d+)?$")
 LABEL = re.compile(r"\W*(?:[A-Za-z]{1,2}\d{2,}(?:'s)?\W*)+$|\W*I/O\W*$|.*\d,\d")
 """Names of publications and number formats, such as L21 and f32, and numbers such as 1,000."""
 RELATION = re.compile(r"\S\s+(?:[=<>~]|<=|>=|->)\s+\S")
-QUOTIENT = re.compile(r"[A-Za-z)*'²³]\s?/\s?\(?[A-Za-z]|\d/[a-z(]")
+QUOTIENT = re.compile(r"[A-Za-z)*'²³]\s?/\s?\(?[A-Za-z]|\d\s?/\s?[a-z(]")
 EQUATION = re.compile(r" [+-] [^=<>]* [=<>] [\d.]+ \w$")
 """A sum of several quantities, equal to a number of another: 4 m in it is a product, and no length."""
 SUM = re.compile(r"[A-Za-z]['*]?(?:_\w+)? [+-] [\w(]|[\w)] [+-] [A-Za-z(]")
@@ -40,7 +40,7 @@ LETTER = re.compile(
     rf"(?<![\w(.,*'^/\\\"-])[B-HJ-Zb-z](?![\w*'^/\"=-]|\.\s+\S|[ /]{UNIT}(?!\w))|(?<=\()[B-Zb-z](?=[ ,])"
 )
 UNIT_BEFORE = re.compile(rf"(?:\d|\b(?:in|per)|(?<!\w){UNIT}),? $")
-ALONE = re.compile(r"(?:^|[,;:(|]) ?$"), re.compile(r"[,;)|]|$")
+ALONE = re.compile(r"(?:^|[,;:(|]) ?$"), re.compile(r"[,;.)|]|$")
 """What stands before and after a letter that may be a unit."""
 JOURNAL = re.compile(r"\. $"), re.compile(r" \d")
 MIRRORED = str.maketrans("()[]", ")(][")

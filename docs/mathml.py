@@ -28,6 +28,8 @@ SIGNS = {
     "+-": "±", "-+": "∓", "x": "\N{MULTIPLICATION SIGN}", ".": "·", "*": "·", "(x)": "⊗",
 }  # fmt: skip
 POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
+DIFFERENTIAL = '<mrow><mi mathvariant="normal">d'
+"""The beginning of a differential."""
 CLOSING = {"(": ")", "[": "]", "|": "|", "<": ">"}
 JOINING = {
     "a", "and", "as", "at", "below", "by", "each", "if", "in", "is", "of", "on", "or", "over", "than", "that",
@@ -167,13 +169,13 @@ def number(text: str) -> str:
 
 
 def joined(parts: list[Part]) -> str:
-    """Return factors side by side, with spaces around text and before functions and numbers."""
+    """Return factors side by side, with spaces around text and before functions, numbers and differentials."""
     found = [parts[0].mathml]
     for before, after in pairwise(parts):
         if "operator" not in (before.role, after.role):
             if {before.role, after.role} & {"text", "joining"}:
                 found.append(space(0.35))
-            elif after.role == "function" or after.mathml.startswith(("<mn>", "<mfrac><mn>")):
+            elif after.role == "function" or after.mathml.startswith(("<mn>", "<mfrac><mn>", DIFFERENTIAL)):
                 found.append(space(0.17))
         found.append(after.mathml)
     return tag("mrow", *found)

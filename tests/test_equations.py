@@ -148,6 +148,7 @@ SENTENCES = {
     "1e6 J/m^2 or kg/m^3, not N^2 pairs": ["J/m^2", "kg/m^3", "N^2"],
     "With g = (0, 0, -9.81) m/s^2 and (x, y, z)": ["g = (0, 0, -9.81)", "m/s^2"],
     "m* of L21 and the f32/f64 of Z16 (6.2), 1,000 m/s, 3 .. 3, I/O, x-axis, and/or i.e. a k": ["m*"],
+    "it has 1 / (1 - 2 a) times the moment": ["1 / (1 - 2 a)"],
     "L/D 20 and tests/foo.py, alpha_1 d^-beta_1 overlap": ["L/D", "alpha_1 d^-beta_1"],
 }
 
@@ -175,7 +176,7 @@ def test_fractions_in_a_sentence_are_on_its_line():
     ("text", "found"),
     [
         ("the mass m of a spring T at i", ["m", "T", "i"]),
-        ("position : m, shape (n, 3), in m, 3 m, N m, (m)", ["n"]),
+        ("position : m, shape (n, 3), in m, 3 m, N m, (m), m.", ["n"]),
         ("by A. T. Meyer, Phys. Rev. B 4; a m-file", []),
     ],
 )
