@@ -81,7 +81,7 @@ class StageControl(ImplicitControl):
     sweeps: int = option("largest number of sweeps in a step", 10, ge=2)
     safety: float = parameter(
         "",
-        "error at which the next step aims, over the requested error",
+        "safety factor of the length of the next step",
         0.85,
         ge=LEAST_SAFETY,
         lt=1,
