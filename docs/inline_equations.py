@@ -37,7 +37,7 @@ EQUATION = re.compile(r" [+-] [^=<>]* [=<>] [\d.]+ \w$")
 """A sum of several quantities, equal to a number of another: 4 m in it is a product, and no length."""
 SUM = re.compile(r"[A-Za-z]['*]?(?:_\w+)? [+-] [\w(]|[\w)] [+-] [A-Za-z(]")
 LETTER = re.compile(
-    rf"(?<![\w(.,*'^/\\\"-])[B-HJ-Zb-z](?![\w*'^/\"=-]|\.\s+\S|[ /]{UNIT}(?!\w))|(?<=\()[B-Zb-z](?=[ ,])"
+    rf"(?<![\w(.,*'^/\\\"-])[B-Zb-z](?![\w*'^/\"=-]|\.\s+\S|[ /]{UNIT}(?!\w))|(?<=\()[B-Zb-z](?=[ ,])"
 )
 UNIT_BEFORE = re.compile(rf"(?:\d|\b(?:in|per)|(?<!\w){UNIT}),? $")
 ALONE = re.compile(r"(?:^|[,;:(|]) ?$"), re.compile(r"[,;.)|]|$")

@@ -175,13 +175,13 @@ def test_fractions_in_a_sentence_are_on_its_line():
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("the mass m of a spring T at i", ["m", "T", "i"]),
+        ("the mass m of a spring T at i, inertia I", ["m", "T", "i", "I"]),
         ("position : m, shape (n, 3), in m, 3 m, N m, (m), m.", ["n"]),
         ("by A. T. Meyer, Phys. Rev. B 4; a m-file", []),
     ],
 )
 def test_single_letters_that_stand_for_a_quantity(text, found):
-    spans = load("inline_equations").letters(text, set("mTiBn"))
+    spans = load("inline_equations").letters(text, set("mTiBnI"))
     assert [text[start:end] for start, end, _ in spans] == found
 
 
