@@ -29,6 +29,8 @@ QUANTITIES = re.compile(rf"(?<![\w^*'.)])(?:[\d.e+-]+ )*{COMPOUND}(?![\w^(*'])")
 LAST_UNIT = re.compile(rf"(?<=[\d)]) {COMPOUND}$|\s\({COMPOUND}\)$|\s\([\d.]+\)$")
 """After a formula: its unit, also in brackets, or its number in a publication."""
 LAST_NUMBER = re.compile(r"(?<=[\w*']) [\d.]+(?:e[+-]?\d+)?$")
+NUMBER_BEFORE = re.compile(r"[\d.]+ (?=\([^()]* [=<>] [^()]*\)$)")
+"""A number that a bracket explains, as in: order 2 (phi = 1/2)."""
 LABEL = re.compile(r"\W*(?:[A-Za-z]{1,2}\d{2,}(?:'s)?\W*)+$|\W*I/O\W*$|.*\d,\d")
 """Names of publications and number formats, such as L21 and f32, and numbers such as 1,000."""
 RELATION = re.compile(r"\S\s+(?:[=<>~]|<=|>=|->)\s+\S")
@@ -129,6 +131,8 @@ def _trimmed(text: str, start: int, end: int) -> tuple[int, int]:
             if is_symbol:
                 return start, end
             end -= len(match[0])
+        elif match := NUMBER_BEFORE.match(piece):
+            start += match.end()
         elif match := _addition(piece):
             end -= len(match[0])
         elif piece[:1] in ("(", "[") and _closing(piece) in (0, len(piece) - 1):
@@ -168,7 +172,7 @@ def _formula(text: str, start: int, end: int) -> Iterator[Span]:
 def _is_formula(piece: str) -> bool:
     """Return whether a piece holds something that prose does not."""
     names = re.findall(r"(?<![A-Za-z])[A-Za-z]+", piece)
-    if names and RELATION.search(piece):
+    if names and (RELATION.search(piece) or SUM.search(piece)):
         return True
     if not re.search(r"[A-Za-z^]", QUANTITIES.sub("", piece)) and "N^" not in piece:
         return False
@@ -178,7 +182,7 @@ def _is_formula(piece: str) -> bool:
         return True
     if re.search(r"[\w)*]\^|[A-Za-z]_\w|\b[A-Za-z]\*(?!\w)", piece):
         return True
-    return bool(names) and any(sign.search(piece) for sign in (QUOTIENT, SUM, CROSS))
+    return bool(names) and any(sign.search(piece) for sign in (QUOTIENT, CROSS))
 
 
 if __name__ == "__main__":

@@ -169,7 +169,7 @@ def number(text: str) -> str:
 
 
 def joined(parts: list[Part]) -> str:
-    """Return factors side by side, with spaces around text and before functions, numbers and differentials."""
+    """Return factors side by side, with space around text and before functions, numbers, differentials."""
     found = [parts[0].mathml]
     for before, after in pairwise(parts):
         if "operator" not in (before.role, after.role):

@@ -148,6 +148,7 @@ SENTENCES = {
     "1e6 J/m^2 or kg/m^3, not N^2 pairs": ["J/m^2", "kg/m^3", "N^2"],
     "With g = (0, 0, -9.81) m/s^2 and (x, y, z)": ["g = (0, 0, -9.81)", "m/s^2"],
     "m* of L21 and the f32/f64 of Z16 (6.2), 1,000 m/s, 3 .. 3, I/O, x-axis, and/or i.e. a k": ["m*"],
+    "2 (phi = 1/2), else 1; 2 s - 2 with s - 1 for each": ["phi = 1/2", "2 s - 2", "s - 1"],
     "it has 1 / (1 - 2 a) times the moment": ["1 / (1 - 2 a)"],
     "L/D 20 and tests/foo.py, alpha_1 d^-beta_1 overlap": ["L/D", "alpha_1 d^-beta_1"],
 }
