@@ -72,4 +72,6 @@ def setup(app):
     app.connect("autodoc-process-docstring", reference_pages.as_rst)
     app.connect("autodoc-process-signature", reference_pages.signature)
     app.connect("doctree-read", equation_nodes.set_blocks)
-    app.add_node(equation_nodes.Equations, html=(equation_nodes.visit, None))
+    app.connect("doctree-read", equation_nodes.set_formulas)
+    for node in (equation_nodes.Equations, equation_nodes.Formula):
+        app.add_node(node, html=(equation_nodes.visit, None))

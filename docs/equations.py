@@ -42,9 +42,14 @@ def mathml(text: str) -> str:
     return f'<math displaystyle="true" alttext="{escape(" ".join(text.split()))}">{content(text)}</math>'
 
 
-def content(text: str) -> str:
+def inline(text: str) -> str:
+    """Return a formula of a sentence as a ``math`` element, with its fractions on one line."""
+    return f'<math alttext="{escape(" ".join(text.split()))}">{content(text, flat=True)}</math>'
+
+
+def content(text: str, flat: bool = False) -> str:
     """Return an equation as MathML, without the ``math`` element around it."""
-    parser = Parser(text)
+    parser = Parser(text, flat)
     result = parser.items()
     if parser.next.kind != "end":
         raise Unset(f"{parser.next.text} in {text}")
@@ -54,8 +59,8 @@ def content(text: str) -> str:
 class Parser:
     """Reads an equation, with a method for each level of precedence. flat : fractions are on one line."""
 
-    def __init__(self, text: str) -> None:
-        self.tokens, self.at, self.flat = tokens(text), 0, False
+    def __init__(self, text: str, flat: bool = False) -> None:
+        self.tokens, self.at, self.flat = tokens(text), 0, flat
 
     @property
     def next(self) -> Token:
@@ -93,7 +98,7 @@ class Parser:
         """Products with + and - between them."""
         parts = [operator(self.take(), form="prefix")] if self.next.text in ("+", "-") else []
         parts.append(self.product())
-        while self.next.text in ("+", "-"):
+        while self.next.text in ("+", "-", "+-", "-+"):
             parts += [operator(self.take(), form="infix"), self.product()]
         return tag("mrow", *parts)
 
@@ -194,7 +199,7 @@ class Parser:
         opening = self.take()
         inner = self.sum() if opening in ("|", "<") else self.items()
         self.take(CLOSING.get(opening, "a bracket"))
-        return fenced(opening, inner)
+        return fenced(opening, inner, self.flat)
 
     def scripts(self, base: str, role: str = "factor", name: bool = False) -> Part:
         """What touches a factor: an index, an exponent, primes, and of a name also `*`, `+` and `-`."""

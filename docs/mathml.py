@@ -19,12 +19,17 @@ GREEK = dict(
 GREEK["eps"] = GREEK["epsilon"]
 del GREEK["final"]
 GREEK |= {name.capitalize(): sign.upper() for name, sign in GREEK.items()}
-FUNCTIONS = {"exp", "sin", "cos", "tan", "coth", "tanh", "ln", "log", "min", "max", "tr"}
+FUNCTIONS = {
+    "exp", "sin", "cos", "tan", "arccos", "arcsin", "arctan", "coth", "tanh", "ln", "log", "min", "max", "tr",
+}  # fmt: skip
 LARGE = {"sum": "∑", "integral": "∫"}
 SIGNS = {
     "<=": "≤", ">=": "≥", "~": "\N{TILDE OPERATOR}", "->": "→", "-": "\N{MINUS SIGN}", "'": "\N{PRIME}",
-    "x": "\N{MULTIPLICATION SIGN}", ".": "·", "*": "·", "(x)": "⊗",
+    "+-": "±", "-+": "∓", "x": "\N{MULTIPLICATION SIGN}", ".": "·", "*": "·", "(x)": "⊗",
 }  # fmt: skip
+POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
+DIFFERENTIAL = '<mrow><mi mathvariant="normal">d'
+"""The beginning of a differential."""
 CLOSING = {"(": ")", "[": "]", "|": "|", "<": ">"}
 JOINING = {
     "a", "and", "as", "at", "below", "by", "each", "if", "in", "is", "of", "on", "or", "over", "than", "that",
@@ -32,8 +37,8 @@ JOINING = {
 }  # fmt: skip
 """Words of sentences, which no quantity is called: a fraction does not reach across them."""
 TOKEN = re.compile(
-    r"(?P<number>\d+(?:\.\d+)?(?:e[+-]?\d+)?)|(?P<name>[A-Za-z]+(?:'s\b)?)"
-    r"|(?P<relation><=|>=|\+=|->|[=<>~:])|(?P<sign>[()\[\]|+\-*/.,;^_'])"
+    r"(?P<power>[⁰¹²³⁴⁵⁶⁷⁸⁹]+)|(?P<number>\d+(?:\.\d+)?(?:e[+-]?\d+)?)|(?P<name>[A-Za-z]+(?:'s\b)?)"
+    r"|(?P<relation><=|>=|\+=|->|[=<>~:])|(?P<sign>\+-(?=\s)|-\+(?=\s)|[()\[\]|+\-*/.,;^_'])"
 )
 
 
@@ -72,6 +77,11 @@ def tokens(text: str) -> list[Token]:
             raise Unset(f"{text[at]} in {text}")
         kind, end = str(match.lastgroup), match.end()
         before, after = not text[at - 1 : at].strip() or at == 0, not text[end : end + 1].strip()
+        if kind == "power":
+            found.append(Token("sign", "^", before, False))
+            found.append(Token("number", match[0].translate(POWERS), False, after))
+            at = end
+            continue
         if match[0] == "=" and not (before and after):
             raise Unset(f"= without spaces in {text}")
         is_run = bool(found) and found[-1].kind == "word" and before
@@ -159,13 +169,13 @@ def number(text: str) -> str:
 
 
 def joined(parts: list[Part]) -> str:
-    """Return factors side by side, with spaces around text and before functions and numbers."""
+    """Return factors side by side, with space around text and before functions, numbers, differentials."""
     found = [parts[0].mathml]
     for before, after in pairwise(parts):
         if "operator" not in (before.role, after.role):
             if {before.role, after.role} & {"text", "joining"}:
                 found.append(space(0.35))
-            elif after.role == "function" or after.mathml.startswith(("<mn>", "<mfrac><mn>")):
+            elif after.role == "function" or after.mathml.startswith(("<mn>", "<mfrac><mn>", DIFFERENTIAL)):
                 found.append(space(0.17))
         found.append(after.mathml)
     return tag("mrow", *found)
@@ -180,10 +190,12 @@ def fraction(over: list[Part], under: Part, is_flat: bool) -> Part:
     return Part(tag("mfrac", above, under.inner or under.mathml), "fraction")
 
 
-def fenced(opening: str, inner: str) -> Part:
-    """Return a bracket; a fraction leaves round and square ones out."""
+def fenced(opening: str, inner: str, is_flat: bool) -> Part:
+    """Return a bracket, a flat one as high as a letter; a fraction leaves round and square ones out."""
     left, right = ("⟨", "⟩") if opening == "<" else (opening, CLOSING[opening])
-    fences = operator(left, form="prefix", fence="true"), operator(right, form="postfix", fence="true")
+    height = {"stretchy": "false"} if is_flat else {}
+    pairs = ((left, "prefix"), (right, "postfix"))
+    fences = [operator(sign, form=form, fence="true", **height) for sign, form in pairs]
     return Part(tag("mrow", fences[0], inner, fences[1]), inner=inner if opening in ("(", "[") else "")
 
 

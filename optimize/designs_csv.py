@@ -116,7 +116,7 @@ def _headings(problem: Problem) -> Iterator[str]:
 
 def _of_file(path: Path) -> list[Row]:
     other = regular_file.irregular(path)
-    must(other is None, "designs", "in a CSV file that can be read", f"{path}, which is {other}")
+    must(other is None, "designs", "a CSV file that can be read", f"{path}, which is {other}")
     try:
         text = path.read_bytes().decode("utf-8-sig")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)

@@ -88,6 +88,11 @@ def described(part):
 
 
 @pytest.mark.parametrize("part", BASES)
+def test_a_contract_is_one_page(part):
+    assert len((ROOT / f"docs/contracts/{part}.md").read_text(encoding="utf-8").splitlines()) <= 80
+
+
+@pytest.mark.parametrize("part", BASES)
 def test_the_names_of_a_contract_exist(part):
     for text, name, kind in described(part):
         assert kind is not None or any(hasattr(module, name) for module in MODULES), text

@@ -84,3 +84,10 @@ def test_the_citation_is_of_this_version_and_names_all_publications():
     for name, year, work in zip(names, years, PUBLICATIONS.values(), strict=True):
         assert name in work
         assert f"({year})" in work
+
+
+def test_the_page_on_citing_has_this_version_and_all_publications():
+    page = (ROOT / "docs/citing.md").read_text(encoding="utf-8")
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", page).replace("*", "")
+    assert f"version = {{{__version__}}}" in page
+    assert [work for work in PUBLICATIONS.values() if work not in plain] == []

@@ -1,4 +1,4 @@
-"""Plain-text equations as MathML: docs/equations.py, and the blocks of docs/equation_blocks.py."""
+"""Plain-text equations as MathML (docs/equations.py), in blocks and in sentences."""
 
 # ruff: noqa: RUF001
 
@@ -129,3 +129,80 @@ def test_only_equations_of_the_guides_are_typeset():
                 found.append(page.name)
                 blocks.block(block)
     assert found == ["granular.md", "magnetism.md"]
+
+
+SENTENCES = {
+    "A moment of inertia of 2/5 m R^2; its spin": ["2/5 m R^2"],
+    "the speed w = q B/m = 100 1/s of a (phi = 0.3)": ["w = q B/m = 100", "phi = 0.3"],
+    "e = 0.5, 5 turns, and r' = r + dt (phi v' + (1 - phi) v), solved": [
+        "e = 0.5",
+        "r' = r + dt (phi v' + (1 - phi) v)",
+    ],
+    "beyond S dt^2 + 2 gamma dt = 4 m the motion grows": ["S dt^2 + 2 gamma dt = 4 m"],
+    "a gap of h_c = 0.3 m from G m_i m_j / d², theta": ["h_c = 0.3", "G m_i m_j / d²", "theta"],
+    "a B of 0.6 T at x -> p/x, sqrt(k/m) +- w/2 (4.11) or |F_n + 2 F|": [
+        "x -> p/x",
+        "sqrt(k/m) +- w/2",
+        "|F_n + 2 F|",
+    ],
+    "1e6 J/m^2 or kg/m^3, not N^2 pairs": ["J/m^2", "kg/m^3", "N^2"],
+    "With g = (0, 0, -9.81) m/s^2 and (x, y, z)": ["g = (0, 0, -9.81)", "m/s^2"],
+    "m* of L21 and the f32/f64 of Z16 (6.2), 1,000 m/s, 3 .. 3, I/O, x-axis, and/or i.e. a k": ["m*"],
+    "2 (phi = 1/2), else 1; 2 s - 2 with s - 1 for each": ["phi = 1/2", "2 s - 2", "s - 1"],
+    "it has 1 / (1 - 2 a) times the moment": ["1 / (1 - 2 a)"],
+    "L/D 20 and tests/foo.py, alpha_1 d^-beta_1 overlap": ["L/D", "alpha_1 d^-beta_1"],
+}
+
+
+@pytest.mark.parametrize("text", SENTENCES)
+def test_formulas_are_found_in_sentences(text):
+    found = list(load("inline_equations").spans(text))
+    assert [text[start:end] for start, end, _ in found] == SENTENCES[text]
+    for _, _, html in found:
+        ET.fromstring(f"<span>{html}</span>")
+
+
+def test_units_stay_upright_with_raised_powers():
+    found = load("inline_equations").spans("in J/m^2 and m s^-1")
+    assert [span.html for span in found] == ["J/m<sup>2</sup>", "m s<sup>−1</sup>"]
+
+
+def test_fractions_in_a_sentence_are_on_its_line():
+    (span,) = load("inline_equations").spans("tau = m/(6 pi mu R)")
+    assert tex(ET.fromstring(span.html)) == "τ=m/(6πμR)"
+    assert 'stretchy="false"' in span.html
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("the mass m of a spring T at i, inertia I", ["m", "T", "i", "I"]),
+        ("position : m, shape (n, 3), in m, 3 m, N m, (m), m.", ["n"]),
+        ("by A. T. Meyer, Phys. Rev. B 4; a m-file", []),
+    ],
+)
+def test_single_letters_that_stand_for_a_quantity(text, found):
+    spans = load("inline_equations").letters(text, set("mTiBnI"))
+    assert [text[start:end] for start, end, _ in spans] == found
+
+
+@pytest.mark.parametrize("text", ["dt", "phi", "s.mass[w, i]", "pair_force(i, j) = -pair_force(j, i)", "m/s"])
+def test_code_stays_code(text):
+    assert load("inline_equations").whole(text) == ""
+
+
+def test_code_that_is_a_formula_is_set():
+    assert tex(ET.fromstring(load("inline_equations").whole("k + 1/2"))) == "k+1/2"
+
+
+def test_a_page_has_its_formulas_set():
+    """In sentences and lists; not in headings, code, links and names of parameters."""
+    nodes, core = load("equation_nodes"), pytest.importorskip("docutils.core")
+    doctree = core.publish_doctree(
+        "Page\n#####\n\nx = y\n=====\n\nA mass m of 2 rho, ``w + 1/2``, ``rho`` and `F = m <a>`__ "
+        "with F = m g.\n\n- phi : the angle phi\n\nx = z\n=====\n\nNothing\n"
+    )
+    nodes.set_formulas(None, doctree)
+    formulas = [one.astext() for one in doctree.findall(nodes.Formula)]
+    assert formulas == ["m", "2 rho", "w + 1/2", "F = m g", "phi"]
+    assert "phi : the angle phi" in doctree.astext()

@@ -165,7 +165,7 @@ def test_rows_of_a_study(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("none.h5", None, "file to read must be there; received "),
+        ("none.h5", None, "file to read must be an existing file; received "),
         (
             "a.png",
             b"\x89PNG\r\n\x1a\n\xff\xfe",

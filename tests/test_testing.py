@@ -171,7 +171,7 @@ def test_a_stepper_that_reports_no_motion_is_detected():
 
 def test_steps_must_not_depend_on_listed_pairs():
     with pytest.raises(
-        InputError, match="step control must be one that does not look at pairs; received 'app"
+        InputError, match="step control must be one that does not depend on pairs; received 'app"
     ):
         assert_lists(crossing(Verlet(), **WAYS[0]))
 

@@ -48,7 +48,7 @@ def read(path: str | Path) -> Any:
         if file is None:
             raise InputError(f"folder must be {rule}; received {str(path)!r}")
         return read(file)
-    must(regular_file.exists(file_path), "file to read", "there", str(path))
+    must(regular_file.exists(file_path), "file to read", "an existing file", str(path))
     head = regular_file.content(regular_file.target(file_path), SIZE) or b""
     if not head.startswith(SIGNATURE):
         return _read_text(file_path)

@@ -44,12 +44,13 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 def growth(runs: Sequence[CloudRun]) -> Figure:
     """Draw the fractions of grains in clusters and in the asteroid over time, and the final Voronoi volumes.
 
-    Clusters have two or more grains (L21 Fig. 4.1). Voronoi volumes are drawn by shell (Fig. 4.6). Thin lines
-    are single clouds.
+    Clusters have two or more grains (L21 Fig. 4.1). Voronoi volumes are drawn by shell (Fig. 4.6), for shells
+    that have cells within the asteroid. Thin lines and dots are single clouds, thick ones and diamonds means.
     """
     figure = empty(11.6, 3.6)
     left, middle, right = figure.subplots(1, 3)
-    for m, colour in zip(published.MAGNETISATIONS, AXIS_COLOURS, strict=True):
+    beside = np.linspace(-0.2, 0.2, len(published.MAGNETISATIONS))
+    for m, colour, shift in zip(published.MAGNETISATIONS, AXIS_COLOURS, beside, strict=True):
         group = of_magnetisation(runs, m)
         for axis, name in ((left, "bound"), (middle, "coalesced")):
             values = np.array([[getattr(a, name) for a in one.agglomerations] for one in group])
@@ -57,12 +58,16 @@ def growth(runs: Sequence[CloudRun]) -> Figure:
             axis.plot(group[0].times, values.mean(axis=0), color=colour, lw=2.0, label=f"{m:g} A/m")
         volumes = np.array([shells(one) for one in group])
         known = np.isfinite(volumes)
-        mean = np.where(known, volumes, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-        right.plot(np.arange(1, SHELLS + 1), np.where(known.any(axis=0), mean, np.nan), "o-", color=colour)
+        at, mean = np.arange(1, SHELLS + 1) + shift, np.where(known, volumes, 0).sum(axis=0)
+        right.plot(at, volumes.T, "o", color=colour, ms=3, alpha=0.5)
+        right.plot(at, mean / np.where(known.any(axis=0), known.sum(axis=0), np.nan), "D", color=colour)
     left.set(xlabel="time (s)", ylabel="part of the grains", ylim=(0, 1.02), title="in clusters")
     middle.set(xlabel="time (s)", ylim=(0, 1.02), title="in the asteroid")
     right.set(xlabel="shell, from the centre", ylabel="Voronoi volume over a grain's")
-    right.set_xticks(np.arange(1, SHELLS + 1))
+    shown = sorted(
+        {int(np.rint(x)) for line in right.lines for x in line.get_xdata()[np.isfinite(line.get_ydata())]}
+    )
+    right.set(xticks=shown, xlim=(shown[0] - 0.5, shown[-1] + 0.5), title="space of a grain")
     left.legend(frameon=False, fontsize=8, title="as in L21's cloud")
     for axis in (left, middle, right):
         plain(axis)

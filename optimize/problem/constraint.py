@@ -34,7 +34,7 @@ class InequalityConstraint:
         what = f"constraint {self.name}"
         must(isinstance(self.name, str) and bool(self.name.strip()), "constraint name", "a non-empty string",
              self.name)  # fmt: skip
-        must(callable(self.of), f"of of {what}", "a function of a result or a design", self.of)
+        must(callable(self.of), f"function 'of' of {what}", "a function of a result or a design", self.of)
         must(bool(self.bounds), what, "at_most or at_least a number, or both", None)
         for bound in self.bounds:
             must(is_number(bound) and math.isfinite(bound), f"bound of {what}", "a finite number", bound)

@@ -50,7 +50,12 @@ class DependentGene(Named):
 
     def __post_init__(self) -> None:
         check_name(self.name)
-        must(callable(self.of), f"of of dependent gene {self.name}", "a function of the design", self.of)
+        must(
+            callable(self.of),
+            f"function 'of' of dependent gene {self.name}",
+            "a function of the design",
+            self.of,
+        )
 
     @property
     def kind(self) -> str:

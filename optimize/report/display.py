@@ -24,11 +24,9 @@ class Display:
     def __init__(self, problem: Problem, settings: Settings, console: Console) -> None:
         self.problem, self.settings, self.console = problem, settings, console
         self.best: Mapping[str, Value] | None = None
-        self.bar = progress_bar(
-            "generation {task.fields[generation]} of {task.fields[last]}", "{task.fields[best]}", console
-        )
-        last = settings.generations
-        self.task = self.bar.add_task("", total=1.0, generation=0, last=last, best="")
+        self.bar = progress_bar("{task.fields[reached]}", "{task.fields[best]}", console)
+        reached = f"generation 0 of {settings.generations}"
+        self.task = self.bar.add_task("", total=1.0, reached=reached, best="")
 
     def __enter__(self) -> Display:
         self.bar.__enter__()
@@ -43,9 +41,12 @@ class Display:
         """Update the bar with the finished fraction of the generations, or of the budget of runs if that ends
         earlier."""
         generations = (where.generation + where.fraction) / (self.settings.generations + 1)
-        most = self.settings.max_evaluations
-        runs = (where.evaluations + where.hits) / most if most else 0.0
-        self.bar.update(self.task, completed=max(generations, runs), generation=where.generation)
+        most, done = self.settings.max_evaluations, where.evaluations + where.hits
+        runs = done / most if most else 0.0
+        reached = f"generation {where.generation} of {self.settings.generations}"
+        if runs > generations:
+            reached = f"generation {where.generation}, {done} of {most} runs"
+        self.bar.update(self.task, completed=max(generations, runs), reached=reached)
 
     def generation(self, where: Progress) -> None:
         """Print a line for a finished generation, and its best design if it is new."""

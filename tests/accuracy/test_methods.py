@@ -375,14 +375,17 @@ WRONG = [
     ({"repeats": 0}, "repeats must be a whole number, at least 1; received 0"),
     ({"coarser": 1.5}, "coarser must be a whole number of decades; received 1.5"),
     ({"coarser": 1, "finer": -2}, "must be at least 0; received -1"),
-    ({"precisions": ("f32",)}, "precisions must be f64 and others"),
+    ({"precisions": ("f32",)}, "precisions must be a list that begins with f64"),
     ({"arithmetics": ("fast",)}, "arithmetics must be strict, or strict and fast"),
     ({"precisions": ("f64", "f16")}, "precision must be f64 or f32; received 'f16'"),
-    ({"starts": (8, 4)}, "starts must be given from few to many"),
+    ({"starts": (8, 4)}, "starts must be in increasing order"),
     ({"starts": (1, 4)}, "starts must be at least 2"),
     ({"budget": 0.0}, "budget must be greater than 0"),
-    ({"quantities": (KNOWN, type(KNOWN)("mean", KNOWN.value, random=True))}, "must be all random, or none"),
-    ({"quantities": (UNKNOWN, UNKNOWN)}, "quantities must be of different names"),
+    (
+        {"quantities": (KNOWN, type(KNOWN)("mean", KNOWN.value, random=True))},
+        "must be all random or",
+    ),
+    ({"quantities": (UNKNOWN, UNKNOWN)}, "quantities must be quantities with different names"),
 ]
 
 
@@ -478,6 +481,14 @@ def test_failed_settings_are_in_the_legend():
     assert 0 < low < high
 
 
+def test_the_legend_has_the_cause_of_a_failure_alone():
+    reason = "a quantity is not finite, by effects.floor, at particle 61"
+    failed = Row(
+        "never", "", "", "", "f64", 1, failed=f"found at t = 0.003 s: {reason} (a hint); kept t = 0 s"
+    )
+    assert pictured(failed)[0] == [f"never; failed: {reason}"]
+
+
 def test_a_method_has_one_colour_in_all_precisions_and_arithmetics():
     numbers = (("f64", "strict"), ("f32", "strict"), ("f64", "fast"), ("f32", "fast"))
     rows = [row("other", 1.0, 1e-2)]
@@ -526,7 +537,7 @@ def test_an_accuracy_that_no_setting_reaches_is_refused():
         "further); received 0.0001"
     )
     cost_study.rows = [Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")]
-    with pytest.raises(RunError, match=r"there is none: a quantity is not finite"):
+    with pytest.raises(RunError, match=r"received no setting that ran: a quantity is not finite"):
         cost_study.cheapest(1.0)
 
 

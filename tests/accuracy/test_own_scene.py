@@ -151,7 +151,7 @@ def test_a_reference_that_takes_longer_than_the_budget_is_stopped(verlet_only, m
 
     monkeypatch.setattr(time, "monotonic", lambda: now() + late[0])
     monkeypatch.setattr(SimulationCache, "run", slowly)
-    with pytest.raises(RunError, match=r"^the reference: .*: takes more running than the budget has$"):
+    with pytest.raises(RunError, match=r"^the reference: .*: takes longer than the budget allows$"):
         study(closed(), **FEW, budget=1e3)
 
 

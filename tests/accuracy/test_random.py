@@ -92,5 +92,5 @@ def test_default_quantities():
     assert usual(drift().model_copy(update={"effects": impacts}))[0].random
     free = drift().model_copy(update={"domain": type(drift()).model_fields["domain"].default})
     assert usual(free)[0].value is displacement
-    with pytest.raises(InputError, match="quantities must be given for a scene with impacts"):
+    with pytest.raises(InputError, match="quantities must be given, as impacts"):
         usual(head_on(1.0, impacts, domain=Box(low=(-1.0,) * 3, high=(1.0,) * 3)))

@@ -43,12 +43,12 @@ def test_a_virial_over_the_volume_is_a_pressure():
     np.testing.assert_allclose(stress_tensor(result), -virial.sum(axis=0).reshape(3, 3) / 40.0)
     result = result_of(position, still, virial, Box(**BOX, periodic=(True, True, False)))
     np.testing.assert_allclose(stress_tensor(result, volume=8.0), -virial.sum(axis=0).reshape(3, 3) / 8.0)
-    with pytest.raises(InputError, match="volume must be given unless all faces of the box are joined"):
+    with pytest.raises(InputError, match="volume must be given, unless the box is periodic along all axes"):
         stress_tensor(result)
     with pytest.raises(InputError, match="volume must be above 0"):
         stress_tensor(result, volume=0.0)
     del result.state["virial"]
-    with pytest.raises(InputError, match="scene must be with the effect virial for a stress"):
+    with pytest.raises(InputError, match="scene must be with the effect virial, which measures the stress"):
         stress_tensor(result, volume=8.0)
 
 

@@ -173,7 +173,7 @@ TEXTS = (
     ("ASCII, scene in a folder with an umlaut",
      f"mkdir Zürich; cp tiny.toml Zürich; {ASCII} $TISIM run Zürich/tiny.toml --out out"),
     ("ASCII, output folder with an umlaut", f"{ASCII} $TISIM run tiny.toml --out Zürich",
-     {"code": 2, "result": False, "says": "^path must be one that this system can have"}),
+     {"code": 2, "result": False, "says": "^path must be a valid name of a file or folder"}),
     ("locale that is not known", "LC_ALL=xx_YY $RUN"),
     ("name of a scene with escapes", "printf 'name = \"\\\\u001b[31mRED\"\\n' | cat - tiny.toml > red.toml; "
      "! $TISIM explain red.toml | grep $'\\x1b'", {"result": None, "says": ""}),

@@ -63,11 +63,11 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 
 def test_a_folder_without_data_to_draw_is_refused(tisim, tmp_path):
     (tmp_path / "out").mkdir()
-    rule = "folder must be one with a trajectory.h5 or result.h5; received 'out', with"
+    rule = "folder must contain a trajectory.h5 or result.h5; received 'out', with"
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "search.h5").touch()
-    message = "folder must be of a run; received the folder of a search, with the pictures:"
+    message = "folder must be one of a run; received the folder of a search, with the pictures:"
     assert tisim("plot", "s") == (2, "", f"{message} none yet\n")
     for name in ("front.png", "convergence.png"):
         (tmp_path / "s" / name).touch()
@@ -221,7 +221,7 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
     monkeypatch.setattr(catalogue, "every", lambda: {"toy": Case(*parts)})
     code, _, err = tisim("figures", "toy")
     assert code == 2
-    assert "case must be one with figures; received 'toy'" in err
+    assert "case must be one that has figures; received 'toy'" in err
 
 
 def test_wrong_input(tisim, toml, tmp_path):

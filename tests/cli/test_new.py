@@ -74,6 +74,7 @@ def test_a_problem(tisim, own_file):
     run_tests("my_throw")
 
 
+UNIQUE = "a name that no other effect, operator, source or stepper has"
 KEPT = ("there.py", "test_tested.py", "settled.toml")
 WRONG = [
     (["law", "soft_law"], f"WHAT must be one of {', '.join(new.USES)}; received 'law'"),
@@ -85,9 +86,15 @@ WRONG = [
     (["source", "x", "--kind", "pair"], "--kind must be given for an effect only; received 'pair'"),
     (["effect", "SoftLaw"], "name must be a lower-case Python identifier; received 'SoftLaw'"),
     (["effect", "class"], "name must be a lower-case Python identifier; received 'class'"),
-    (["case", "json"], "name must be one that no other module has; received 'json'"),
-    (["effect", "gravity"], "name must be one that no other part of scenes has; received 'gravity'"),
-    (["stepper", "verlet"], "name must be one that no other part of scenes has; received 'verlet'"),
+    (["case", "json"], "name must be a name that no other Python module has; received 'json'"),
+    (
+        ["effect", "gravity"],
+        f"name must be {UNIQUE}; received 'gravity'",
+    ),
+    (
+        ["stepper", "verlet"],
+        f"name must be {UNIQUE}; received 'verlet'",
+    ),
     (
         ["effect", "my_x_law"],
         "name must be words of two letters or more, such as my_xlaw; received 'my_x_law'",

@@ -59,7 +59,7 @@ def test_files_of_the_user_are_not_replaced(tisim, toml, tmp_path, command, name
     users.symlink_to(tmp_path / "elsewhere")
     code, out, err = tisim(command, toml, "--out", "mine", "--overwrite")
     assert (code, out) == (2, "")
-    assert f"mine/{name} must be a regular file of its own that may be opened; received a symbolic" in err
+    assert f"mine/{name} must be a regular file that can be opened; received a symbolic" in err
     assert (tmp_path / "elsewhere").read_text() == "the user's own"
 
 

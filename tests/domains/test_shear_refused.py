@@ -33,7 +33,7 @@ WRONG = {
     "control": (
         {},
         {"stepper": Verlet(control=ApproachTime()), "effects": ()},
-        r"stepper.control must be one that does not look at pairs, such as fixed_step, in a sheared_box; rec",
+        r"stepper.control must be one that does not depend on pairs, such as fixed_step, in a sheared_box",
     ),
     "sudden": (
         {},
@@ -43,27 +43,27 @@ WRONG = {
     "walls": (
         {},
         {"effects": (HERTZ_MINDLIN, Walls(planes=[Plane()]))},
-        r"effects.walls must be one that acts on all layers alike \(homogeneous\), as gravity does, in a she",
+        r"effects.walls must be the same at all places \(homogeneous\), as gravity is, in a she",
     ),
     "drag": (
         {},
         {"effects": (StokesDrag(viscosity=1e-3),)},
-        r"effects.stokes_drag must be one that acts on all layers alike",
+        r"effects.stokes_drag must be the same at all places",
     ),
     "flow": (
         {},
         {"effects": (UniformFlow(velocity=(0.0, 0.0, 0.0)),)},
-        r"effects.uniform_flow must be one that acts on all layers alike",
+        r"effects.uniform_flow must be the same at all places",
     ),
     "a force that does not say so": (
         {},
         {"effects": (Trap(stiffness=1.0),)},
-        r"effects.trap must be one that acts on all layers alike",
+        r"effects.trap must be the same at all places",
     ),
     "an operator": (
         {},
         {"effects": (PeakDisplacement(),)},
-        r"effects.peak_displacement must be one that acts on all layers alike",
+        r"effects.peak_displacement must be the same at all places",
     ),
 }
 

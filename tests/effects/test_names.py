@@ -120,12 +120,12 @@ def test_shared_fields_must_be_declared_equally():
 
 
 REFUSED = {
-    "effects.mie must be given once; received 2": lambda: one(Mie(epsilon=1.0), Mie(epsilon=2.0)),
-    "effects.core must be given once; received 2": lambda: one(CORE, NearField(name="core")),
-    "effects of kind impact must be one in a scene; received 2": lambda: one(
+    "effects.mie must be given only once; received 2": lambda: one(Mie(epsilon=1.0), Mie(epsilon=2.0)),
+    "effects.core must be given only once; received 2": lambda: one(CORE, NearField(name="core")),
+    "effects of kind impact must be at most one in a scene; received 2": lambda: one(
         Impact(hardness=1e5), Impact(name="soft", hardness=1e3)
     ),
-    "effects of kind random_kicks must be one in a scene; received 2": lambda: one(
+    "effects of kind random_kicks must be at most one in a scene; received 2": lambda: one(
         RandomKicks(sigma=1.0), RandomKicks(name="more", sigma=1.0)
     ),
     "effects.cold must be used together with effects.heating; received 'cold'": lambda: one(

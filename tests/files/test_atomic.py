@@ -211,7 +211,7 @@ def test_commands_on_an_inaccessible_folder_are_refused(theirs):
     assert completed.returncode == 0, completed.stderr
     ends = json.loads(completed.stdout.splitlines()[-1])
     assert [code for code, _ in ends] == [2] * len(COMMANDS)
-    rule = r"(in a folder that may be entered|a regular file of its own that may be opened); received "
+    rule = r"(in a folder that may be entered|a regular file that can be opened); received "
     for _, output in ends:
         *kernels, line = output.splitlines()
         assert re.fullmatch(rf"closed/\S+ must be {rule}.*(denied|without permission)", line)

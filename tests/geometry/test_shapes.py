@@ -273,7 +273,7 @@ def test_a_scene_file_names_the_file_of_a_surface(tmp_path, monkeypatch):
 
 
 FILES = {
-    "file = 'parts/t.st'": r"hopper.surface.file must be there; received '.*parts/t.st'",
+    "file = 'parts/t.st'": r"hopper.surface.file must be an existing file; received '.*parts/t.st'",
     "file = 3": r"hopper.surface.file must be text; received 3",
     "file = 'parts'": r"surface must be a regular file; received a folder .*parts",
     "file = 'parts/t.stl'\nscale = 0": r"hopper.surface.scale must be a number of m above 0; received 0",

@@ -57,7 +57,7 @@ def test_the_passage_precedes_the_outflow():
     data = train(gone=0.0).to_dict()
     tether, passage, outflow = data["effects"]
     turned = {name: data["effects"][name] for name in (tether, outflow, passage)}
-    rule = "^effects.passage must be before effects.outflow; received 'tether, outflow, passage'"
+    rule = "^effects.passage must be listed before effects.outflow; received 'tether, outflow, passage'"
     with pytest.raises(InputError, match=rule):
         Scene.from_dict({**data, "effects": turned})
     assert Scene.from_dict(data) == train(gone=0.0)

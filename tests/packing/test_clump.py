@@ -50,7 +50,7 @@ REFUSED = {
     "inertia": ({"mass": 1.0, "inertia": FLAT}, r"clump.inertia must be symmetric, with moments above 0"),
     "off": (
         {"mass": 1.0, "inertia": np.eye(3).tolist(), "centres": [(1, 0, 0), (3, 0, 0)]},
-        "clump must be one whose centre of mass is within what its spheres' centres span",
+        "clump must be one whose centre of mass lies between the centres of its spheres",
     ),
 }
 

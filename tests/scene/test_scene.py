@@ -203,7 +203,7 @@ class TestRequires:
                 (Impact(hardness=1), Softening(activation_energy=1)),
                 "effects.softening must be used together with effects.heating",
             ),
-            ((Impact(hardness=1), Impact(hardness=2)), "effects.impact must be given once; received 2"),
+            ((Impact(hardness=1), Impact(hardness=2)), "effects.impact must be given only once; received 2"),
         ],
     )
     def test_an_effect_without_its_requirements_is_refused(self, effects, message):

@@ -176,12 +176,17 @@ class Study:
         for name, decades_of_error in (("coarser", coarser), ("finer", finer)):
             must(is_whole(decades_of_error, -16), name, "a whole number of decades", decades_of_error)
         must(coarser + finer >= 0, "coarser + finer", "at least 0", coarser + finer)
-        must(len(precisions) > 0 and precisions[0] == "f64", "precisions", "f64 and others", precisions)
+        must(
+            len(precisions) > 0 and precisions[0] == "f64",
+            "precisions",
+            "a list that begins with f64",
+            precisions,
+        )
         for precision in precisions:
             must(precision in runtime.PRECISIONS, "precision", "f64 or f32", precision)
         rule = "strict, or strict and fast"
         must(tuple(arithmetics) in (("strict",), runtime.ARITHMETICS), "arithmetics", rule, arithmetics)
-        must(list(starts) == sorted(set(starts)), "starts", "given from few to many", list(starts))
+        must(list(starts) == sorted(set(starts)), "starts", "in increasing order", list(starts))
         must(len(starts) > 0 and starts[0] > 1, "starts", "at least 2", list(starts))
         must(budget > 0, "budget", "greater than 0", budget)
         must(limit > 0, "limit", "greater than 0", limit)
@@ -189,8 +194,8 @@ class Study:
         self.quantities = tuple(quantities) or usual(scene)
         kinds = {quantity.random for quantity in self.quantities}
         names = [quantity.name for quantity in self.quantities]
-        must(len(set(names)) == len(names), "quantities", "of different names", names)
-        must(len(kinds) == 1, "quantities", "all random, or none", sorted(kinds))
+        must(len(set(names)) == len(names), "quantities", "quantities with different names", names)
+        must(len(kinds) == 1, "quantities", "all random or all deterministic", sorted(kinds))
         self.random = kinds == {True}
         self.levels = tuple(float(k) for k in range(coarser, -finer - 1, -1))
         self.repeats, self.precisions, self.arithmetics = repeats, tuple(precisions), tuple(arithmetics)
@@ -240,7 +245,7 @@ class Study:
         measured = [row for row in self.rows if row.errors]
         if not measured:
             failed = next((f": {row.failed}" for row in self.rows if row.failed), "")
-            raise RunError(f"{name} must be of a setting that was measured; there is none{failed}")
+            raise RunError(f"{name} must be measured; received no setting that ran{failed}")
         least = min(measured, key=lambda row: row.at_most(k))
         finer = "more starts go further" if self.random else "finer settings go further"
         raise RunError(

@@ -116,13 +116,17 @@ def _usual_method(row: Row) -> str:
 
 
 def _label(study: Study, method: str) -> str:
-    """Return the name of a method, with the number of failed settings and the reason."""
+    """Return the name of a method, with the number of failed settings and the cause.
+
+    The time of the failure and advice are in the table.
+    """
     rows = study.line(method)
     failed = [row.failed for row in rows if row.failed]
     if not failed:
         return method
     many = "" if len(failed) == len(rows) else f"{len(failed)} of {len(rows)} "
-    return f"{method}; {many}failed: {failed[0]}"
+    cause = re.sub(r"^found at t = \S+ s: ", "", failed[0]).partition(" (")[0].partition(";")[0]
+    return f"{method}; {many}failed: {cause}"
 
 
 def _ring(axis: Axes, rows: list[Row], k: int, style: str, label: str) -> None:

@@ -132,7 +132,12 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     if impacts or operators start from a state without randomness.
     """
     if scene.stepper.random:
-        must(not any(scene.domain.joined()), "quantities", "given for random paths in a box", Words("none"))
+        must(
+            not any(scene.domain.joined()),
+            "quantities",
+            "given, as the mean square displacement is not defined in a periodic box",
+            Words("none"),
+        )
         return (Quantity("mean square displacement", mean_square, random=True),)
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
         # Positions jump at periodic faces, and so do velocities if the faces move relative to each other.
@@ -144,7 +149,7 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
         return (Quantity(name, value, returns=True),)
     starts = [scene.start(scene.seed + k) for k in (0, 1)]
     differ = any(not np.array_equal(starts[0][name], starts[1][name]) for name in ("position", "velocity"))
-    rule = "given for a scene with impacts or operators whose start is not random"
+    rule = "given, as impacts or operators act and the start is not random"
     must(differ, "quantities", rule, Words("none"))
     return (Quantity("mean kinetic energy", kinetic_energy, random=True),)
 
@@ -193,7 +198,12 @@ def reference_runs(methods: Sequence[SettingSweep], level: float) -> list[Refere
     level : decades of error at the finest settings of the methods. InputError if no method converges.
     """
     able = [m for m in methods if m.converges and all(s.numbers == USUAL_NUMBERS for s in m.settings)]
-    must(bool(able), "stepper", "one with an error that vanishes with an accuracy parameter", Words("none"))
+    must(
+        bool(able),
+        "stepper",
+        "one whose error can be made as small as wanted, for the reference",
+        Words("none"),
+    )
     best = max(able, key=lambda method: method.base.stepper.order)
     others = [
         m for m in able if type(m.base.stepper) is not type(best.base.stepper) and m.base.stepper.order > 1

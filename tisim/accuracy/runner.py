@@ -144,7 +144,12 @@ class StudyRunner:
         base = self._run([study.scene], 0.0)
         sweeps = self._methods(base)
         self.base = base.seconds
-        must(bool(sweeps), "scene", "one with a setting to vary", study.scene.stepper.kind())
+        must(
+            bool(sweeps),
+            "scene",
+            "one with a setting that trades accuracy for time",
+            study.scene.stepper.kind(),
+        )
         rounds = max(len(method.settings) for method in sweeps)
         measured = {row.key for row in study.rows}
         plan = [
@@ -233,7 +238,7 @@ class StudyRunner:
                 except RunError as error:
                     raise RunError(f"the {self.what}: {error}") from None
                 except OutOfTime:
-                    raise RunError(f"the {self.what}: takes more running than the budget has") from None
+                    raise RunError(f"the {self.what}: takes longer than the budget allows") from None
         largest = self._largest()
         study.truths = tuple(
             truth_by_reference(q, runs, references, most)

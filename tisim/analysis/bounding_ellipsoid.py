@@ -87,7 +87,7 @@ def bounding_ellipsoid(
         points = np.vstack([points[used], farthest[worst] @ axes.T + centre])
         fresh = np.full(len(worst), 0.1 / len(worst))
         weights = np.concatenate([0.9 * weights[used], fresh])
-    must(growth**3 <= 1 + tolerance, "tolerance", "within reach of the search", tolerance)
+    must(growth**3 <= 1 + tolerance, "tolerance", "larger, as the search ends before it", tolerance)
     semi_axes = scale * growth / np.sqrt(squares)
     return Ellipsoid(middle + scale * centre, semi_axes, np.ascontiguousarray(axes.T))
 

@@ -46,7 +46,12 @@ def radial_distribution(
     count = int(number.max(initial=-1)) + 1
     deep = (places[:count] >= edges[-1]) & (places[:count] <= lengths - edges[-1])
     centres = places[:count][(deep | joined).all(axis=1)]
-    must(len(centres) > 0, "particles", "farther than the last edge from all open faces, at least one", 0)
+    must(
+        len(centres) > 0,
+        "particles",
+        "at least one that is farther than the last edge from all open faces",
+        0,
+    )
     within = cKDTree(centres).count_neighbors(cKDTree(places), edges)
     if edges[0] == 0:
         # Exclude each particle's distance of 0 to itself.

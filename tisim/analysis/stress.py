@@ -28,9 +28,9 @@ def stress_tensor(result: Result, volume: float | None = None) -> np.ndarray:
     Source: J. H. Irving, J. G. Kirkwood, J. Chem. Phys. 18 (1950) 817.
     """
     state, domain = result.state, result.scene.domain
-    must("virial" in state, "scene", "with the effect virial for a stress", sorted(state))
+    must("virial" in state, "scene", "with the effect virial, which measures the stress", sorted(state))
     if volume is None:
-        must(all(domain.joined()), "volume", "given unless all faces of the box are joined", None)
+        must(all(domain.joined()), "volume", "given, unless the box is periodic along all axes", None)
         volume = float(np.abs(np.linalg.det(domain.edges(result.time))))
     must(volume > 0, "volume", "above 0 m^3", volume)
     return -(streaming_part(result) + state["virial"].sum(axis=0).reshape(3, 3)) / volume
@@ -58,7 +58,7 @@ def stress_profile(result: Result, edges: np.ndarray, area: float, axis: int = 2
     in all layers and on the walls.
     """
     state = result.state
-    must("virial" in state, "scene", "with the effect virial for a stress", sorted(state))
+    must("virial" in state, "scene", "with the effect virial, which measures the stress", sorted(state))
     must(area > 0, "area", "above 0 m^2", area)
     position, edges = state["position"].astype(float), np.asarray(edges, float)
     mass, velocity = state["mass"].astype(float), state["velocity"].astype(float)

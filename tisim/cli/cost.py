@@ -113,10 +113,10 @@ def cost(
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
-    """Measure error against time for every setting of a scene; write cost.csv, cost.h5 and cost.png.
+    """Measure error against time for every setting of a scene.
 
-    The same command, given again, resumes where it was stopped, and answers --error from the stored
-    measurements.
+    It writes cost.csv, cost.h5 and cost.png. The same command, given again, resumes where it was stopped, and
+    answers --error from the stored measurements.
     """
     from tisim.accuracy import Study, report, storage
 

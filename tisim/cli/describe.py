@@ -60,7 +60,10 @@ def explain(
     size: Size = None, device: Device = "cpu", precision: Precision = "f64", plugins: Plugins = None,
     everything: Everything = False, variant: SceneVariant = None,
 ) -> None:  # fmt: skip
-    """Describe a scene: its effects with values and memory, its stepper and steps, and what is left out."""
+    """Describe a scene: effects, memory, stepper and steps.
+
+    It also lists the kinds of effects that the scene leaves out, and their cost.
+    """
     from tisim.describe.explain import brief, explain, render
 
     runtime.init(device, precision)
@@ -75,7 +78,7 @@ def check(
     arithmetic: Arithmetic = "strict",
     plugins: Plugins = None,
 ) -> None:  # fmt: skip
-    """Run a case's own checks; exit code 1 when one fails."""
+    """Run the checks of a case; exit code 1 if one fails."""
     checks = targets.case(case).check()
     runtime.init(device, precision, threads, arithmetic)
     table = plain_table("check", "measured", "expected", "off by", "allowed", "")
@@ -94,7 +97,10 @@ def check(
 
 
 def doctor() -> None:
-    """Report this machine's backend, processor, memory, devices and versions; time both backends."""
+    """Report processor, memory, devices and versions of this machine.
+
+    It also times the kernel compilers that are installed.
+    """
     from tisim.describe.diagnostics import findings
 
     table = plain_table()

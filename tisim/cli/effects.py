@@ -30,7 +30,7 @@ LEAST_WIDTH = 20
 
 
 def effects(name: Name = None, plugins: Plugins = None) -> None:
-    """List effects, sources, operators, steppers, step controls, placements and others, or explain one."""
+    """List all effects, steppers and other parts, or explain one."""
     from tisim.describe import reference
 
     groups = reference.groups()

@@ -61,8 +61,11 @@ def plot(
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
-    """Draw the cloud, the time series of energy, centre of gravity and number of particles, the forces on
-    walls and driven groups, and the pictures of its case."""
+    """Draw pictures of a run.
+
+    They show the cloud, the time series of energy, centre of gravity and number of particles, the forces on
+    walls and driven groups, and more if the run is of a case.
+    """
     from tisim.io.reader import frames
 
     file = _trajectory_file(file)
@@ -101,7 +104,9 @@ def figures(
     arithmetic: Arithmetic = "strict", overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:  # fmt: skip
-    """Make the figures of a case that take many runs, and the numbers in them.
+    """Draw the figures of a case, which need many runs.
+
+    The numbers in them are written as CSV files.
 
     An interrupted command keeps no results; it starts from the beginning when run again.
     """
@@ -111,7 +116,7 @@ def figures(
     size_name = size or "default"
     chosen_case.size(size_name)
     if chosen_case.figures is None:
-        raise InputError(f"case must be one with figures; received {case!r}")
+        raise InputError(f"case must be one that has figures; received {case!r}")
     # Check that drawing works before the runs.
     with pictures.drawing(f"figures of {chosen_case.name}"):
         from tisim.plotting import style
@@ -153,7 +158,7 @@ def movie(
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
-    """Draw a trajectory as a moving picture."""
+    """Draw the trajectory of a run as a moving picture."""
     from tisim.io.reader import frames
 
     file = _trajectory_file(file)
@@ -177,7 +182,10 @@ def export(
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
-    """Write the frames of a run for other programs; h5md is a copy."""
+    """Convert the frames of a run to a format of other programs.
+
+    A trajectory is H5MD already; the format h5md makes a copy of it.
+    """
     from tisim.io.export import check, file_names
     from tisim.io.export import export as write
     from tisim.io.reader import frames, world_count
@@ -220,9 +228,9 @@ def _trajectory_file(path: Path) -> Path:
         if regular_file.exists(path / name):
             pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
             raise InputError(
-                f"folder must be of a run; received the folder of {what}, with the pictures: {pictures}"
+                f"folder must be one of a run; received the folder of {what}, with the pictures: {pictures}"
             )
-    raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
+    raise InputError(f"folder must contain a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 
 
 @contextmanager

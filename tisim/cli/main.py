@@ -29,7 +29,7 @@ WRITERS = ("run", "new", "cost", "optimize", "compare", "plot", "figures", "movi
 
 app = typer.Typer(
     cls=CommandGroup,
-    help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
+    help="Simulate interacting particles, and search for the design that gives a wanted result.",
     no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None,
 )  # fmt: skip
 for _command in COMMANDS:

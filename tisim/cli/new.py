@@ -39,7 +39,9 @@ Kind = Annotated[
 
 
 def new(what: What, name: Name, kind: Kind = None) -> None:
-    """Write NAME.py with a part of scenes, a case or an inverse problem that runs, and test_NAME.py.
+    """Write an example to start from: an effect, a case or another part.
+
+    The example is in NAME.py and runs as it is; test_NAME.py tests it.
 
     For an effect, contact_part, operator, source or stepper it also writes NAME.toml, a scene that uses it.
     Existing files are not overwritten. NAME.py begins with a short contract: the names that such a file must
@@ -76,9 +78,14 @@ def _check_name(what: str, name: str) -> None:
     from tisim.components.component import snake_case
     from tisim.describe import reference
 
-    must(find_spec(name) is None, "name", "one that no other module has", name)
+    must(find_spec(name) is None, "name", "a name that no other Python module has", name)
     of_scene = USES[what] == SCENE_COMMAND
-    must(not of_scene or name not in reference.names(), "name", "one that no other part of scenes has", name)
+    must(
+        not of_scene or name not in reference.names(),
+        "name",
+        "a name that no other effect, operator, source or stepper has",
+        name,
+    )
     # Scenes find a part by its class, whose name must lead back to the name of the file.
     found = snake_case(fields_of(name)["Class"])
     must(not of_scene or found == name, "name", f"words of two letters or more, such as {found}", name)
@@ -90,4 +97,4 @@ def _write(path: Path, text: str) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except OSError as error:
-        raise InputError(f"{path} must be a file that can be made; received {error.strerror}") from None
+        raise InputError(f"{path} must be a file that can be written; received {error.strerror}") from None

@@ -21,7 +21,7 @@ def nameable(path: Path | None) -> Path | None:
         # Too long, a loop of links, a NUL, or bytes that are not text.
         why = error.strerror if isinstance(error, OSError) else "not a name"
         raise InputError(
-            f"path must be one that this system can have; received {abbreviated(str(path))} ({why})"
+            f"path must be a valid name of a file or folder; received {abbreviated(str(path))} ({why})"
         ) from None
     return path
 
@@ -56,7 +56,9 @@ CaseName = Annotated[
 Changes = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Change a setting: effects.impact.hardness=3e5. Repeatable."
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a setting, as effects.impact.hardness=3e5. Repeatable.",
     ),
 ]
 SceneVariant = Annotated[
@@ -100,7 +102,7 @@ Fresh = Annotated[
 ]  # fmt: skip
 Absent = Annotated[
     list[str] | None,
-    typer.Option("--without", metavar="EFFECT", help="Leave an effect out: cooling. Repeatable."),
+    typer.Option("--without", metavar="EFFECT", help="Leave out an effect, such as cooling. Repeatable."),
 ]
 Frames = Annotated[
     int | None,

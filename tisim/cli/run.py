@@ -50,7 +50,10 @@ def run(
     overwrite: Overwrite = False, frames: Frames = None, every: Every = None, plugins: Plugins = None,
     variant: SceneVariant = None,
 ) -> None:  # fmt: skip
-    """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
+    """Run a scene, and write its result and a picture.
+
+    The files are result.h5, scene.toml, versions.json and cloud.png.
+    """
     from tisim.engine import checkpoint
     from tisim.io import run_folder
     from tisim.io.recording import recording_from_options

@@ -85,7 +85,7 @@ def optimize(
         ),
     ] = None,
     generations: Annotated[
-        int | None, typer.Option(help="Number of generations after the random one.")
+        int | None, typer.Option(help="Number of generations after the first, random one.")
     ] = None,
     population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
     target: Annotated[
@@ -113,9 +113,10 @@ def optimize(
     executor: Executor = "batch",
     plugins: Plugins = None,
 ) -> None:
-    """Search for the best design of a case, or of your own problem in a Python file.
+    """Search for the best design of a case, or of your own problem.
 
-    All results are stored in search.h5. The same command, given again, resumes where it was stopped.
+    Your own problem is a Python file with a PROBLEM. All results are stored in search.h5. The same command,
+    given again, resumes where it was stopped.
     """
     from tisim.optimize.beginning import Beginning
     from tisim.optimize.evaluation.executors import evaluator_for
@@ -188,7 +189,7 @@ def compare(
     executor: Executor = "batch",
     plugins: Plugins = None,
 ) -> None:
-    """Compare search methods on a case, or on your own problem, at equal numbers of runs.
+    """Compare search methods at equal numbers of runs.
 
     The same command, given again, resumes where it was stopped; with other methods or numbers it reuses the
     runs.
@@ -240,7 +241,7 @@ def cache(
     ] = False,
     compact: Annotated[bool, typer.Option("--compact", help="Drop damaged and duplicate records.")] = False,
 ) -> None:
-    """List the evaluations in a search's file; verify or compact it."""
+    """List the runs stored by a search; verify or compact the file."""
     from tisim.optimize.report.cache_summary import summary
     from tisim.optimize.storage import maintenance
 

@@ -144,8 +144,8 @@ class Box(Domain):
 
     low: Vector = parameter("m", "lower corner of the box", examples=[(-0.01, -0.01, -0.01)])
     high: Vector = parameter("m", "upper corner of the box", examples=[(0.01, 0.01, 0.01)])
-    periodic: Axes = option("whether opposite faces are joined along x, y and z", (True, True, True))
-    images: bool = option("whether particles see each other across joined faces", True)
+    periodic: Axes = option("whether the box is periodic along x, y and z", (True, True, True))
+    images: bool = option("whether particles interact across periodic faces", True)
 
     @model_validator(mode="after")
     def _ordered(self) -> Box:

@@ -63,7 +63,12 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         effect.check_start(start, scene)
     with np.errstate(over="ignore", invalid="ignore"):
         momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
-    must(bool(np.isfinite(momentum)), "particles.velocity", "of a finite momentum", float(momentum))
+    must(
+        bool(np.isfinite(momentum)),
+        "particles.velocity",
+        "small enough for the total momentum to be a finite number",
+        float(momentum),
+    )
     # If rounding is coarser than a radius, contacts cannot be found.
     farthest = np.abs(start["position"]).max(axis=1)
     coarse = np.spacing(farthest.astype(_real())) > start["radius"]

@@ -140,5 +140,5 @@ def _refusal(path: Path, error: OSError) -> InputError | None:
 
 def _not_regular(path: Path, received: str) -> InputError:
     return InputError(
-        f"{printable(str(path))} must be a regular file of its own that may be opened; received {received}"
+        f"{printable(str(path))} must be a regular file that can be opened; received {received}"
     )

@@ -68,7 +68,7 @@ class TriangulatedSurface(Shape):
         must(not others, where, "given a file and a scale alone, or vertices and faces", ", ".join(others))
         file, scale = values["file"], values.get("scale", 1.0)
         must(isinstance(file, str), f"{where}.file", "text", file)
-        must(regular_file.exists(folder / file), f"{where}.file", "there", str(folder / file))
+        must(regular_file.exists(folder / file), f"{where}.file", "an existing file", str(folder / file))
         surface = cls.read(folder / file, scale, where)
         return {"vertices": surface.vertices, "faces": surface.faces}
 

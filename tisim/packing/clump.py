@@ -150,7 +150,7 @@ def _shares(places: np.ndarray, radius: np.ndarray) -> np.ndarray:
     )
     shares: np.ndarray = softmax(weights + r @ found.x)
     off = float(np.abs(shares @ r).max())
-    must(off < 1e-9, "clump", "one whose centre of mass is within what its spheres' centres span", off)
+    must(off < 1e-9, "clump", "one whose centre of mass lies between the centres of its spheres", off)
     return shares
 
 

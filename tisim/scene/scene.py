@@ -105,10 +105,10 @@ class Scene(Component):
         present = [type(effect) for effect in self.effects]
         labels = [effect.label for effect in self.effects]
         for effect, kind, label in zip(self.effects, present, labels, strict=True):
-            must(labels.count(label) == 1, f"effects.{label}", "given once", labels.count(label))
+            must(labels.count(label) == 1, f"effects.{label}", "given only once", labels.count(label))
             repeatable = kind.repeatable and not names_of(kind.world_fields, "measure")
             allowed = repeatable or present.count(kind) == 1
-            must(allowed, f"effects of kind {kind.kind()}", "one in a scene", present.count(kind))
+            must(allowed, f"effects of kind {kind.kind()}", "at most one in a scene", present.count(kind))
             for required_kinds in effect.required_effects():
                 must(
                     any(issubclass(other, required_kinds) for other in present),
@@ -120,7 +120,7 @@ class Scene(Component):
                 apart = not issubclass(other, kind.excludes)
                 must(apart, f"effects.{label}", f"used without {other.kind()}", other_label)
                 late = issubclass(other, kind.precedes) and labels.index(other_label) < labels.index(label)
-                must(not late, f"effects.{label}", f"before effects.{other_label}", ", ".join(labels))
+                must(not late, f"effects.{label}", f"listed before effects.{other_label}", ", ".join(labels))
             quantities = {other.quantity for other in present if issubclass(other, Source)}
             must(
                 not kind.requires_source or not quantities.isdisjoint(kind.requires_source),

@@ -70,12 +70,12 @@ class Stepper(Component):
             where = f"in a {domain.kind()}"
             rule = f"one that follows shear, such as verlet or boris, {where}"
             must(self.follows_shear, "stepper", rule, self.kind())
-            rule = f"one that does not look at pairs, such as fixed_step, {where}"
+            rule = f"one that does not depend on pairs, such as fixed_step, {where}"
             must(not self.control.watches_pairs, "stepper.control", rule, self.control.kind())
             for effect in effects:
                 name = f"effects.{effect.label}"
                 must(not isinstance(effect, PairEvent), name, f"a force, not a pair event, {where}", name)
-                rule = f"one that acts on all layers alike (homogeneous), as gravity does, {where}"
+                rule = f"the same at all places (homogeneous), as gravity is, {where}"
                 must(effect.homogeneous, name, rule, effect.kind())
 
     def resolves(self, effects: Sequence[Effect], start: Callable[[], Mapping[str, np.ndarray]]) -> None:

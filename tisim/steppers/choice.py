@@ -73,7 +73,7 @@ def choose(
     for effect in effects:
         rule = f"given, because the step length is part of the law of effects.{effect.label}"
         must(not effect.step_dependent, "scene.stepper", rule, Words("none"))
-        rule = f"given, because effects.{effect.label} inserts particles later, of sizes unknown here"
+        rule = f"given, because effects.{effect.label} inserts particles later, of sizes not known in advance"
         must(not len(largest_inserted([effect])["radius"]), "scene.stepper", rule, Words("none"))
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
@@ -142,7 +142,7 @@ def _meetings(
 ) -> StepperChoice:
     _check_told(steps, "collisions")
     for effect in effects:
-        rule = f"given, because no choice steps collisions and effects.{effect.label} together"
+        rule = f"given, because no default stepper suits both collisions and effects.{effect.label}"
         suits = ApproachTime.kind() not in effect.incompatible_controls and not effect.gyrates(effects)
         must(suits, "scene.stepper", rule, Words("none"))
     control, events = ApproachTime(), any(isinstance(effect, PairEvent) for effect in effects)
@@ -158,7 +158,7 @@ def _meetings(
     longest = min(longest, leapfrog_step(effects, critical, accuracy)[0])
     control = ApproachTime(shortest=_length(min(shortest, longest)), longest=_length(longest))
     what = "particles collide" if events else "no force acts"
-    reason = f"{what}: steps from one meeting of surfaces to the next, {control.shortest:.3g} s at least"
+    reason = f"{what}: steps that end when two surfaces meet, of {control.shortest:.3g} s at least"
     return StepperChoice(Verlet(control=control), reason, critical)
 
 
@@ -182,7 +182,7 @@ def _leapfrog(
     gyrates = any(effect.gyrates(effects) for effect in effects)
     others = [one.label for one in effects if one.leapfrog and not isinstance(one, Force | PairForce)]
     if gyrates and others:
-        rule = f"given, because no choice steps a magnetic force and effects.{others[0]} to second order"
+        rule = f"given, because no default stepper suits both a magnetic force and effects.{others[0]}"
         must(False, "scene.stepper", rule, Words("none"))
     stepper = (Boris if gyrates else Verlet)(control=FixedStep(dt=dt))
     reason = (

@@ -17,7 +17,7 @@ def assert_lists(scene: Scene, simulation: Simulation | None = None) -> None:
     simulation : a simulation of two worlds compiled for the structure of the scene; created if not given.
     """
     control = scene.stepper.control
-    must(not control.watches_pairs, "step control", "one that does not look at pairs", control.kind())
+    must(not control.watches_pairs, "step control", "one that does not depend on pairs", control.kind())
     made = simulation or Simulation(scene, worlds=2)
     made.load([scene, scene])
     made.s.write("listed_above", np.array([0, ALL_PAIRS]))

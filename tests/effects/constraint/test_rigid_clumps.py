@@ -418,7 +418,7 @@ def test_particles_without_clumps_are_refused():
     cut = {name: values[1:] for name, values in made.start().items()}
     core = {name: cut.pop(name) for name in ("position", "velocity", "radius", "mass")}
     part = made.model_copy(update={"particles": Particles(**core, quantities=cut)})
-    with pytest.raises(InputError, match="particles must be those of whole clumps"):
+    with pytest.raises(InputError, match="particles must be whole clumps"):
         simulate([part])
 
 

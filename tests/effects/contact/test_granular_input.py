@@ -53,7 +53,7 @@ WRONG = {
     f"{ALONE}; received 'hertz, walls'": lambda: one(Hertz(young=1, poisson=0), Walls(planes=[Plane()])),
     "stepper.control must be one that suits granular, such as fixed_step or the control of an implicit "
     "stepper; received 'approach_time'": lambda: one(HERTZ_MINDLIN, stepper=Verlet()),
-    "effects.granular must be given once; received 2": lambda: one(HERTZ_MINDLIN, HERTZ_MINDLIN),
+    "effects.granular must be given only once; received 2": lambda: one(HERTZ_MINDLIN, HERTZ_MINDLIN),
     "materials must be given, as hertz_material needs them; received none": lambda: one(
         HERTZ_MINDLIN, materials={}
     ),

@@ -130,7 +130,7 @@ def test_a_periodic_box_with_images_is_refused():
     scene([[0.5] * 3], [[0] * 3], (TreeGravity(),), mass=1.0, radius=0.1, domain=Box(**box, images=False))
     with pytest.raises(InputError) as fault:
         scene([[0.5] * 3], [[0] * 3], (TreeGravity(),), mass=1.0, radius=0.1, domain=Box(**box))
-    assert "particles do not see images of each other, with effects.tree_gravity" in str(fault.value)
+    assert "one without periodic images, with effects.tree_gravity" in str(fault.value)
 
 
 def test_a_cost_study_tries_tree_gravity():

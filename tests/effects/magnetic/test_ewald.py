@@ -271,13 +271,13 @@ def test_settings_minimise_cost_and_suit_the_box():
     for settings in (few, many, ewald_settings(box((6.0, 9.0, 3.0), (True, False, True)), 50)):
         EwaldDipoleDipole(**settings)
     assert ewald_settings(box(), 10)["cutoff"] == pytest.approx(0.4 * 4.0)
-    with pytest.raises(InputError, match=r"^open must be one in which particles see images"):
+    with pytest.raises(InputError, match=r"^open must be a periodic box with images"):
         ewald_settings(Open(), 10)
 
 
 FINE = {"cutoff": 1.6, "waves": WAVES}
 WRONG = {
-    "box must be one in which particles see images of each other along two axes or three, with "
+    "box must be periodic along two or three axes, with "
     "effects.ewald_dipole_dipole; received (True, False, False)": (FINE, {"periodic": (True, False, False)}),
     "effects.ewald_dipole_dipole.waves must be at least (11, 14, 13) in this box; received (11, 13, 12)": (
         {**FINE, "accuracy": 1e-4},

@@ -212,7 +212,7 @@ DESIGN = GENOME.decode(np.full(7, 0.5))
         (lambda: Choice("c", ("a", "b" * 41)), r"choice of c must be a printable text of at most 40"),
         (lambda: Choice("c", ("a", None)), r"choice of c must be a text, a number or a flag; received None"),
         (lambda: FixedGene("f", [1]), r"fixed gene f must be a text, a number or a flag; received \[1\]"),
-        (lambda: DependentGene("d", "", 3.0), r"of of dependent gene d must be a function of the design"),
+        (lambda: DependentGene("d", "", 3.0), r"function 'of' of dependent gene d must be a function"),
         (lambda: Genome((FixedGene("f", 1),)), r"genome must be one gene or more that is searched"),
         (lambda: Genome(("x",)), r"gene must be a Gene, Choice, FixedGene or DependentGene; received 'x'"),
     ],

@@ -263,9 +263,13 @@ def test_starts_with_equal_results_count_separately():
     assert "starts: number of random starts in the mean" in console.export_text()
 
 
-@pytest.mark.parametrize(("budget", "part"), [(None, 0.25), (40, 0.5), (1000, 0.25)])
-def test_the_bar_goes_to_its_end_by_generations_or_by_the_budget(budget, part):
+@pytest.mark.parametrize(
+    ("budget", "part", "reached"),
+    [(None, 0.25, "2 of 9"), (40, 0.5, "2, 20 of 40 runs"), (1000, 0.25, "2 of 9")],
+)
+def test_the_bar_goes_to_its_end_by_generations_or_by_the_budget(budget, part, reached):
     settings = Settings(generations=9, max_evaluations=budget)
     display = Display(fake_problem(), settings, Console(file=io.StringIO()))
     display.step(Progress(2, 9, 0.5, (1.0,), 1, None, 14, 6, 1.0))
     assert display.bar.tasks[0].percentage == pytest.approx(100 * part)
+    assert display.bar.tasks[0].fields["reached"] == f"generation {reached}"

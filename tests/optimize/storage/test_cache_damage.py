@@ -318,7 +318,7 @@ def test_irregular_files_are_refused(path, place, name):
     path.with_name(name).unlink()
     place(path.with_name(name))
     for function in (Cache, verify, existing, compact):
-        with pytest.raises(InputError, match=rf"{name} must be a regular file of its own"):
+        with pytest.raises(InputError, match=rf"{name} must be a regular file that"):
             function(path)
 
 

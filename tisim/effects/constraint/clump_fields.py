@@ -75,7 +75,7 @@ def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
         rows = ((first, firsts), (member, firsts + number - lead), (size, np.repeat(sizes, sizes)))
         whole = all(np.array_equal(values, right) for values, right in rows)
         whole = whole and np.array_equal(clump, clump[lead]) and len(np.unique(clump)) == len(leads)
-    must(whole, "particles", "those of whole clumps, as Particles.of_clumps makes them", Words("others"))
+    must(whole, "particles", "whole clumps, as Particles.of_clumps makes them", Words("others"))
     if len(held):
         _check_bodies(start, domain, held, np.repeat(held[leads], sizes))
 

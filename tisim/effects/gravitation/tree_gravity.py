@@ -67,7 +67,7 @@ class TreeGravity(LongRange, Force):
 
     def check(self, scene: SceneParts) -> None:
         domain = scene.domain
-        rule = f"one in which particles do not see images of each other, with effects.{self.label}"
+        rule = f"one without periodic images, with effects.{self.label}"
         must(not any(domain.imaged()), domain.label, rule, domain.imaged())
 
     def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> TreeSum:

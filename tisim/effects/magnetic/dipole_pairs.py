@@ -112,7 +112,12 @@ class DipolePairs(Dipoles):
         rule, every = "greater than 2, or 2 beside a gap", self.every_pair and self.cutoff == self.gap == 0
         rule += ", or 0 without a gap for all pairs" if self.every_pair else ""
         must(apart or every, f"{self.label}.cutoff", rule, self.cutoff)
-        must(self.short_ranged or not self.shifted, f"{self.label}.shifted", "false without a cutoff", True)
+        must(
+            self.short_ranged or not self.shifted,
+            f"{self.label}.shifted",
+            "false without a cutoff",
+            True,
+        )
         return self
 
     @property

@@ -98,7 +98,7 @@ def ewald_settings(
 
     The ``waves`` hold for this box; worlds of a batch share them, so use the values of the largest box.
     """
-    must(any(domain.imaged()), domain.label, "one in which particles see images of each other", domain.kind())
+    must(any(domain.imaged()), domain.label, "a periodic box with images", domain.kind())
     must(particles > 0, "particles", "above 0", particles)
     x = screening_for(accuracy)
     s, sides = waves_for(accuracy, x), periods(domain, slab_factor)

@@ -102,7 +102,7 @@ class EwaldPairs(LongRange, Dipoles):
         super().check(scene)
         domain = scene.domain
         joined, where = domain.imaged(), f"effects.{self.label}"
-        rule = f"one in which particles see images of each other along two axes or three, with {where}"
+        rule = f"periodic along two or three axes, with {where}"
         must(sum(joined) >= 2 and not domain.shears(), domain.label, rule, joined)
         poles, rule = any(self.demagnetising_factors), "0 in a box with an open axis, along which it is 1"
         must(all(joined) or not poles, f"{where}.demagnetising_factors", rule, self.demagnetising_factors)

@@ -62,7 +62,9 @@ class Walls(WallContacts, UsesMaterials, Force):
     requires: ClassVar = (GranularContact,)
 
     planes: tuple[Plane, ...] = option(
-        "planes; their number may differ per world, as for the other lists", (), examples=[(Plane(),)]
+        "planes; worlds of a batch may differ in their number, as for other shapes",
+        (),
+        examples=[(Plane(),)],
     )
     discs: tuple[Disc, ...] = option("flat discs", (), examples=[()])
     spheres: tuple[SphericalSurface, ...] = option(

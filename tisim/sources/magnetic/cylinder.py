@@ -138,7 +138,7 @@ class MagneticCylinders(Magnets):
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
 
-    cylinders: tuple[Cylinder, ...] = option("the cylinders; their number may differ per world")
+    cylinders: tuple[Cylinder, ...] = option("the cylinders; worlds of a batch may have different numbers")
     table_digits: int | None = option(
         "digits of accuracy of field and gradient from a table; closed forms unless given",
         None,

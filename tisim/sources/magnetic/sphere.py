@@ -49,4 +49,4 @@ class MagneticSpheres(Magnets):
     Source: J. D. Jackson, Classical Electrodynamics (1999), Eqs (5.56), (5.105).
     """
 
-    spheres: tuple[Sphere, ...] = option("the spheres; their number may differ per world")
+    spheres: tuple[Sphere, ...] = option("the spheres; worlds of a batch may have different numbers")

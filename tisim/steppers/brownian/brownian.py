@@ -71,7 +71,7 @@ class Brownian(Stepper):
     hydrodynamics: Literal["none", "oseen", "rotne-prager"] = option(
         "hydrodynamic interaction: tensor D_ij for i != j; none: D_ij = 0", "none"
     )
-    noise: Literal["exact", "fast"] = option("method that makes the noise", "exact")
+    noise: Literal["exact", "fast"] = option("method by which the noise is computed", "exact")
 
     all_pairs = True
     random: ClassVar = True

@@ -39,7 +39,7 @@ class DriftLimit(Controller):
 
     longest: float = parameter(
         "s",
-        "longest step; independent particles meet at multiples of it",
+        "longest step; particles without interaction are at a common time at its multiples",
         examples=[1e-4],
         ge=SHORTEST_STEP,
     )

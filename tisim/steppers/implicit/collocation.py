@@ -77,11 +77,11 @@ class StageControl(ImplicitControl):
     """
 
     error: float = parameter("", "requested error of position, relative", 1e-6, gt=0)
-    part: float = parameter("", "part of that error that may remain when sweeps end", 0.3, gt=0)
+    part: float = parameter("", "largest error when sweeps end, over the requested error", 0.3, gt=0)
     sweeps: int = option("largest number of sweeps in a step", 10, ge=2)
     safety: float = parameter(
         "",
-        "part of that error at which the next step aims",
+        "safety factor of the length of the next step",
         0.85,
         ge=LEAST_SAFETY,
         lt=1,

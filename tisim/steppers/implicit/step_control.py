@@ -234,9 +234,7 @@ class ErrorControl(IterationControl):
     """
 
     error: float = parameter("", "requested error of position, relative", 1e-4, gt=0)
-    safety: float = parameter(
-        "", "part of that error at which the next step aims", 0.8, ge=LEAST_SAFETY, lt=1
-    )
+    safety: float = parameter("", "safety factor of the length of the next step", 0.8, ge=LEAST_SAFETY, lt=1)
     resolution: float = parameter(
         "", "part of its radius that is added to a particle's displacement or size of motion", 1e-3, ge=0
     )
