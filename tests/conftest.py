@@ -1,6 +1,7 @@
 """One runtime for the whole suite: cpu, f64 and strict arithmetic, unless TISIM_DEVICE, TISIM_TEST_PRECISION
 or TISIM_TEST_ARITHMETIC is set."""
 
+import gc
 import json
 import os
 import signal
@@ -69,7 +70,10 @@ def pytest_configure(config):
 
     The processes of xdist, one for each core, inherit the environment of this one. Otherwise the linear
     algebra of NumPy and SciPy would start one thread per core in each of them, which wait for each other.
+
+    A third of the time of the collection went to searches for garbage, of which it leaves none.
     """
+    gc.disable()
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
@@ -77,6 +81,12 @@ def pytest_configure(config):
         signal.signal(signal.SIGHUP, lambda *_: None)
     os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def pytest_collection_finish():
+    """Collect garbage again, except among the tests and modules."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
