@@ -109,6 +109,7 @@ def test_a_free_top_turns_to_second_order_and_keeps_its_momentum():
     assert np.log2(energies[0] / energies[2]) > 3.5
 
 
+@pytest.mark.long
 def test_a_top_spun_about_its_intermediate_axis_flips():
     """Energy stays bounded over thousands of turns, and the axis flips back and forth (Dzhanibekov)."""
     axes = PEAR.body.axes
@@ -410,6 +411,7 @@ def test_invalid_scenes_are_refused(why):
         clumps(PEAR, [(0, 0, 0)], **wrong)
 
 
+@pytest.mark.long
 def test_particles_without_clumps_are_refused():
     made = clumps(PEAR, [(0, 0, 0)])
     bare = made.model_copy(update={"particles": LOOSE})

@@ -62,6 +62,7 @@ def needle(angle, moment=2.0, flux=3.0, **more):
     return magnets([[0, 0, 0]], start, felt(MagneticField(constant=(0, 0, flux))), **more)
 
 
+@pytest.mark.long
 def test_a_compass_needle_swings_as_a_pendulum():
     """I theta'' = -m B sin theta, I = 2/5 m R^2. For small angles the frequency is sqrt(m B / I); for any
     angle the period is 4 K(sin^2 theta_0/2) over that frequency."""
@@ -78,6 +79,7 @@ def test_a_compass_needle_swings_as_a_pendulum():
         np.testing.assert_array_equal(state["spin"][0, [0, 2]], 0.0)
 
 
+@pytest.mark.long
 def test_a_moment_turns_with_its_particle_and_keeps_its_magnitude(rng):
     """Without a field a moment rotates about the spin by the spin times the time, in steps of any size. Its
     length stays constant to the rounding of 20 000 rotations."""

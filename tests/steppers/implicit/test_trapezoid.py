@@ -171,6 +171,7 @@ def test_particles_at_rest_have_no_error():
         np.testing.assert_allclose(end.state["position"][0], place, rtol=0, atol=1e-15)
 
 
+@pytest.mark.long
 def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
     """Z16's control: from dt_0 the step grows to dt_lim in an easy problem, and K stays below K_d."""
     (result,) = simulate([oscillator(Trapezoid(), duration=0.1)], worlds=1)
@@ -219,6 +220,7 @@ def test_the_force_of_the_previous_iterate_suffices():
     assert sums[1] > 2.5
 
 
+@pytest.mark.long
 def test_only_needed_fields_are_allocated():
     """No spins without torques; for one particle no sums or iterates; without acceleration no stored
     iterates."""
