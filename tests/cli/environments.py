@@ -164,7 +164,7 @@ STREAMS = (
      {"result": None, "says": FULL, "prints": "pull.py"}),
 )  # fmt: skip
 TEXTS = (
-    ("ASCII by LC_ALL=C", f"{ASCII} $RUN", {"quick": True}),
+    ("ASCII by LC_ALL=C", f"{ASCII} $RUN"),
     ("ASCII by PYTHONIOENCODING", "PYTHONIOENCODING=ascii:strict $RUN"),
     ("ASCII: explain", f"{ASCII} $TISIM explain tiny.toml", {"result": None, "says": ""}),
     ("ASCII: effects", f"{ASCII} $TISIM effects > list && ! LC_ALL=C grep '[^ -~]' list", {"result": None}),
@@ -268,7 +268,7 @@ PYTHONS = (
     ("forked by hand after a run", "print(work()); assert child(sys.exit) == 0; print(work())",
      {"prints": SPAWN, "quick": True}),
     ("forked by hand after a run, quadrants", "print(work()); assert child(sys.exit) == 0; print(work())",
-     {"prints": SPAWN, "quick": True}),
+     {"prints": SPAWN}),
     ("forked after a run, to read", "tisim.run(tisim.Scene.from_toml('tiny.toml'), "
      "record=tisim.Recording('t.h5', frames=2))\n"
      "    print(len(fork.Pool(1).apply_async(tisim.read, ['t.h5']).get(60).times)); print(work())"),

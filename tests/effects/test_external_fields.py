@@ -45,7 +45,7 @@ def lorentz_twin(setup, state, t=0.0):
     [
         (ElectricField, MagneticField),
         pytest.param((ElectricField,), marks=pytest.mark.slow),
-        (MagneticField,),
+        pytest.param((MagneticField,), marks=pytest.mark.long),
     ],
 )
 def test_lorentz_force(kinds, rng):
@@ -62,6 +62,7 @@ def test_lorentz_force(kinds, rng):
         close(state["force"], lorentz_twin(one, state))
 
 
+@pytest.mark.long
 def test_the_electric_field_alone_acts_without_a_magnetic_one(rng):
     electric, magnetic = (oscillating(kind, rng) for kind in (ElectricField, MagneticField))
     law = Lorentz(magnetic=False)
@@ -74,6 +75,7 @@ def test_the_electric_field_alone_acts_without_a_magnetic_one(rng):
     assert Lorentz().gyrates(setup.effects)
 
 
+@pytest.mark.long
 def test_fields_oscillate_in_time(rng):
     """Heavy charges keep their velocity: the force after some steps is the force in the field at
     that time."""
@@ -93,6 +95,7 @@ def test_fields_oscillate_in_time(rng):
         assert result.time > 0.3
 
 
+@pytest.mark.long
 def test_zero_amplitude_is_a_constant_field(rng):
     """A field of zero amplitude in one world of a batch beside one that oscillates."""
     still = ElectricField(constant=vector(rng), omega=vector(rng), phase=vector(rng))

@@ -53,7 +53,7 @@ def fallen(t):
 
 @pytest.mark.long
 def test_layers_join_at_the_given_time_and_follow_the_group():
-    (result,) = simulate([falling()], capacity=8)
+    (result,) = simulate([falling()], worlds=2, capacity=8)
     state, t, joined = by_id(result), 31 * DT, fallen(31 * DT)
     assert result.work["joined"] == 3
     np.testing.assert_array_equal(state["group"], [1, 0, 1, 2, 2])

@@ -42,6 +42,7 @@ def test_the_final_error_of_a_single_particle_is_the_requested_one():
     assert list(ratios_by_scene) == list(SINGLE)
 
 
+@pytest.mark.long
 def test_particles_in_a_batch_and_from_a_checkpoint_have_the_same_bits(tmp_path):
     """The largest distance from the start is stored for each particle."""
     scenes = [calibrated.scene(trapezoid("run")(ASKED[0])) for calibrated in SINGLE.values()]

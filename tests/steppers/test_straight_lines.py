@@ -134,6 +134,7 @@ def test_remaining_steps():
     assert simulation.remaining_steps() == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["trapezoid, iteration", "brownian"])
 def test_frames_near_the_times_of_synchronisation(name, tmp_path):
     """Particles synchronise at multiples of the longest step, and frames are due just before and after them.

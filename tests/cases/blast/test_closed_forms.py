@@ -48,6 +48,11 @@ def end(effects, duration=DURATION, along=ALONG):
     return result.state["position"][0], result.state["velocity"][0]
 
 
+def slowed_in(electric=(0.0, 0.0, 0.0), magnetic=(0.0, 0.0, 0.0)):
+    """Effects of quadratic drag and two constant fields, which may be 0; all are compiled once."""
+    return (Lorentz(), ElectricField(constant=electric), MagneticField(constant=magnetic), QUADRATIC)
+
+
 def test_the_numbers_of_the_paper():
     """Its blast at the start: the fields of parity at C_D = 0.5, (6.3) with its own density of air, and
     (4.15)."""
@@ -62,7 +67,7 @@ def test_the_numbers_of_the_paper():
 
 @pytest.mark.long
 def test_speed_distance_and_time_with_quadratic_drag():
-    place, velocity = end((QUADRATIC,))
+    place, velocity = end(slowed_in())
     distance, slowed = np.linalg.norm(place), np.linalg.norm(velocity)
     assert distance == pytest.approx(distance_after(DURATION, SPEED, RATE), rel=1e-9)
     assert slowed == pytest.approx(speed_at(distance, SPEED, RATE), rel=1e-9)
@@ -74,8 +79,8 @@ def test_speed_distance_and_time_with_quadratic_drag():
 @pytest.mark.long
 def test_a_field_of_parity_keeps_the_speed():
     """The electric force balances the drag, so the particle neither slows down nor speeds up (5.7)."""
-    field = ElectricField(constant=tuple(parity_field(RATE, SPEED, CHARGE) * ALONG))
-    place, velocity = end((Lorentz(), field, QUADRATIC))
+    field = parity_field(RATE, SPEED, CHARGE) * ALONG
+    place, velocity = end(slowed_in(electric=tuple(field)))
     np.testing.assert_allclose(velocity, SPEED * ALONG, rtol=1e-9)
     np.testing.assert_allclose(place, SPEED * DURATION * ALONG, rtol=1e-9)
 
@@ -86,8 +91,8 @@ def test_a_flux_of_parity_turns_as_fast_as_drag_slows_down():
     radian."""
     flux = parity_flux(RATE, SPEED, CHARGE)
     across = np.array([0.6, 0.0, 0.8])
-    field = MagneticField(constant=(0.0, float(flux), 0.0))
-    _, velocity = end((Lorentz(), field, QUADRATIC), 1 / (CHARGE * flux), across)
+    effects = slowed_in(magnetic=(0.0, float(flux), 0.0))
+    _, velocity = end(effects, 1 / (CHARGE * flux), across)
     assert np.linalg.norm(velocity) == pytest.approx(SPEED / 2, rel=1e-9)
     assert velocity @ across == pytest.approx(SPEED / 2 * np.cos(1.0), rel=1e-9)
 

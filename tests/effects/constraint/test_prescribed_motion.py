@@ -36,7 +36,11 @@ def driven(motion, place, velocity=None, group=(1,), effects=(), **more):
 
 
 @pytest.mark.parametrize(
-    "motion", ["oscillation", "rotation", "translation", "translation later", "translation after"]
+    "motion",
+    [
+        pytest.param("oscillation", marks=pytest.mark.long),
+        *("rotation", "translation", "translation later", "translation after"),
+    ],
 )
 def test_a_driven_group_follows_its_motion(motion):
     """For any gravity and any initial velocity; also through the faces of a box."""
@@ -111,6 +115,7 @@ def test_a_frozen_group_carries_the_weight_on_it():
     np.testing.assert_allclose(state["force"][[2, 5, 6, 7, 8]], np.tile([0, 0, -weight], (5, 1)), rtol=1e-12)
 
 
+@pytest.mark.long
 def test_a_group_continues_from_an_earlier_run():
     place, fall = (
         np.array([[0.0, 0.0, 0.0], [3e-3, 1e-3, 0.0], [0.0, 9e-3, 0.0]]),

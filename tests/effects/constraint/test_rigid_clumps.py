@@ -73,6 +73,10 @@ def twin(scene, stiffness, times, acceleration=0.0):
     return solve_ivp(rate, (0, times[-1]), y, "DOP853", times, rtol=1e-12, atol=1e-14 * np.abs(y).max()).y.T
 
 
+TOPS = 30
+"""Worlds of one top each; all tests of tops share a simulation."""
+
+
 def spun(dt, steps, spin=(100.0, 500.0, -300.0), effects=()):
     return clumps(
         PEAR, [(0, 0, 0)], effects, dt, steps, velocity=(0.1, 0.2, 0.3), angular_velocity=spin, name="top"
@@ -89,7 +93,7 @@ def test_a_free_top_turns_to_second_order_and_keeps_its_momentum():
     (expected,) = twin(spun(1e-4, 200), 0.0, [time])
     for steps in (100, 200, 400):
         made = spun(time / steps, steps)
-        (result,) = simulate([made], capacity=4)
+        (result,) = simulate([made], worlds=TOPS, capacity=4)
         start, end = clump_bodies(result.start), clump_bodies(result.state)
         np.testing.assert_array_equal(end.angular_momentum, start.angular_momentum)
         np.testing.assert_allclose(end.position, start.velocity * time, rtol=1e-13)
@@ -109,12 +113,13 @@ def test_a_free_top_turns_to_second_order_and_keeps_its_momentum():
     assert np.log2(energies[0] / energies[2]) > 3.5
 
 
+@pytest.mark.long
 def test_a_top_spun_about_its_intermediate_axis_flips():
     """Energy stays bounded over thousands of turns, and the axis flips back and forth (Dzhanibekov)."""
     axes = PEAR.body.axes
     spin = axes @ np.array([1.0, 500.0, 1.0])
     made = spun(2e-5, 20_000, tuple(spin))
-    simulation = compiled(made, 1, 4)
+    simulation = compiled(made, TOPS, 4)
     simulation.load(made)
     along, energy = [], []
     for _ in range(100):
@@ -147,14 +152,14 @@ def random_clump(rng):
 @pytest.mark.long
 def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
     """Tops of any inertia, spun about any axis, at 0.03 rad a step: docs/bodies.md states the errors."""
-    spins = rng.normal(size=(30, 3))
+    spins = rng.normal(size=(TOPS, 3))
     spins *= 500 / np.linalg.norm(spins, axis=1)[:, None]
     shapes = [random_clump(rng) for _ in spins]
     scenes = [
         clumps(shape, [(0, 0, 0)], (), 0.03 / 500, 3000, angular_velocity=tuple(spin), name="top")
         for shape, spin in zip(shapes, spins, strict=True)
     ]
-    simulation = compiled(scenes[0], len(scenes), 4)
+    simulation = compiled(scenes[0], TOPS, 4)
     simulation.load(scenes)
     energies = [[clump_bodies(scene.start()).energy[0] for scene in scenes]]
     for _ in range(30):
@@ -410,16 +415,17 @@ def test_invalid_scenes_are_refused(why):
         clumps(PEAR, [(0, 0, 0)], **wrong)
 
 
+@pytest.mark.long
 def test_particles_without_clumps_are_refused():
     made = clumps(PEAR, [(0, 0, 0)])
     bare = made.model_copy(update={"particles": LOOSE})
     with pytest.raises(InputError, match=r"particles must be made by Particles\.of_clumps with effects"):
-        simulate([bare])
+        simulate([bare], worlds=TOPS, capacity=4)
     cut = {name: values[1:] for name, values in made.start().items()}
     core = {name: cut.pop(name) for name in ("position", "velocity", "radius", "mass")}
     part = made.model_copy(update={"particles": Particles(**core, quantities=cut)})
     with pytest.raises(InputError, match="particles must be whole clumps"):
-        simulate([part])
+        simulate([part], worlds=TOPS, capacity=4)
 
 
 def test_a_scene_file_holds_clumps():

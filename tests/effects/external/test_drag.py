@@ -91,6 +91,7 @@ def test_drag_in_a_fluid_at_rest(kind, rng):
         assert ((state["force"] * state["velocity"]).sum(axis=1) < 0).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kind",
     [
@@ -132,6 +133,7 @@ def test_nothing_drags_at_rest(kind, rng):
     np.testing.assert_allclose(claimed[0], expected * np.eye(3), rtol=1e-12, atol=0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", [ConstantDrag, StokesDrag])
 def test_velocity_jacobians_are_the_derivatives(kind, rng):
     """Against a central difference of the force, in a flow."""

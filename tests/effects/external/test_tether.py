@@ -33,6 +33,7 @@ def test_a_tether_to_an_anchor_that_the_start_gives(rng):
         close(state["force"], -np.array(one.effects[0].stiffness) * (state["position"] - anchor))
 
 
+@pytest.mark.long
 def test_gravity(rng):
     scenes = [cloud(rng, (Gravity(acceleration=vector(rng)),)) for _ in range(WORLDS)]
     for one, state in zip(scenes, loads(scenes), strict=True):

@@ -52,6 +52,7 @@ def dipoles(rng, n=16):
     return rng.uniform(low, high, (n, 3)), 1e3 * rng.normal(size=(n, 3))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("periodic", [(True, True, True), (True, True, False)])
 def test_sums_are_independent_of_splitting_and_conservative(periodic, rng):
     """In NumPy, by central differences of positions and moments; also for a box that is open along z."""

@@ -62,6 +62,7 @@ def needle(angle, moment=2.0, flux=3.0, **more):
     return magnets([[0, 0, 0]], start, felt(MagneticField(constant=(0, 0, flux))), **more)
 
 
+@pytest.mark.long
 def test_a_compass_needle_swings_as_a_pendulum():
     """I theta'' = -m B sin theta, I = 2/5 m R^2. For small angles the frequency is sqrt(m B / I); for any
     angle the period is 4 K(sin^2 theta_0/2) over that frequency."""
@@ -70,7 +71,7 @@ def test_a_compass_needle_swings_as_a_pendulum():
     for angle in (1e-4, 1.0, 3.0):
         period = 4 * ellipk(np.sin(angle / 2) ** 2) / frequency
         setup = needle(angle, radius=radius, mass=mass, stepper=fixed(period / 4096), duration=period / 4)
-        state = simulate([setup], capacity=4)[0].state
+        state = simulate([setup], capacity=8)[0].state
         # After a quarter of a period the angle is 0, and energy conservation gives the angular speed.
         swung = np.arctan2(state["moment"][0, 0], state["moment"][0, 2])
         assert abs(swung) < 3e-6 * angle
@@ -78,6 +79,7 @@ def test_a_compass_needle_swings_as_a_pendulum():
         np.testing.assert_array_equal(state["spin"][0, [0, 2]], 0.0)
 
 
+@pytest.mark.long
 def test_a_moment_turns_with_its_particle_and_keeps_its_magnitude(rng):
     """Without a field a moment rotates about the spin by the spin times the time, in steps of any size. Its
     length stays constant to the rounding of 20 000 rotations."""
@@ -158,7 +160,7 @@ def test_a_needle_swings_under_every_stepper_that_turns(name):
     """A quarter of a period, to first order in the step, because operators act at the end of a step."""
     stepper, frequency = STEPPERS[name], np.sqrt(2.0 * 3.0 / 0.4)
     setup = needle(0.01, stepper=stepper, velocity=[[0.1, 0, 0]], duration=np.pi / 2 / frequency)
-    (result,) = simulate([setup], capacity=4)
+    (result,) = simulate([setup], capacity=8)
     assert result.status.ok, result.status.reason
     state = result.state
     swung = np.arctan2(state["moment"][0, 0], state["moment"][0, 2])
@@ -192,7 +194,7 @@ def test_a_clump_of_magnets_swings_as_one():
         stepper=fixed(np.pi / 2 / frequency / 1000),
         duration=np.pi / 2 / frequency,
     )
-    state = by_id(simulate([setup], capacity=4)[0])
+    state = by_id(simulate([setup], capacity=8)[0])
     np.testing.assert_allclose(state["moment"], moments, rtol=0, atol=5e-6 * angle * 5.0 + 5 * angle**2)
     np.testing.assert_allclose(state["spin"][:, 1], -frequency * angle, rtol=1e-5)
 
@@ -213,7 +215,7 @@ def dragged():
     lengths = np.linalg.norm(state["moment"].astype(float), axis=1)
     frequency = np.sqrt(2.0 * 3.0 / 0.4)
     swing = needle(1.0, stepper=fixed(np.pi / frequency / 2000), duration=np.pi / frequency)
-    return [(lengths / [3e-18, 5e-10]).tolist(), simulate([swing], capacity=4)[0].state["moment"][0].tolist()]
+    return [(lengths / [3e-18, 5e-10]).tolist(), simulate([swing], capacity=8)[0].state["moment"][0].tolist()]
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def coefficients(rng):
     return {"alpha1": rng.uniform(), "alpha2": rng.uniform()}
 
 
-STRENGTHS = [("mass", True), ("charge", True)]
+STRENGTHS = [pytest.param("mass", True, marks=pytest.mark.long), ("charge", True)]
 STRENGTHS += [
     pytest.param(*kind, marks=pytest.mark.slow)
     for kind in (("plain", False), ("area", False), ("volume", True))
@@ -77,6 +77,7 @@ def test_every_strength(strength, signed, rng):
     ])  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "exponents",
     [
@@ -123,6 +124,7 @@ def test_alpha1_attracts_and_alpha2_repels():
     np.testing.assert_allclose(on_the_left(alpha2=3.0, signed=True), [12, 0, 0])
 
 
+@pytest.mark.long
 def test_between_charges_it_is_coulombs_law():
     law = NearField(alpha2=COULOMB, strength="charge")
     scenes = [
@@ -143,6 +145,7 @@ def test_equilibrium_at_alpha2_over_alpha1():
     assert (back - out) / (2 * h) == pytest.approx(2.0 * (2.0 / 1.0) ** 2, rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_nearest_image_acts_in_a_periodic_box():
     law = NearField(alpha1=1.0)
     box = Box(low=(0, 0, 0), high=(1, 1, 1))

@@ -1,5 +1,7 @@
 """Options of a generation that are not given follow from those that are, for every method and case."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -30,9 +32,11 @@ USUAL = {
 }
 
 
-def generations(settings):
-    """Sizes of the first two generations, and the number of new individuals in the second."""
-    method = find(settings.method)(fake_problem(GENES).genome, 1, settings.options, seed=1)
+@functools.cache
+def generations(name, **options):
+    """Sizes of the first two generations of a method, and the number of new individuals in the second."""
+    kind = find(name)
+    method = kind(fake_problem(GENES).genome, 1, kind.Options(**options), seed=1)
     first = method.ask()
     for rank, individual in enumerate(first):
         individual.know((FitnessEstimate.certain(float(rank)),))
@@ -73,9 +77,10 @@ def test_every_population_is_accepted_or_refused_for_a_real_reason(case, method)
         usual = USUAL[case]
         spread = {"sigma"} & usual.get("options", {}).keys() if usual.get("method") == method else ()
         own = {name: usual["options"][name] for name in spread}
-        alone = Settings(method=method, options={**own, "population": population, **first})
+        wanted = {**own, "population": population, **first}
+        alone = Settings(method=method, options=wanted)
         assert settings.options == alone.options, "the same from Python"
-        sizes, new = generations(settings)
+        sizes, new = generations(method or settings.method, **wanted)
         assert sizes == (population, population)
         assert new > 0
 

@@ -29,7 +29,7 @@ TENSORS = {"oseen": oseen, "rotne-prager": rotne_prager}
 DIRECTION = np.array([2.0, -1.0, 2.0]) / 3
 
 slow = pytest.mark.slow
-noises = pytest.mark.parametrize("noise", ["exact", "fast"])
+noises = pytest.mark.parametrize("noise", ["exact", pytest.param("fast", marks=pytest.mark.long)])
 tensors = pytest.mark.parametrize("hydrodynamics", [pytest.param("oseen", marks=slow), "rotne-prager"])
 
 

@@ -33,6 +33,7 @@ def trapped(part, number=NUMBER, stiffness=STIFFNESS, mass=4e-15):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", [0.02, LONGEST_RELAXATION])
 def test_the_variance_is_larger_by_half_of_a_step_over_the_relaxation_time(part):
     result = tisim.run(trapped(part))

@@ -92,7 +92,7 @@ def oscillator(stepper, duration=3.0, stiffness=4.0):
 def test_a_step_too_long_is_rejected_not_blown_up():
     """dt_0 is a thousand times too long: attempts are rejected until one converges, and the rest is right."""
     control = ErrorControl(first=10.0, longest=10.0, shortest=1e-9, error=1e-5, tolerance=1e-7)
-    (result,) = simulate([oscillator(Trapezoid(control=control), stiffness=1e6, duration=1e-2)], worlds=1)
+    (result,) = simulate([oscillator(Trapezoid(control=control), stiffness=1e6, duration=1e-2)], worlds=2)
     assert result.status.ok
     assert result.work["rejections"] >= 3
     assert result.state["position"][0, 0] == pytest.approx(np.cos(1e3 * 1e-2), abs=2e-3)
@@ -152,7 +152,7 @@ def test_the_named_force_is_evaluated_at_the_failing_step(kind):
     place, drift = [[0, 0, 0], [1, 0, 0]], [[1, 0, 0], [1, 0, 0]]
     stepper = kind(control=control)
     setup = scene(place, drift, effects, mass=1.0, stepper=stepper, duration=1.0)
-    (result,) = simulate([setup], worlds=1)
+    (result,) = simulate([setup], worlds=2)
     assert "by effects.late, at particle 0" in result.status.reason
     assert 0.4 < float(result.status.reason.split()[4]) <= 0.52
     assert np.isfinite(result.state["velocity"]).all()
@@ -161,19 +161,20 @@ def test_the_named_force_is_evaluated_at_the_failing_step(kind):
 @pytest.mark.slow
 def test_particles_at_rest_have_no_error():
     """No velocity and no force would give 0/0 in the error norm; also a world in which no particle moves."""
-    (result,) = simulate([oscillator(Trapezoid(), duration=1e-2, stiffness=0.0)], worlds=1)
+    (result,) = simulate([oscillator(Trapezoid(), duration=1e-2, stiffness=0.0)], worlds=2)
     still = scene(
         [[0, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), mass=1.0, stepper=Trapezoid(), duration=1e-2
     )
-    (rest,) = simulate([still], worlds=1)
+    (rest,) = simulate([still], worlds=2)
     for end, place in ((result, [1.0, 1e-2, 0]), (rest, [0, 0, 0])):
         assert end.status.ok
         np.testing.assert_allclose(end.state["position"][0], place, rtol=0, atol=1e-15)
 
 
+@pytest.mark.long
 def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
     """Z16's control: from dt_0 the step grows to dt_lim in an easy problem, and K stays below K_d."""
-    (result,) = simulate([oscillator(Trapezoid(), duration=0.1)], worlds=1)
+    (result,) = simulate([oscillator(Trapezoid(), duration=0.1)], worlds=2)
     # 0.1 s in steps of dt_lim is 400; growing from 1e-5 s by at most 4 takes three more.
     assert 400 <= result.work["particle_steps"] <= 405
     assert result.work["rejections"] == 0
@@ -184,7 +185,7 @@ def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
 def test_time_does_not_drift():
     """A million steps of 1e-6 s end at exactly one second, and the position of the oscillator is right."""
     setup = oscillator(equal_steps(1e-6, tolerance=1e-6), duration=1.0)
-    (result,) = simulate([setup], worlds=1)
+    (result,) = simulate([setup], worlds=2)
     assert result.time == 1.0
     assert result.work["particle_steps"] == 1_000_000
     assert result.state["position"][0, 0] == pytest.approx(np.cos(2.0), abs=1e-9)
@@ -219,6 +220,7 @@ def test_the_force_of_the_previous_iterate_suffices():
     assert sums[1] > 2.5
 
 
+@pytest.mark.long
 def test_only_needed_fields_are_allocated():
     """No spins without torques; for one particle no sums or iterates; without acceleration no stored
     iterates."""
