@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.outcome import Outcome
-from tisim.optimize.problem.feasibility import excess
+from tisim.optimize.problem.feasibility import excess, feasible
 from tisim.optimize.tables import interval_of_value
 from tisim.plotting.style import empty, letters, plain, scale_of, superscripts
 
@@ -73,7 +73,7 @@ def violating(outcome: Outcome) -> list[Estimates]:
 
 
 def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
-    objectives = outcome.problem.objectives
+    objectives, constraints = outcome.problem.objectives, outcome.problem.result_constraints
     plain(axis)
     axis.set_xlabel(_heading(objectives[x].label, objectives[x].maximise))
     axis.set_ylabel(_heading(objectives[y].label, objectives[y].maximise))
@@ -111,7 +111,9 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
         (None, "o", "may violate a constraint"),
         (False, "X", "violates a constraint; none satisfies all"),
     ):
-        rows = [k for k, design in enumerate(outcome.designs) if design.feasible is answer]
+        rows = [
+            k for k, one in enumerate(outcome.hall) if feasible(constraints, one.reported_limits) is answer
+        ]
         if rows:
             axis.plot(
                 means[rows, x], means[rows, y], mark, ms=4, mfc="white", mec=_FRONT_COLOUR, zorder=4.5,
