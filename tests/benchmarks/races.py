@@ -3,8 +3,8 @@
     python tests/benchmarks/races.py [--searches 20] [--runs 400] [--methods genetic,cma-es] [--races 0,12,24]
 
 The noisy bowl and the noisy Hartmann function have noise of deviation 0.3 in each start, which differs
-between designs. Random designs of the bowl differ by about as much; the deepest well of Hartmann's function is
-3.3 deep. The third function has ten genes and the noise of agglomeration: costs of 0.15 to 0.5, with a
+between designs. Random designs of the bowl differ by about as much; the deepest well of Hartmann's function
+is 3.3 deep. The third function has ten genes and the noise of agglomeration: costs of 0.15 to 0.5, with a
 deviation of 0.11 between the starts of a design. A round of a race adds two starts to each of six designs at
 first, so races of fewer than 12 starts have no effect.
 """
