@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.constraint import InequalityConstraint
@@ -21,6 +21,7 @@ from tisim.optimize.surrogate.gaussian_process import GaussianProcess
 from tisim.optimize.surrogate.noise import all_exact, costs_and_noise
 from tisim.optimize.surrogate.selection import MOST_LEARNED, beaten_by, representative
 
+Number = float | NDArray[np.float64]
 _UNSEEN = 1e-4
 """If the noise is not known and the nugget is below this fraction of the variance of all costs, there is no
 noise."""
@@ -89,11 +90,11 @@ class PosteriorLimits:
         return cls(means, deviations)
 
     def violations(
-        self, constraints: Sequence[InequalityConstraint], shift: ArrayLike = 0.0, margin: ArrayLike = 0.0
+        self, constraints: Sequence[InequalityConstraint], shift: Number = 0.0, margin: Number = 0.0
     ) -> NDArray[np.float64]:
         """Return the total violation of each design, (individuals,), if every constraint may deviate by
         ``margin`` from its posterior mean plus ``shift``; both may be arrays (constraints,)."""
-        low, high = (self.means + shift + sign * np.asarray(margin) for sign in (-1.0, 1.0))
+        low, high = (self.means + shift + sign * margin for sign in (-1.0, 1.0))
         total = np.zeros(len(self.means))
         for k, constraint in enumerate(constraints):
             total += [
