@@ -145,9 +145,12 @@ class Outcome:
     @property
     def best(self) -> Individual | None:
         """Return the best design; for several objectives the compromise, the design nearest to the best of
-        each."""
+        each, of those that satisfy the constraints of the result with confidence if there are any."""
         if self.hall and self.problem.several:
-            return compromise(self.hall)
+            constraints = self.problem.result_constraints
+            return compromise(
+                [one for one in self.hall if feasible(constraints, one.reported_limits)] or self.hall
+            )
         return self.hall[0] if self.hall else None
 
     @property
@@ -160,6 +163,18 @@ class Outcome:
         if not self.hall:
             return ""
         return violated(self.problem.result_constraints, self.hall[0].reported_limits)
+
+    @property
+    def doubt(self) -> str:
+        """Return in words that the best design violates constraints of the result, or may do so; "" if it
+        satisfies all with confidence."""
+        if self.best is None:
+            return ""
+        constraints, limits = self.problem.result_constraints, self.best.reported_limits
+        answer = feasible(constraints, limits)
+        if answer is None:
+            return "may violate a constraint: an interval contains a bound, or is not known"
+        return "" if answer else f"violates a constraint: {violated(constraints, limits)}"
 
     @property
     def designs(self) -> list[Design]:

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from tisim.errors import RunError
 from tisim.optimize.beginning import NOTHING, Beginning
-from tisim.optimize.conclusion import concluded, proven, reserve
+from tisim.optimize.conclusion.conclusion import concluded, proven, reserve
 from tisim.optimize.evaluation.ensemble import Ensemble
 from tisim.optimize.evaluation.runs import Evaluator
 from tisim.optimize.generation_log import OwnStatistics, statistics

@@ -12,7 +12,7 @@ from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.generation_log import chapter_column
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.calls import constraint_value
-from tisim.optimize.problem.feasibility import ANSWERS, feasible
+from tisim.optimize.problem.feasibility import ANSWERS, excess, feasible
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
 
@@ -158,24 +158,31 @@ def error_of(name: str) -> str:
     return f"{name} {ERROR}"
 
 
-def met_points(problem: Problem, estimates: Estimates) -> list[tuple[float, ...]]:
-    """Return the points of the designs with a fitness of ``met_at`` or better, best first; none without
-    ``met_at``."""
+def met_points(problem: Problem, estimates: Estimates, limits: Estimates) -> list[tuple[float, ...]]:
+    """Return the points of the designs with a fitness of ``met_at`` or better whose means satisfy the
+    constraints of the result, best first; none without ``met_at``.
+
+    estimates : of the objectives. limits : of the constraints of the result.
+    """
     if problem.met_at is None:
         return []
     (objective,) = problem.objectives
     costs = {point: of_all[0].mean for point, of_all in estimates.items()}
-    limit = objective.sign * problem.met_at
-    return sorted((one for one in costs if costs[one] <= limit), key=lambda one: (costs[one], one))
+    limit, constraints = objective.sign * problem.met_at, problem.result_constraints
+    met = (one for one in costs if costs[one] <= limit and not excess(constraints, limits.get(one, ())))
+    return sorted(met, key=lambda one: (costs[one], one))
 
 
-def met_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
-    """Return every gene and the fitness of the designs with ``met_at`` or better, best first: heading ->
-    values."""
-    points, (objective,) = met_points(problem, estimates), problem.objectives
+def met_columns(problem: Problem, estimates: Estimates, limits: Estimates) -> dict[str, list[Any]]:
+    """Return every gene, the fitness and each constraint of the result of the designs of ``met_points``:
+    heading -> values."""
+    points, (objective,) = met_points(problem, estimates, limits), problem.objectives
     designs = [problem.genome.decode(point) for point in points]
     columns = {gene.label: [design[gene.name] for design in designs] for gene in problem.genome.genes}
-    return {**columns, objective.label: [objective.sign * estimates[one][0].mean for one in points]}
+    columns[objective.label] = [objective.sign * estimates[one][0].mean for one in points]
+    for k, constraint in enumerate(problem.result_constraints):
+        columns[constraint.label] = [limits[one][k].mean for one in points]
+    return columns
 
 
 def logbook_columns(problem: Problem, logbook: tools.Logbook) -> dict[str, list[Any]]:

@@ -27,6 +27,7 @@ from tisim.optimize.analysis.misfit_shape import (
     fit,
 )
 from tisim.optimize.outcome import Outcome
+from tisim.optimize.problem.feasibility import excess
 from tisim.optimize.problem.gene_values import Value, brief
 from tisim.optimize.problem.genes import Searched
 from tisim.optimize.problem.problem import Problem
@@ -120,7 +121,8 @@ class Calibration:
 def calibration(outcome: Outcome) -> Calibration:
     """Return the calibration of the genes by the measurements, from all designs of a search.
 
-    Genes that are choices are fixed at the choices of the best design. InputError if the objective is not a
+    Genes that are choices are fixed at the choices of the best design, of those that satisfy the constraints
+    of the result by their means if there are any. InputError if the objective is not a
     Misfit, or the search has no design.
     """
     problem = outcome.problem
@@ -134,9 +136,10 @@ def calibration(outcome: Outcome) -> Calibration:
     genome = problem.genome
     numbers = [k for k, gene in enumerate(genome.searched) if gene.kind != "category"]
     others = [k for k in range(len(genome)) if k not in numbers]
-    best = points[int(np.argmin(evidence.chi2))]
+    allowed = _allowed(outcome)
+    best = points[allowed][int(np.argmin(evidence.chi2[allowed]))]
     same = np.all(points[:, others] == best[others], axis=1)
-    choices = _choices(problem, points, evidence.chi2, others)
+    choices = _choices(problem, points[allowed], evidence.chi2[allowed], others)
     shape = None
     if numbers:
         near = evidence.chi2[same], evidence.noise[same]
@@ -163,8 +166,31 @@ def calibration(outcome: Outcome) -> Calibration:
         designs=shape.designs,
         missing=0,
         wanted=(),
-        remarks=tuple(_remarks(measurements, shape, searched, estimates, evidence)),
+        remarks=(
+            *_remarks(measurements, shape, searched, estimates, evidence),
+            *_violating(outcome, evidence),
+        ),
     )
+
+
+def _allowed(outcome: Outcome) -> NDArray[np.bool_]:
+    """Return which designs satisfy the constraints of the result by their means; all if none does."""
+    constraints = outcome.problem.result_constraints
+    found = np.array([not excess(constraints, outcome.limits.get(one, ())) for one in outcome.estimates])
+    return found if found.any() else ~found
+
+
+def _violating(outcome: Outcome, evidence: Evidence) -> list[str]:
+    """Return a remark if designs of a small chi^2 violate a constraint of the result."""
+    constraints = outcome.problem.result_constraints
+    near = evidence.chi2 < evidence.chi2.min() + ONE_GENE_95
+    close = [one for one, is_near in zip(outcome.estimates, near, strict=True) if is_near]
+    out = sum(excess(constraints, outcome.limits.get(one, ())) > 0 for one in close)
+    words = (
+        f"{out} of the {len(close)} designs with a chi^2 of less than {ONE_GENE_95:.2f} above the least "
+        "violate a constraint: the intervals follow from the measurements alone and may contain such designs."
+    )
+    return [words] if out else []
 
 
 def _evidence(outcome: Outcome, measured: Misfit) -> tuple[Array, Evidence]:

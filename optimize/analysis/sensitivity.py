@@ -87,6 +87,8 @@ class Sensitivity:
     designs : number of designs that the surrogate is fitted to.
     q2 : predictive power of the surrogate, 0 to 1: the part of the variance over all ranges, without noise,
         that it predicts for each design from the others.
+    doubt : "" or in words that the best design violates constraints of the result, or may do so; the changes
+        are those around this design.
     """
 
     objective: str
@@ -95,6 +97,7 @@ class Sensitivity:
     genes: tuple[GeneSensitivity, ...]
     designs: int
     q2: Between
+    doubt: str = ""
 
     @property
     def trusted(self) -> bool:
@@ -137,7 +140,8 @@ def sensitivity(outcome: Outcome) -> tuple[Sensitivity, ...]:
             )
             for j, gene in enumerate(genome.searched)
         )
-        found.append(Sensitivity(objective.name, objective.unit, objective.label, genes, len(points), q2))
+        named = objective.name, objective.unit, objective.label
+        found.append(Sensitivity(*named, genes, len(points), q2, outcome.doubt))
     return tuple(found)
 
 

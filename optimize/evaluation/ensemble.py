@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,8 @@ from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.numerics.skewed import Moments, shared_skewness
 from tisim.numerics.statistics import CONFIDENCE, half_width
-from tisim.optimize.evaluation.estimate import FitnessEstimate, converged_after
+from tisim.optimize.evaluation.estimate import FitnessEstimate, converged_after, may_occur
+from tisim.optimize.evaluation.limits import held_out_limits, limits_of_search
 from tisim.optimize.evaluation.runs import Evaluator, Runs, Sample
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.problem.problem import Problem
@@ -260,48 +260,24 @@ class Ensemble:
         searched = [self._costs(sample) for sample in self._known.values() if sample.used]
         ranges = self._ranges([*searched, *by_design])
         estimates = [self._summary(sample, skewness, ranges, confidence) for sample in samples]
-        return list(zip(estimates, self._fresh_limits(samples, confidence), strict=True))
+        return list(zip(estimates, self._held_out_limits(samples, confidence), strict=True))
 
-    def limits(self, design: Design) -> tuple[FitnessEstimate, ...]:
+    def limits(self, design: Design, *, held_out: bool = False) -> tuple[FitnessEstimate, ...]:
         """Return the estimate of each result constraint from the starts of a design that has run.
 
-        It has no interval unless all starts are the same, because these starts also choose the design.
+        held_out : whether these starts have not chosen the design, so that intervals hold; otherwise there is
+            none unless all starts are the same.
         """
-        return tuple(self._limit(column) for column in zip(*self._sample(design).limited, strict=True))
+        sample = self._sample(design)
+        if held_out:
+            return self._held_out_limits([sample], CONFIDENCE)[0]
+        return limits_of_search(sample, bool(self.repeatable))
 
-    def _limit(self, values: Sequence[float]) -> FitnessEstimate:
-        if self.repeatable:
-            return FitnessEstimate.certain(values[0])
-        std = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
-        return FitnessEstimate(float(np.mean(values)), std, math.nan, math.nan, len(values), False)
-
-    def _fresh_limits(
+    def _held_out_limits(
         self, samples: Sequence[Sample], confidence: float
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Return the estimates of the result constraints of each sample, with intervals.
-
-        If a start of a sample has failed, its values are not known, which counts as a violation.
-        """
-        names = [one.name for one in self.runs.problem.result_constraints]
-        columns: list[list[FitnessEstimate]] = [[] for _ in samples]
-        for k, name in enumerate(names):
-            by_sample = [np.array([row[k] for row in sample.limited]) for sample in samples]
-            good = [values for values, one in zip(by_sample, samples, strict=True) if not one.reason]
-            known = [np.array([row[k] for row in one.limited]) for one in self._known.values() if one.limited]
-            skewness = shared_skewness(good)
-            seen = np.unique(np.concatenate([*good, *known])).tolist()
-            most = max((float(np.ptp(values)) for values in [*good, *known]), default=0.0)
-            mean = Objective(name, float)
-            for column, values, sample in zip(columns, by_sample, samples, strict=True):
-                if sample.reason:
-                    failed = FitnessEstimate.failed(len(values), sample.reason)
-                    column.append(replace(failed, mean=math.nan))
-                elif self.repeatable:
-                    column.append(FitnessEstimate.certain(float(values[0])))
-                else:
-                    others = Others(_may_occur(values, seen, most), skewness)
-                    column.append(FitnessEstimate.of(mean, values, False, others, confidence))
-        return [tuple(column) for column in columns]
+        constraints, searched = self.runs.problem.result_constraints, list(self._known.values())
+        return held_out_limits(constraints, samples, searched, bool(self.repeatable), confidence)
 
     def values(self, design: Design) -> np.ndarray:
         """Return the quantities of each start in a design's estimate, shape (starts, quantities)."""
@@ -366,8 +342,8 @@ class Ensemble:
         estimates = []
         for k, (one, part) in enumerate(self._of_objectives(sample.values[: sample.used])):
             costs = sorted(one.sign * value for value in seen[one.quantities[0]])
-            may_occur = _may_occur(one.pseudo_costs(part), costs, ranges[k] if ranges else math.inf)
-            others = Others(may_occur, skewness[k] if skewness else None)
+            further = may_occur(one.pseudo_costs(part), costs, ranges[k] if ranges else math.inf)
+            others = Others(further, skewness[k] if skewness else None)
             estimates.append(FitnessEstimate.of(one, part, sample.converged, others, confidence))
         return tuple(estimates)
 
@@ -380,19 +356,3 @@ class Ensemble:
         """Return for each objective the largest difference between two starts of one design."""
         columns = zip(*by_design, strict=True)
         return [max(float(np.ptp(costs)) for costs in column if len(costs)) for column in columns]
-
-
-def _may_occur(costs: np.ndarray, seen: Sequence[float], most: float) -> Sequence[float]:
-    """Return the costs that may occur for a design whose own costs are all equal.
-
-    They are the two ends of a range: at most ``most`` from the design's cost, the largest difference between
-    starts of one design, and within the costs ``seen`` of all designs. If no starts have differed, a rare
-    cost may lie on either side, as far off as the costs of all designs are from each other: the least cost
-    seen is no bound for it. If fewer than three costs are known, ``seen`` itself is returned.
-    """
-    if len(seen) < 3:
-        return seen
-    if not most:
-        spread = seen[-1] - seen[0]
-        return float(costs[0]) - spread, float(costs[0]) + spread
-    return max(seen[0], float(costs[0]) - most), min(seen[-1], float(costs[0]) + most)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tisim.numerics.statistics import CONFIDENCE
 from tisim.optimize.problem.objective import Objective
@@ -100,3 +101,19 @@ def converged_after(costs: ArrayLike, tolerance: float, min_starts: int) -> int 
         if np.all((change == 0) | (change < tolerance * np.abs(means[n - 1]))):
             return n
     return None
+
+
+def may_occur(costs: NDArray[np.float64], seen: Sequence[float], most: float) -> Sequence[float]:
+    """Return the costs that may occur for a design whose own costs are all equal.
+
+    They are the two ends of a range: at most ``most`` from the design's cost, the largest difference between
+    starts of one design, and within the costs ``seen`` of all designs. If no starts have differed, a rare
+    cost may lie on either side, as far off as the costs of all designs are from each other: the least cost
+    seen is no bound for it. If fewer than three costs are known, ``seen`` itself is returned.
+    """
+    if len(seen) < 3:
+        return seen
+    if not most:
+        spread = seen[-1] - seen[0]
+        return float(costs[0]) - spread, float(costs[0]) + spread
+    return max(seen[0], float(costs[0]) - most), min(seen[-1], float(costs[0]) + most)

@@ -216,10 +216,19 @@ class Genetic(SearchMethod):
             drawn.append(self._open(self.operators.bred(parents, count)))
             points = drawn[-1] if len(drawn) > 2 else np.vstack(drawn)
             means, deviations = belief.predict(points)
-            costs = -worth(means, deviations)[:, None] if self.objectives == 1 else means
+            log_valid = belief.log_valid(points)
+            costs = means if log_valid is None else self._expected(means, np.exp(log_valid))
+            if self.objectives == 1:
+                costs = -worth(means, deviations, log_valid)[:, None]
             kept = parents if len(drawn) > 2 else []
             parents = self._best(self._individuals_at(points, costs) + kept, most)
         return np.vstack(drawn)
+
+    def _expected(self, means: Array, valid: Array) -> Array:
+        """Return the expected costs of designs that are valid with these probabilities, (m,), if a failed
+        design has the worst cost."""
+        worst = self.belief.costs.max(axis=0)
+        return worst + valid[:, None] * (means - worst)
 
     def _open(self, points: Array) -> Array:
         """Return the points outside the trust region, if there is one."""

@@ -16,7 +16,6 @@ from tisim import InputError
 from tisim.components.component import Checked
 from tisim.errors import Words, must
 from tisim.optimize.methods.individual import Individual
-from tisim.optimize.methods.random_state import OwnRandom
 from tisim.optimize.problem.calls import function_name
 from tisim.optimize.problem.problem import checksum_of
 from tisim.optimize.surrogate.gaussian_process import Array
@@ -212,3 +211,28 @@ class Operators:
                 trial += self.toolbox.mate(Individual(individual), Individual(individuals[0]))
                 trial += self.toolbox.mutate(Individual(individual))
         return [list(individual) for individual in trial]
+
+
+class OwnRandom:
+    """Within ``with``, the modules random and numpy.random have this object's states; afterwards the
+    caller's.
+
+    DEAP uses random; operators of the user may use numpy.random.
+    """
+
+    def __init__(self, seed: int) -> None:
+        legacy = np.random.RandomState(seed % 2**32)
+        self.state = random.Random(seed).getstate(), legacy.get_state()
+
+    def __enter__(self) -> None:
+        self._callers = random.getstate(), np.random.get_state()  # noqa: NPY002
+        self._set(self.state)
+
+    def __exit__(self, *error: object) -> None:
+        self.state = random.getstate(), np.random.get_state()  # noqa: NPY002
+        self._set(self._callers)
+
+    @staticmethod
+    def _set(state: tuple[object, object]) -> None:
+        random.setstate(state[0])  # type: ignore[arg-type]
+        np.random.set_state(state[1])  # type: ignore[arg-type]  # noqa: NPY002

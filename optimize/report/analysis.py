@@ -125,6 +125,8 @@ def sensitivity_table(found: Sensitivity) -> RenderableType:
         f"±: half of the 95 % interval. From a Gaussian process through {found.designs} designs, which "
         f"{predicts}",
     ]
+    if found.doubt:
+        words.append(f"the best design {found.doubt}")
     if not found.trusted:
         words[1] = f"alone, in all: not given, because the Gaussian process predicts less than {LEAST_Q2:g}"
     title = Text(f"effect of each gene on {found.label}", "italic")

@@ -96,7 +96,8 @@ def _changes(axis: Axes, one: Sensitivity) -> None:
             color=_FAR if abs(move) > 0.05 else _CLOSE, label=_minus(f"{100 * move:+g} % of range"),
         )  # fmt: skip
     axis.set_xlabel(f"change of {superscripts(one.label)}")
-    axis.set_title("moved from the best design", fontsize=9)
+    doubt = one.doubt.partition(":")[0]
+    axis.set_title("moved from the best design" + f",\nwhich {doubt}" * bool(doubt), fontsize=9)
     _legend_below(axis, 4)
 
 

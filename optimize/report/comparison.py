@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,11 +22,13 @@ from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.evaluation.runs import Evaluator
 from tisim.optimize.outcome import Outcome, Progress
+from tisim.optimize.problem.feasibility import ANSWERS, excess, feasible, penalised
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.search import search
 from tisim.optimize.search_folder import check_problem, resume_or_clear
 from tisim.optimize.settings import Settings, fit, identity, proposed
 from tisim.optimize.storage.cache import Cache
+from tisim.optimize.tables import FEASIBLE, FRESH_STARTS, HIGH, LOW
 
 COMPARISON_FILE, CSV = "compare.h5", "compare.csv"
 COMPARISON_FILES = (
@@ -41,18 +44,28 @@ NOTE = (
     "median, lowest, highest: best designs of the searches, from held-out (fresh) starts; claimed: median of "
     "the searches' own estimates; 95 % +-: median of half the interval from the fresh starts"
 )
+NOTE_ON_CONSTRAINTS = (
+    "feasible: number of these designs whose intervals of all constraints, from the fresh starts, lie within "
+    "the bounds; unproven: an interval contains a bound; violated: a mean violates a bound. Designs that "
+    "violate one rank behind all others: in the median they count as worst (- if it is one of them), and "
+    "lowest, highest, claimed and 95 % +- leave them out"
+)
 
 
 @dataclass(frozen=True)
 class MethodResult:
-    """The result of one search: the estimate of its best design from the search, and from held-out starts
-    (costs)."""
+    """The result of one search.
+
+    claimed, fresh : estimates of the cost of its best design, from the search and from held-out starts.
+    limits : estimates of each constraint of the result, from the same held-out starts.
+    """
 
     method: str
     repeat: int
     evaluations: int
     claimed: FitnessEstimate
     fresh: FitnessEstimate
+    limits: tuple[FitnessEstimate, ...] = ()
 
 
 @contextmanager
@@ -150,36 +163,62 @@ def compare(
 def _result(method: str, repeat: int, outcome: Outcome, fresh_ensemble: Ensemble) -> MethodResult:
     if outcome.best is None:
         raise RunError(f"{method}, repeat {repeat}: no design has run to its end")
-    (estimates,) = fresh_ensemble.estimate([outcome.problem.genome.decode(outcome.best)])
+    design = outcome.problem.genome.decode(outcome.best)
+    (estimates,) = fresh_ensemble.estimate([design])
     assert estimates is not None  # this ensemble has no budget
     (claimed,) = outcome.best.estimates
-    return MethodResult(method, repeat, outcome.evaluations + outcome.hits, claimed, estimates[0])
+    limits = fresh_ensemble.limits(design, held_out=True)
+    return MethodResult(method, repeat, outcome.evaluations + outcome.hits, claimed, estimates[0], limits)
+
+
+def verdict(problem: Problem, result: MethodResult) -> str:
+    """Return whether the best design of a search satisfies the constraints of the result by its fresh starts,
+    as in ``best.csv``: yes, unproven or no."""
+    return ANSWERS[feasible(problem.result_constraints, result.limits)]
 
 
 def table(problem: Problem, results: Sequence[MethodResult]) -> Table:
     """Return a table with a line for each method, the best median first.
 
-    It shows the best designs from held-out starts, and the estimates of the searches themselves.
+    It shows the best designs from held-out starts, and the estimates of the searches themselves. With
+    constraints of the result, designs that violate one are behind all others.
     """
     (objective,) = problem.objectives
+    constraints = problem.result_constraints
     meaning = problem.meanings.get(objective.name, "")
-    grid = plain_table("method", "searches", "runs each", "median", "lowest", "highest", "claimed", "95 % +-")
+    verdicts = ("feasible", "unproven", "violated") if constraints else ()
+    grid = plain_table(
+        "method", "searches", "runs each", *verdicts, "median", "lowest", "highest", "claimed", "95 % +-"
+    )
     grid.title, grid.title_justify = objective.label + (f": {meaning}" if meaning else ""), "left"
-    grid.caption, grid.caption_justify = NOTE, "left"
-    by_method = {f.method: [g for g in results if g.method == f.method] for f in results}
-    for method, mine in sorted(
-        by_method.items(), key=lambda item: np.median([f.fresh.mean for f in item[1]])
-    ):
-        values = [objective.sign * f.fresh.mean for f in mine]
+    grid.caption = f"{NOTE}. {NOTE_ON_CONSTRAINTS}" if constraints else NOTE
+    grid.caption_justify = "left"
+    excesses = [excess(constraints, f.limits) for f in results]
+    ordered = penalised([f.fresh.mean for f in results], excesses)
+    by_method: dict[str, list[int]] = {}
+    for k, f in enumerate(results):
+        by_method.setdefault(f.method, []).append(k)
+    for method, rows in sorted(by_method.items(), key=lambda item: np.median(ordered[item[1]])):
+        mine = [results[k] for k in rows]
+        allowed = [results[k] for k in rows if not excesses[k]]
+        values = [objective.sign * f.fresh.mean for f in allowed]
+        costs = [f.fresh.mean for f in allowed] + [math.inf] * (len(mine) - len(allowed))
         numbers = (
-            np.median(values), min(values), max(values),
-            np.median([objective.sign * f.claimed.mean for f in mine]),
-            np.median([f.fresh.half_width for f in mine]),
+            objective.sign * np.median(costs), min(values, default=math.nan), max(values, default=math.nan),
+            _median([objective.sign * f.claimed.mean for f in allowed]),
+            _median([f.fresh.half_width for f in allowed]),
         )  # fmt: skip
         runs = sorted({f.evaluations for f in mine})
         each = str(runs[0]) if len(runs) == 1 else f"{runs[0]}..{runs[-1]}"
-        grid.add_row(method, str(len(mine)), each, *(f"{number:.4g}" for number in numbers))
+        answers = [verdict(problem, f) for f in mine]
+        counts = [str(answers.count(answer)) for answer in ANSWERS.values()] if constraints else []
+        cells = (f"{number:.4g}" if math.isfinite(number) or not constraints else "-" for number in numbers)
+        grid.add_row(method, str(len(mine)), each, *counts, *cells)
     return grid
+
+
+def _median(values: Sequence[float]) -> float:
+    return float(np.median(values)) if values else math.nan
 
 
 def as_csv(problem: Problem, results: Sequence[MethodResult]) -> bytes:
@@ -187,18 +226,30 @@ def as_csv(problem: Problem, results: Sequence[MethodResult]) -> bytes:
     (objective,) = problem.objectives
     text = io.StringIO(newline="")
     writer = csv.writer(text)
+    constraints = problem.result_constraints
+    of_limits = [
+        f"{heading}{FRESH_STARTS}"
+        for one in constraints
+        for heading in (one.label, f"{one.name} {LOW}", f"{one.name} {HIGH}")
+    ]
     writer.writerow(
         (
             "method",
             "repeat",
             "runs",
-            f"{objective.label}, fresh starts",
+            *((FEASIBLE,) if constraints else ()),
+            f"{objective.label}{FRESH_STARTS}",
             "95 % +-",
             "claimed",
             "std. error claimed",
+            *of_limits,
         )
     )
     for f in results:
         means = objective.sign * f.fresh.mean, f.fresh.half_width, objective.sign * f.claimed.mean
-        writer.writerow((f.method, f.repeat, f.evaluations, *means, f.claimed.standard_error))
+        known = (verdict(problem, f),) if constraints else ()
+        limits = (number for limit in f.limits for number in (limit.mean, limit.low, limit.high))
+        writer.writerow(
+            (f.method, f.repeat, f.evaluations, *known, *means, f.claimed.standard_error, *limits)
+        )
     return text.getvalue().encode()

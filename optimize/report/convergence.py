@@ -22,8 +22,10 @@ def convergence_figure(outcome: Outcome) -> Figure:
     """Draw best and mean fitness by generation, and below it the first derived value of the best design.
 
     Dotted lines mark generations after which the search box was moved. If the best design was run again from
-    held-out starts, that value is drawn at the end; the curve itself is biased by lucky starts. With several
-    objectives, the best value of each is drawn, one below the other.
+    held-out starts, that value is drawn at the end; the curve itself is biased by lucky starts. The curves
+    are those of designs that satisfy the constraints of the result by their means; the mark of a best design
+    that violates one, or may do so, is open. With several objectives, the best value of each is drawn, one
+    below the other.
     """
     problem = outcome.problem
     if problem.several:
@@ -42,11 +44,14 @@ def convergence_figure(outcome: Outcome) -> Figure:
             axes[1].plot(generation, _plottable(log[derived]), color=_BEST, marker="o", ms=3.5, lw=1.6)
         if outcome.best is not None and outcome.best.confirmed:
             (sure,) = outcome.best.confirmed
+            doubt = outcome.doubt.partition(":")[0]
+            face = "white" if doubt else _SURE
             (mean_again,) = problem.costs([sure.mean])
             ends = np.nan_to_num(interval_of_value(sure, problem.objectives[0]), nan=mean_again)
             axes[0].errorbar(
                 generation[-1] + 0.4, mean_again, np.abs(ends - mean_again)[:, None], color=_SURE,
-                marker="s", ms=3.5, lw=1.2, capsize=2, ls="none", label="best, fresh starts, 95 % interval",
+                marker="s", mfc=face, ms=3.5, lw=1.2, capsize=2, ls="none",
+                label="best, fresh starts, 95 % interval" + f"; {doubt}" * bool(doubt),
             )  # fmt: skip
             if derived:
                 of = problem.derived[derived]
@@ -54,7 +59,7 @@ def convergence_figure(outcome: Outcome) -> Figure:
                 value = of(mean_again)
                 axes[1].errorbar(
                     generation[-1] + 0.4, value, [[value - min(ends)], [max(ends) - value]], color=_SURE,
-                    marker="s", ms=3.5, lw=1.2, capsize=2,
+                    marker="s", mfc=face, ms=3.5, lw=1.2, capsize=2,
                 )  # fmt: skip
         _mark_moves(axes, log)
         legend_above(axes[0], 2)

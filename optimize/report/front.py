@@ -2,7 +2,8 @@
 
 Of many designs estimated from few starts, the luckiest appear to lie beyond the front, whose designs have
 more starts. Designs with fewer starts than the front are therefore drawn differently and labelled. Intervals
-are drawn only for held-out starts, because the starts that chose a design bias its values.
+are drawn only for held-out starts, because the starts that chose a design bias its values. Designs that
+violate a constraint of the result are crosses; members of the front that may violate one are open.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from matplotlib.figure import Figure
 
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.outcome import Outcome
+from tisim.optimize.problem.feasibility import excess, feasible
 from tisim.optimize.tables import interval_of_value
 from tisim.plotting.style import empty, letters, plain, scale_of, superscripts
 
@@ -48,16 +50,30 @@ def front_figure(outcome: Outcome) -> Figure:
 
 
 def others(outcome: Outcome) -> tuple[list[Estimates], list[Estimates]]:
-    """Return the designs outside the front: those with at least the median number of starts of the front, and
-    those with fewer."""
+    """Return the designs outside the front that satisfy the constraints of the result by their means: those
+    with at least the median number of starts of the front, and those with fewer."""
     front = {tuple(individual) for individual in outcome.hall}
     enough = np.median([individual.estimates[0].starts for individual in outcome.hall] or [1])
+    excluded = set(map(id, violating(outcome)))
     good = [e for genes, e in outcome.estimates.items() if e[0].ok and genes not in front]
+    good = [e for e in good if id(e) not in excluded]
     return [e for e in good if e[0].starts >= enough], [e for e in good if e[0].starts < enough]
 
 
+def violating(outcome: Outcome) -> list[Estimates]:
+    """Return the designs outside the front that violate a constraint of the result by their means."""
+    front, constraints = (
+        {tuple(individual) for individual in outcome.hall},
+        outcome.problem.result_constraints,
+    )
+    return [
+        e for genes, e in outcome.estimates.items()
+        if e[0].ok and genes not in front and excess(constraints, outcome.limits.get(genes, ()))
+    ]  # fmt: skip
+
+
 def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
-    objectives = outcome.problem.objectives
+    objectives, constraints = outcome.problem.objectives, outcome.problem.result_constraints
     plain(axis)
     axis.set_xlabel(_heading(objectives[x].label, objectives[x].maximise))
     axis.set_ylabel(_heading(objectives[y].label, objectives[y].maximise))
@@ -74,6 +90,12 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
             means[:, x], means[:, y], "o", color=_MANY_STARTS_COLOUR, ms=2.5, zorder=2,
             label=f"other designs, {_starts(many)}",
         )  # fmt: skip
+    if excluded := violating(outcome):
+        means, _ = _values(outcome, excluded)
+        axis.plot(
+            means[:, x], means[:, y], "x", color=_MANY_STARTS_COLOUR, ms=3, mew=0.8, zorder=1,
+            label=f"designs that violate a constraint, {_starts(excluded)}",
+        )  # fmt: skip
     if not outcome.hall:
         return
     front = [individual.confirmed or individual.estimates for individual in outcome.hall]
@@ -85,12 +107,24 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
         yerr=widths[:, :, y] if fresh else None, fmt="o", color=_FRONT_COLOUR, ms=4, lw=0.8, zorder=4,
         label=f"front, {again}{_starts(front)}" + ", 95 % intervals" * bool(fresh and widths.any()),
     )  # fmt: skip
+    for answer, mark, words in (
+        (None, "o", "may violate a constraint"),
+        (False, "X", "violates a constraint; none satisfies all"),
+    ):
+        rows = [
+            k for k, one in enumerate(outcome.hall) if feasible(constraints, one.reported_limits) is answer
+        ]
+        if rows:
+            axis.plot(
+                means[rows, x], means[rows, y], mark, ms=4, mfc="white", mec=_FRONT_COLOUR, zorder=4.5,
+                ls="", label=f"of the front, {words}",
+            )  # fmt: skip
     compromise = next(k for k, individual in enumerate(outcome.hall) if individual is outcome.best)
     axis.plot(
         *means[compromise, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN_COLOUR, mew=1.5, zorder=5, ls="",
         label="nearest to the best of each",
     )  # fmt: skip
-    everything, _ = _values(outcome, [*many, *few, *front])
+    everything, _ = _values(outcome, [*many, *few, *excluded, *front])
     axis.set_xscale(scale_of(means[:, x]) if everything[:, x].min() > 0 else "linear")
     axis.set_yscale(scale_of(means[:, y]) if everything[:, y].min() > 0 else "linear")
 

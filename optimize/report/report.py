@@ -18,7 +18,6 @@ from tisim.console import TERMINAL_WIDTH
 from tisim.files import pictures
 from tisim.files.atomic import replace_file
 from tisim.optimize.outcome import Outcome
-from tisim.optimize.problem.feasibility import feasible
 from tisim.optimize.tables import ERROR, FEASIBLE, HIGH, LOW, best_columns, met_columns, met_points
 
 if TYPE_CHECKING:
@@ -66,10 +65,8 @@ def notes(outcome: Outcome) -> RenderableType:
     warnings = []
     if outcome.violated:
         warnings.append(f"no design satisfies the constraints; of the first one, {outcome.violated}")
-    elif feasible(problem.result_constraints, first.reported_limits) is None:
-        warnings.append(
-            "the first design may violate a constraint: an interval contains a bound, or is not known"
-        )
+    elif outcome.doubt:
+        warnings.append(f"the {'compromise' if problem.several else 'first design'} {outcome.doubt}")
     words = {
         "starts": "number of random starts in the mean",
         ERROR: "standard error of that mean; it does not include the bias from choosing the best designs",
@@ -97,13 +94,14 @@ def notes(outcome: Outcome) -> RenderableType:
 
 
 def met_table(outcome: Outcome) -> RenderableType:
-    """Return the ranges of the genes over all designs with a fitness of ``met_at`` or better, for the
-    terminal."""
+    """Return the ranges of the genes over all designs with a fitness of ``met_at`` or better that satisfy the
+    constraints of the result, for the terminal."""
     problem = outcome.problem
-    points, (objective,) = met_points(problem, outcome.estimates), problem.objectives
+    points, (objective,) = met_points(problem, outcome.estimates, outcome.limits), problem.objectives
     bound = "at least" if objective.maximise else "at most"
     number = f"{len(points)} of {len(outcome.estimates)} designs"
-    title = Text(f"{number} have {objective.label} of {bound} {problem.met_at:g}", "italic")
+    also = " and satisfy the constraints" if problem.result_constraints else ""
+    title = Text(f"{number} have {objective.label} of {bound} {problem.met_at:g}{also}", "italic")
     if not points:
         return Group("", title)
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
@@ -149,8 +147,8 @@ def best_csv(outcome: Outcome) -> bytes:
 
 
 def met_csv(outcome: Outcome) -> bytes:
-    """Return the designs with a fitness of ``met_at`` or better as CSV, all digits."""
-    return columns_csv(met_columns(outcome.problem, outcome.estimates))
+    """Return the designs of ``met_table`` as CSV, all digits."""
+    return columns_csv(met_columns(outcome.problem, outcome.estimates, outcome.limits))
 
 
 def columns_csv(columns: Mapping[str, Sequence[Any]]) -> bytes:

@@ -2,7 +2,8 @@
 
 One cost: the logarithm of the expected improvement on the least posterior mean of the designs that were run.
 The logarithm does not underflow. Several costs: the hypervolume that the lower confidence bound of a design
-would add to the front.
+would add to the front. If some designs have failed, either is multiplied by the probability that a design
+does not fail.
 
 A batch is chosen one design at a time. Each chosen design is assumed to have its expected mean. This leaves
 all means unchanged and reduces the uncertainty of the process around the design (kriging believer).
@@ -50,35 +51,42 @@ class Worth:
         if means.shape[1] > 1:
             self.volume = _Volume(self.front, rng)
 
-    def __call__(self, means: Array, deviations: Array) -> Array:
-        """Return the worth of designs from mean and standard deviation of their costs, both (m,
-        objectives)."""
+    def __call__(self, means: Array, deviations: Array, log_valid: Array | None = None) -> Array:
+        """Return the worth of designs from mean and standard deviation of their costs, both (m, objectives).
+
+        log_valid : logarithm of the probability that they do not fail, (m,); None if all are valid.
+        """
         if means.shape[1] == 1:
             mean, deviation, best = means[:, 0], deviations[:, 0], float(self.best[0])
             if self.belief.exact:
                 mean = np.maximum(mean, best - _LARGEST_IMPROVEMENT * deviation)
-            return log_expected_improvement(mean, deviation, best)
-        return self.volume.improvement(means - _CONFIDENCE * deviations)
+            improvement = log_expected_improvement(mean, deviation, best)
+            return improvement if log_valid is None else improvement + log_valid
+        added = self.volume.improvement(means - _CONFIDENCE * deviations)
+        # A negative value is the distance from the front.
+        return added if log_valid is None else added * np.exp(np.where(added > 0, log_valid, -log_valid))
 
     def of(self, points: Array) -> Array:
         """Return the worth of points of the unit cube, shape (m,)."""
-        return self(*self.belief.predict(points))
+        return self(*self.belief.predict(points), self.belief.log_valid(points))
 
     def batch(self, points: Array, count: int, apart: float = _APART) -> Array:
         """Return the points with the greatest joint worth, (count, genes), out of many, (m, genes)."""
         belief = self.belief
         means, deviations = belief.predict(points)
+        log_valid = belief.log_valid(points)
         if len(points) > _MOST_RANKED:
             # A design of little worth alone has even less in a batch.
-            kept = np.argsort(-self(means, deviations), kind="stable")[:_MOST_RANKED]
+            kept = np.argsort(-self(means, deviations, log_valid), kind="stable")[:_MOST_RANKED]
             points, means, deviations = points[kept], means[kept], deviations[kept]
+            log_valid = None if log_valid is None else log_valid[kept]
         at = belief.features(points)
         explained = [model.half_solved(at) for model in belief.models]
         rows: list[list[Array]] = [[] for _ in belief.models]
         chosen: list[int] = []
         barred = np.zeros(len(points), dtype=bool)
         for _ in range(min(count, len(points))):
-            worth = np.where(barred, -np.inf, self(means, deviations))
+            worth = np.where(barred, -np.inf, self(means, deviations, log_valid))
             pick = int(np.argmax(worth))
             chosen.append(pick)
             barred |= np.abs(points - points[pick]).max(axis=1) < apart

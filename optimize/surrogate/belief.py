@@ -11,6 +11,7 @@ from tisim.optimize.methods.individual import Individual
 from tisim.optimize.surrogate.gaussian_process import Array, GaussianProcess, Parameters
 from tisim.optimize.surrogate.noise import all_exact, costs_and_noise, pooled_variance
 from tisim.optimize.surrogate.selection import MOST_LEARNED, representative, thinned
+from tisim.optimize.surrogate.validity import Validity
 
 _SKEWED, _SKEWED_NOISE = 0.5, 2.0
 """Costs with a larger skewness than this, without and with noise, are transformed: otherwise a few large
@@ -34,13 +35,15 @@ class Belief:
     The noise of a mean over n starts is the variance between starts divided by n. The variance of a single
     design, known from about two starts, is shrunk towards the pooled variance of all designs. A value given
     with its standard error keeps it. If no design has more than one start, the nugget of the process
-    represents the noise. A failed design has the worst cost.
+    represents the noise. The costs are learned from the designs that did not fail; the others determine
+    ``validity``, which is None if none has failed.
     """
 
     def __init__(self, features: Callable[[Array], Array] = np.asarray) -> None:
         self.features = features
         self.models: list[GaussianProcess] = []
         self._parameters: list[Parameters | None] = []
+        self.validity: Validity | None = None
         self.starts = 1
 
     def learn(self, individuals: Sequence[Individual], iterations: int = 30, apart: float = 0.0) -> None:
@@ -49,6 +52,8 @@ class Belief:
         apart : with one cost and no noise, only the best of designs that are closer than this in all genes is
             used; a cluster of almost equal designs would make the function appear constant.
         """
+        self._learn_validity(individuals)
+        individuals = [individual for individual in individuals if not individual.failed]
         self.individuals = list(individuals)
         self.points = np.array([list(individual) for individual in individuals])
         costs, self.noise = costs_and_noise(individuals)
@@ -73,6 +78,17 @@ class Belief:
             for cost, variance, start in zip(self.costs.T, variances.T, starts, strict=True)
         ]
         self._parameters = [model.parameters for model in self.models]
+
+    def _learn_validity(self, individuals: Sequence[Individual]) -> None:
+        failed = np.array([individual.failed for individual in individuals])
+        if failed.any():
+            points = np.array([list(individual) for individual in individuals])
+            start = None if self.validity is None else self.validity.model.parameters
+            self.validity = Validity(self.features, points, failed, start)
+
+    def log_valid(self, points: Array) -> Array | None:
+        """Return the logarithm of the probability that designs do not fail, (m,); None if none has failed."""
+        return None if self.validity is None else self.validity.log_probability(points)
 
     @property
     def means(self) -> Array:

@@ -8,6 +8,7 @@ the constraints of the result: a design that violates one may have satisfied it 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from tisim.optimize.surrogate.gaussian_process import GaussianProcess
 from tisim.optimize.surrogate.noise import all_exact, costs_and_noise
 from tisim.optimize.surrogate.selection import MOST_LEARNED, beaten_by, representative
 
+Number = float | NDArray[np.float64]
 _UNSEEN = 1e-4
 """If the noise is not known and the nugget is below this fraction of the variance of all costs, there is no
 noise."""
@@ -44,36 +46,62 @@ def posterior_means(genome: Genome, individuals: Sequence[Individual]) -> NDArra
     return belief.predict(belief.points)[0] if seen else costs
 
 
-def posterior_violations(
-    genome: Genome, individuals: Sequence[Individual], constraints: Sequence[InequalityConstraint]
-) -> NDArray[np.float64]:
-    """Return two total violations of each design, (individuals, 2), by the posterior of its constraints.
+def by_posterior_mean(genome: Genome, individuals: Sequence[Individual]) -> list[Individual]:
+    """Return the designs of one objective that satisfy the constraints of the result by their own means, best
+    posterior mean first. None of the individuals may have failed."""
+    # The costs of designs that violate a constraint are penalised.
+    good = [individual for individual in individuals if not individual.violation]
+    if not good:
+        return []
+    return [good[i] for i in np.argsort(posterior_means(genome, good)[:, 0], kind="stable")]
 
-    The first is computed from the posterior means, with ``_MARGIN`` added on the side of the violation; the
-    second from the posterior means alone. Both are the violation by the design's own means if there is no
-    noise, or too few designs. None of the individuals may have failed.
+
+@dataclass(frozen=True, eq=False)
+class PosteriorLimits:
+    """The posterior of the constraints of the result of some designs, from the starts of the search.
+
+    means, deviations : of each constraint, in its unit, shape (individuals, constraints). They are the own
+        means of the designs, and 0, if there is no noise or there are too few designs.
     """
-    own = np.array([individual.violation for individual in individuals])
-    exact = all(limit.exact for individual in individuals for limit in individual.limits)
-    if not constraints or len(individuals) < 3 or exact:
-        return np.column_stack([own, own])
-    stand_ins = [Individual(individual, len(constraints)) for individual in individuals]
-    for stand_in, individual in zip(stand_ins, individuals, strict=True):
-        stand_in.know(individual.limits)
-    means, noise = costs_and_noise(stand_ins)
-    features = genome.features(np.array([list(individual) for individual in individuals]))
-    chosen = representative(means, MOST_LEARNED, exact=False)
-    total = np.zeros((len(individuals), 2))
-    for k, constraint in enumerate(constraints):
-        values, margins = means[:, k], np.zeros(len(individuals))
-        model = GaussianProcess(features[chosen], values[chosen], noise[chosen, k], iterations=60)
-        if model.nugget > _UNSEEN or np.any(noise[:, k]):
-            values, deviations = model.predict(features)
-            margins = _MARGIN * deviations
-        for i, (value, margin) in enumerate(zip(values, margins, strict=True)):
-            ends = (constraint.violation(value - margin), constraint.violation(value + margin))
-            total[i] += max(ends), constraint.violation(value)
-    return total
+
+    means: NDArray[np.float64]
+    deviations: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls, genome: Genome, individuals: Sequence[Individual], constraints: Sequence[InequalityConstraint]
+    ) -> PosteriorLimits:
+        """Return the posterior. None of the individuals may have failed."""
+        means = np.array([individual.limited for individual in individuals], dtype=float)
+        deviations = np.zeros_like(means)
+        exact = all(limit.exact for individual in individuals for limit in individual.limits)
+        if len(individuals) < 3 or exact:
+            return cls(means, deviations)
+        stand_ins = [Individual(individual, len(constraints)) for individual in individuals]
+        for stand_in, individual in zip(stand_ins, individuals, strict=True):
+            stand_in.know(individual.limits)
+        values, noise = costs_and_noise(stand_ins)
+        features = genome.features(np.array([list(individual) for individual in individuals]))
+        chosen = representative(values, MOST_LEARNED, exact=False)
+        for k in range(len(constraints)):
+            model = GaussianProcess(features[chosen], values[chosen, k], noise[chosen, k], iterations=60)
+            if model.nugget > _UNSEEN or np.any(noise[:, k]):
+                means[:, k], deviations[:, k] = model.predict(features)
+        return cls(means, deviations)
+
+    def violations(
+        self, constraints: Sequence[InequalityConstraint], shift: Number = 0.0, margin: Number = 0.0
+    ) -> NDArray[np.float64]:
+        """Return the total violation of each design, (individuals,), if every constraint may deviate by
+        ``margin`` from its posterior mean plus ``shift``; both may be arrays (constraints,)."""
+        low, high = (self.means + shift + sign * margin for sign in (-1.0, 1.0))
+        total = np.zeros(len(self.means))
+        for k, constraint in enumerate(constraints):
+            total += [
+                max(constraint.violation(one), constraint.violation(other))
+                for one, other in zip(low[:, k], high[:, k], strict=True)
+            ]
+        return total
 
 
 def by_feasibility(
@@ -84,8 +112,12 @@ def by_feasibility(
 
     The first are in the given order, the others are sorted by their violation.
     """
-    margined, plain = posterior_violations(genome, individuals, constraints).T
     own = np.array([individual.violation for individual in individuals])
+    margined = plain = own
+    if constraints:
+        limits = PosteriorLimits.of(genome, individuals, constraints)
+        margined = limits.violations(constraints, margin=_MARGIN * limits.deviations)
+        plain = limits.violations(constraints)
     sure = (own == 0) & (margined == 0)
     by_violation = np.lexsort([own, margined])
     return (
@@ -100,8 +132,6 @@ def best(
     individuals: Sequence[Individual],
     count: int,
     constraints: Sequence[InequalityConstraint] = (),
-    *,
-    allowed: bool = False,
 ) -> list[Individual]:
     """Return the best designs by posterior mean, best first.
 
@@ -111,13 +141,11 @@ def best(
     constraints : of the result. Designs that satisfy them by the posterior mean are returned, those closest
         to a bound last; without such a design, the ones with the least violation, or the one for several
         objectives.
-    allowed : leave out designs that do not satisfy the constraints, even if there are no others.
     """
     ran = [individual for individual in individuals if not individual.failed]
     if not ran:
         return []
     good, near, others = by_feasibility(genome, ran, constraints)
-    others = [] if allowed else others
     several = len(ran[0].fitness.values) > 1
     if not good:
         return (near or others)[: 1 if several else count]

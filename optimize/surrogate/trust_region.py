@@ -61,6 +61,7 @@ class TrustRegion:
         enough = max(40, min(200, (self.genes + 1) * (self.genes + 2)))
         nearest = np.argsort(((belief.points - self.centre) ** 2).sum(axis=1), kind="stable")[:enough]
         self.belief.learn([belief.individuals[i] for i in nearest])
+        self.belief.validity = belief.validity
         worth = Worth(self.belief, rng)
         worth.best = self.belief.costs[0]  # the centre; designs elsewhere may be better
         low = np.maximum(self.centre - self.half_width, 0.0)

@@ -180,6 +180,13 @@ def truly_dominated(kind, outcome):
     return np.mean(np.any(np.all(true[:, None] > true[None], axis=2), axis=1))
 
 
+def share_dominated(kind, searches, runs):
+    """Mean share of truly dominated designs in the fronts of searches, and its standard error."""
+    settings = {"ensemble": OWN, "generations": 1000, "options": {"population": 100}, "max_evaluations": runs}
+    found = [truly_dominated(kind, searched(kind, seed, True, **settings)) for seed in range(searches)]
+    return np.mean(found), np.std(found, ddof=1) / math.sqrt(searches)
+
+
 def table(searches, kinds):
     """Print a line for each kind of noise and each way to search."""
     for kind in kinds:
@@ -187,7 +194,10 @@ def table(searches, kinds):
             report(kind, way, coverage(kind, searches, **settings))
         for way, settings in WAYS_TO_FRONTS.items():
             report(kind, way, coverage(kind, searches, several=True, **settings))
-
+        for runs in (200, 400):
+            part, error = share_dominated(kind, searches, runs)
+            way = f"a front, {runs} runs"
+            print(f"{kind:40s} {way:26s} truly dominated {part:.3f} +- {1.96 * error:.3f}", flush=True)
         for above in (-1e-9, 0.1):
             stopped, wrong = stopped_at_target(kind, searches, above)
             print(

@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 from tests.optimize.fake_runs import FakeCache
+from tests.optimize.reported_constraints import PROBLEM, reported, shares
 from tisim import InputError, optimize
 from tisim.optimize import AskTell, Gene, Objective, Problem, ResultConstraint
 from tisim.optimize.designs_csv import check_headings
@@ -66,16 +67,7 @@ def test_a_range_of_few_designs_is_searched_to_its_end():
         assert len(outcome.estimates) == 6
 
 
-def noisy(design, seed):
-    """Least value at the smallest x; the constraint of its load is as noisy as it is tight."""
-    rng = np.random.default_rng(seed)
-    value = design["x"] + 0.1 * (design["y"] - 0.5) ** 2 + 0.02 * rng.normal()
-    return {"value": value, "load": design["x"] + 0.3 * rng.normal()}
-
-
-VALUE = Objective("value", lambda result: result.value["value"])
-LOAD = ResultConstraint("load", lambda result: result.value["load"], "N", at_least=0.5)
-NOISY = Problem.of_function(noisy, GENES, (VALUE,), constraints=(LOAD,), code="1")
+LOAD, NOISY = PROBLEM.result_constraints[0], PROBLEM
 
 
 def of_random(seed, runs=120, **ensemble):
@@ -105,18 +97,33 @@ def test_a_true_violation_is_never_reported_as_feasible():
     assert violations <= 4
 
 
-def test_the_next_design_is_confirmed_if_the_first_one_fails():
-    """Its budget is for one design with all its held-out starts."""
-    tried = 0
+def test_the_next_design_is_tried_unless_the_first_one_is_proven_feasible():
+    """The budget is for one design with all its held-out starts, and for a second one with half of them."""
+    tried, ahead = 0, 0
     for seed in range(12):
         outcome = of_random(seed, 96, common_starts=True)
         assert outcome.evaluations + outcome.hits <= 96
         starts = [individual.confirmed_limits[0].starts for individual in outcome.hall]
         assert sorted(starts) in ([16], [8, 16])
-        failed = any(design.feasible is False for design in outcome.designs)
-        assert failed == (len(starts) == 2)
-        tried += failed
-    assert tried
+        answers = [design.feasible for design in outcome.designs]
+        assert len(starts) == 2 or answers == [True]
+        order = [{True: 0, None: 1, False: 2}[answer] for answer in answers]
+        assert order == sorted(order)
+        tried += len(starts) == 2
+        ahead += starts == [8, 16]
+    assert tried > ahead > 0
+
+
+def test_reported_designs_satisfy_a_noisy_constraint():
+    """The best design of 14 of 20 such searches satisfies it if the next ones are not tried."""
+    listed = [reported("random", seed, 200, common_starts=True) for seed in range(20)]
+    true, proven, _, violating, wrong, _ = shares([designs[0] for designs in listed])
+    for designs in listed:
+        order = [{True: 0, None: 1, False: 2}[design.feasible] for design in designs]
+        assert order == sorted(order)
+    assert true >= 0.9
+    assert proven >= 0.7
+    assert violating == wrong == 0
 
 
 def test_the_interval_of_a_constraint_is_in_the_tables(path):

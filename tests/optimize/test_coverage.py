@@ -86,3 +86,10 @@ def test_fronts_list_no_dominated_design(kind):
     assert sum(map(experiment.dominated, outcomes)) == 0
     part = np.mean([experiment.truly_dominated(kind, outcome) for outcome in outcomes])
     print(f"{kind}: {part:.3f} of the listed designs are truly dominated")
+
+
+@pytest.mark.slow
+def test_few_designs_of_a_front_are_truly_dominated():
+    part, error = experiment.share_dominated("normal", 100, 200)
+    print(f"{part:.3f} +- {1.96 * error:.3f}")
+    assert part < 0.1

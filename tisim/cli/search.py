@@ -224,6 +224,8 @@ def compare(
             for result in searches:
                 results.append(result)
                 line = f"{result.method}, search {result.repeat + 1} of {repeats}: {result.evaluations} runs"
+                if problem.result_constraints:
+                    line += f", feasible: {comparison.verdict(problem, result)}"
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
             message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all finished runs."

@@ -111,7 +111,7 @@ def test_a_known_design_is_met():
     case = every()["avalanche"]
     problem, search = case.inverse("default", "calibrate")
     outcome = optimize.run(problem, **search)
-    frictions = met_columns(outcome.problem, outcome.estimates)["friction"]
+    frictions = met_columns(outcome.problem, outcome.estimates, outcome.limits)["friction"]
     assert len(frictions) > 5
     assert max(frictions) - min(frictions) > 0.3
     for design in (KNOWN, outcome.designs[0].genes):

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.optimize.analysis.sensitivity_coverage import FUNCTIONS, coverage
 from tisim import InputError, optimize
 from tisim.optimize import Choice, Gene, Objective, Problem
 from tisim.optimize.analysis import sensitivity
@@ -118,6 +119,16 @@ def test_the_predictivity_is_uncertain_with_few_noisy_designs():
     assert all(0.0 <= one.low <= one.value <= one.high <= 1.0 for one in found)
     assert np.mean([one.high > 0.9 for one in found]) > 0.8
     assert np.mean([one.high - one.low for one in found]) > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_intervals_have_their_coverage(name):
+    """Intervals of moves by 1 % are too narrow for the function of Ishigami, as the documentation says."""
+    parts, errors = coverage(name, 200)
+    least = (0.78 if "noise" in name else 0.88, 0.93, 0.93) if "ishigami" in name else (0.93,) * 3
+    print(name, parts, 1.96 * errors)
+    assert np.all(parts > np.array(least) - 1.96 * errors)
 
 
 def test_several_objectives_have_one_each_and_are_written(tmp_path):

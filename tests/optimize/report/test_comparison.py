@@ -15,10 +15,13 @@ from tisim import InputError
 from tisim.cases import case as catalogue
 from tisim.cli.main import main
 from tisim.files import output_folder
+from tisim.optimize import Gene, Problem, ResultConstraint
+from tisim.optimize.evaluation.estimate import FitnessEstimate
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.report import comparison
-from tisim.optimize.report.comparison import FRESH, compare, plan, settings_of
+from tisim.optimize.report.comparison import FRESH, MethodResult, compare, plan, settings_of
 from tisim.optimize.storage.cache import Cache
 
 BASE = {
@@ -119,6 +122,66 @@ def test_incomparable_objects_are_refused():
         usual = {"methods": ["random"], "evaluations": 9, "repeats": 1, "fresh": 4, "problem": fake_problem()}
         with pytest.raises(InputError, match=message):
             plan(**{**usual, "base": BASE, **arguments})
+
+
+def constrained(design, seed):
+    """Least value at the smallest x, whose load must be at least 0.5 N; every start has its own load."""
+    load = design["x"] + 0.3 * np.random.default_rng(seed).normal()
+    return {"value": design["x"], "load": load}
+
+
+LOAD = ResultConstraint("load", lambda result: result.value["load"], "N", at_least=0.5)
+LIMITED = Problem.of_function(
+    constrained, (Gene("x", "m", 0.0, 1.0),), (Objective("value", lambda result: result.value["value"]),),
+    constraints=(LOAD,),
+)  # fmt: skip
+
+
+def test_designs_that_violate_a_constraint_are_marked():
+    """Two starts of a search make a design with x below 0.5 feasible by luck in some searches."""
+    searches = plan(LIMITED, {"method": "random"}, ["random", "nsga2"], 60, 6, 16)
+    results = list(compare(searches, FunctionEvaluator(), FakeCache()))
+    seeds = [start_seed(FRESH, k) for k in range(16)]
+    noise = np.mean([constrained({"x": 0.0}, seed)["load"] for seed in seeds])
+    for f in results:
+        (load,) = f.limits
+        assert load.mean == pytest.approx(f.fresh.mean + noise)
+        assert load.low < load.mean < load.high
+        known = "no" if load.mean < 0.5 else "yes" if load.low >= 0.5 else "unproven"
+        assert comparison.verdict(LIMITED, f) == known
+    assert len({comparison.verdict(LIMITED, f) for f in results}) > 1
+    lines = list(csv.DictReader(comparison.as_csv(LIMITED, results).decode().splitlines()))
+    assert [line["feasible"] for line in lines] == [comparison.verdict(LIMITED, f) for f in results]
+    label = "load, at least 0.5 N, fresh starts"
+    assert [float(line[label]) for line in lines] == [f.limits[0].mean for f in results]
+    assert [float(line["load 95 % low, fresh starts"]) for line in lines] == [
+        f.limits[0].low for f in results
+    ]
+    for name, searches, _, *counts in (line[:6] for line in rows(LIMITED, results) if line[0] == "random"):
+        mine = [comparison.verdict(LIMITED, f) for f in results if f.method == name]
+        assert counts == [str(mine.count(answer)) for answer in ("yes", "unproven", "no")]
+        assert int(searches) == len(mine) == 6
+
+
+def known(mean, half=0.01):
+    return FitnessEstimate(mean, half, mean - half, mean + half, 16, False)
+
+
+def test_a_method_whose_designs_violate_a_constraint_is_behind():
+    results = [
+        MethodResult(method, k, 60, known(value), known(value), (known(load),))
+        for method, found in {
+            "cma-es": [(0.1, 0.30), (0.2, 0.31), (0.9, 0.6)],
+            "random": [(0.6, 0.60), (0.7, 0.55), (0.8, 0.505)],
+            "zohdi": [(0.05, 0.1), (0.05, 0.2), (0.05, 0.3)],
+        }.items()
+        for k, (value, load) in enumerate(found)
+    ]
+    table = {line[0]: line[3:] for line in rows(LIMITED, results) if line[0] in {f.method for f in results}}
+    assert list(table) == ["random", "cma-es", "zohdi"]
+    assert table["random"] == ["2", "1", "0", "0.7", "0.6", "0.8", "0.7", "0.01"]
+    assert table["cma-es"] == ["1", "0", "2", "-", "0.9", "0.9", "0.9", "0.01"]
+    assert table["zohdi"] == ["0", "0", "3", "-", "-", "-", "-", "-"]
 
 
 @pytest.mark.parametrize("wrong", [("--methods", "simplex"), ("--repeats", "0"), ("--executor", "nobody")])
