@@ -171,8 +171,11 @@ def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
         print(f"\nenergy of free tops: median {np.median(largest):.1e}, largest {largest.max():.1e}")
     assert 2e-5 < np.median(largest) < 5e-5
     assert largest.max() < 1e-4
-    # The error does not grow: it is the same in both halves.
-    assert (errors[15:].max(axis=0) < 1.5 * errors[:15].max(axis=0)).all()
+    # The error does not grow: it is the same in both halves. The run may be less than a period of a single
+    # top, such as two spheres that precess by half a radian: two of their principal axes are any of a plane.
+    halves = errors[:15].max(axis=0), errors[15:].max(axis=0)
+    assert halves[1].max() < 1.1 * halves[0].max()
+    assert np.median(halves[1] / halves[0]) < 1.1
 
 
 @pytest.mark.long
