@@ -158,13 +158,21 @@ def column_energy(law, material, state):
     figure="column",
 )
 def column_at_rest(law: GrainLaw = HERTZ_MINDLIN, strong: Substance = {"restitution": 0.1}):  # noqa: B006
-    """law : the law of contact. strong : properties of its material that bring a column to rest in seconds."""
+    """law : the law of contact. strong : properties of its material that bring a column to rest soon."""
     materials = law.elastic, {**law.elastic, **law.lossy[0], **strong}
     free, damped, start = columns(law, materials)
     balance = [(states, material) for states, material in zip(start, materials, strict=True)]
-    moved = max(np.abs(state["position"] - states[0]["position"]).max() for states, _ in balance for state in states)
+    moved = max(
+        np.abs(state["position"] - states[0]["position"]).max() for states, _ in balance for state in states
+    )
     heat = max(kinetic(state) for states, _ in balance for state in states)
-    return moved, heat, np.abs(free / free[0] - 1).max(), np.diff(damped).max() / damped[0], damped[-1] / damped[0]
+    return (
+        moved,
+        heat,
+        np.abs(free / free[0] - 1).max(),
+        np.diff(damped).max() / damped[0],
+        damped[-1] / damped[0],
+    )
 
 
 def columns(law, materials):
@@ -177,8 +185,8 @@ def columns(law, materials):
             place[5:, 2] += lift
             scenes.append(
                 law.scene(
-                    place, np.zeros((10, 3)), first=material, planes=[FLOOR], gravity=(0, 0, -WEIGHT), dt=1e-4,
-                    steps=40_000,
+                    place, np.zeros((10, 3)), first=material, planes=[FLOOR], gravity=(0, 0, -WEIGHT),
+                    dt=1e-4, steps=40_000,
                 )
             )  # fmt: skip
     series = looks(scenes, 40)

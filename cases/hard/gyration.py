@@ -60,10 +60,13 @@ def charges(position, velocity, stepper, duration, charge=3.0, mass=2.0, flux=2.
 
 
 def angle(z, degree):
-    """Return the turn (rad) in a step of w dt = z: twice the phase of the numerator of the Pade approximant."""
+    """Return the turn (rad) in a step of w dt = z: twice the phase of the numerator of the approximant."""
     k = degree
     terms = [
-        factorial(2 * k - j) * factorial(k) / (factorial(2 * k) * factorial(j) * factorial(k - j)) * (1j * z) ** j
+        factorial(2 * k - j)
+        * factorial(k)
+        / (factorial(2 * k) * factorial(j) * factorial(k - j))
+        * (1j * z) ** j
         for j in range(k + 1)
     ]
     return 2 * np.angle(sum(terms))
@@ -113,8 +116,9 @@ def ten_thousand_gyrations(method="boris"):
 
 
 @hard_case(
-    "A charge starts at rest in crossed E and B and drifts for ten thousand periods, also in steps of 300 periods.",
-    Bound("mean velocity from E/B, over the width of the orbit a run", 1),
+    "A charge starts at rest in crossed E and B and drifts for ten thousand periods, also in steps of 300 "
+    "periods.",
+    Bound("mean velocity from E/B, over the width of the orbit over the time", 1),
     Bound("speed about the drift, relative error", 1e-9),
 )
 def drift_across_both_fields(method="boris"):

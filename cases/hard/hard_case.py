@@ -144,4 +144,3 @@ def selected(names: Sequence[str]) -> list[HardCase]:
                 f"hard case must be {rule}; received {abbreviated(name)}{did_you_mean(name, known)}"
             )
     return [case for case in every if not names or {case.name, case.family} & set(names)]
-

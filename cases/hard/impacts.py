@@ -13,6 +13,7 @@ from tisim.cases.hard.reacting_flow import STONE
 from tisim.cases.hard.runs import ends, given, kinetic, momentum, verlet
 from tisim.effects import Agglomeration, Contact, ContactDissipation, Friction, Impact
 
+
 def touching(gap, approach, hardness=1e9, radius=1e-3, mass=None):
     """Return two hard spheres with centres at a distance (m) along a slanted line; the first approaches the
     second along it (m/s). One very short step, in which only the impact happens."""
@@ -42,7 +43,8 @@ def impacts_of_any_speed():
 
 
 @hard_case(
-    "Elastic spheres meet head-on at 1000 times the speed of waves in their material and fly through each other.",
+    "Elastic spheres meet head-on at 1000 times the speed of waves in their material and fly through each "
+    "other.",
     Bound("kinetic energy, change over the energy of a full overlap", 0.02),
     Bound("with dissipation: energy lost over its integral, relative error", 0.02),
 )

@@ -45,11 +45,13 @@ def magnetised(place, **options):
 
 
 def in_line(height):
-    """Return the moments (A m^2) of such spheres at heights (m) on a line along the field, by a linear solve."""
+    """Return the moments (A m^2) of such spheres at heights (m) in line with the field, by a linear solve."""
     height = np.asarray(height, float)
     gain = SUSCEPTIBILITY / (3 + SUSCEPTIBILITY)
     apart = np.abs(height[:, None] - height) + np.diag(np.full(len(height), np.inf))
-    return np.linalg.solve(np.eye(len(height)) - 2 * gain / apart**3, np.full(len(height), 4 * np.pi / mu_0 * gain))
+    return np.linalg.solve(
+        np.eye(len(height)) - 2 * gain / apart**3, np.full(len(height), 4 * np.pi / mu_0 * gain)
+    )
 
 
 EXACT = {"sweeps": 2000, "tolerance": 1e-12}
@@ -57,8 +59,8 @@ EXACT = {"sweeps": 2000, "tolerance": 1e-12}
 
 
 @hard_case(
-    "Two spheres of mu_r = 1e6 overlap along the field: below 1.26 radii their moments have no finite solution. "
-    "And a chain of 50.",
+    "Two spheres of mu_r = 1e6 overlap along the field: below 1.26 radii their moments have no finite "
+    "solution. And a chain of 50.",
     Bound("moments of pairs at 2 and 1.27 radii, relative error", 1e-9),
     Bound("moments of the chain, relative error", 1e-9),
     Bound("words missing from the message at 1.25 and 0.5 radii", 0, 0),
@@ -86,8 +88,8 @@ def moments_near_divergence(acceleration="anderson"):
 
 
 @hard_case(
-    "Superparamagnetic grains in fields from 1e-12 to 1e6 times their thermal field: L(x) cancels to rounding "
-    "for small x.",
+    "Superparamagnetic grains in fields from 1e-12 to 1e6 times their thermal field: L(x) cancels to "
+    "rounding for small x.",
     Bound("moment, relative error", 1e-12),
 )
 def zero_field_to_saturation():
@@ -116,9 +118,7 @@ def zero_field_to_saturation():
 def magnets_that_snap_together():
     moment, bottom = 4e3, 2 * 2 ** (1 / 15)
     scene = Scene(
-        particles=given(
-            [[0, 0, -1.3], [0, 0, 1.3]], np.zeros((2, 3)), 1.0, 1.0, moment=[[0, 0, moment]] * 2
-        ),
+        particles=given([[0, 0, -1.3], [0, 0, 1.3]], np.zeros((2, 3)), 1.0, 1.0, moment=[[0, 0, moment]] * 2),
         effects=(DipoleDipole(), Mie(epsilon=3.0)),
         stepper=verlet(1e-3),
         duration=60.0,

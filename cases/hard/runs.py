@@ -112,4 +112,3 @@ def off(actual: ArrayLike, expected: ArrayLike, scale: float | None = None) -> f
     largest expected magnitude."""
     deviation = np.abs(np.asarray(actual, float) - np.asarray(expected, float)).max()
     return float(deviation / (np.abs(expected).max() if scale is None else scale))
-

@@ -99,8 +99,8 @@ def electrons_from_a_nanometre(stepper=electron_stepper, *, gap=1e-9):
 
 
 @hard_case(
-    "Two of three particles are in one place, at which the force is 0/0; in another scene they are 1e-12 radii "
-    "apart.",
+    "Two of three particles are in one place, at which the force is 0/0; in another scene they are 1e-12 "
+    "radii apart.",
     Bound("in one place: words missing from the message", 0, 0),
     Bound("in one place: change of the state kept", 0, 0),
     Bound("1e-12 radii apart: force, relative error", 1e-12),
@@ -120,14 +120,21 @@ def coincident_particles():
     ])  # fmt: skip
     sound([good])
     words = ("at t = 0 s", "effects.near_field", "particle 1", "not finite")
-    change = max(np.abs(one.state[name] - one.start[name]).max() for one in bad for name in ("position", "velocity"))
+    change = max(
+        np.abs(one.state[name] - one.start[name]).max() for one in bad for name in ("position", "velocity")
+    )
     expected = np.outer([1, -1], (2.0 / 1e-13 - 1e-13 / 1e-26) * n)
     force = by_id(good.state)["force"]
-    return sum(missing(one, *words) for one in bad), change, np.abs(force - expected).max() / np.abs(expected).max()
+    return (
+        sum(missing(one, *words) for one in bad),
+        change,
+        np.abs(force - expected).max() / np.abs(expected).max(),
+    )
 
 
 @hard_case(
-    "Hard spheres whose centres are 1e-300, 1e-12 and 1e-6 radii apart: the square of the distance underflows.",
+    "Hard spheres whose centres are 1e-300, 1e-12 and 1e-6 radii apart: the square of the distance "
+    "underflows.",
     Bound("numbers that are not finite", 0, 0),
     Bound("momentum, relative change", 1e-14),
     Bound("kinetic energy gained, relative", 1e-14),
@@ -136,9 +143,7 @@ def coincident_particles():
 def nearly_coincident_spheres():
     results = sound(run([touching(part * 1e-3, 1.0) for part in (1e-300, 1e-12, 1e-6)]))
     lost = sum((~np.isfinite(values)).sum() for result in results for values in result.state.values())
-    moved = max(
-        np.abs(momentum(result.state) / momentum(result.start) - 1).max() for result in results
-    )
+    moved = max(np.abs(momentum(result.state) / momentum(result.start) - 1).max() for result in results)
     gain = max(kinetic(result.state) / kinetic(result.start) - 1 for result in results)
     return lost, moved, gain, sum(result.work["impacts"] for result in results[1:])
 
@@ -175,7 +180,8 @@ def overlapping(position, radius, mass, dt, steps):
 
 
 @hard_case(
-    "Spheres are released from an overlap of 10 %, and from centres 1e-12 radii apart, across a periodic face.",
+    "Spheres are released from an overlap of 10 %, and from centres 1e-12 radii apart, across a periodic "
+    "face.",
     Bound("energy released over energy stored, relative error", 1e-6),
     Bound("momentum, kg m/s", 1e-12),
 )
