@@ -14,11 +14,11 @@ import tisim
 from tisim import effects as laws
 from tisim import sources
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.runs import given, kinetic
 from tisim.steppers.choice import ACCURACY
 
-NUMBER = 12
+SCENES_EACH = 12
 """Random scenes of each hard case."""
 
 
@@ -212,14 +212,14 @@ def drawn(family, number):
 
 
 BOUNDS = (
-    Bound(f"largest error of {NUMBER} scenes over the motion or the energy", ACCURACY),
-    Bound("scenes refused", 0, 0),
+    Criterion(f"largest error of {SCENES_EACH} scenes over the motion or the energy", ACCURACY),
+    Criterion("scenes refused", 0, 0),
 )
 
 
 def largest_error(family):
     """Return the largest error of random scenes of a family, and the number of refused ones."""
-    scenes, refused = drawn(family, NUMBER)
+    scenes, refused = drawn(family, SCENES_EACH)
     results = sound(tisim.run([scene for scene, _ in scenes]))
     return max(error(result) for (_, error), result in zip(scenes, results, strict=True)), refused
 

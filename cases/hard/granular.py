@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from tisim import Material, Scene
 from tisim.cases.common.two_spheres import hertz_force
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.runs import ends, given, kinetic, looks, momentum, verlet
 from tisim.cases.hard.singular import overlap_energy, overlapping
 from tisim.effects import Granular, Gravity, HertzMaterial, MindlinForce, RestitutionDamping, Walls
@@ -23,9 +23,9 @@ from tisim.geometry import Plane
 
 Substance = Mapping[str, float]
 """Properties of a material, SI units."""
-FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+GROUND = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """Point and normal of the plane z = 0."""
-WEIGHT = 10.0
+GRAIN_WEIGHT = 10.0
 """Gravity (m/s^2), and the weight of a grain of 1 kg, N."""
 
 
@@ -65,7 +65,7 @@ def hertz_mindlin(
     ``dt`` (s) and ``steps``.
     """
     position = np.asarray(position, float)
-    planes = more.get("planes", [((0.0, 0.0, -1e6), FLOOR[1])])
+    planes = more.get("planes", [((0.0, 0.0, -1e6), GROUND[1])])
     materials = {
         name: Material(**{**ELASTIC_GRAIN, **more.get(name, {})}) for name in ("first", "second")
     }  # fmt: skip
@@ -90,7 +90,7 @@ def _modulus(material: Substance) -> float:
     return material["young"] / (2 * (1 - material["poisson"] ** 2))
 
 
-HERTZ_MINDLIN = GrainLaw(
+HERTZ_MINDLIN_LAW = GrainLaw(
     hertz_mindlin,
     lambda overlap, radius, material: float(hertz_force(overlap, radius, _modulus(material))),
     lambda overlap, radius, material: float(
@@ -106,10 +106,10 @@ HERTZ_MINDLIN = GrainLaw(
 
 @hard_case(
     "A thousand spheres at random places in a box for a tenth of them: each overlaps a dozen others.",
-    Bound("energy, kinetic and stored, relative change", 1e-4),
-    Bound("momentum over the sum of its magnitudes", 1e-12),
-    Bound("stored energy left", 0.9),
-    Bound("overlaps at the start", least=5001),
+    Criterion("energy, kinetic and stored, relative change", 1e-4),
+    Criterion("momentum over the sum of its magnitudes", 1e-12),
+    Criterion("stored energy left", 0.9),
+    Criterion("overlaps at the start", least=5001),
 )
 def thousand_overlapping_spheres():
     draw, n = np.random.Generator(np.random.Philox(20040101)), 1000
@@ -134,7 +134,7 @@ def balanced(law, material, n):
     """Return positions of n grains of 1 kg at rest on each other and on the floor, from the law alone."""
     place = np.zeros((n, 3))
     for k in range(n):
-        load, radius = WEIGHT * (n - k), 0.5 if k else 1.0
+        load, radius = GRAIN_WEIGHT * (n - k), 0.5 if k else 1.0
         overlap = brentq(lambda d, f=load, r=radius: law.push(d, r, material) - f, 0, 0.9, xtol=1e-16)
         place[k, 2] = place[k - 1, 2] + 2 - overlap if k else 1 - overlap
     return place
@@ -145,34 +145,27 @@ def column_energy(law, material, state):
     z = state["position"][:, 2]
     contacts = [law.stored(1 - z[0], 1.0, material)]
     contacts += [law.stored(2 - d, 0.5, material) for d in np.diff(z)]
-    return kinetic(state) + WEIGHT * z.sum() + sum(contacts)
+    return kinetic(state) + GRAIN_WEIGHT * z.sum() + sum(contacts)
 
 
 @hard_case(
     "Ten grains on each other for 200 periods of a contact: no creep, no heat, with and without losses.",
-    Bound("in balance: largest displacement, m of 1", 1e-11),
-    Bound("in balance: kinetic energy, J", 1e-18),
-    Bound("off balance, elastic: energy, change over the energy given", 3e-3),
-    Bound("off balance, with losses: largest rise of the energy, over the energy given", 1e-6),
-    Bound("off balance, with losses: energy left, over the energy given", 0.02),
-    figure="column",
+    Criterion("in balance: largest displacement, m of 1", 1e-11),
+    Criterion("in balance: kinetic energy, J", 1e-18),
+    Criterion("off balance, elastic: energy, change over the energy given", 3e-3),
+    Criterion("off balance, with losses: largest rise of the energy, over the energy given", 1e-6),
+    Criterion("off balance, with losses: energy left, over the energy given", 0.02),
 )
-def column_at_rest(law: GrainLaw = HERTZ_MINDLIN, strong: Substance = {"restitution": 0.1}):  # noqa: B006
+def column_at_rest(law: GrainLaw = HERTZ_MINDLIN_LAW, strong: Substance = {"restitution": 0.1}):  # noqa: B006
     """law : the law of contact. strong : properties of its material that bring a column to rest soon."""
     materials = law.elastic, {**law.elastic, **law.lossy[0], **strong}
     free, damped, start = columns(law, materials)
-    balance = [(states, material) for states, material in zip(start, materials, strict=True)]
     moved = max(
-        np.abs(state["position"] - states[0]["position"]).max() for states, _ in balance for state in states
+        np.abs(state["position"] - states[0]["position"]).max() for states in start for state in states
     )
-    heat = max(kinetic(state) for states, _ in balance for state in states)
-    return (
-        moved,
-        heat,
-        np.abs(free / free[0] - 1).max(),
-        np.diff(damped).max() / damped[0],
-        damped[-1] / damped[0],
-    )
+    heat = max(kinetic(state) for states in start for state in states)
+    rise = np.diff(damped).max() / damped[0]
+    return moved, heat, np.abs(free / free[0] - 1).max(), rise, damped[-1] / damped[0]
 
 
 def columns(law, materials):
@@ -185,7 +178,7 @@ def columns(law, materials):
             place[5:, 2] += lift
             scenes.append(
                 law.scene(
-                    place, np.zeros((10, 3)), first=material, planes=[FLOOR], gravity=(0, 0, -WEIGHT),
+                    place, np.zeros((10, 3)), first=material, planes=[GROUND], gravity=(0, 0, -GRAIN_WEIGHT),
                     dt=1e-4, steps=40_000,
                 )
             )  # fmt: skip
@@ -204,13 +197,13 @@ SQUEEZE = 0.02
 
 @hard_case(
     "A grain between two planes is pulled along them by 0.99 and by 1.01 of the largest friction.",
-    Bound("below: speed over the limit, m/s a N", 1e-9),
-    Bound("below: way in the last eighth of the run, m", 1e-9),
-    Bound("above: acceleration by the excess force, relative error", 1e-6),
-    Bound("spin, rad/s", 1e-9),
+    Criterion("below: speed over the limit, m/s a N", 1e-9),
+    Criterion("below: way in the last eighth of the run, m", 1e-9),
+    Criterion("above: acceleration by the excess force, relative error", 1e-6),
+    Criterion("spin, rad/s", 1e-9),
 )
 def friction_at_its_limit(
-    law: GrainLaw = HERTZ_MINDLIN,
+    law: GrainLaw = HERTZ_MINDLIN_LAW,
     grip: Substance = {"friction": 0.5, "restitution": 0.0},  # noqa: B006
     adhesion=0.0,
     drag=0.0,
@@ -219,7 +212,7 @@ def friction_at_its_limit(
     a friction that is a dashpot, N s/m; the speed below the limit is then relative to its own."""
     material = {**law.elastic, **grip}
     limit = 2 * grip["friction"] * (law.push(SQUEEZE, 1.0, material) + adhesion)
-    planes = [FLOOR, ((0.0, 0.0, 2 - 2 * SQUEEZE), (0.0, 0.0, -1.0))]
+    planes = [GROUND, ((0.0, 0.0, 2 - 2 * SQUEEZE), (0.0, 0.0, -1.0))]
     scenes = [
         law.scene(
             [[0, 0, 1 - SQUEEZE]], np.zeros((1, 3)), planes=planes, gravity=(part * limit, 0, 0),

@@ -24,7 +24,7 @@ HARD_FAMILIES = (
 
 
 @dataclass(frozen=True)
-class Bound:
+class Criterion:
     """A number that a hard case measures, and the least and the most that it may be."""
 
     quantity: str
@@ -42,11 +42,11 @@ class Bound:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Measured:
     """The number that came out of a run, beside its bound. reason : why there is no number, if a run
     failed."""
 
-    bound: Bound
+    bound: Criterion
     number: float
     reason: str = ""
 
@@ -74,11 +74,11 @@ class HardCase:
     name: str
     family: str
     difficulty: str
-    bounds: tuple[Bound, ...]
+    bounds: tuple[Criterion, ...]
     measure: Callable[..., Iterable[float]]
     figure: Callable[[], Figure] | None = None
 
-    def run(self, *arguments: Any) -> list[Outcome]:
+    def run(self, *arguments: Any) -> list[Measured]:
         """Run the case and return its numbers beside their bounds.
 
         arguments : of ``measure``, for another stepper or law than the one of the case.
@@ -91,15 +91,15 @@ class HardCase:
             try:
                 numbers = [float(number) for number in self.measure(*arguments)]
             except RunError as failure:
-                return [Outcome(bound, math.nan, str(failure)) for bound in self.bounds]
-        return [Outcome(bound, number) for bound, number in zip(self.bounds, numbers, strict=True)]
+                return [Measured(bound, math.nan, str(failure)) for bound in self.bounds]
+        return [Measured(bound, number) for bound, number in zip(self.bounds, numbers, strict=True)]
 
 
 _cases: dict[str, HardCase] = {}
 
 
 def hard_case(
-    difficulty: str, *bounds: Bound, figure: str | None = None
+    difficulty: str, *bounds: Criterion, figure: str | None = None
 ) -> Callable[[Callable[..., Iterable[float]]], HardCase]:
     """Return a decorator that registers a function as the ``measure`` of a hard case of its name.
 

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from tisim import Scene, run
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.reacting_flow import STONE
 from tisim.cases.hard.runs import ends, given, kinetic, momentum, verlet
 from tisim.effects import Agglomeration, Contact, ContactDissipation, Friction, Impact
@@ -29,10 +29,10 @@ def touching(gap, approach, hardness=1e9, radius=1e-3, mass=None):
 
 @hard_case(
     "Hard spheres collide at 1e-12 m/s to 1e7 m/s, a thousand times the speed of sound in steel.",
-    Bound("kinetic energy gained at any speed, relative", 1e-14),
-    Bound("least kinetic energy left, over its start", least=1e-12),
-    Bound("momentum, relative change", 1e-13),
-    Bound("pairs that did not collide", 0, 0),
+    Criterion("kinetic energy gained at any speed, relative", 1e-14),
+    Criterion("least kinetic energy left, over its start", least=1e-12),
+    Criterion("momentum, relative change", 1e-13),
+    Criterion("pairs that did not collide", 0, 0),
 )
 def impacts_of_any_speed():
     scenes = [touching(2e-3 * (1 - 1e-12), v, 1e6) for v in 10.0 ** np.arange(-12, 7.5, 1.0)]
@@ -45,8 +45,8 @@ def impacts_of_any_speed():
 @hard_case(
     "Elastic spheres meet head-on at 1000 times the speed of waves in their material and fly through each "
     "other.",
-    Bound("kinetic energy, change over the energy of a full overlap", 0.02),
-    Bound("with dissipation: energy lost over its integral, relative error", 0.02),
+    Criterion("kinetic energy, change over the energy of a full overlap", 0.02),
+    Criterion("with dissipation: energy lost over its integral, relative error", 0.02),
 )
 def beyond_the_speed_of_waves():
     stiffness, damping = 1e6, 1e3

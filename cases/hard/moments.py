@@ -9,7 +9,7 @@ from scipy.constants import Boltzmann, mu_0
 
 from tisim import Material, Scene, run
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.runs import by_id, ends, given, kinetic, looks, missing, solved, verlet
 from tisim.effects import (
     DipoleDipole,
@@ -28,14 +28,14 @@ from tisim.effects import (
 )
 from tisim.sources import MagneticField
 
-SUSCEPTIBILITY = 1e6 - 1
+SOFT_IRON = 1e6 - 1
 """Of a material with mu_r = 1e6."""
 
 
 def magnetised(place, **options):
     """Return spheres with mu_r = 1e6 and a radius of 1 m in 1 T along z."""
     place = np.asarray(place, float)
-    law = MutualInducedMoment(susceptibility=SUSCEPTIBILITY, **options)
+    law = MutualInducedMoment(susceptibility=SOFT_IRON, **options)
     return Scene(
         particles=given(place, 0 * place, 1.0, 1.0),
         effects=(MagneticField(constant=(0, 0, 1)), law),
@@ -47,31 +47,31 @@ def magnetised(place, **options):
 def in_line(height):
     """Return the moments (A m^2) of such spheres at heights (m) in line with the field, by a linear solve."""
     height = np.asarray(height, float)
-    gain = SUSCEPTIBILITY / (3 + SUSCEPTIBILITY)
+    gain = SOFT_IRON / (3 + SOFT_IRON)
     apart = np.abs(height[:, None] - height) + np.diag(np.full(len(height), np.inf))
     return np.linalg.solve(
         np.eye(len(height)) - 2 * gain / apart**3, np.full(len(height), 4 * np.pi / mu_0 * gain)
     )
 
 
-EXACT = {"sweeps": 2000, "tolerance": 1e-12}
+TO_ROUNDING = {"sweeps": 2000, "tolerance": 1e-12}
 """Options of moments that are solved to rounding."""
 
 
 @hard_case(
     "Two spheres of mu_r = 1e6 overlap along the field: below 1.26 radii their moments have no finite "
     "solution. And a chain of 50.",
-    Bound("moments of pairs at 2 and 1.27 radii, relative error", 1e-9),
-    Bound("moments of the chain, relative error", 1e-9),
-    Bound("words missing from the message at 1.25 and 0.5 radii", 0, 0),
-    Bound("growth of a sweep there over 2 R^3/d^3, relative error", 1e-4),
+    Criterion("moments of pairs at 2 and 1.27 radii, relative error", 1e-9),
+    Criterion("moments of the chain, relative error", 1e-9),
+    Criterion("words missing from the message at 1.25 and 0.5 radii", 0, 0),
+    Criterion("growth of a sweep there over 2 R^3/d^3, relative error", 1e-4),
     figure="divergence",
 )
 def moments_near_divergence(acceleration="anderson"):
     """acceleration : of the sweeps, "none" or "anderson"."""
     places = [[0, 2.0], [0, 1.27], 2.0 * np.arange(50.0), [0, 1.25], [0, 0.5]]
     results = solved([
-        magnetised(np.outer(z, [0, 0, 1]), acceleration=acceleration, **EXACT) for z in places
+        magnetised(np.outer(z, [0, 0, 1]), acceleration=acceleration, **TO_ROUNDING) for z in places
     ])  # fmt: skip
     errors = [
         np.abs(by_id(result.state)["moment"] / in_line(z)[:, None] - [0, 0, 1]).max()
@@ -90,7 +90,7 @@ def moments_near_divergence(acceleration="anderson"):
 @hard_case(
     "Superparamagnetic grains in fields from 1e-12 to 1e6 times their thermal field: L(x) cancels to "
     "rounding for small x.",
-    Bound("moment, relative error", 1e-12),
+    Criterion("moment, relative error", 1e-12),
 )
 def zero_field_to_saturation():
     n, law = np.array([2.0, -3.0, 6.0]) / 7, LangevinMoment(temperature=300.0)
@@ -111,9 +111,9 @@ def zero_field_to_saturation():
 
 @hard_case(
     "Two magnets fall on each other head to tail and rebound from hard cores (d^-30), twenty times.",
-    Bound("energy, largest relative change", 1e-3),
-    Bound("turns of the distance", least=31),
-    Bound("least distance over the diameter", least=0.9, most=2 ** (1 / 15)),
+    Criterion("energy, largest relative change", 1e-3),
+    Criterion("turns of the distance", least=31),
+    Criterion("least distance over the diameter", least=0.9, most=2 ** (1 / 15)),
 )
 def magnets_that_snap_together():
     moment, bottom = 4e3, 2 * 2 ** (1 / 15)
@@ -134,9 +134,9 @@ def magnets_that_snap_together():
 
 @hard_case(
     "Two magnets are held head to head in unstable balance, exactly and with an offset of 1e-3 rad.",
-    Bound("in exact balance: spin, rad/s", 0, 0),
-    Bound("with the offset: energy, change over the energy of the pair", 1e-3),
-    Bound("with the offset: largest change of a moment, over the moment", least=0.5),
+    Criterion("in exact balance: spin, rad/s", 0, 0),
+    Criterion("with the offset: energy, change over the energy of the pair", 1e-3),
+    Criterion("with the offset: largest change of a moment, over the moment", least=0.5),
 )
 def antiparallel_magnets():
     size, tilt, power = 1e3, 1e-3, 13
@@ -190,9 +190,9 @@ def soft_chain(stiffness=1e5, saturation=1.7e6, **more):
 
 @hard_case(
     "A chain of soft grains without saturation collapses: its moments grow by a factor in each step.",
-    Bound("words missing from the message", 0, 0),
-    Bound("largest speed in the state kept, m/s", 100),
-    Bound("largest speed without the guard, m/s", least=1e6),
+    Criterion("words missing from the message", 0, 0),
+    Criterion("largest speed in the state kept, m/s", 100),
+    Criterion("largest speed without the guard, m/s", least=1e6),
 )
 def collapse_of_soft_magnets():
     guarded, free = run([

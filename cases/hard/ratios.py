@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from tisim import Scene, run
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.granular import HERTZ_MINDLIN, GrainLaw
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.granular import HERTZ_MINDLIN_LAW, GrainLaw
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.impacts import touching
 from tisim.cases.hard.reacting_flow import STONE
 from tisim.cases.hard.runs import by_id, ends, given, kinetic, momentum
@@ -19,10 +19,10 @@ from tisim.effects import NearField
 
 @hard_case(
     "1 g and 1 t vibrate about the balance of an attraction and a repulsion, in both orders.",
-    Bound("distance against SciPy's DOP853 at 1e-11, m of 0.1", 2e-5),
-    Bound("relative velocity, m/s of 10", 2e-3),
-    Bound("total momentum over the exchanged momentum", 1e-9),
-    Bound("energy, relative error", 1e-7),
+    Criterion("distance against SciPy's DOP853 at 1e-11, m of 0.1", 2e-5),
+    Criterion("relative velocity, m/s of 10", 2e-3),
+    Criterion("total momentum over the exchanged momentum", 1e-9),
+    Criterion("energy, relative error", 1e-7),
 )
 def masses_a_million_apart(stepper=tight):
     """stepper : function of the first and the longest step."""
@@ -55,9 +55,9 @@ def masses_a_million_apart(stepper=tight):
 
 @hard_case(
     "Hard spheres with radii up to 1 : 1e9 and masses up to 1 : 1e27 rebound or bond.",
-    Bound("momentum, relative change", 1e-14),
-    Bound("rebound of the light sphere as from a wall, relative error", 1e-3),
-    Bound("pairs that did not rebound, or did not bond", 0, 0),
+    Criterion("momentum, relative change", 1e-14),
+    Criterion("rebound of the light sphere as from a wall, relative error", 1e-3),
+    Criterion("pairs that did not rebound, or did not bond", 0, 0),
 )
 def spheres_of_unequal_size():
     scenes = []
@@ -77,10 +77,10 @@ def spheres_of_unequal_size():
 
 @hard_case(
     "A grain hits another of 1e-6 to 1e6 times its mass.",
-    Bound("restitution, relative error", 5e-3),
-    Bound("momentum and angular momentum, change over the momentum at the start", 2e-13),
+    Criterion("restitution, relative error", 5e-3),
+    Criterion("momentum and angular momentum, change over the momentum at the start", 2e-13),
 )
-def restitution_of_unlike_masses(law: GrainLaw = HERTZ_MINDLIN, restitution=0.5):
+def restitution_of_unlike_masses(law: GrainLaw = HERTZ_MINDLIN_LAW, restitution=0.5):
     """law : the law of contact. restitution : of its material; 1 for a law without."""
     ratios = np.array([1e-6, 1e-3, 1.0, 1e3, 1e6])
     scenes = [
@@ -115,11 +115,11 @@ def momenta(state):
 @hard_case(
     "Small grains fly at four large ones 20 times their size and 8000 times their mass; every other grain is "
     "1000 times stiffer.",
-    Bound("momentum and angular momentum, change over the momentum at the start", 1e-12),
-    Bound("kinetic energy left", 0.9),
-    Bound("grains that have collided", least=31),
+    Criterion("momentum and angular momentum, change over the momentum at the start", 1e-12),
+    Criterion("kinetic energy left", 0.9),
+    Criterion("grains that have collided", least=31),
 )
-def mixture_of_grains(law: GrainLaw = HERTZ_MINDLIN):
+def mixture_of_grains(law: GrainLaw = HERTZ_MINDLIN_LAW):
     """law : the law of contact."""
     draw = np.random.Generator(np.random.Philox(20040101))
     soft = law.unbonded()

@@ -8,7 +8,7 @@ import numpy as np
 
 from tisim import Scene, run
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.reacting_flow import (
     BONDING_HARDNESS,
     STONE,
@@ -60,19 +60,19 @@ def balances(results):
 
 
 BALANCES = (
-    Bound("mass, relative change", 1e-14),
-    Bound("volume, relative change", 1e-13),
-    Bound("momentum, change over the sum of its magnitudes", 1e-13),
-    Bound("energy, relative change", 1e-12),
+    Criterion("mass, relative change", 1e-14),
+    Criterion("volume, relative change", 1e-13),
+    Criterion("momentum, change over the sum of its magnitudes", 1e-13),
+    Criterion("energy, relative change", 1e-12),
 )
 
 
 @hard_case(
     "Grains at 0 K, at 1e-30 K and up to 1e9 K collide, soften and react: exp(Q/RT) overflows, T^4 is 1e36.",
-    Bound("energy, relative change", 1e-11),
-    Bound("numbers that are not finite, and negative temperatures", 0, 0),
-    Bound("least number of impacts", least=11),
-    Bound("impacts whose iteration did not converge", 0, 0),
+    Criterion("energy, relative change", 1e-11),
+    Criterion("numbers that are not finite, and negative temperatures", 0, 0),
+    Criterion("least number of impacts", least=11),
+    Criterion("impacts whose iteration did not converge", 0, 0),
 )
 def absolute_zero_to_a_billion_kelvin():
     scenes = []
@@ -101,8 +101,9 @@ def z04_iteration(pressure=0.5, iterations=200):
 @hard_case(
     "Restitution and impact pressure depend on each other: the iteration printed in Z04 alternates for ever "
     "between bond and rebound.",
-    Bound("restitution from 1 - sqrt(p)", 1e-9),
-    Bound("last change of Z04's own iteration", least=0.49),
+    Criterion("restitution from 1 - sqrt(p)", 1e-9),
+    Criterion("last change of Z04's own iteration", least=0.49),
+    figure="threshold",
 )
 def bond_or_rebound():
     pressure, hardness = 0.5, 1e6
@@ -126,12 +127,11 @@ def strongly_coupled(speed, iterations=200, **more):
 
 @hard_case(
     "Heat softens, and softness heats: 300 speeds through the threshold above which grains bond.",
-    Bound("impacts whose iteration did not converge", 0, 0),
-    Bound("most iterations", 200),
-    Bound("largest rise of the restitution with speed", 1e-9),
-    Bound("pairs that bond", least=1, most=299),
-    Bound("speeds above which a pair bonds, and at which it does not", 0, 0),
-    figure="threshold",
+    Criterion("impacts whose iteration did not converge", 0, 0),
+    Criterion("most iterations", 200),
+    Criterion("largest rise of the restitution with speed", 1e-9),
+    Criterion("pairs that bond", least=1, most=299),
+    Criterion("speeds above which a pair bonds, and at which it does not", 0, 0),
 )
 def threshold_of_bonding():
     speeds, results = across_the_threshold()
@@ -153,8 +153,8 @@ def across_the_threshold():
 @hard_case(
     "150 grains in a periodic box all merge into one sphere, also across its faces.",
     *BALANCES,
-    Bound("grains left", 1, 1),
-    Bound("radius by volume, relative error", 1e-13),
+    Criterion("grains left", 1, 1),
+    Criterion("radius by volume, relative error", 1e-13),
 )
 def all_grains_merge():
     (result,) = results = sound(
@@ -167,8 +167,8 @@ def all_grains_merge():
 @hard_case(
     "Grains merge, break, react and cool for thousands of steps, in four worlds of hard and soft grains.",
     *BALANCES,
-    Bound("merges", least=101),
-    Bound("fractures", least=31),
+    Criterion("merges", least=101),
+    Criterion("fractures", least=31),
 )
 def grains_that_merge_and_break():
     kinds = [(3e5, 10.0), (3e6, 1.0), (3e6, 30.0), (1e7, 3.0)]
@@ -188,8 +188,8 @@ def grains_that_merge_and_break():
 @hard_case(
     "Two agglomerates of 32 grains break into 64 fragments, all that the world has room for.",
     *BALANCES,
-    Bound("fragments", 64, 64),
-    Bound("mass of a fragment, relative error", 1e-13),
+    Criterion("fragments", 64, 64),
+    Criterion("mass of a fragment, relative error", 1e-13),
 )
 def fragments_fill_every_slot():
     scene = meeting(1e3, laws(BONDING_HARDNESS, surface_energy=1.0), STONE_RADIUS * 32 ** (1 / 3))

@@ -21,7 +21,7 @@ import numpy as np
 
 from tisim.backend import runtime
 from tisim.backend.processor import processor
-from tisim.cases.hard.hard_case import HardCase, Outcome, title
+from tisim.cases.hard.hard_case import HardCase, Measured, title
 from tisim.files import checksum, output_folder
 from tisim.files.atomic import replace_file
 from tisim.io.run_folder import versions
@@ -37,7 +37,7 @@ class Finished:
     """A hard case that has been run, with its numbers and its processor time (s), compilation included."""
 
     case: HardCase
-    outcomes: Sequence[Outcome]
+    outcomes: Sequence[Measured]
     seconds: float
 
 

@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 
 from tisim import Scene, Simulation
-from tisim.cases.hard.granular import HERTZ_MINDLIN, GrainLaw
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.granular import HERTZ_MINDLIN_LAW, GrainLaw
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.runs import ends, given, verlet
 from tisim.effects import Tether
 
@@ -47,12 +47,11 @@ def pairs_of_size(law, size):
 
 @hard_case(
     "Spinning grains of 10 nm, 1 m and 1 km collide obliquely; masses span 32 decades.",
-    Bound("velocities, difference from those at 1 m, m/s of 1", 1e-9),
-    Bound("spins times the size, difference, m/s", 3e-9),
-    Bound("largest change of a velocity, m/s", least=0.3),
-    figure="sizes",
+    Criterion("velocities, difference from those at 1 m, m/s of 1", 1e-9),
+    Criterion("spins times the size, difference, m/s", 3e-9),
+    Criterion("largest change of a velocity, m/s", least=0.3),
 )
-def impacts_from_nanometres_to_kilometres(law: GrainLaw = HERTZ_MINDLIN):
+def impacts_from_nanometres_to_kilometres(law: GrainLaw = HERTZ_MINDLIN_LAW):
     """law : the law of contact."""
     sizes = (2.0**-27, 1.0, 2.0**10)
     scenes = [pairs_of_size(law, size) for size in sizes]
@@ -67,9 +66,9 @@ def impacts_from_nanometres_to_kilometres(law: GrainLaw = HERTZ_MINDLIN):
 
 @hard_case(
     "A million steps of 0.1 s, which is no binary fraction: plain summation loses 1e-7 s and more.",
-    Bound("time, error in units of its last bit", 1),
-    Bound("steps missing", 0, 0),
-    Bound("error of plain summation, s", least=1e-7),
+    Criterion("time, error in units of its last bit", 1),
+    Criterion("steps missing", 0, 0),
+    Criterion("error of plain summation, s", least=1e-7),
 )
 def time_of_a_million_steps():
     number = 10**6

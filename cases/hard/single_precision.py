@@ -8,7 +8,7 @@ from scipy.constants import Boltzmann, mu_0
 
 from tisim import Scene
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.moments import magnetised
 from tisim.cases.hard.runs import by_id, ends, given, single_precision, solved, verlet
 from tisim.effects import Contact, DipoleDipole, Mie, MutualLangevinMoment, NearField
@@ -17,8 +17,8 @@ from tisim.sources import MagneticField
 
 @hard_case(
     "Grains that touch 1 km from the origin, at which single-precision positions are 6e-5 m apart.",
-    Bound("momentum over the sum of its magnitudes", 3e-7),
-    Bound("force at the stored positions, error over the largest", 1e-5),
+    Criterion("momentum over the sum of its magnitudes", 3e-7),
+    Criterion("force at the stored positions, error over the largest", 1e-5),
 )
 def far_from_the_origin():
     strength, radius, stiffness = 1e-3, 1e-2, 1e3
@@ -81,7 +81,7 @@ def colloids():
 
 @hard_case(
     "Colloids with moments of 1e-18 A m^2 and energies of 1e-19 J, and a dense lattice of mu_r = 1e6.",
-    Bound("forces and moments against double precision, over the largest", 2e-5),
+    Criterion("forces and moments against double precision, over the largest", 2e-5),
 )
 def colloids_of_nanometres():
     fine = colloids()

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from tisim import Box, Scene, run
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.impacts import touching
 from tisim.cases.hard.runs import by_id, ends, given, kinetic, missing, momentum, verlet
 from tisim.cases.hard.springs import tight
@@ -23,10 +23,10 @@ COULOMB_CONSTANT = 8.9875517873681764e9
 
 @hard_case(
     "Two particles that attract by 1/d fall on each other from rest; the speed has no bound.",
-    Bound("kinetic energy until shortly before, relative error", 1e-4),
-    Bound("momentum, kg m/s", 1e-12),
-    Bound("words missing from the message at the singularity", 0, 0),
-    Bound("time of the last good state beyond the fall, over the fall", 1e-6),
+    Criterion("kinetic energy until shortly before, relative error", 1e-4),
+    Criterion("momentum, kg m/s", 1e-12),
+    Criterion("words missing from the message at the singularity", 0, 0),
+    Criterion("time of the last good state beyond the fall, over the fall", 1e-6),
 )
 def fall_into_a_singularity(stepper=tight):
     """stepper : function of the limits of its steps."""
@@ -77,10 +77,10 @@ def electrons(stepper, gap=1e-9):
 
 @hard_case(
     "Two electrons released 1 nm apart fly to 1 mm; the first step is right, or 1e9 times too long.",
-    Bound("speed by the released energy, relative error", 1e-3),
-    Bound("distance at the end from 1 mm, relative", 1e-2),
-    Bound("momentum over that of one electron", 1e-12),
-    Bound("rejected steps after the long first step", least=4),
+    Criterion("speed by the released energy, relative error", 1e-3),
+    Criterion("distance at the end from 1 mm, relative", 1e-2),
+    Criterion("momentum over that of one electron", 1e-12),
+    Criterion("rejected steps after the long first step", least=4),
     figure="released",
 )
 def electrons_from_a_nanometre(stepper=electron_stepper, *, gap=1e-9):
@@ -101,9 +101,9 @@ def electrons_from_a_nanometre(stepper=electron_stepper, *, gap=1e-9):
 @hard_case(
     "Two of three particles are in one place, at which the force is 0/0; in another scene they are 1e-12 "
     "radii apart.",
-    Bound("in one place: words missing from the message", 0, 0),
-    Bound("in one place: change of the state kept", 0, 0),
-    Bound("1e-12 radii apart: force, relative error", 1e-12),
+    Criterion("in one place: words missing from the message", 0, 0),
+    Criterion("in one place: change of the state kept", 0, 0),
+    Criterion("1e-12 radii apart: force, relative error", 1e-12),
 )
 def coincident_particles():
     place, n = np.array([[0, 0, 0], [1, 1, 1], [1, 1, 1]], float), np.array([2.0, -3.0, 6.0]) / 7
@@ -135,10 +135,10 @@ def coincident_particles():
 @hard_case(
     "Hard spheres whose centres are 1e-300, 1e-12 and 1e-6 radii apart: the square of the distance "
     "underflows.",
-    Bound("numbers that are not finite", 0, 0),
-    Bound("momentum, relative change", 1e-14),
-    Bound("kinetic energy gained, relative", 1e-14),
-    Bound("impacts at 1e-12 and 1e-6 radii", 2, 2),
+    Criterion("numbers that are not finite", 0, 0),
+    Criterion("momentum, relative change", 1e-14),
+    Criterion("kinetic energy gained, relative", 1e-14),
+    Criterion("impacts at 1e-12 and 1e-6 radii", 2, 2),
 )
 def nearly_coincident_spheres():
     results = sound(run([touching(part * 1e-3, 1.0) for part in (1e-300, 1e-12, 1e-6)]))
@@ -182,8 +182,8 @@ def overlapping(position, radius, mass, dt, steps):
 @hard_case(
     "Spheres are released from an overlap of 10 %, and from centres 1e-12 radii apart, across a periodic "
     "face.",
-    Bound("energy released over energy stored, relative error", 1e-6),
-    Bound("momentum, kg m/s", 1e-12),
+    Criterion("energy released over energy stored, relative error", 1e-6),
+    Criterion("momentum, kg m/s", 1e-12),
 )
 def released_overlaps():
     radius, gaps = 0.125, (1.8 * 0.125, 1e-12 * 0.125)

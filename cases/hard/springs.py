@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from tisim import Scene, run
 from tisim.cases.common.runs import sound
-from tisim.cases.hard.hard_case import Bound, hard_case
+from tisim.cases.hard.hard_case import Criterion, hard_case
 from tisim.cases.hard.runs import ends, given, kinetic, missing, verlet
 from tisim.effects import Contact, NearField, Tether
 from tisim.steppers import ErrorControl, Stepper, Trapezoid
@@ -33,11 +33,10 @@ def spring(stiffness: float, stepper: Stepper, duration: float) -> Scene:
 @hard_case(
     "Springs of 4 N/m, and 100 and 1e6 times stiffer, with one and the same control: the first step is up to "
     "20 radians long.",
-    Bound("distance from the centre after 3.25 periods / amplitude", 1e-4),
-    Bound("speed there, relative error", 1e-6),
-    Bound("steps of any spring beyond 1.2 times the fewest", 10),
-    Bound("rejected steps of the stiffest", least=2),
-    figure="stiffness",
+    Criterion("distance from the centre after 3.25 periods / amplitude", 1e-4),
+    Criterion("speed there, relative error", 1e-6),
+    Criterion("steps of any spring beyond 1.2 times the fewest", 10),
+    Criterion("rejected steps of the stiffest", least=2),
 )
 def stiff_springs(stepper=tight):
     """stepper : function of the first and the longest step."""
@@ -60,9 +59,9 @@ def stiff_springs(stepper=tight):
 
 @hard_case(
     "Verlet in steps ten times as long as the stability limit w dt = 2 of a spring would grow without bound.",
-    Bound("below the limit: position after 10 s, absolute error, m", 1e-3),
-    Bound("beyond it: words missing from the message", 0, 0),
-    Bound("particles left that are not finite", 0, 0),
+    Criterion("below the limit: position after 10 s, absolute error, m", 1e-3),
+    Criterion("beyond it: words missing from the message", 0, 0),
+    Criterion("particles left that are not finite", 0, 0),
 )
 def step_beyond_stability():
     stable, stiff = run([spring(4.0 * f, verlet(0.01), 10.0) for f in (1.0, 1e6)])
@@ -75,9 +74,9 @@ def step_beyond_stability():
 @hard_case(
     "Spheres of 1 m graze each other at 200 m/s with an overlap of 1 mm: the contact lasts a few hundredths "
     "of the flight.",
-    Bound("deflection over the impulse along the straight path, relative error", 1e-3),
-    Bound("kinetic energy, relative change", 1e-9),
-    Bound("without overlap: change of velocity, m/s", 0, 0),
+    Criterion("deflection over the impulse along the straight path, relative error", 1e-3),
+    Criterion("kinetic energy, relative change", 1e-9),
+    Criterion("without overlap: change of velocity, m/s", 0, 0),
 )
 def grazing_spheres():
     speed, stiffness, apart = 100.0, 1e6, 2.0 - 1e-3

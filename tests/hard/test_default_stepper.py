@@ -62,14 +62,6 @@ def work_of(results):
     return float(np.mean([r.work.get("force_evaluations", 0) or r.work["steps"] for r in results]))
 
 
-@pytest.mark.parametrize("name", QUICK)
-def test_a_scene_without_a_stepper_reaches_its_accuracy(name):
-    scenes, refused = drawn(name, 12)
-    assert refused == 0
-    errors = errors_of(scenes, tisim.run([scene for scene, _ in scenes]))
-    assert errors.max() <= ACCURACY
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FAMILIES)
 def test_100_random_scenes_of_each_family(name, capsys):
