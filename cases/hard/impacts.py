@@ -36,7 +36,8 @@ def touching(gap, approach, hardness=1e9, radius=1e-3, mass=None):
 )
 def impacts_of_any_speed():
     scenes = [touching(2e-3 * (1 - 1e-12), v, 1e6) for v in 10.0 ** np.arange(-12, 7.5, 1.0)]
-    results = sound(run(scenes))
+    # In batches of few worlds, for which other impacts of this law are compiled too.
+    results = [one for k in range(0, len(scenes), 5) for one in sound(run(scenes[k : k + 5]))]
     left = [kinetic(result.state) / kinetic(result.start) for result in results]
     moved = max(np.abs(momentum(result.state) / momentum(result.start) - 1).max() for result in results)
     return max(left) - 1, min(left), moved, sum(result.work["impacts"] != 1 for result in results)

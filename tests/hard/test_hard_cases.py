@@ -13,9 +13,10 @@ SLOW = (
     *("restitution_of_unlike_masses", "bond_or_rebound", "threshold_of_bonding", "all_grains_merge"),
     *("grains_that_merge_and_break", "fragments_fill_every_slot", "thousand_overlapping_spheres"),
     *("column_at_rest", "friction_at_its_limit", "impacts_from_nanometres_to_kilometres"),
-    *("far_from_the_origin", "colloids_of_nanometres"),
+    *("far_from_the_origin", "colloids_of_nanometres", "electrons_from_a_nanometre"),
+    *("zero_field_to_saturation", "time_of_a_million_steps"),
 )
-"""Cases whose structures take longer to compile, or which are compiled in two precisions."""
+"""Cases that compile large structures, or several, or whose laws other quick tests compile."""
 
 pytestmark = pytest.mark.long
 

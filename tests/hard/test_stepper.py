@@ -26,11 +26,7 @@ STEPPERS = {
 }
 
 
-NAMES = [
-    "trapezoid",
-    pytest.param("anderson", marks=pytest.mark.slow),
-    pytest.param("collocation", marks=pytest.mark.slow),
-]
+NAMES = [pytest.param(name, marks=pytest.mark.slow) for name in STEPPERS]
 
 
 def adaptive(name, first, longest, **more):
@@ -71,6 +67,7 @@ def test_other_steppers_keep_the_bounds(case, name):
     holds(case, partial(adaptive, name))
 
 
+@pytest.mark.slow
 def test_verlet_with_masses_a_million_apart():
     holds(masses_a_million_apart, lambda **_: fixed(2e-5))
 
