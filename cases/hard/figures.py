@@ -18,7 +18,7 @@ from tisim.cases.hard.runs import by_id, solved
 from tisim.cases.hard.singular import COULOMB_CONSTANT, electron_stepper, electrons
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain
 
-ROUNDING = 1e-16
+LEAST_DRAWN = 1e-16
 """Errors below this are drawn at it."""
 
 
@@ -37,7 +37,7 @@ def released() -> Figure:
 
     def draw(time: np.ndarray, d: np.ndarray, v: np.ndarray, label: str, colour: str) -> None:
         error = np.abs((v / swiftest) ** 2 + gap / d - 1)
-        axis.loglog(time, np.maximum(error, ROUNDING), color=colour, label=f"{label}: {forces} forces")
+        axis.loglog(time, np.maximum(error, LEAST_DRAWN), color=colour, label=f"{label}: {forces} forces")
 
     draw(times, distance, speed, "tisim, adaptive steps", AXIS_COLOURS[0])
     for (name, step), colour in zip(
@@ -94,7 +94,7 @@ def gyrations() -> Figure:
             [np.linalg.norm(one.state["velocity"][0, :2]) for one in sound(run(scenes))]
         )  # fmt: skip
         length = f"{z:g} rad" if z < 1 else f"{z / (2 * np.pi):.0f} periods"
-        error = np.maximum(np.abs(speed - 1), ROUNDING)
+        error = np.maximum(np.abs(speed - 1), LEAST_DRAWN)
         axis.loglog(steps * z / (2 * np.pi), error, color=colour, label=f"tisim, Boris, steps of {length}")
     z = 0.3
     steps = np.unique(np.round(np.geomspace(1, 1e4 * 2 * np.pi / z, 300)))
@@ -105,7 +105,7 @@ def gyrations() -> Figure:
         axis.loglog(
             steps * z / (2 * np.pi), error, style, color=AXIS_COLOURS[1], label=f"{name}, steps of {z} rad"
         )
-    axis.set_ylim(ROUNDING / 2, 1e4)
+    axis.set_ylim(LEAST_DRAWN / 2, 1e4)
     axis.set_xlabel("periods")
     axis.set_ylabel("error of the speed / speed")
     legend_above(axis, columns=2)
