@@ -33,9 +33,6 @@ from tisim.steppers.choice import ACCURACY, ALONE, KINKED
 
 pytestmark = pytest.mark.long
 
-QUICK = ("tether", "lorentz", "permanent_magnet", "damped_grains", "impact", "driven_charge")
-"""The families that the quick tests use; each stands for one rule of the choice."""
-
 
 def drawn(name, number):
     """Return scenes of a family with the functions that return their errors, and the number of refused

@@ -134,15 +134,6 @@ def test_coincident_centres_are_named(name, monkeypatch):
         np.testing.assert_array_equal(result.state["velocity"], still)
 
 
-GROWS = {
-    "stiffness": 1, "rolling_stiffness": 1, "rolling_damping": 2, "twisting_friction": 1,
-    "twisting_stiffness": 3, "twisting_damping": 4, "surface_energy": 1, "viscous_time": 1, "damping": 2,
-    "surface_tension": 1, "volume": 3,
-}  # fmt: skip
-"""Exponent of the length with which each property scales, with velocities and moduli fixed, for the same
-motion."""
-
-
 def test_a_bond_conserves_energy_and_adds_none_if_it_breaks():
     """Bonded pairs are stretched, sheared, bent and twisted by their initial spins.
 

@@ -9,9 +9,6 @@ from tests.scenes import by_id, roundoff
 
 pytestmark = pytest.mark.slow
 
-LARGE, SMALL, STIFFER = 0.2, 0.01, 1e3
-"""Radii (m) of a mixture, and the stiffness ratio of its two materials."""
-
 
 def test_a_mixture_comes_to_rest_and_bears_its_weight(rng):
     """Two large grains fall on small ones on a floor; both materials occur in each size.

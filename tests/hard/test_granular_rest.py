@@ -30,15 +30,6 @@ def looks(scenes, number):
     return series
 
 
-STRONG = {
-    "hooke": {"restitution": 0.1},
-    "jkr": {"viscous_time": 1e-2},
-    "dmt": {"damping": 100.0},
-    "mindlin": {"restitution": 0.1},
-}
-"""Losses that bring a column to rest within seconds."""
-
-
 def balanced(name, law, n):
     """Positions of n grains of 1 kg at rest on each other and on the floor, from the contact force alone."""
     place = np.zeros((n, 3))
@@ -47,13 +38,6 @@ def balanced(name, law, n):
         overlap = brentq(lambda d, f=load, r=radius: push(name, d, r, law) - f, 0, 0.9, xtol=1e-16)
         place[k, 2] = 1 - overlap if k == 0 else place[k - 1, 2] + 2 - overlap
     return place
-
-
-def column_energy(name, law, state):
-    """Kinetic, potential and contact energy of a column, J."""
-    z = state["position"][:, 2]
-    contacts = [stored(name, 1 - z[0], 1.0, law)] + [stored(name, 2 - d, 0.5, law) for d in np.diff(z)]
-    return kinetic(state).sum() + G * z.sum() + sum(contacts)
 
 
 def lasting():
@@ -69,21 +53,6 @@ def lasting():
 def test_a_column_lasts_in_single_precision(single):
     """In single precision the square of a tiny slip underflows to zero."""
     assert single("hard.test_granular_rest", "lasting") == "running"
-
-
-PRESSED = 0.02
-"""Overlap (m) of a grain with each of the two planes that enclose it."""
-SLOT = [FLOOR, ((0.0, 0.0, 2 - 2 * PRESSED), (0.0, 0.0, -1.0))]
-GRIPS = {
-    "hooke": {"friction": 0.5, "restitution": 0.0},
-    "jkr": {"friction": 0.5, "viscous_time": 4e-3, "surface_energy": 20.0},
-    "dmt": {"friction": 0.5, "damping": 200.0, "surface_energy": 20.0},
-    "mindlin": {"friction": 0.5, "restitution": 0.0},
-}
-"""Friction, damping strong enough that a sticking grain does not oscillate, and adhesion if the law has
-it."""
-CREEPS = {"dmt": 2 * 0.7 * 200.0}
-"""Drag coefficient (N s/m) of both planes, for laws whose friction is a dashpot."""
 
 
 def springs(name, made, memory, overlap, radius):

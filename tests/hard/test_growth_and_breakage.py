@@ -3,15 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.engine.test_schedules import BATCH
 from tests.scenes import GRAIN, HEAT_CAPACITY, RADIUS, hit, simulate
 from tisim.effects import Heating, Impact
 from tisim.operators import Fragmentation
-
-
-def run(scenes):
-    """Run with a capacity of 200, in the batch that test_schedules has compiled."""
-    return simulate(scenes, worlds=BATCH, capacity=200, schedule="world")
 
 
 class Optimist(Fragmentation):

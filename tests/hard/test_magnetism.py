@@ -32,7 +32,6 @@ from tisim.numerics.langevin import langevin_ratio
 from tisim.sources import MagneticField
 from tisim.steppers import ErrorControl, Trapezoid
 
-N = np.array([2.0, -3.0, 6.0]) / 7
 ARGUMENTS = np.concatenate(
     [[1e-30, 1e-12, 1e6, 1e30], np.nextafter(1, [0, 1, 2]), 10 ** np.linspace(-4, 3, 400)]
 )

@@ -3,7 +3,6 @@ particles."""
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from tests.effects.contact.loads import WORLDS, loads
 from tests.scenes import fixed, scene, simulate
@@ -15,7 +14,6 @@ from tisim.operators.base import parameter
 
 CROWD = 1000
 BOX = Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0))
-N = np.array([2.0, -3.0, 6.0]) / 7
 
 
 def grains(position, radius, young=1e3, stiffness=1e3, **more):
@@ -28,25 +26,6 @@ def grains(position, radius, young=1e3, stiffness=1e3, **more):
 
 def run_grains(scenes):
     return simulate(scenes, worlds=WORLDS, capacity=CROWD)
-
-
-def stored_energy(d, a, b, young=1e3, stiffness=1e3):
-    """Energy (J) of a pair at a distance d under both contact laws (Z16 7.3, B.5, B.7), by quadrature."""
-
-    def push(x):
-        overlap = a + b - x
-        area = np.pi * max(a**2 - (0.5 * (x - (b**2 - a**2) / x)) ** 2, 0.0)
-        modulus = young / (2 * (1 - 0.25**2))
-        return (
-            stiffness * (overlap / (a + b)) ** 2 * area
-            + 4 / 3 * modulus * np.sqrt(a * b / (a + b)) * overlap**1.5
-        )
-
-    return quad(push, d, a + b)[0] if d < a + b else 0.0
-
-
-def kinetic(state):
-    return 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
 
 
 R = 0.125

@@ -56,10 +56,6 @@ def good(results):
     return results
 
 
-def kinetic(state):
-    return 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["anderson", "collocation"])
 @pytest.mark.parametrize("case", [stiff_springs, masses_a_million_apart, fall_into_a_singularity])
