@@ -5,18 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tisim import Box, Particles, Scene, Simulation
+from tisim import Particles, Scene, Simulation
 from tisim.backend import runtime
-from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
-from tisim.operators import Cooling, Fragmentation
+from tisim.cases.hard.reacting_flow import (
+    BONDING_HARDNESS,
+    STONE,
+    STONE_HEAT_CAPACITY,
+    STONE_MASS,
+    STONE_RADIUS,
+    energy,
+    flow,
+    laws,
+)
 from tisim.steppers import Boris, FixedStep, Verlet
 
-DENSITY = 2000.0
-RADIUS = 1e-3
-GRAIN = DENSITY * 4 / 3 * np.pi * RADIUS**3
+__all__ = ["energy", "flow", "laws"]
+
+DENSITY = STONE
+RADIUS = STONE_RADIUS
+GRAIN = STONE_MASS
 """kg, mass of a grain of RADIUS and DENSITY."""
-HEAT_CAPACITY = 500.0
-SOFT = 1.0
+HEAT_CAPACITY = STONE_HEAT_CAPACITY
+SOFT = BONDING_HARDNESS
 """Pa; a hardness at which all grains bond."""
 
 _compiled: dict = {}
@@ -107,72 +117,9 @@ def hit(speed, effects, **more):
     return head_on(speed, effects, dt=1e-15, quantities={"temperature": 300.0}, **more)
 
 
-def laws(
-    hardness=SOFT,
-    surface_energy=1e16,
-    grain_mass=GRAIN,
-    threshold=2 ** (-1 / 3),
-    activation_energy=0.0,
-    reaction=1e3,
-):
-    """All impact laws of Z04; by default the hardness does not depend on temperature."""
-    return (
-        Impact(hardness=hardness),
-        Friction(coefficient=0.1),
-        Heating(heat_capacity=HEAT_CAPACITY),
-        DeformationWork(),
-        Softening(activation_energy=activation_energy),
-        Reaction(energy_density=reaction),
-        Fragmentation(surface_energy=surface_energy, grain_mass=grain_mass, threshold=threshold),
-        Agglomeration(),
-    )
-
-
-def flow(
-    seed=0,
-    grains=100,
-    hardness=3e5,
-    surface_energy=1e16,
-    grain_mass=GRAIN,
-    threshold=0.5,
-    duration=1e-3,
-    side=0.02,
-    images=False,
-    stepper=None,
-    sizes=1.0,
-):
-    """A random cloud under all of Z04's physics; ``sizes`` is the largest radius over the smallest."""
-    draw = np.random.Generator(np.random.Philox(seed))
-    radius = RADIUS * sizes ** -draw.uniform(0, 1, grains)
-    return Scene(
-        particles=Particles(
-            position=draw.uniform(-side / 2, side / 2, (grains, 3)),
-            velocity=np.array([100.0, 10, 10]) + draw.uniform(-1, 1, (grains, 3)) * [150.0, 15, 15],
-            radius=radius,
-            density=DENSITY,
-            quantities={"temperature": draw.uniform(200, 600, grains)},
-        ),
-        effects=(*laws(hardness, surface_energy, grain_mass, threshold, 300.0, 2e4), Cooling()),
-        domain=Box(low=(-side / 2,) * 3, high=(side / 2,) * 3, images=images),
-        stepper=stepper or Verlet(),
-        duration=duration,
-        seed=seed,
-    )
-
-
 def momentum(state):
     """Momentum, kg m/s."""
     return (state["mass"][:, None] * state["velocity"]).sum(axis=0)
-
-
-def energy(state, heat_capacity=HEAT_CAPACITY):
-    """Energy balance, J: kinetic energy, heat, and losses to cooling and new surface, less supplied
-    energy."""
-    kinetic = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
-    heat = heat_capacity * (state["mass"] * state["temperature"]).sum()
-    spent = sum(state[name].sum() for name in ("cooling_loss", "fracture_energy") if name in state)
-    supplied = sum(state[name].sum() for name in ("reaction_heat", "deformation_work") if name in state)
-    return kinetic + heat + spent - supplied
 
 
 def check_sums(result):

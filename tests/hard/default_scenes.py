@@ -1,4 +1,5 @@
-"""Random small scenes that name no stepper, of every family, each with an exact reference.
+"""Random small scenes that name no stepper, of every family, each with an exact reference. Six families are
+hard cases (cases/hard/default_stepper.py).
 
 A family is a function of a random number generator. It returns a scene and a function that returns the error
 of a result against the reference, relative to the size of the motion or to the energy. Sizes, masses, forces
@@ -7,11 +8,23 @@ and times are drawn over decades.
 
 import numpy as np
 from scipy.constants import G, mu_0
-from scipy.integrate import solve_ivp
 
 import tisim
 from tisim import effects as laws
 from tisim import sources
+from tisim.cases.hard.default_stepper import (
+    by_path,
+    damped_grains,
+    decades,
+    direction,
+    driven_charge,
+    grains_of,
+    impact,
+    lorentz,
+    permanent_magnet,
+    tether,
+)
+from tisim.cases.hard.runs import given, kinetic
 from tisim.geometry import Plane
 
 FAMILIES = {}
@@ -23,132 +36,8 @@ def family(function):
     return function
 
 
-def decades(draw, low, high):
-    """Return a random number between two bounds, uniform in its logarithm."""
-    return float(np.exp(draw.uniform(np.log(low), np.log(high))))
-
-
-def direction(draw):
-    """Return a random unit vector."""
-    v = draw.normal(size=3)
-    return v / np.linalg.norm(v)
-
-
-def particles(position, velocity, radius, mass, **quantities):
-    """Return particles with the given arrays of quantities."""
-    return tisim.Particles(
-        position=np.atleast_2d(position),
-        velocity=np.atleast_2d(velocity),
-        radius=radius,
-        mass=mass,
-        quantities=quantities,
-    )
-
-
-def kinetic(state, turning=True):
-    """Return the kinetic energy (J) of solid spheres."""
-    energy = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
-    if turning and "spin" in state:
-        inertia = 0.4 * state["mass"] * state["radius"] ** 2
-        energy += 0.5 * (inertia * (state["spin"] ** 2).sum(axis=1)).sum()
-    return energy
-
-
-def by_path(acceleration, start, duration, **tolerances):
-    """Return the error of a result against an integration to 1e-11, over the largest distance from the start.
-
-    acceleration : function of (t, r, v), which are arrays of shape (n, 3).
-    """
-    r, v = start["position"], start["velocity"]
-    n = len(r)
-
-    def rates(t, y):
-        y = y.reshape(2, n, 3)
-        return np.concatenate([y[1], acceleration(t, y[0], y[1])]).ravel()
-
-    speed = np.abs(v).max() + 1e-3 * duration * np.abs(acceleration(0.0, r, v)).max()
-    resolved = 1e-12 * np.repeat([speed * duration, speed], 3 * n)
-    exact = solve_ivp(
-        rates, (0, duration), np.concatenate([r, v]).ravel(), method="DOP853", rtol=1e-10, atol=resolved,
-        t_eval=np.linspace(0, duration, 65), **tolerances,
-    )  # fmt: skip
-    paths = exact.y.reshape(2, n, 3, -1)[0]
-    sizes = np.linalg.norm(paths - r[:, :, None], axis=1).max(axis=1)
-
-    def error(result):
-        off = np.linalg.norm(result.state["position"] - paths[..., -1], axis=1)
-        return float((off / sizes).max())
-
-    return error
-
-
-@family
-def tether(draw):
-    mass, omega = decades(draw, 1e-15, 1.0), draw.uniform(0.3, 1, 3) * decades(draw, 1e-2, 1e8)
-    speed, duration = decades(draw, 1e-6, 1e2), draw.uniform(0.3, 50) / omega.max()
-    v = speed * direction(draw)
-    scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [v], 0.1 * speed / omega.max(), mass),
-        effects=(laws.Tether(stiffness=tuple(mass * omega**2)),),
-        duration=duration,
-    )
-
-    def error(result):
-        exact = v / omega * np.sin(omega * duration)
-        size = np.abs(v / omega).max()
-        return float(np.linalg.norm(result.state["position"][0] - exact) / size)
-
-    return scene, error
-
-
-@family
-def lorentz(draw):
-    rate, speed = decades(draw, 1e-2, 1e9), decades(draw, 1e-3, 1e3)
-    mass, b = decades(draw, 1e-18, 1e-3), direction(draw)
-    e = draw.uniform(-0.3, 0.3, 3) * speed
-    v, duration = speed * direction(draw), draw.uniform(0.5, 60) / rate
-    scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [v], 1e-6, mass, charge=[mass * rate]),
-        effects=(
-            laws.Lorentz(),
-            sources.MagneticField(constant=tuple(b)),
-            sources.ElectricField(constant=tuple(e)),
-        ),
-        duration=duration,
-    )
-    start = {"position": np.zeros((1, 3)), "velocity": v[None]}
-    return scene, by_path(lambda t, r, u: rate * (e + np.cross(u, b)), start, duration)
-
-
-@family
-def driven_charge(draw):
-    """A charge in an oscillating field, which may be switched on later."""
-    omega, specific = decades(draw, 1e-1, 1e6), decades(draw, 1e-3, 1e3)
-    amplitude, phase = direction(draw), draw.uniform(0, 6, 3)
-    periods = draw.uniform(0.3, 8)
-    duration, begin = periods * 2 * np.pi / omega, 0.0
-    if draw.uniform() < 0.5:
-        begin = float(draw.uniform(0, 0.5) * duration)
-    speed = specific / omega * draw.uniform(0.1, 3)
-    v = speed * direction(draw)
-    field = sources.ElectricField(
-        amplitude=tuple(amplitude), omega=(omega,) * 3, phase=tuple(phase), begin=begin
-    )
-    scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [v], 1e-3 * speed / omega, 1e-9, charge=[1e-9 * specific]),
-        effects=(laws.Lorentz(), field),
-        duration=duration,
-    )
-
-    def at(t):
-        """Position a time t after the field is switched on, for a charge then at rest."""
-        a, b = omega * begin + phase, omega * (begin + t) + phase
-        return specific * amplitude / omega**2 * (omega * t * np.cos(a) - np.sin(b) + np.sin(a))
-
-    times = np.linspace(0, duration, 257)
-    paths = np.array([v * t + (at(t - begin) if t > begin else 0) for t in times])
-    size = np.linalg.norm(paths, axis=1).max()
-    return scene, lambda result: float(np.linalg.norm(result.state["position"][0] - paths[-1]) / size)
+for one in (tether, lorentz, driven_charge, permanent_magnet, damped_grains, impact):
+    family(one)
 
 
 @family
@@ -159,7 +48,7 @@ def stokes_drag(draw):
     duration, flow = draw.uniform(0.1, 20) / rate, decades(draw, 1e-4, 10) * direction(draw)
     v, g = decades(draw, 1e-4, 10) * direction(draw), np.array([0, 0, -9.81])
     scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [v], radius, mass),
+        particles=given([(0, 0, 0)], [v], radius, mass),
         effects=(
             laws.StokesDrag(viscosity=mu),
             sources.UniformFlow(velocity=tuple(flow)),
@@ -193,7 +82,7 @@ def quadratic_drag(draw):
         return -0.25 * np.pi * mu * radius * drag * u / mass
 
     scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [v], radius, mass),
+        particles=given([(0, 0, 0)], [v], radius, mass),
         effects=(law(density=rho, viscosity=mu),),
         duration=duration,
     )
@@ -213,7 +102,7 @@ def self_gravity(draw):
     v = np.array([[0, -m[1], 0], [0, m[0], 0]]) / total * speed
     duration = draw.uniform(0.2, 6) * period
     scene = tisim.Scene(
-        particles=particles(r, v, 1e-3 * size, m), effects=(laws.SelfGravity(),), duration=duration
+        particles=given(r, v, 1e-3 * size, m), effects=(laws.SelfGravity(),), duration=duration
     )
 
     def acceleration(t, x, u):
@@ -235,7 +124,7 @@ def near_field(draw):
     alpha1, alpha2 = strength * size, strength * size**2
     duration = draw.uniform(0.5, 6) / rate
     scene = tisim.Scene(
-        particles=particles(r, v, 1e-3 * size, mass),
+        particles=given(r, v, 1e-3 * size, mass),
         effects=(laws.NearField(alpha1=alpha1, beta1=1, alpha2=alpha2, beta2=2),),
         duration=duration,
     )
@@ -263,7 +152,7 @@ def mie(draw):
     v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
     duration = 4 * half / speed
     scene = tisim.Scene(
-        particles=particles(r, v, radius, mass), effects=(laws.Mie(epsilon=eps),), duration=duration
+        particles=given(r, v, radius, mass), effects=(laws.Mie(epsilon=eps),), duration=duration
     )
 
     def acceleration(t, x, u):
@@ -279,36 +168,6 @@ def mie(draw):
 
 
 @family
-def permanent_magnet(draw):
-    """A magnet swings in a uniform field; its energy is conserved."""
-    radius, rho = decades(draw, 1e-7, 1e-1), decades(draw, 1e3, 8e3)
-    magnetisation, b = decades(draw, 1e3, 1e6), decades(draw, 1e-5, 5.0) * direction(draw)
-    mass, volume = rho * 4 / 3 * np.pi * radius**3, 4 / 3 * np.pi * radius**3
-    moment = magnetisation * volume * direction(draw)
-    inertia = 0.4 * mass * radius**2
-    rate = np.sqrt(magnetisation * volume * np.linalg.norm(b) / inertia)
-    spin = draw.uniform(0, 2) * rate * direction(draw)
-    scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [(0, 0, 0)], radius, mass, moment=[moment], spin=[spin]),
-        effects=(laws.PermanentMoment(), sources.MagneticField(constant=tuple(b)), laws.Magnetophoresis()),
-        duration=draw.uniform(1, 200) / rate,
-    )
-
-    def energy(state):
-        return kinetic(state) - (state["moment"] @ b).sum()
-
-    scale = np.linalg.norm(moment) * np.linalg.norm(b)
-    return scene, lambda result: float(abs(energy(result.state) - energy(result.start)) / scale)
-
-
-def grains_of(draw, number=2):
-    """Return radius (m), density (kg/m^3), mass (kg) and material of grains, from soft to hard."""
-    radius, rho = decades(draw, 1e-5, 1e-1), decades(draw, 5e2, 8e3)
-    young = decades(draw, 1e6, 1e11)
-    return radius, rho, rho * 4 / 3 * np.pi * radius**3, young
-
-
-@family
 def elastic_grains(draw):
     """Two elastic Hertzian grains collide off centre without friction; the energy is conserved."""
     radius, rho, mass, young = grains_of(draw)
@@ -317,7 +176,7 @@ def elastic_grains(draw):
     r = np.array([[-1.1 * radius, 0, 0], [1.1 * radius, draw.uniform(0, 1.5) * radius, 0]])
     v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
     scene = tisim.Scene(
-        particles=particles(r, v, radius, mass),
+        particles=given(r, v, radius, mass),
         materials={"grain": tisim.Material(young=young, poisson=0.25)},
         effects=(laws.Granular(),),
         duration=8 * radius / speed,
@@ -350,7 +209,7 @@ def adhesive_grains(draw):
     # Long enough for the remaining speed after the impact, and for some oscillations.
     slowest = speed * np.sqrt(1 - lost / before)
     scene = tisim.Scene(
-        particles=particles(
+        particles=given(
             [[-1.02 * radius, 0, 0], [1.02 * radius, 0, 0]], [[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]],
             radius, mass,
         ),
@@ -366,27 +225,6 @@ def adhesive_grains(draw):
 
 
 @family
-def damped_grains(draw):
-    """Two damped grains collide head-on; the restitution must equal the restitution of the material."""
-    radius, rho, mass, young = grains_of(draw)
-    speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
-    restitution = draw.uniform(0.3, 0.95)
-    r, v = [[-1.1 * radius, 0, 0], [1.1 * radius, 0, 0]], [[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]]
-    scene = tisim.Scene(
-        particles=particles(r, v, radius, mass),
-        materials={"grain": tisim.Material(young=young, poisson=0.25, restitution=restitution, friction=0.5)},
-        effects=(laws.Granular(damping=laws.RestitutionDamping(), tangential=laws.MindlinForce()),),
-        duration=3 * radius / speed,
-    )
-
-    def error(result):
-        u = result.state["velocity"][:, 0]
-        return float(abs((u[1] - u[0]) / speed - restitution))
-
-    return scene, error
-
-
-@family
 def grain_on_floor(draw):
     """An elastic grain bounces on a floor under gravity; the energy is conserved."""
     radius, rho, mass, young = grains_of(draw)
@@ -394,7 +232,7 @@ def grain_on_floor(draw):
     height = min(decades(draw, 0.1, 20) * radius, 1e-4 * young / (rho * g))
     speed = np.sqrt(2 * g * height)
     scene = tisim.Scene(
-        particles=particles([(0, 0, radius + height)], [(0.3 * speed, 0, 0)], radius, mass),
+        particles=given([(0, 0, radius + height)], [(0.3 * speed, 0, 0)], radius, mass),
         materials={"grain": tisim.Material(young=young, poisson=0.25)},
         effects=(laws.Granular(), laws.Walls(planes=[Plane()]), laws.Gravity(acceleration=(0, 0, -g))),
         duration=2.5 * speed / g,
@@ -422,7 +260,7 @@ def bonded(draw, velocities):
     period = 2 * np.pi * np.sqrt(0.5 * mass / stiffness)
     law = laws.ParallelBond(gap=1e-6 * radius, young=young, tensile_strength=1e30, shear_strength=1e30)
     scene = tisim.Scene(
-        particles=particles(r, v, radius, mass), effects=(law,), duration=draw.uniform(1, 30) * period
+        particles=given(r, v, radius, mass), effects=(law,), duration=draw.uniform(1, 30) * period
     )
     return scene, stiffness, v
 
@@ -468,31 +306,8 @@ def zohdi_contact(draw):
     speed = decades(draw, 1e-4, 1e-2) * np.sqrt(young / rho)
     law = laws.Hertz(young=young, poisson=0.3)
     r, v = [[-1.1 * radius, 0, 0], [1.1 * radius, 0, 0]], [[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]]
-    scene = tisim.Scene(particles=particles(r, v, radius, mass), effects=(law,), duration=3 * radius / speed)
+    scene = tisim.Scene(particles=given(r, v, radius, mass), effects=(law,), duration=3 * radius / speed)
     return scene, lambda result: float(abs(kinetic(result.state) / kinetic(result.start) - 1))
-
-
-@family
-def impact(draw):
-    """Two hard spheres collide off centre, without friction or loss; their final positions are compared."""
-    radius, speed = decades(draw, 1e-7, 1e2), decades(draw, 1e-6, 1e3)
-    mass = decades(draw, 1e-15, 1e3) * draw.uniform(0.5, 1, 2)
-    offset, gap = draw.uniform(0, 1.2) * radius, draw.uniform(1.5, 4)
-    r = np.array([[-gap * radius, 0, 0], [gap * radius, offset, 0]])
-    v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
-    duration = 3 * gap * radius / speed
-    scene = tisim.Scene(
-        particles=particles(r, v, radius, mass), effects=(laws.Impact(hardness=1e30),), duration=duration
-    )
-    d, u = r[1] - r[0], v[1] - v[0]
-    b, c = d @ u, d @ d - 4 * radius**2
-    meet = (-b - np.sqrt(b * b - u @ u * c)) / (u @ u)
-    n = (d + meet * u) / (2 * radius)
-    pulse = 2 / (1 / mass).sum() * (u @ n) * n
-    after = v + np.array([pulse / mass[0], -pulse / mass[1]])
-    exact = r + meet * v + (duration - meet) * after
-    size = speed * duration
-    return scene, lambda result: float(np.linalg.norm(result.state["position"] - exact, axis=1).max() / size)
 
 
 @family
@@ -529,7 +344,7 @@ def charged_grains(draw):
     v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
     signs = [1, int(np.sign(charge))]
     scene = tisim.Scene(
-        particles=particles(r, v, radius, mass, polarity=signs),
+        particles=given(r, v, radius, mass, polarity=signs),
         materials={"grain": tisim.Material(young=young, poisson=0.25)},
         effects=(laws.Granular(), laws.NearField(alpha2=abs(charge), beta2=2, signed=True)),
         duration=8 * radius / speed,
@@ -552,7 +367,7 @@ def grains_in_magnetic_field(draw):
     orbit = radius * decades(draw, 1, 20)
     rate = speed / orbit
     scene = tisim.Scene(
-        particles=particles(
+        particles=given(
             [(0, 0, 1.3 * radius)], [(0.1 * speed, 0, -speed)], radius, mass, charge=[mass * rate]
         ),
         materials={"grain": tisim.Material(young=young, poisson=0.25)},
@@ -590,7 +405,7 @@ def dipoles(draw):
     v = np.array([[speed, 0, 0], [-speed, 0, 0]])
     duration, size = 4 * radius / speed, np.linalg.norm(moment)
     scene = tisim.Scene(
-        particles=particles(r, v, radius, mass, saturation_moment=[size, size]),
+        particles=given(r, v, radius, mass, saturation_moment=[size, size]),
         effects=(
             sources.MagneticField(constant=tuple(moment / size)),
             laws.FixedMoment(),
@@ -618,7 +433,7 @@ def moment_past_magnet(draw):
     r = size * np.array([[-4, 2.5, draw.uniform(-1, 1)]])
     v, duration = np.array([[speed, 0, 0]]), 8 * size / speed
     scene = tisim.Scene(
-        particles=particles(r, v, 1e-3 * size, mass, saturation_moment=[moment]),
+        particles=given(r, v, 1e-3 * size, mass, saturation_moment=[moment]),
         effects=(
             laws.FixedMoment(),
             sources.MagneticSpheres(
@@ -652,7 +467,7 @@ def drag_in_constriction(draw):
     )  # fmt: skip
     duration = 0.4 * size
     scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [(0, 0, speed)], radius, mass),
+        particles=given([(0, 0, 0)], [(0, 0, speed)], radius, mass),
         effects=(flow, laws.StokesDrag(viscosity=mu)),
         duration=duration,
     )
@@ -679,7 +494,7 @@ def drag_in_couette(draw):
         first=-gap, second=gap, first_velocity=(-wall, 0, 0), second_velocity=(wall, 0, 0), begin=begin
     )
     scene = tisim.Scene(
-        particles=particles([(0, 0, 0)], [v], radius, mass),
+        particles=given([(0, 0, 0)], [v], radius, mass),
         effects=(flow, laws.StokesDrag(viscosity=mu)),
         duration=duration,
     )

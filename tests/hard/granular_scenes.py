@@ -120,11 +120,3 @@ def kinetic(state):
     inertia = 0.4 * state["mass"] * state["radius"] ** 2
     moving = state["mass"] * (state["velocity"] ** 2).sum(axis=1)
     return 0.5 * (moving + inertia * (state["spin"] ** 2).sum(axis=1))
-
-
-def momenta(state):
-    """Total momentum, and total angular momentum about the origin; shape (6,)."""
-    momentum = state["mass"][:, None] * state["velocity"]
-    inertia = 0.4 * (state["mass"] * state["radius"] ** 2)[:, None]
-    turning = np.cross(state["position"], momentum) + inertia * state["spin"]
-    return np.concatenate([momentum, turning], axis=1).sum(axis=0)

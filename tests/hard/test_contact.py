@@ -7,52 +7,15 @@ from scipy.optimize import brentq
 
 from tests.hard.grains import (
     SPRING,
-    K,
     R,
     angular_momentum,
     area,
     grains,
     kinetic,
     push,
-    run,
     stored_energy,
     watched,
 )
-
-
-@pytest.mark.slow
-def test_head_on_beyond_the_speed_of_waves():
-    """At 1e3 times the wave speed sqrt(K R/m) the spheres pass through each other, as the law implies.
-
-    Without dissipation they keep their energy. With dissipation they lose c (closing speed) times the volume
-    that both have crossed.
-    """
-    v = 1e3 * np.sqrt(K * R)
-    dt = R / v / 500
-    place, speed = [[-1.5 * R, 0, 0], [1.5 * R, 0, 0]], [[v, 0, 0], [-v, 0, 0]]
-    free, damped = run([grains(place, speed, dt, 1500, damping=c) for c in (0.0, 1e3)])
-    assert abs(kinetic(free) - v**2) < 0.02 * stored_energy(0.0)
-    assert free["velocity"][0, 0] > 0
-    assert free["position"][0, 0] > 1.4 * R
-    loss = 1e3 * 2 * quad(area, 0, 2 * R)[0] * 2 * v
-    assert v**2 - kinetic(damped) == pytest.approx(loss, rel=2e-2)
-
-
-@pytest.mark.long
-def test_grazing():
-    """Spheres that pass with an overlap of 1e-3 radii are deflected by the impulse along the straight path;
-    without overlap they are not deflected."""
-    v, deep, reach = 100.0, 1e-3 * R, 1.0
-    scenes = []
-    for offset in (2 * R - deep, 2 * R):
-        place = [[-reach, 0, 0], [reach, offset, 0]]
-        scenes.append(grains(place, [[v, 0, 0], [-v, 0, 0]], 1e-6, 20_000))
-    touched, missed = run(scenes)
-    b = 2 * R - deep
-    impulse, _ = quad(lambda x: push(np.hypot(b, x)) * b / np.hypot(b, x), -0.1, 0.1, points=[0])
-    assert touched["velocity"][1, 1] == pytest.approx(impulse / (2 * v), rel=1e-3)
-    assert kinetic(touched) == pytest.approx(v**2, rel=1e-9)
-    np.testing.assert_array_equal(missed["velocity"], [[v, 0, 0], [-v, 0, 0]])
 
 
 def column(n=10, g=10.0):

@@ -33,9 +33,6 @@ from tisim.steppers.choice import ACCURACY, ALONE, KINKED
 
 pytestmark = pytest.mark.long
 
-QUICK = ("tether", "lorentz", "permanent_magnet", "damped_grains", "impact", "driven_charge")
-"""The families that the quick tests use; each stands for one rule of the choice."""
-
 
 def drawn(name, number):
     """Return scenes of a family with the functions that return their errors, and the number of refused
@@ -60,14 +57,6 @@ def errors_of(scenes, results):
 def work_of(results):
     """Return the number of force evaluations, averaged over the runs."""
     return float(np.mean([r.work.get("force_evaluations", 0) or r.work["steps"] for r in results]))
-
-
-@pytest.mark.parametrize("name", QUICK)
-def test_a_scene_without_a_stepper_reaches_its_accuracy(name):
-    scenes, refused = drawn(name, 12)
-    assert refused == 0
-    errors = errors_of(scenes, tisim.run([scene for scene, _ in scenes]))
-    assert errors.max() <= ACCURACY
 
 
 @pytest.mark.slow

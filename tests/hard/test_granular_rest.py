@@ -30,15 +30,6 @@ def looks(scenes, number):
     return series
 
 
-STRONG = {
-    "hooke": {"restitution": 0.1},
-    "jkr": {"viscous_time": 1e-2},
-    "dmt": {"damping": 100.0},
-    "mindlin": {"restitution": 0.1},
-}
-"""Losses that bring a column to rest within seconds."""
-
-
 def balanced(name, law, n):
     """Positions of n grains of 1 kg at rest on each other and on the floor, from the contact force alone."""
     place = np.zeros((n, 3))
@@ -47,46 +38,6 @@ def balanced(name, law, n):
         overlap = brentq(lambda d, f=load, r=radius: push(name, d, r, law) - f, 0, 0.9, xtol=1e-16)
         place[k, 2] = 1 - overlap if k == 0 else place[k - 1, 2] + 2 - overlap
     return place
-
-
-def column_energy(name, law, state):
-    """Kinetic, potential and contact energy of a column, J."""
-    z = state["position"][:, 2]
-    contacts = [stored(name, 1 - z[0], 1.0, law)] + [stored(name, 2 - d, 0.5, law) for d in np.diff(z)]
-    return kinetic(state).sum() + G * z.sum() + sum(contacts)
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_a_tall_column_rests(name):
-    """Ten grains for 200 times the period of a contact.
-
-    A column that starts in balance stays at rest, without creep or heat, both undamped and with every loss. A
-    column that starts off balance conserves its energy, and comes to rest with losses.
-    """
-    soft = {**lossy(name)[0], **STRONG[name]}
-    made, still = [], np.zeros((10, 3))
-    laws = [{**ELASTIC[name]}, {**ELASTIC[name], **soft}]
-    for off in (0.0, 1e-4):
-        for law in laws:
-            place = balanced(name, law, 10)
-            place[5:, 2] += off
-            more = {"planes": [FLOOR], "gravity": (0, 0, -G), "dt": 1e-4, "steps": 40_000}
-            made.append(grains(name, place, still, first=law, **more))
-    series = looks(made, 40)
-    for one, states in zip(made[:2], series[:2], strict=True):
-        for state in states:
-            place = one.start()["position"]
-            np.testing.assert_allclose(state["position"], place, rtol=0, atol=1e-11 + 1e3 * roundoff())
-            assert kinetic(state).sum() < 1e-18 + (1e5 * roundoff()) ** 2
-    rest = [column_energy(name, law, states[0]) for law, states in zip(laws, series[:2], strict=True)]
-    free, damped = (
-        np.array([column_energy(name, law, state) - lowest for state in states])
-        for law, lowest, states in zip(laws, rest, series[2:], strict=True)
-    )
-    rounding = 1e3 * roundoff() * rest[0]
-    np.testing.assert_allclose(free, free[0], rtol=0, atol=3e-3 * free[0] + rounding)
-    assert np.diff(damped).max() < 1e-6 * damped[0] + rounding
-    assert damped[-1] < 0.02 * damped[0] + rounding
 
 
 def lasting():
@@ -102,56 +53,6 @@ def lasting():
 def test_a_column_lasts_in_single_precision(single):
     """In single precision the square of a tiny slip underflows to zero."""
     assert single("hard.test_granular_rest", "lasting") == "running"
-
-
-PRESSED = 0.02
-"""Overlap (m) of a grain with each of the two planes that enclose it."""
-SLOT = [FLOOR, ((0.0, 0.0, 2 - 2 * PRESSED), (0.0, 0.0, -1.0))]
-GRIPS = {
-    "hooke": {"friction": 0.5, "restitution": 0.0},
-    "jkr": {"friction": 0.5, "viscous_time": 4e-3, "surface_energy": 20.0},
-    "dmt": {"friction": 0.5, "damping": 200.0, "surface_energy": 20.0},
-    "mindlin": {"friction": 0.5, "restitution": 0.0},
-}
-"""Friction, damping strong enough that a sticking grain does not oscillate, and adhesion if the law has
-it."""
-CREEPS = {"dmt": 2 * 0.7 * 200.0}
-"""Drag coefficient (N s/m) of both planes, for laws whose friction is a dashpot."""
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_friction_just_below_and_just_above_its_threshold(name):
-    """A grain between two planes is pulled along them by 0.99 and 1.01 of the friction limit, 2 mu N.
-
-    Below the limit it stays at rest, also with adhesion, or creeps if the friction is a dashpot. Above the
-    limit it accelerates by the excess force.
-    """
-    law = {**ELASTIC[name], **GRIPS[name]}
-    pulls = {"jkr": 2 * 3, "dmt": 2 * 4}.get(name, 0) * np.pi * law.get("surface_energy", 0.0)
-    most = 2 * 0.5 * (push(name, PRESSED, 1.0, law) + pulls)
-    made = [
-        grains(
-            name, [[0, 0, 1 - PRESSED]], np.zeros((1, 3)), planes=SLOT, gravity=(part * most, 0, 0),
-            first=law, dt=2e-5, steps=40_000,
-        )
-        for part in (0.99, 1.01)
-    ]  # fmt: skip
-    below, above = looks(made, 8)
-    for states, part in ((below, 0.99), (above, 1.01)):
-        late, last = states[-2:]
-        x, v = ([state[what][0, 0] for state in (late, last)] for what in ("position", "velocity"))
-        time = made[0].duration / 8
-        if part > 1:
-            assert (v[1] - v[0]) / time == pytest.approx(0.01 * most, rel=1e-6 + 1e5 * roundoff())
-        elif name in CREEPS:
-            np.testing.assert_allclose(v, part * most / CREEPS[name], rtol=1e-6 + 1e3 * roundoff())
-        else:
-            # So slow a motion is below the rounding of a position.
-            stuck = roundoff() * x[1] / made[0].stepper.control.dt
-            assert np.abs(v).max() < 1e-9 * most + stuck
-            assert x[1] == pytest.approx(x[0], abs=1e-9)
-            assert x[1] > 0
-        np.testing.assert_allclose(last["spin"], 0, atol=1e-9)
 
 
 def springs(name, made, memory, overlap, radius):
