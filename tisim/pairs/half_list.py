@@ -23,7 +23,6 @@ from tisim.pairs.neighbour_rows import ALL_PAIRS, NeighbourRows, search_rows
 from tisim.program.phases import Phase
 from tisim.state.bound import Bound
 from tisim.state.state import State
-from tisim.state.status import WorldStatus
 
 REACH_PART = 0.125
 """Fraction of the skin reserved for interaction ranges that increase, for example of growing particles."""
@@ -186,24 +185,30 @@ class HalfList(NeighbourRows):
     def moved(self, w):
         """Record that particles have moved by at most ``displacement`` relative to the frame, along each
         axis."""
-        square, step = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+        square = ti.cast(0.0, ti.f64)
         self.moves[w] = self.moves[w] + 1
         for k in ti.static(range(3)):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
             square += self.since[w, k] ** 2
-            step += self.s.displacement[w, k] ** 2
-        # Two particles that move towards each other approach by twice the displacement. The smallest radius
-        # is unknown in a list that was just lengthened and is about to be rebuilt.
-        smallest = ti.cast(self.grid.smallest[w], ti.f64)
-        if ti.static(self.solid):
-            outrun = smallest > 0.0 and step > smallest * smallest
-            if outrun and self.s.count[w] > 1:
-                ti.atomic_max(self.s.failed[w], WorldStatus.OUTRUN)
         apart = 2.0 * ti.sqrt(square)
         if ti.static(self.images > 0):
             apart += self.sheared(w, self.s.time[w] + self.s.dt[w] - self.made[w])
         if not (apart <= self.spent * self.grid.skin[w, 0]):
             self.stale[w] = 1
+
+    @ti.func
+    def outrun(self, w):
+        """Return whether solid particles that move by ``displacement`` may pass through each other."""
+        passing = False
+        if ti.static(self.solid):
+            step = ti.cast(0.0, ti.f64)
+            for k in ti.static(range(3)):
+                step += self.s.displacement[w, k] ** 2
+            # Two particles that move towards each other approach by twice the displacement. The smallest
+            # radius is unknown in a list that was just lengthened and is about to be rebuilt.
+            smallest = ti.cast(self.grid.smallest[w], ti.f64)
+            passing = smallest > 0.0 and step > smallest * smallest and self.s.count[w] > 1
+        return passing
 
     @ti.func
     def sheared(self, w, elapsed):

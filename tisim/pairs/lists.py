@@ -8,6 +8,7 @@ from tisim.pairs.half_list import ListSizes
 from tisim.pairs.near_list import NearList
 from tisim.pairs.neighbour_rows import NeighbourRows
 from tisim.state.state import State
+from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:
     from tisim.pairs.pair_chunks import PairChunks
@@ -22,15 +23,27 @@ class NeighbourLists:
     """
 
     def __init__(self, s: State, near: NearList | None, pairs: "PairChunks | None") -> None:
-        self.s, self.near, self.pairs, self.watched = s, near, pairs, near is not None
+        self.s, self.near, self.pairs = s, near, pairs
+        self.watched, self.listed = near is not None, pairs is not None
         self.lists = tuple(one for one in (near, pairs) if one is not None)
 
     @ti.func
     def moved(self, w):
         """Record that particles have moved by at most ``displacement`` relative to the frame, along each
-        axis."""
+        axis. The world fails if particles may have passed through each other."""
+        if self.tried(w):
+            ti.atomic_max(self.s.failed[w], WorldStatus.OUTRUN)
+
+    @ti.func
+    def tried(self, w):
+        """Record the displacement of an attempt at a step, as ``moved`` does, and return whether particles
+        may have passed through each other."""
         for one in ti.static(self.lists):
             one.moved(w)
+        passing = False
+        if ti.static(self.listed):
+            passing = self.pairs.half_list.outrun(w)
+        return passing
 
     @ti.func
     def invalidate(self, w):

@@ -4,7 +4,7 @@ from tisim.backend.taichi import ti
 from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.state.fields import WorldField
 from tisim.state.status import WorldStatus
-from tisim.steppers.common import SavedState, note_displacement
+from tisim.steppers.common import ReportDisplacement, SavedState, note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.step_control import note_speed
 
@@ -17,11 +17,12 @@ ATTEMPTS = (
     WorldField("next_dt", "real", "s"),
     WorldField("attempting", "integer"),
     WorldField("verdict", "integer"),
+    WorldField("outrun", "integer"),
 )
 """World fields of all implicit steppers."""
 
-SHORTER = 0.8
-"""Largest length of a second attempt, over the length of the first."""
+SHORTER, FAR_SHORTER = 0.8, 0.5
+"""Largest length of a second attempt, over the length of the first; the latter after one far astray."""
 
 
 class Begin(Phase):
@@ -34,7 +35,7 @@ class Begin(Phase):
     def run(self, w, _k):
         s = self.s
         s.time_before[w] = s.time[w]
-        s.attempting[w] = 1
+        s.attempting[w], s.outrun[w] = 1, 0
         s.approach_time[w] = ti.math.inf
         s.fastest[w] = 0.0
         s.events[w] = 0
@@ -42,6 +43,24 @@ class Begin(Phase):
         s.particle_steps[w] += s.count[w]
         for k in ti.static(range(3)):
             s.displacement[w, k] = 0.0
+
+
+class ReportTrial(ReportDisplacement):
+    """This phase reports the displacements of an attempt to the neighbour lists, and records whether solid
+    particles may have passed through each other."""
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        if self.lists.tried(w):
+            s.outrun[w] = 1
+        for k in ti.static(range(3)):
+            s.displacement[w, k] = 0.0
+
+
+def report_trial(context: StepContext) -> tuple[Phase, ...]:
+    """Return the phase that reports displacements of an attempt to the neighbour lists, if there are any."""
+    return (ReportTrial(context),) if context.neighbour_lists else ()
 
 
 class SaveState(PerParticle):
@@ -115,14 +134,19 @@ def verdict_on(control: ti.template(), s, w, dt, accepted):  # type: ignore[vali
 def conclude(control: ti.template(), s, w, accepted, factor, most):  # type: ignore[valid-type]
     """Set the verdict on the attempt of a world, and the length of the next attempt (s).
 
+    An attempt in which solid particles may have passed through each other is not accepted.
+
     factor : the proposed ratio of the lengths. most : the largest ratio after a rejected attempt, which would
         fail again in the same way with the same length.
     """
-    verdict = verdict_on(control, s, w, s.dt[w], accepted)
-    if verdict == HOPELESS:
+    passing = s.outrun[w] > 0
+    verdict = verdict_on(control, s, w, s.dt[w], accepted and not passing)
+    if verdict == HOPELESS and not passing:
         report_failure(s, w)
     s.verdict[w] = verdict
-    s.next_dt[w] = s.dt[w] * ti.select(verdict == ACCEPTED, factor, ti.min(factor, most))
+    s.next_dt[w] = s.dt[w] * ti.select(
+        verdict == ACCEPTED, factor, ti.min(factor, ti.select(passing, FAR_SHORTER, most))
+    )
 
 
 class RestoreState(PerParticle):
@@ -164,5 +188,6 @@ class Decide(Phase):
             s.rejections[w] += 1
             s.time[w] = s.time_before[w]
         if s.verdict[w] == HOPELESS:
-            s.failed[w] = WorldStatus.STEP_TOO_SHORT
+            s.failed[w] = ti.select(s.outrun[w] > 0, WorldStatus.OUTRUN, WorldStatus.STEP_TOO_SHORT)
+        s.outrun[w] = 0
         s.attempting[w] = ti.select(s.verdict[w] == RETRY, 1, 0)

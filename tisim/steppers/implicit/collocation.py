@@ -17,9 +17,17 @@ from tisim.program.phases import Item
 from tisim.program.scans import BlockSums
 from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
-from tisim.steppers.common import CHANGE, AdvanceClock, apply_operators, report_displacement, saved_fields
+from tisim.steppers.common import CHANGE, AdvanceClock, apply_operators, saved_fields
 from tisim.steppers.context import Buffer, Step, StepContext
-from tisim.steppers.implicit.attempts import ATTEMPTS, Begin, Decide, RestoreState, SaveState, StepAttempt
+from tisim.steppers.implicit.attempts import (
+    ATTEMPTS,
+    Begin,
+    Decide,
+    RestoreState,
+    SaveState,
+    StepAttempt,
+    report_trial,
+)
 from tisim.steppers.implicit.collocation_phases import (
     ChooseCollocationStep,
     Conclude,
@@ -221,7 +229,7 @@ class Collocation(Stepper):
 
     def step(self, context: StepContext) -> Step:
         stages, sums = Stages(context, self.stages), BlockSums(context.s, 4)
-        report, forces = report_displacement(context), (*context.update_lists, *context.sum_trial_forces)
+        report, forces = report_trial(context), (*context.update_lists, *context.sum_trial_forces)
         take = (TakeStages(context, sums, stages), JudgeStages(context, sums, stages))
         sweep = StageSweep(context, (Place(stages), *report, *forces, *take))
         attempt: tuple[Item, ...] = (

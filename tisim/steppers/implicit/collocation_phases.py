@@ -10,7 +10,7 @@ from tisim.program.phases import Item, PerParticle, Phase, Repeat
 from tisim.program.scans import PerBlock
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.attempts import ACCEPTED, SHORTER, conclude, length, relative
+from tisim.steppers.implicit.attempts import ACCEPTED, FAR_SHORTER, SHORTER, conclude, length, relative
 
 
 class Forget(Phase):
@@ -194,8 +194,6 @@ class Conclude(OfStages):
 
 GUESS = 0.5
 """Contraction of a sweep if none has been measured, and its largest assumed value."""
-DIVERGED = 0.5
-"""Largest length of a second attempt if sweeps did not converge, over the length of the first."""
 
 
 class JudgeStages(Phase):
@@ -267,6 +265,6 @@ class JudgeStages(Phase):
         current_contraction = ti.select(s.sweep[w] > 1 or not solved, contraction, 0.0)
         factor = self.control.factor(w, current_contraction, error, self.order)
         accepted = solved and self.control.accepts(w, error)
-        if accepted:
+        conclude(self.control, s, w, accepted, factor, ti.select(solved, SHORTER, FAR_SHORTER))
+        if s.verdict[w] == ACCEPTED:
             s.last_dt[w] = s.dt[w]
-        conclude(self.control, s, w, accepted, factor, ti.select(solved, SHORTER, DIVERGED))

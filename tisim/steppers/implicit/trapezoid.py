@@ -18,7 +18,6 @@ from tisim.steppers.common import (
     AdvanceClock,
     apply_operators,
     note_displacement,
-    report_displacement,
     saved_fields,
 )
 from tisim.steppers.context import Buffer, Step, StepContext
@@ -34,6 +33,7 @@ from tisim.steppers.implicit.attempts import (
     conclude,
     length,
     relative,
+    report_trial,
 )
 from tisim.steppers.implicit.one_particle import IndependentSteps, Solve
 from tisim.steppers.implicit.step_control import (
@@ -120,7 +120,7 @@ class Trapezoid(Stepper):
         if context.independent:
             return Step((BeginIntervals(context), IndependentSteps(context, solve), EndIntervals(context)))
         sums = BlockSums(s, 4)
-        report, forces = report_displacement(context), (*context.update_lists, *context.sum_trial_forces)
+        report, forces = report_trial(context), (*context.update_lists, *context.sum_trial_forces)
         buffers: tuple[Buffer, ...] = (Buffer(sums, "sums of the iteration", self.kind()),)
         if self.acceleration == "anderson":
             mixing = BlockSums(s, 2)
