@@ -15,6 +15,7 @@ import importlib.util
 import re
 import shlex
 import sys
+import textwrap
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -51,6 +52,7 @@ class Row:
     the number that the check measures. here : numbers, as they are written on ``page``. published : the
     number in the publication. command : prints the numbers or draws the figure. reason : why a row is in part
     or left out, or how it differs. later : it belongs to a part of a publication that is not built yet.
+    laboratory : it is no simulation.
     """
 
     source: str
@@ -66,6 +68,7 @@ class Row:
     command: str = ""
     reason: str = ""
     later: bool = False
+    laboratory: bool = False
 
     @classmethod
     def of(cls, table: dict[str, Any]) -> Row:
@@ -115,49 +118,51 @@ def number(line: dict[str, str]) -> str:
 
 def page() -> str:
     """Return the text of docs/coverage.md."""
-    return "\n".join(_page(publications())) + "\n"
+    return "\n".join(_page(publications())).rstrip() + "\n"
 
 
 def _page(works: Sequence[Publication]) -> Iterator[str]:
     rows = [row for work in works for row in work.rows]
-    later = [row for row in rows if row.later]
-    whole = sum(row.status == "works" for row in rows if not row.later)
-    yield "# Coverage of the publications"
-    yield ""
-    yield (
-        "To see which parts of a publication run in tisim, go to its table: each row is an equation, a figure or a "
-        "section, in the order of the publication, with its status, the number here, the published number, and "
-        "the place where it is explained, implemented and tested."
+    yield from ("# Coverage of the publications", "")
+    yield from _paragraph(
+        "To see which parts of a publication run in tisim, go to its table. Each row is an equation, a figure or "
+        "a section, in the order of the publication, with its status, the number here, the published number, and "
+        "the page, the parts of a scene, the code, the command and the tests that belong to it."
     )
-    yield ""
-    yield "| publication | works | in part | left out | rows |"
-    yield "|---|---|---|---|---|"
+    yield from ("| publication | works | in part | left out | rows |", "|---|---|---|---|---|")
     for work in works:
         yield f"| [{work.name}](#{slug(_heading(work))}) | {_cells(work.counts())} |"
-    yield f"| all | {_cells(Counter(row.status for row in rows))} |"
-    yield ""
-    yield (
-        f"*Works*: it is used in a case, and a test or a check holds it. *In part*: some of it, another size, or "
-        f"without a conclusion of the source. *Left out*: with the reason. {len(later)} of the rows belong to two "
-        f"parts of B16 that are not built yet, random packings (chapters 1 to 4) and the packed filter (chapter "
-        f"7). Of the other {len(rows) - len(later)} rows, {whole} work."
+    yield from (f"| all | {_cells(Counter(row.status for row in rows))} |", "")
+    yield from _paragraph(_meaning(rows))
+    lines = measured().values()
+    dates, processors, versions = (
+        sorted({line[key] for line in lines}) for key in ("date", "processor", "physics")
     )
-    yield ""
-    dates = sorted({line["date"] for line in measured().values()})
-    processors = sorted({line["processor"] for line in measured().values()})
-    versions = sorted({line["physics"] for line in measured().values()}, key=int)
-    yield (
-        f"± is half of a 95 % interval. Numbers marked \\* are from `tisim check` with physics version "
-        f"{', '.join(versions)} on {', '.join(processors)} ({_dates(dates)}; `docs/coverage/*.csv`); others are "
-        f"quoted from the page named in the row. Names in {{ref}}`blue <reference/effects>` are parts of a scene. "
-        f"Tests are in the folder `tests` of the repository, and run with `python -m pytest -n 0 TEST`."
+    yield from _paragraph(
+        rf"± is half of a 95 % interval. Numbers with a star \* were printed by `tisim check` (physics version "
+        f"{', '.join(versions)}, {', '.join(processors)}, {' to '.join(dict.fromkeys((dates[0], dates[-1])))}; "
+        "`docs/coverage`). The others are quoted from the page in the last column. Tests are in the repository; "
+        "`python -m pytest -n 0 TEST` runs one, with `-m slow` if it is long."
     )
     for work in works:
         yield from _publication(work)
 
 
-def _dates(dates: Sequence[str]) -> str:
-    return dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
+def _meaning(rows: Sequence[Row]) -> str:
+    later, laboratory = (sum(getattr(row, name) for row in rows) for name in ("later", "laboratory"))
+    others = [row for row in rows if not (row.later or row.laboratory)]
+    whole = sum(row.status == "works" for row in others)
+    return (
+        "*Works*: it is used in a scene, and a test or a check holds it. *In part*: some of it, or another size, "
+        "or without a conclusion of the source; the row says which. *Left out*: not there, with the reason. "
+        f"{later} rows belong to two parts of B16 that are not built yet: random packings (chapters 1 to 4) and "
+        f"the filter of packed fibres (chapter 7). {laboratory} rows are laboratory work. Of the other "
+        f"{len(others)} rows, {whole} work."
+    )
+
+
+def _paragraph(text: str) -> Iterator[str]:
+    yield from (*textwrap.wrap(text, 120, break_on_hyphens=False), "")
 
 
 def _cells(counts: Counter[str]) -> str:
@@ -169,13 +174,14 @@ def _heading(work: Publication) -> str:
 
 
 def _publication(work: Publication) -> Iterator[str]:
-    yield from ("", f"## {_heading(work)}", "", f"{work.title}.", "")
-    yield f"| {work.name} | subject | status | here | published | explained, implemented, tested |"
+    yield from (f"## {_heading(work)}", "", *_paragraph(f"{work.title}."))
+    yield f"| {work.name} | subject | status | here | published | page, parts, code, command, tests |"
     yield "|---|---|---|---|---|---|"
     for row in work.rows:
         subject = f"{row.title}. {row.reason}" if row.reason else row.title
         cells = (row.source, subject, STATUS[row.status], "; ".join(_numbers(row)), row.published, _place(row))
         yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+    yield ""
 
 
 def _numbers(row: Row) -> Iterator[str]:
