@@ -1,6 +1,7 @@
-"""Makes docs/coverage.md: which equations and figures of the five publications tisim has, row by row.
+"""Makes docs/coverage.md, which equations and figures of the five publications tisim has, row by row, and
+docs/coverage_tests.md, their code and tests.
 
-    python docs/coverage_page.py           writes the page anew
+    python docs/coverage_page.py    writes the pages anew
     tisim check CASE --out docs/coverage/CASE.csv --overwrite    takes the numbers of a case anew
 
 The rows are in docs/coverage/PUBLICATION.toml. Numbers come from docs/coverage/CASE.csv, which ``tisim check``
@@ -38,6 +39,8 @@ ROOT = DOCS.parent
 FOLDER = DOCS / "coverage"
 ORDER = ("z04", "z13", "z16", "l21", "b16")
 """Files of the publications, in the order of the page."""
+SMALL = 1e-4
+"""Numbers below this are printed with two digits."""
 STATUS = {"works": "works", "part": "in part", "out": "left out"}
 """The status of a row in a file, and on the page."""
 
@@ -113,7 +116,10 @@ def measured(folder: Path = FOLDER) -> dict[tuple[str, str], dict[str, str]]:
 def number(line: dict[str, str]) -> str:
     """Return the measured number of a check as text, with its interval if it has one."""
     value = float(line["measured"])
-    return str(Mean(value, float(line["half_interval"]))) if line["half_interval"] else f"{value:.5g}"
+    if line["half_interval"]:
+        return str(Mean(value, float(line["half_interval"])))
+    # Of an error the first digits are enough.
+    return f"{value:.2g}" if abs(value) < SMALL else f"{value:.5g}"
 
 
 def page() -> str:
@@ -126,8 +132,9 @@ def _page(works: Sequence[Publication]) -> Iterator[str]:
     yield from ("# Coverage of the publications", "")
     yield from _paragraph(
         "To see which parts of a publication run in tisim, go to its table. Each row is an equation, a figure or "
-        "a section, in the order of the publication, with its status, the number here, the published number, and "
-        "the page, the parts of a scene, the code, the command and the tests that belong to it."
+        "a section, in the order of the publication, with its status, the number here, the published number, the "
+        "page that explains it, the parts of a scene that do it, and a command that runs it. The [code and the "
+        "tests](coverage_tests.md) of each row are on another page."
     )
     yield from ("| publication | works | in part | left out | rows |", "|---|---|---|---|---|")
     for work in works:
@@ -141,8 +148,7 @@ def _page(works: Sequence[Publication]) -> Iterator[str]:
     yield from _paragraph(
         rf"± is half of a 95 % interval. Numbers with a star \* were printed by `tisim check` (physics version "
         f"{', '.join(versions)}, {', '.join(processors)}, {' to '.join(dict.fromkeys((dates[0], dates[-1])))}; "
-        "`docs/coverage`). The others are quoted from the page in the last column. Tests are in the repository; "
-        "`python -m pytest -n 0 TEST` runs one, with `-m slow` if it is long."
+        "`docs/coverage`). The others are quoted from the page in the last column."
     )
     for work in works:
         yield from _publication(work)
@@ -175,12 +181,18 @@ def _heading(work: Publication) -> str:
 
 def _publication(work: Publication) -> Iterator[str]:
     yield from (f"## {_heading(work)}", "", *_paragraph(f"{work.title}."))
-    yield f"| {work.name} | subject | status | here | published | page, parts, code, command, tests |"
-    yield "|---|---|---|---|---|---|"
+    head = (work.name, "subject", "status", "number here", "published", "read, use, run")
+    rows = []
     for row in work.rows:
         subject = f"{row.title}. {row.reason}" if row.reason else row.title
-        cells = (row.source, subject, STATUS[row.status], "; ".join(_numbers(row)), row.published, _place(row))
-        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+        numbers = "; ".join(_numbers(row))
+        rows.append((row.source, subject, STATUS[row.status], numbers, row.published, _place(row)))
+    yield from _table(head, rows)
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    yield from (f"| {' | '.join(head)} |", "|---" * len(head) + "|")
+    yield from (f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in rows)
     yield ""
 
 
@@ -192,18 +204,42 @@ def _numbers(row: Row) -> Iterator[str]:
 
 
 def _place(row: Row) -> str:
-    """The page, the parts, the code, the command and the tests of a row."""
-    lines = []
-    if row.page:
-        file, _, anchor = row.page.partition("#")
-        headings = {slug(one): one for one in _headings(DOCS / file)}
-        title = headings.get(anchor) or next(iter(headings.values()))
-        lines.append(f"[{title}]({row.page})")
+    """The page, the parts of a scene and the command of a row."""
+    lines = [f"[{_title(row.page)}]({row.page})" if row.page else ""]
     lines.append(", ".join(f"{{ref}}`{name}`" for name in row.parts))
-    lines += [f"`{path}`" for path in row.code]
     lines.append(f"`{row.command}`" if row.command else "")
-    lines += [f"`tests/{one}`" for one in row.tests]
     return "<br>".join(filter(None, lines))
+
+
+def _title(page: str) -> str:
+    """The heading of a section; of a whole page, the name of its file."""
+    file, _, anchor = page.partition("#")
+    name = file.removesuffix(".md")
+    return next((one for one in _headings(DOCS / file) if slug(one) == anchor), name) if anchor else name
+
+
+def tests_page() -> str:
+    """Return the text of docs/coverage_tests.md."""
+    return "\n".join(_tests_page(publications())).rstrip() + "\n"
+
+
+def _tests_page(works: Sequence[Publication]) -> Iterator[str]:
+    yield from ("# Code and tests behind the coverage", "")
+    yield from _paragraph(
+        "For each row of the [coverage of the publications](coverage.md) that works, or works in part, this page "
+        "has the files of its code and its tests. `python -m pytest -n 0 TEST` runs a test in the repository, "
+        "with `-m slow` if it takes long. Names without a folder are parts of a scene."
+    )
+    for work in works:
+        yield from (f"## {work.name}", "")
+        head = (work.name, "parts and files", "tests")
+        rows = []
+        for row in work.rows:
+            files = (*(f"{{ref}}`{name}`" for name in row.parts), *(f"`{path}`" for path in row.code))
+            tests = [f"`tests/{one}`" for one in row.tests]
+            if files or tests:
+                rows.append((row.source, "<br>".join(files), "<br>".join(tests)))
+        yield from _table(head, rows)
 
 
 def slug(heading: str) -> str:
@@ -322,8 +358,12 @@ def _cli_fault(words: list[str]) -> str:
     return ""
 
 
+PAGES = {"coverage.md": page, "coverage_tests.md": tests_page}
+"""The functions that make the text of each page."""
+
 if __name__ == "__main__":
     if found := list(faults(publications())):
         print(*found, sep="\n")
         sys.exit(1)
-    (DOCS / "coverage.md").write_text(page(), encoding="utf-8")
+    for name, make in PAGES.items():
+        (DOCS / name).write_text(make(), encoding="utf-8")

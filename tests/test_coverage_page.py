@@ -27,9 +27,10 @@ def test_every_row_names_things_that_exist_and_gives_its_reason(maker, works):
     assert list(maker.faults(works)) == []
 
 
-def test_the_page_is_made_from_its_data(maker):
+@pytest.mark.parametrize("page", ["coverage.md", "coverage_tests.md"])
+def test_the_page_is_made_from_its_data(maker, page):
     """If it fails, run: python docs/coverage_page.py."""
-    assert (DOCS / "coverage.md").read_text(encoding="utf-8") == maker.page()
+    assert (DOCS / page).read_text(encoding="utf-8") == maker.PAGES[page]()
 
 
 def test_the_counts_add_up(works):
