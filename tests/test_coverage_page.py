@@ -11,26 +11,33 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 
 @pytest.fixture(scope="module")
-def maker():
-    """docs/coverage_page.py, which does not belong to a package."""
+def modules():
+    """Modules of docs, which do not belong to a package, by the end of their names."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(DOCS))
-        yield importlib.import_module("coverage_page")
+        names = ("page", "rows", "faults")
+        yield {name: importlib.import_module(f"coverage_{name}") for name in names}
 
 
 @pytest.fixture(scope="module")
-def works(maker):
-    return maker.publications()
+def works(modules):
+    return modules["rows"].publications()
 
 
-def test_every_row_names_things_that_exist_and_gives_its_reason(maker, works):
-    assert list(maker.faults(works)) == []
+@pytest.fixture(scope="module")
+def faults(modules):
+    """The faults of publications, as a list."""
+    return lambda works: list(modules["faults"].faults(works))
+
+
+def test_every_row_names_things_that_exist_and_gives_its_reason(faults, works):
+    assert faults(works) == []
 
 
 @pytest.mark.parametrize("page", ["coverage.md", "coverage_tests.md"])
-def test_the_page_is_made_from_its_data(maker, page):
+def test_the_page_is_made_from_its_data(modules, page):
     """If it fails, run: python docs/coverage_page.py."""
-    assert (DOCS / page).read_text(encoding="utf-8") == maker.PAGES[page]()
+    assert (DOCS / page).read_text(encoding="utf-8") == modules["page"].PAGES[page]()
 
 
 def test_the_counts_add_up(works):
@@ -91,30 +98,32 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("change", "fault"), FAULTS)
-def test_a_row_with_a_fault_is_found(maker, works, change, fault):
+def test_a_row_with_a_fault_is_found(faults, works, change, fault):
     z13 = next(work for work in works if work.name == "Z13")
     sound = next(row for row in z13.rows if row.source == "Fig. 3")
-    assert list(maker.faults([replace(z13, rows=(sound,))])) == []
-    (found, *_) = maker.faults([replace(z13, rows=(replace(sound, **change),))])
+    assert faults([replace(z13, rows=(sound,))]) == []
+    (found, *_) = faults([replace(z13, rows=(replace(sound, **change),))])
     assert found.startswith("Z13 Fig. 3: ")
     assert fault in found
 
 
-def test_a_failed_check_is_found(maker, works, monkeypatch):
+def test_a_failed_check_is_found(modules, faults, works, monkeypatch):
     row = next(one for one in works[1].rows if one.checks)
     lines = {
         (one["case"], one["check"]): {"verdict": "FAIL", "measured": "1", "half_interval": ""}
         for one in row.checks
     }
-    monkeypatch.setattr(maker, "measured", lambda: lines)
-    assert any("fails" in one for one in maker.faults([replace(works[1], rows=(row,))]))
+    monkeypatch.setattr(modules["rows"], "measured", lambda: lines)
+    assert any("fails" in one for one in faults([replace(works[1], rows=(row,))]))
 
 
-def test_numbers_have_their_intervals(maker):
-    assert maker.number({"measured": "0.784", "half_interval": "0.0216"}) == "0.784 ± 0.022"
-    assert maker.number({"measured": "46126.34", "half_interval": ""}) == "46126"
+def test_numbers_have_their_intervals(modules):
+    number = modules["rows"].number
+    assert number({"measured": "0.784", "half_interval": "0.0216"}) == "0.784 ± 0.022"
+    assert number({"measured": "46126.34", "half_interval": ""}) == "46126"
+    assert number({"measured": "3.3307e-16", "half_interval": ""}) == "3.3e-16"
 
 
-def test_anchors_are_made_as_sphinx_makes_them(maker):
-    assert maker.slug("A step beside L21's") == "a-step-beside-l21s"
-    assert maker.slug("`tisim check` and 3.4 others") == "tisim-check-and-34-others"
+def test_anchors_are_made_as_sphinx_makes_them(modules):
+    assert modules["rows"].slug("A step beside L21's") == "a-step-beside-l21s"
+    assert modules["rows"].slug("`tisim check` and 3.4 others") == "tisim-check-and-34-others"

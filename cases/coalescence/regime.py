@@ -158,14 +158,16 @@ def surface_weight(diameter: float, density: float, acceleration: float) -> floa
 
 
 def balanced_gravity(diameter: float, magnetisation: float, density: float) -> float:
-    """Return the gravity (m/s^2) in which a grain weighs as much as it attracts its neighbour (L21 Fig. 4.16).
+    """Return the gravity (m/s^2) in which a grain weighs as much as it attracts its neighbour.
 
-    diameter : m. magnetisation : of both grains, A/m. density : kg/m^3.
+    L21 Fig. 4.16 has its lines. diameter : m. magnetisation : of both grains, A/m. density : kg/m^3.
     """
     return attraction(diameter, magnetisation) / sphere_mass(diameter, density)
 
 
-def dominated(magnetisation: float, gravity: float, cleanliness: float, density: float) -> tuple[float, float]:
+def dominated(
+    magnetisation: float, gravity: float, cleanliness: float, density: float
+) -> tuple[float, float]:
     """Return the diameters (m) between which magnetism exceeds both the cohesion and the weight of a grain.
 
     The attraction of two grains is proportional to the square of the diameter, cohesion to the diameter and
