@@ -134,9 +134,11 @@ def forces() -> Figure:
         left.axvline(d, color="0.8", lw=0.8, zorder=0)
     left.set(ylabel="force (N)", ylim=(1e-12, 1e6), title="L21's grains")
     for (field, m), colour in zip(
-        regime.FIELDS.items(), colormaps["viridis"](np.linspace(0.9, 0.1, len(regime.FIELDS))), strict=True
+        regime.MAGNETISED_BY.items(),
+        colormaps["viridis"](np.linspace(0.9, 0.1, len(regime.MAGNETISED_BY))),
+        strict=True,
     ):
-        equal = [regime.balanced_gravity(d, m, regime.IRON) for d in line]
+        equal = [regime.balanced_gravity(d, m, regime.IRON_DENSITY) for d in line]
         right.plot(line, equal, color=colour, label=f"{1e6 * field:g} µT, {m:g} A/m")
     right.set(ylabel="gravity (m/s²)", ylim=(1e-8, 1e2), title="iron: magnetism dominates below a line")
     for axis in (left, right):

@@ -21,9 +21,9 @@ COMPARED = published.DURATION * FALLS[published.DIAMETERS[1]] / FALLS[published.
 """The time, s, for grains of 100 cm that equals 15 000 s for L21's grains of 50 cm in units of the free-fall
 time."""
 
-FIELDS = {5e-7: 1.19, 5e-6: 11.9, 5e-5: 119.0, 5e-4: 1190.0, 5e-3: 11_900.0}
+MAGNETISED_BY = {5e-7: 1.19, 5e-6: 11.9, 5e-5: 119.0, 5e-4: 1190.0, 5e-3: 11_900.0}
 """The magnetisation of a single sphere, A/m, by the field, T; section 4.5."""
-IRON = 7860.0
+IRON_DENSITY = 7860.0
 """Density of iron, kg/m^3; section 4.5 prints none."""
 
 PACKED = 0.6

@@ -18,16 +18,16 @@ from tisim.cases.spin_up.scene import DEFAULT
 from tisim.cases.spin_up.stages import SpinUp, spin_ups
 from tisim.scene.initial_state import Arrays
 
-LEAST = 8
+LEAST_GRAINS = 8
 """Least number of grains of a fragment, a tenth of a pile. Two grains in a row would have an axis ratio of
 two."""
 FURTHER_RATES = tuple(1e-4 * k for k in range(1, 13))
 """Successive angular velocities of the pile, rad/s: three steps more than L21's."""
-COMPARED = (published.MAGNETISATIONS[0], published.MAGNETISATIONS[-1])
+COMPARED_MAGNETISATIONS = (published.MAGNETISATIONS[0], published.MAGNETISATIONS[-1])
 """The magnetisations of L21's grains, A/m."""
 
 
-def fragments(state: Arrays, least: int = LEAST) -> list[Asteroid]:
+def fragments(state: Arrays, least: int = LEAST_GRAINS) -> list[Asteroid]:
     """Return the clusters of at least this number of grains, with their bounding ellipsoids."""
     cluster = clusters_of(state)
     large = np.flatnonzero(np.bincount(cluster) >= least)
@@ -35,7 +35,7 @@ def fragments(state: Arrays, least: int = LEAST) -> list[Asteroid]:
     return [Asteroid.of(grains) for grains in chosen]
 
 
-def elongation(run: SpinUp, least: int = LEAST) -> float:
+def elongation(run: SpinUp, least: int = LEAST_GRAINS) -> float:
     """Return the longest axis over the shortest of the most elongated fragment after any step that broke the
     pile.
 
@@ -48,9 +48,8 @@ def elongation(run: SpinUp, least: int = LEAST) -> float:
 
 def elongations(runs: Sequence[SpinUp]) -> dict[float, np.ndarray]:
     """Return the elongation of each pile's most elongated fragment, by magnetisation (A/m)."""
-    return {
-        m: np.array([elongation(one) for one in runs if one.magnetisation == m]) for m in COMPARED
-    }  # fmt: skip
+    by_magnetisation = {m: [one for one in runs if one.magnetisation == m] for m in COMPARED_MAGNETISATIONS}
+    return {m: np.array([elongation(one) for one in group]) for m, group in by_magnetisation.items()}
 
 
 def main() -> None:
@@ -58,12 +57,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--starts", type=int, default=10)
     options = parser.parse_args()
-    runs = spin_ups(options.starts, magnetisations=COMPARED, rates=FURTHER_RATES, **DEFAULT)
+    runs = spin_ups(options.starts, magnetisations=COMPARED_MAGNETISATIONS, rates=FURTHER_RATES, **DEFAULT)
     found = elongations(runs)
     for m, values in found.items():
         each = ", ".join(f"{value:.1f}" for value in values)
         print(f"{m:g} A/m: {Mean.of(values)} ({each}); L21 {'6:1 and 5:1' if m else 'gives none'}")
-    plain, strong = (found[m] for m in COMPARED)
+    plain, strong = (found[m] for m in COMPARED_MAGNETISATIONS)
     print(f"difference, start by start: {Mean.of(strong - plain)}")
 
 

@@ -1,6 +1,6 @@
 """The core time of a grain and step of mrf_shear, in L21's own cells, beside L21's.
 
-    python tests/benchmarks/mrf_cost.py [--sizes l21 l21_monodisperse] [--steps 300] [--repeats 5] [--one-sweep]
+    python tests/benchmarks/mrf_cost.py [--sizes l21 ...] [--steps 300] [--repeats 5] [--one-sweep]
 
 L21 section 2.4.3 prints the wall time of a step, the number of cores, of grains and of neighbours of a grain
 for six simulations; the sizes l21, l21_monodisperse, l21_volume and l21_bidisperse have the cells of four of

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 VERDICTS = {True: "pass", False: "FAIL", None: ""}
 """The verdict on a check that passes, on one that fails, and on a value that is shown without a check."""
-STYLES = {True: "green", False: "bold red", None: ""}
-COLUMNS = (
+VERDICT_STYLES = {True: "green", False: "bold red", None: ""}
+CSV_COLUMNS = (
     "case", "check", "measured", "half_interval", "expected", "allowed", "verdict",
     "tisim", "physics", "processor", "date",
 )  # fmt: skip
@@ -74,7 +74,7 @@ def check(
     with err().status("checking") as status:
         for item in checks:
             done.append(item)
-            table.add_row(item.name, *item.cells, Text(VERDICTS[_ok(item)], STYLES[_ok(item)]))
+            table.add_row(item.name, *item.cells, Text(VERDICTS[_ok(item)], VERDICT_STYLES[_ok(item)]))
             status.update(f"checked: {item.name}")
     out().print(table)
     if file is not None:
@@ -105,4 +105,4 @@ def _csv(case: str, items: Iterable[Check | Claim | Shown]) -> str:
         number, expected, allowed = item.number, item.cells[1], item.cells[3]
         value, half = (number.value, number.half) if isinstance(number, Mean) else (float(number), "")
         rows.append((case, item.name, value, half, expected, allowed, VERDICTS[_ok(item)], *made))
-    return csv_text([COLUMNS, *rows])
+    return csv_text([CSV_COLUMNS, *rows])

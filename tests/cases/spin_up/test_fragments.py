@@ -5,7 +5,7 @@ import pytest
 
 from tests.cases.common.test_rubble_pile import state_of
 from tests.cases.spin_up.test_stages import pile, spin_up
-from tisim.cases.spin_up.fragments import COMPARED, elongation, elongations, fragments
+from tisim.cases.spin_up.fragments import COMPARED_MAGNETISATIONS, elongation, elongations, fragments
 
 ROW = np.array([[k, 0, 0] for k in range(8)], float)
 BLOCK = np.argwhere(np.ones((3, 3, 3))).astype(float)
@@ -13,7 +13,7 @@ BLOCK = np.argwhere(np.ones((3, 3, 3))).astype(float)
 
 def broken(*pieces):
     """A state of pieces far apart."""
-    return state_of(np.concatenate([one + [0, 0, 100.0 * k] for k, one in enumerate(pieces)]))
+    return state_of(np.concatenate([one + np.array([0, 0, 100.0 * k]) for k, one in enumerate(pieces)]))
 
 
 def test_fragments_have_enough_grains():
@@ -35,7 +35,7 @@ def test_the_most_elongated_fragment_of_a_broken_pile_counts():
 
 
 def test_elongations_are_by_magnetisation():
-    runs = [spin_up(pile(), broken(BLOCK, ROW), magnetisation=m) for m in (*COMPARED, 119.0)]
+    runs = [spin_up(pile(), broken(BLOCK, ROW), magnetisation=m) for m in (*COMPARED_MAGNETISATIONS, 119.0)]
     found = elongations(runs)
-    assert list(found) == list(COMPARED)
+    assert list(found) == list(COMPARED_MAGNETISATIONS)
     assert [len(one) for one in found.values()] == [1, 1]
