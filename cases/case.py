@@ -44,6 +44,11 @@ class Check:
         return abs(self.measured - self.expected) <= self.bound
 
     @property
+    def number(self) -> float:
+        """The measured value."""
+        return self.measured
+
+    @property
     def cells(self) -> tuple[str, str, str, str]:
         """Return measured value, expected value, deviation and bound as text for a table."""
         off = abs(self.measured - self.expected)
@@ -66,6 +71,11 @@ class Claim:
         )
 
     @property
+    def number(self) -> Mean:
+        """The mean, with its interval."""
+        return self.mean
+
+    @property
     def cells(self) -> tuple[str, str, str, str]:
         """Return mean, bounds, an empty cell and the confidence level as text for a table."""
         bounds = [f"above {self.least:.4g}"] * bool(np.isfinite(self.least))
@@ -81,6 +91,11 @@ class Shown:
     value: float | Mean
     beside: str = ""
     ok: ClassVar[None] = None
+
+    @property
+    def number(self) -> float | Mean:
+        """The value."""
+        return self.value
 
     @property
     def cells(self) -> tuple[str, str, str, str]:

@@ -99,7 +99,8 @@ def in_time_by_angle(axis: Axes, rows: Sequence[Row]) -> None:
     for (settings, group), colour in zip(rows, _colours("viridis", len(rows)), strict=True):
         axis.plot(TIMES, curve(group), color=colour, lw=1.4, label=f"{settings['angle']:.0f}°")
     settings = rows[0][0]
-    axis.set_title(f"{settings['nanometres']} nm, {str(settings['part']).upper()}, L/D = 20")
+    part, aspect = str(settings["part"]).upper(), float(settings["aspect"])
+    axis.set_title(f"{settings['nanometres']} nm, {part}, L/D = {aspect:.3g}")
 
 
 def in_time_by_size(axis: Axes, rows: Sequence[Row]) -> None:

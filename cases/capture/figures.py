@@ -9,10 +9,10 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from tisim import Scene
-from tisim.cases.capture import curves
+from tisim.cases.capture import curves, regions
 from tisim.cases.capture import scene as capture
 from tisim.cases.common.magnetic_fibre import MICRO, Magnetised
-from tisim.engine.batches import Progress
+from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
 from tisim.plotting.style import TIME, empty, letters, plain
 from tisim.sources import Cylinder, MagneticCylinders, sample
@@ -85,11 +85,16 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """field.png, volume.png: field and capture volume of the magnet; capture.png, capture.csv: captured
-    fractions; brownian.png: Brownian fractions.
+    fractions; brownian.png: Brownian fractions; regions.png: captured fractions by start region.
 
     The fractions are of all particle sizes, for any ``size``.
     """
-    return {"field.png": field(), "volume.png": volume(), **curves.figures(progress)}
+    return {
+        "field.png": field(),
+        "volume.png": volume(),
+        **curves.figures(progress_of_part(progress, 0, 2)),
+        "regions.png": regions.figure(progress_of_part(progress, 1, 2)),
+    }
 
 
 def plane(reach: float) -> np.ndarray:

@@ -78,14 +78,6 @@ def even(by_angle: np.ndarray) -> np.ndarray:
     return by_angle.mean(axis=0)
 
 
-def check(repeats: int = CHECK_REPEATS) -> Iterator[Check | Claim]:
-    """Yield B16's conclusions for one cylinder, each with its confidence interval."""
-    yield from of_orientation(repeats)
-    yield from of_aspect(repeats)
-    yield from of_size(repeats)
-    yield from of_diffusion(repeats)
-
-
 def of_orientation(repeats: int) -> Iterator[Claim]:
     """Section 6.4.2: transverse captures more than longitudinal; TOP and SIDE behave in opposite ways."""
     sizes, parts = (75, 212), ("top", "side")

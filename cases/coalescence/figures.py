@@ -4,6 +4,7 @@ size."""
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -117,13 +118,13 @@ def moved(state: Arrays, grains: Arrays) -> Arrays:
 
 
 def forces() -> Figure:
-    """Draw the forces on a grain by its diameter: magnetism, cohesion, weight and the gravity of its
-    neighbour (L21 Fig. 4.15)."""
-    figure = empty(5.8, 4.2)
-    axis = figure.subplots()
+    """Draw the forces on a grain by its diameter (L21 Fig. 4.15), and the gravity in which magnetism and
+    weight are equal (Fig. 4.16)."""
+    figure = empty(11.6, 4.2)
+    left, right = figure.subplots(1, 2)
     line = np.geomspace(1e-4, 1e2, 60)
     for m, colour in zip(published.MAGNETISATIONS[1:], AXIS_COLOURS[1:], strict=True):
-        axis.plot(line, [attraction(d, m) for d in line], color=colour, label=f"dipoles, {m:g} A/m")
+        left.plot(line, [attraction(d, m) for d in line], color=colour, label=f"dipoles, {m:g} A/m")
     density, energy = published.DENSITY, published.SURFACE_ENERGY
     laws = (
         ("weight at 5e-6 m/s²", "-", lambda d: regime.surface_weight(d, density, regime.ACCELERATION)),
@@ -133,13 +134,23 @@ def forces() -> Figure:
     )
     for k, (name, style, force) in enumerate(laws):
         colour = AXIS_COLOURS[0] if k < 2 else "0.4"
-        axis.plot(line, [force(d) for d in line], style, color=colour, label=name)
+        left.plot(line, [force(d) for d in line], style, color=colour, label=name)
     for d in published.DIAMETERS:
-        axis.axvline(d, color="0.8", lw=0.8, zorder=0)
-    axis.set(xscale="log", yscale="log", xlabel="diameter of the grains (m)", ylabel="force (N)")
-    axis.set(xlim=(1e-4, 1e2), ylim=(1e-12, 1e6))
-    axis.legend(frameon=False, fontsize=8)
-    plain(axis)
+        left.axvline(d, color="0.8", lw=0.8, zorder=0)
+    left.set(ylabel="force (N)", ylim=(1e-12, 1e6), title="L21's grains")
+    for (field, m), colour in zip(
+        regime.MAGNETISED_BY.items(),
+        colormaps["viridis"](np.linspace(0.9, 0.1, len(regime.MAGNETISED_BY))),
+        strict=True,
+    ):
+        equal = [regime.balanced_gravity(d, m, regime.IRON_DENSITY) for d in line]
+        right.plot(line, equal, color=colour, label=f"{1e6 * field:g} µT, {m:g} A/m")
+    right.set(ylabel="gravity (m/s²)", ylim=(1e-8, 1e2), title="iron: magnetism dominates below a line")
+    for axis in (left, right):
+        axis.set(xscale="log", yscale="log", xlabel="diameter of the grains (m)", xlim=(1e-4, 1e2))
+        axis.legend(frameon=False, fontsize=8)
+        plain(axis)
+    letters((left, right))
     return figure
 
 

@@ -21,6 +21,11 @@ COMPARED = published.DURATION * FALLS[published.DIAMETERS[1]] / FALLS[published.
 """The time, s, for grains of 100 cm that equals 15 000 s for L21's grains of 50 cm in units of the free-fall
 time."""
 
+MAGNETISED_BY = {5e-7: 1.19, 5e-6: 11.9, 5e-5: 119.0, 5e-4: 1190.0, 5e-3: 11_900.0}
+"""The magnetisation of a single sphere, A/m, by the field, T; section 4.5."""
+IRON_DENSITY = 7860.0
+"""Density of iron, kg/m^3; section 4.5 prints none."""
+
 PACKED = 0.6
 """Packing fraction of a pile, approximately."""
 
@@ -150,6 +155,29 @@ def spin_when_packed(rotation: float, diameter: float, spacing: float) -> float:
 def surface_weight(diameter: float, density: float, acceleration: float) -> float:
     """Return the weight of a grain, N (L21 Eq. 4.13)."""
     return sphere_mass(diameter, density) * acceleration
+
+
+def balanced_gravity(diameter: float, magnetisation: float, density: float) -> float:
+    """Return the gravity (m/s^2) in which a grain weighs as much as it attracts its neighbour.
+
+    L21 Fig. 4.16 has its lines. diameter : m. magnetisation : of both grains, A/m. density : kg/m^3.
+    """
+    return attraction(diameter, magnetisation) / sphere_mass(diameter, density)
+
+
+def dominated(
+    magnetisation: float, gravity: float, cleanliness: float, density: float
+) -> tuple[float, float]:
+    """Return the diameters (m) between which magnetism exceeds both the cohesion and the weight of a grain.
+
+    The attraction of two grains is proportional to the square of the diameter, cohesion to the diameter and
+    weight to its cube. magnetisation : A/m. gravity : m/s^2. cleanliness : S of (4.15). density : kg/m^3.
+    """
+    per_square = attraction(1.0, magnetisation)
+    return (
+        surface_cohesion(1.0, cleanliness) / per_square,
+        per_square / surface_weight(1.0, density, gravity),
+    )
 
 
 def mutual_gravity(diameter: float, density: float) -> float:

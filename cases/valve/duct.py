@@ -152,3 +152,18 @@ def suspension_viscosity(fraction: float) -> float:
 def open_flow(duct: Duct, pressure: float, fraction: float) -> float:
     """Return the volume flow rate, m^3/s, that a pressure (Pa) drives through a duct without a field."""
     return pressure / (suspension_viscosity(fraction) * resistance(duct))
+
+
+def yield_pressure(duct: Duct, stress: float) -> float:
+    """Return the pressure (Pa) below which a fluid with a yield stress (Pa) does not flow through a duct.
+
+    The pressure on each slice is borne by the yield stress at the wall, so it is the stress times the
+    integral of 2/r, which is 2 l ln(r_2/r_1) / (r_2 - r_1) along a cone of the length l from r_1 to r_2. L21
+    (1.1) and (3.1) write tau L/d, without the factor of 4 of a round duct of the diameter d.
+    """
+    heights, radii = duct.profile()
+    a, b = radii[:-1], radii[1:]
+    # (b - a) / ln(b/a), the logarithmic mean, is a where both are equal.
+    same = np.isclose(a, b, rtol=1e-12, atol=0.0)
+    mean = np.where(same, a, (b - a) / np.where(same, 1.0, np.log(b / a)))
+    return float(stress * (2 * np.diff(heights) / mean).sum())

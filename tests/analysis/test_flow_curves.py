@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tisim import InputError
-from tisim.analysis import fit_bingham, fit_herschel_bulkley
+from tisim.analysis import fit_bingham, fit_biviscous, fit_herschel_bulkley
 
 RATE = np.geomspace(1.0, 1e3, 25)
 
@@ -15,6 +15,10 @@ def test_exact_curves_are_found(size):
     assert found.yield_stress.value == pytest.approx(5.0 * size, rel=1e-10)
     assert found.plastic_viscosity.value == pytest.approx(0.02 * size, rel=1e-10)
     assert found.yield_stress.half < 1e-9 * size
+    stress = size * np.minimum(0.4 * RATE, 5.0 + 0.02 * RATE)
+    creeping = fit_biviscous(RATE, stress)
+    assert [one.value / size for one in creeping] == pytest.approx([0.4, 5.0, 0.02], rel=1e-7)
+    np.testing.assert_allclose(creeping.stress(RATE), stress, rtol=1e-7)
     for exponent in (0.4, 1.0, 2.1):
         stress = size * (3.0 + 0.5 * RATE**exponent)
         curve = fit_herschel_bulkley(RATE, stress)
@@ -60,3 +64,20 @@ def test_intervals_have_their_nominal_coverage(rng, fit, law, true, known):
     assert np.abs(held / tries - 0.95).max() < 4 * np.sqrt(0.95 * 0.05 / tries)
     half = fit(RATE, stress, error if known else None, confidence=0.5)
     assert all(0 < narrow.half < wide.half for narrow, wide in zip(half, found, strict=True))
+
+
+@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.parametrize(("noise", "least"), [(0.01, 0.906), (0.2, 0.85)])
+def test_intervals_of_a_biviscous_fluid_hold_if_noise_hides_no_point_near_the_yield_stress(
+    rng, noise, least, known
+):
+    """Otherwise points near the yield stress are taken for the other line, and intervals are too narrow."""
+    true, tries = (0.4, 5.0, 0.02), 400
+    error = noise * (np.where(RATE > 30, 1.5, 0.5) if known else np.ones(len(RATE)))
+    held = np.zeros(len(true))
+    for _ in range(tries):
+        stress = np.minimum(true[0] * RATE, true[1] + true[2] * RATE) + error * rng.normal(size=len(RATE))
+        found = fit_biviscous(RATE, stress, error if known else None)
+        held += [abs(one.value - value) <= one.half for one, value in zip(found, true, strict=True)]
+    assert (held / tries).min() > least
+    assert (held / tries).max() < 0.994

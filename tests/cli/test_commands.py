@@ -1,7 +1,12 @@
 """Commands that print information: cases, explain, check, doctor."""
 
+import csv
+import datetime
+
+from tisim.analysis import Mean
 from tisim.cases import case as catalogue
-from tisim.cases.case import Case, Check
+from tisim.cases.case import Case, Check, Claim, Shown
+from tisim.scene.scene import PHYSICS_VERSION
 
 
 def test_cases_explain_and_version(tisim):
@@ -35,6 +40,38 @@ def test_check_detects_failures(tisim, monkeypatch):
     assert err.strip().endswith("2 of 3 checks failed")
     checks[1:] = []
     assert tisim("check", "toy")[0] == 0
+
+
+def test_check_writes_what_it_prints(tisim, monkeypatch, tmp_path):
+    """Numbers keep all digits, means their intervals; failed checks are written too."""
+    items = [
+        Check("one, m", 0.1 + 0.2, 0.3, 1e-3),
+        Claim("two", Mean(0.5, 0.125), least=0.4),
+        Shown("three", 7.0, "L21: 6"),
+        Check("four", 2.0, 1.0, 0.5),
+    ]
+    case = Case("toy", "A toy", "", {}, lambda size, seed: None, lambda: iter(items))
+    monkeypatch.setattr(catalogue, "every", lambda: {"toy": case})
+    assert tisim("check", "toy", "--out", "toy.csv")[0] == 1
+    with (tmp_path / "toy.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert [line["check"] for line in lines] == ["one, m", "two", "three", "four"]
+    assert [float(line["measured"]) for line in lines] == [0.1 + 0.2, 0.5, 7.0, 2.0]
+    assert [line["half_interval"] for line in lines] == ["", "0.125", "", ""]
+    assert [line["expected"] for line in lines] == ["0.3", "above 0.4", "L21: 6", "1"]
+    assert [line["verdict"] for line in lines] == ["pass", "FAIL", "", "FAIL"]
+    assert {line["case"] for line in lines} == {"toy"}
+    assert {line["physics"] for line in lines} == {str(PHYSICS_VERSION)}
+    assert {line["date"] for line in lines} == {datetime.datetime.now(tz=datetime.UTC).date().isoformat()}
+    items[1:] = []
+    assert tisim("check", "toy", "--out", "toy.csv")[0] == 0
+    (tmp_path / "mine.csv").write_text("mine")
+    code, _, err = tisim("check", "toy", "--out", "mine.csv")
+    assert code == 2
+    assert "would replace (or give --overwrite)" in err
+    assert (tmp_path / "mine.csv").read_text() == "mine"
+    code, _, err = tisim("check", "toy", "--out", "toy.txt")
+    assert (code, err) == (2, "--out must be a file NAME.csv; received 'toy.txt'\n")
 
 
 def doctor(tisim, monkeypatch, taichi, quadrants):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import scene
-from tisim.analysis import bounding_ellipsoid, fit_bingham, fit_herschel_bulkley, labels
+from tisim.analysis import bounding_ellipsoid, fit_bingham, fit_biviscous, fit_herschel_bulkley, labels
 from tisim.effects import Tether
 from tisim.plotting.cloud import PROJECTION
 from tisim.plotting.clusters import clusters
@@ -25,6 +25,10 @@ def test_a_flow_curve_has_its_points_and_the_laws_with_their_numbers():
     assert "n = 1 ±" in texts[1]
     assert axis.get_ylabel() == "shear stress (kPa)"
     assert axis.get_xscale() == "log"
+    creeping = fit_biviscous(RATE, np.minimum(500 * RATE, stress))
+    (legend,) = flow_curve(RATE, stress, (creeping,)).axes[0].get_legend().get_texts()
+    assert legend.get_text().startswith("(4000 ±")
+    assert ",\nat most (500 ±" in legend.get_text()
 
 
 @pytest.mark.parametrize(

@@ -23,9 +23,11 @@ from .discharge import beverloo_rate as beverloo_rate
 from .discharge import discharge_rate as discharge_rate
 from .discharge import discharge_rates as discharge_rates
 from .flow_curves import BinghamFit as BinghamFit
+from .flow_curves import BiviscousFit as BiviscousFit
 from .flow_curves import Estimate as Estimate
 from .flow_curves import HerschelBulkleyFit as HerschelBulkleyFit
 from .flow_curves import fit_bingham as fit_bingham
+from .flow_curves import fit_biviscous as fit_biviscous
 from .flow_curves import fit_herschel_bulkley as fit_herschel_bulkley
 from .gravitation import angular_momentum as angular_momentum
 from .gravitation import gravitational_energy as gravitational_energy

@@ -1,4 +1,4 @@
-"""The commands ``cases``, ``explain``, ``check`` and ``doctor`` describe cases, a scene and the machine."""
+"""The commands ``cases``, ``explain`` and ``doctor`` describe cases, a scene and the machine."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ import typer
 from rich.text import Text
 
 from tisim.backend import runtime
-from tisim.cli import scene_arguments, targets
+from tisim.cli import scene_arguments
 from tisim.cli.options import (
     Absent,
-    Arithmetic,
-    CaseName,
     Changes,
     Device,
     Plugins,
@@ -21,13 +19,9 @@ from tisim.cli.options import (
     Seed,
     Size,
     Target,
-    Threads,
 )
 from tisim.console import err, out, plain_table
-from tisim.errors import RunError
 
-VERDICTS = {True: Text("pass", "green"), False: Text("FAIL", "bold red"), None: Text("")}
-"""The text printed for a check that passes, one that fails, and a value that is shown without a check."""
 Everything = Annotated[
     bool,
     typer.Option(
@@ -71,29 +65,6 @@ def explain(
     with err().status("compiling"):
         explanation = explain(scene)
     out().print(render(explanation) if everything else brief(explanation))
-
-
-def check(
-    case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
-    arithmetic: Arithmetic = "strict",
-    plugins: Plugins = None,
-) -> None:  # fmt: skip
-    """Run the checks of a case; exit code 1 if one fails."""
-    checks = targets.case(case).check()
-    runtime.init(device, precision, threads, arithmetic)
-    table = plain_table("check", "measured", "expected", "off by", "allowed", "")
-    outcomes: list[bool | None] = []
-    with err().status("checking") as status:
-        for item in checks:
-            # A value that is only shown has no verdict.
-            ok = None if item.ok is None else bool(item.ok)
-            outcomes.append(ok)
-            table.add_row(item.name, *item.cells, VERDICTS[ok])
-            status.update(f"checked: {item.name}")
-    out().print(table)
-    failed, passed = outcomes.count(False), outcomes.count(True)
-    if failed:
-        raise RunError(f"{failed} of {failed + passed} checks failed")
 
 
 def doctor() -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from tisim.backend import choice, runtime
-from tisim.cli import cost, describe, effects, hard, inspect, new, run, search
+from tisim.cli import check, cost, describe, effects, hard, inspect, new, run, search
 from tisim.cli.usage import Command, CommandGroup, UsageError
 from tisim.errors import InputError, RunError
 from tisim.interrupt import exit_code, handle_signals, raise_interrupt
@@ -19,7 +19,7 @@ from tisim.streams import safe_standard_streams, say
 from tisim.version import __version__
 
 COMMANDS = (
-    run.run, describe.cases, describe.explain, describe.check, hard.hard, describe.doctor, effects.effects,
+    run.run, describe.cases, describe.explain, check.check, hard.hard, describe.doctor, effects.effects,
     new.new,
     cost.cost, search.optimize, search.compare, search.cache,
     inspect.plot, inspect.figures, inspect.movie, inspect.export,

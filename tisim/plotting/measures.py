@@ -8,14 +8,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tisim.analysis.flow_curves import BinghamFit, Estimate, HerschelBulkleyFit
+from tisim.analysis.flow_curves import BinghamFit, BiviscousFit, Estimate, HerschelBulkleyFit
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain, quantity, scale_of, superscripts
 
 
 def flow_curve(
     rate: np.ndarray,
     stress: np.ndarray,
-    fits: tuple[BinghamFit | HerschelBulkleyFit, ...] = (),
+    fits: tuple[BinghamFit | BiviscousFit | HerschelBulkleyFit, ...] = (),
     error: np.ndarray | None = None,
 ) -> Figure:
     """Draw shear stresses (Pa) against shear rates (1/s), and fitted laws with 95 % confidence intervals.
@@ -38,16 +38,19 @@ def flow_curve(
     return figure
 
 
-def _law(fit: BinghamFit | HerschelBulkleyFit) -> str:
+def _law(fit: BinghamFit | BiviscousFit | HerschelBulkleyFit) -> str:
     """Return the law with its numbers, for a legend."""
 
     def known(estimate: Estimate) -> str:
         return f"({estimate.value:.4g} ± {estimate.half:.1g})"
 
-    if isinstance(fit, BinghamFit):
-        return (
+    if isinstance(fit, BinghamFit | BiviscousFit):
+        bingham = (
             f"{known(fit.yield_stress)} Pa + {known(fit.plastic_viscosity)} Pa s \N{MULTIPLICATION SIGN} rate"
         )
+        if isinstance(fit, BinghamFit):
+            return bingham
+        return f"{bingham},\nat most {known(fit.rest_viscosity)} Pa s \N{MULTIPLICATION SIGN} rate"
     power = f"Pa sⁿ \N{MULTIPLICATION SIGN} rateⁿ\nn = {fit.exponent.value:.3g} ± {fit.exponent.half:.1g}"
     return f"{known(fit.yield_stress)} Pa + {known(fit.consistency)} {power}"
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tisim.cases.capture import curves, figures
+from tisim.cases.capture import curves, figures, regions
 from tisim.cases.capture import scene as capture
 from tisim.cases.capture.curves import TIMES
 from tisim.cases.capture.statistics import ANGLES, ASPECTS
@@ -53,6 +53,36 @@ def test_captured_fraction_in_time_and_at_the_end():
         assert list(line.get_xdata()) == list(x)
         assert set(line.get_ydata()) == {0.75}
     assert curves.table(sizes).splitlines()[1].startswith("25,0.0,20.0,all,2,0.75,")
+
+
+def test_captured_fractions_by_region():
+    """A particle of each setting is caught at a time of its own."""
+    settings = regions.settings()
+    assert len(settings) == 2 * 2 * len(ANGLES)
+    axes = regions.drawn([[caught(1.0 + k)] for k in range(len(settings))]).axes
+    titles = [axis.get_title("left") for axis in axes]
+    assert titles[0].endswith("125 nm, TOP, L/D = 1.67")
+    assert titles[3].endswith("125 nm, SIDE, L/D = 6.67")
+    for k, axis in enumerate(axes):
+        for line, setting, time in zip(axis.lines, settings[7 * k :], range(7 * k + 1, 99), strict=False):
+            assert line.get_label() == f"{setting['angle']:.0f}°"
+            np.testing.assert_array_equal(line.get_ydata(), np.heaviside(TIMES - time, 1.0))
+
+
+def test_regions_are_compared_angle_by_angle(monkeypatch):
+    """In SIDE the shorter cylinder captures all particles along the field, and half of them at 15 degrees."""
+    fewer = {("side", 0.0, 20 / 3): 0, ("side", 15.0, 20 / 3): 1}
+
+    def results(settings, repeats):
+        numbers = [fewer.get((one["part"], one["angle"], one["aspect"]), 2) for one in settings]
+        return [[caught(*(1.0 if k < number else -1.0 for k in range(2)))] * repeats for number in numbers]
+
+    monkeypatch.setattr(regions, "results", results)
+    claims = list(regions.check(2))
+    assert [one.mean.value for one in claims] == [0.0, 1.0, 0.5, 0.0]
+    assert all(one.ok for one in claims)
+    fewer |= {("side", 0.0, 20 / 3): 2, ("side", 0.0, 5 / 3): 1, ("top", 0.0, 5 / 3): 1}
+    assert [one.ok for one in regions.check(2)] == [False, False, True, True]
 
 
 @pytest.mark.slow

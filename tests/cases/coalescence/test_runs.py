@@ -9,8 +9,14 @@ from tisim import InputError
 from tisim.cases.case import Check
 from tisim.cases.coalescence.checks import of_agglomeration, of_conservation, of_structure, of_the_cloud
 from tisim.cases.coalescence.figures import asteroids, figures, forces, growth, shells, table
-from tisim.cases.coalescence.published import BULK, MAGNETISATIONS, NUMBER
-from tisim.cases.coalescence.regime import COMPARED, random_moment, regime, rotation_over_gravity
+from tisim.cases.coalescence.published import BULK, DIAMETERS, MAGNETISATIONS, NUMBER
+from tisim.cases.coalescence.regime import (
+    COMPARED,
+    MAGNETISED_BY,
+    random_moment,
+    regime,
+    rotation_over_gravity,
+)
 from tisim.cases.coalescence.runs import CloudRun, Gathering, chain_length, clouds, of_magnetisation
 from tisim.cases.coalescence.scene import scene
 from tisim.cases.common.rubble_pile import Conserved
@@ -92,7 +98,12 @@ def test_the_rotation_that_disrupts_a_cloud():
 def test_figures_of_runs():
     assert len(growth(RUNS).axes) == 3
     assert len(asteroids([of_magnetisation(RUNS, m)[0] for m in MAGNETISATIONS]).axes) == 3
-    assert len(forces().axes) == 1
+    by_size, by_gravity = forces().axes
+    assert len(by_size.lines) == 2 + 4 + len(DIAMETERS)
+    # At 5 mT grains of iron of 5 mm attract each other with 7.86 times their weight on Psyche.
+    line = by_gravity.lines[list(MAGNETISED_BY).index(5e-3)]
+    at = np.exp(np.interp(np.log(5e-3), *np.log([line.get_xdata(), line.get_ydata()])))
+    assert at == pytest.approx(7.86 * 0.144, rel=1e-3)
     assert len(table(RUNS).splitlines()) == 1 + len(RUNS)
     assert shells(RUNS[0]).shape == (2,)
     assert table(RUNS).splitlines()[0].split(",")[5] == "semi_major_axis_m"

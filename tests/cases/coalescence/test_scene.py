@@ -6,7 +6,16 @@ from scipy.constants import Boltzmann, G, mu_0
 
 from tisim.analysis import contacts
 from tisim.cases.coalescence import published
-from tisim.cases.coalescence.regime import dmt_cohesion, mutual_gravity, spin_when_packed, surface_weight
+from tisim.cases.coalescence.regime import (
+    IRON_DENSITY,
+    balanced_gravity,
+    dmt_cohesion,
+    dominated,
+    mutual_gravity,
+    spin_when_packed,
+    surface_cohesion,
+    surface_weight,
+)
 from tisim.cases.coalescence.scene import (
     DEFAULT,
     ROTATION,
@@ -141,3 +150,15 @@ def test_which_force_dominates():
     )
     assert weak == pytest.approx([0.59, 0.30], abs=0.01)
     assert strong == pytest.approx([59, 30], abs=1)
+
+
+def test_lines_of_equal_force():
+    """L21 Fig. 4.16; and section 4.5, for 1190 A/m, S = 0.1 and 1e-4 m/s^2: from some 1e-4 m to 1e-1 m."""
+    for d in (5e-3, 0.5):
+        gravity = balanced_gravity(d, 119.0, IRON_DENSITY)
+        assert surface_weight(d, IRON_DENSITY, gravity) == pytest.approx(attraction(d, 119.0))
+    smallest, largest = dominated(1190.0, 1e-4, 0.1, IRON_DENSITY)
+    assert attraction(smallest, 1190.0) == pytest.approx(surface_cohesion(smallest, 0.1))
+    assert attraction(largest, 1190.0) == pytest.approx(surface_weight(largest, IRON_DENSITY, 1e-4))
+    assert smallest == pytest.approx(0.77e-3, abs=1e-5)
+    assert largest == pytest.approx(0.57, abs=0.01)
