@@ -14,7 +14,7 @@ from .analysis.sensitivity import (
     sensitivity as sensitivity,
 )
 from .ask_tell import AskTell as AskTell
-from .evaluation.ensemble import EnsembleSettings as EnsembleSettings
+from .evaluation.ensemble_settings import EnsembleSettings as EnsembleSettings
 from .fitness_record import FitnessRecord as FitnessRecord
 from .outcome import (
     Design as Design,

@@ -7,8 +7,6 @@ with the same settings replays the file.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -16,9 +14,8 @@ from typing import Any, Literal
 import numpy as np
 
 from tisim.errors import InputError, Words, is_number, must
-from tisim.files import regular_file
-from tisim.files.atomic import replace_file
 from tisim.optimize.beginning import Beginning
+from tisim.optimize.campaign_file import CampaignFile, Tried, campaign_line
 from tisim.optimize.designs_csv import (
     GENERATION,
     WHETHER_ASKED,
@@ -29,7 +26,7 @@ from tisim.optimize.designs_csv import (
     rows,
 )
 from tisim.optimize.evaluation.estimate import FitnessEstimate
-from tisim.optimize.experiments import Values, known, row_values
+from tisim.optimize.experiments import known, row_values
 from tisim.optimize.hall_of_fame import hall_of_fame
 from tisim.optimize.methods.base import find
 from tisim.optimize.methods.individual import Individual
@@ -51,8 +48,6 @@ _TRIES = 100
 _SETTINGS = "of the same genes, method, seed, options and starting designs as this campaign"
 Point = tuple[float, ...]
 """A design as a point of the unit cube, at the centre of the cells of integers and choices."""
-Tried = tuple[Values, Values, Values]
-"""The values, standard errors and constraint values of one trial of a design."""
 
 
 class AskTell:
@@ -94,8 +89,7 @@ class AskTell:
         # Individuals of told designs; the first one of a design is the one told.
         self._individuals: dict[Point, list[Individual]] = {}
         self._not_learned: list[Point] = []
-        self._file, self._content = None if file is None else Path(file), b""
-        self._lines: list[list[str]] = []
+        self._file = CampaignFile(self.problem, None if file is None else Path(file))
         self._replay()
 
     def ask(self) -> list[dict[str, Any]]:
@@ -141,7 +135,7 @@ class AskTell:
                 read.append((row, *self._read(row)))
         lines = [self._line(row, self._same(point) in self._open) for row, point, _ in read]
         tries, individuals = self._known([(point, tried) for _, point, tried in read])
-        self._write(lines)
+        self._file.append(lines)
         self._take(tries, individuals)
 
     @property
@@ -284,48 +278,13 @@ class AskTell:
 
     def _line(self, row: Mapping[str, str], asked: bool) -> list[str]:
         """Return the line of the file for a told row."""
-        _, (values, errors, limits) = self._read(row)
-        design = design_of(self.problem, row)
-        numbers = ("" if np.isnan(number) else repr(number) for number in (*values, *errors, *limits))
-        return [str(self._generations), "yes" if asked else "no", *map(str, design.values()), *numbers]
-
-    @property
-    def _heading(self) -> list[str]:
-        problem = self.problem
-        return [
-            GENERATION, WHETHER_ASKED, *(gene.label for gene in problem.genome.searched),
-            *(objective.label for objective in problem.objectives),
-            *(error_of(objective.name) for objective in problem.objectives),
-            *(constraint.name for constraint in problem.result_constraints),
-        ]  # fmt: skip
-
-    def _write(self, lines: list[list[str]]) -> None:
-        """Append these lines to the file, if there is one. RunError if the disk is full."""
-        if self._file is not None:
-            rule = "as this campaign has left it; make a new AskTell to go on with it"
-            same = (regular_file.content(self._file) or b"") == self._content
-            must(same, "campaign file", rule, f"{self._file}, which has changed")
-            text = io.StringIO(newline="")
-            csv.writer(text).writerows([self._heading, *self._lines, *lines])
-            content = text.getvalue().encode()
-            replace_file(self._file, content)
-            self._content = content
-        self._lines += lines
+        _, tried = self._read(row)
+        return campaign_line(self._generations, asked, design_of(self.problem, row), tried)
 
     def _replay(self) -> None:
         """Tell the method the contents of the file, in their order."""
-        content = None if self._file is None else regular_file.content(self._file)
-        if self._file is None or not content:
-            return
-        self._content = content
-        for place, row in rows(self._file, "campaign file"):
+        for place, row in self._file.rows():
             with naming(place):
-                must(
-                    {GENERATION, WHETHER_ASKED} <= set(row),
-                    "campaign file",
-                    "one of an AskTell",
-                    str(self._file),
-                )
                 point, tried = self._read(row)
                 self._go_on_to(row[GENERATION])
                 asked = self._same(point) in self._open
@@ -335,7 +294,7 @@ class AskTell:
                     _SETTINGS,
                     Words("a design that was not asked for"),
                 )
-                self._lines.append(self._line(row, asked))
+                self._file.lines.append(self._line(row, asked))
                 self._take(*self._known([(point, tried)]))
 
     def _go_on_to(self, generation: str) -> None:

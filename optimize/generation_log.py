@@ -12,7 +12,7 @@ from deap import tools
 from tisim.errors import InputError, abbreviated, must
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.individual import Individual
-from tisim.optimize.problem.calls import error_told
+from tisim.optimize.problem.faults import error_told
 from tisim.optimize.problem.problem import Problem
 
 BEFORE_STATISTICS = ("gen", "designs", "starts", "failed", "box", "recentred")

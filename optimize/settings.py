@@ -13,7 +13,7 @@ from pydantic import Field, SerializeAsAny, model_validator
 from tisim.components.component import Checked
 from tisim.errors import must
 from tisim.optimize.beginning import Beginning
-from tisim.optimize.evaluation.ensemble import LOOKED_AT, EnsembleSettings, fewest_starts
+from tisim.optimize.evaluation.ensemble_settings import LOOKED_AT, EnsembleSettings, fewest_starts
 from tisim.optimize.generation_log import OwnStatistics
 from tisim.optimize.methods.base import SearchMethod, code_of, every, find
 from tisim.optimize.problem.problem import Problem

@@ -38,7 +38,7 @@ ROOMS = (
     "tisim.optimize.experiments", "tisim.optimize.beginning", "tisim.optimize.settings",
     "tisim.optimize.outcome", "tisim.optimize.search_records", "tisim.optimize.search_folder",
     "tisim.optimize.search_file",
-    "tisim.optimize.warm_start", "tisim.optimize.ask_tell",
+    "tisim.optimize.warm_start", "tisim.optimize.campaign_file", "tisim.optimize.ask_tell",
     "tisim.optimize.conclusion", "tisim.optimize.search", "tisim.optimize.analysis",
     "tisim.optimize.report", "tisim.optimize.session", "tisim.optimize",
     "tisim.cases", "tisim.cases.case", "tisim.cases.common", "tisim.cases.capture", "tisim.cases.coalescence",

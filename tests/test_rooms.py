@@ -21,10 +21,7 @@ TYPES_FROM_ABOVE = {
     ("tisim.optimize.problem.feasibility", "tisim.optimize.evaluation.estimate"),
 }
 """Types from a later room: ``tisim.run`` takes a Recording, and an estimate is judged by the problem."""
-CIRCLES_OF_TYPES = (
-    {"tisim.engine.simulation", "tisim.engine.observer"},
-    {f"tisim.optimize.problem.{name}" for name in ("calls", "function", "genome", "given_genes", "problem")},
-)
+CIRCLES_OF_TYPES = ({"tisim.engine.simulation", "tisim.engine.observer"},)
 """Modules whose classes hold each other: a simulation calls its observers, which read the simulation."""
 
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from tisim import InputError, RunError
-from tisim.optimize.problem.calls import FaultyProblem, check_refusal, constraint_value, make_scene, values_of
+from tisim.optimize.problem.calls import check_refusal, constraint_value, make_scene, values_of
+from tisim.optimize.problem.faults import FaultyProblem
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.record import Record, canonical, evaluation_key

@@ -16,7 +16,7 @@ from tisim import InputError
 from tisim.components.component import Checked
 from tisim.errors import Words, must
 from tisim.optimize.methods.individual import Individual
-from tisim.optimize.problem.calls import function_name
+from tisim.optimize.problem.faults import function_name
 from tisim.optimize.problem.problem import checksum_of
 from tisim.optimize.surrogate.gaussian_process import Array
 

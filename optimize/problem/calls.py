@@ -1,11 +1,8 @@
-"""Calls of the user's functions of a problem. An error in one is reported in one line, with its place in the
-file."""
+"""Calls of the user's functions of a problem, and checks of what they return and read."""
 
 from __future__ import annotations
 
-import functools
 import numbers
-import traceback
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -14,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tisim.errors import InputError, Words, abbreviated, must, printable
-from tisim.optimize.problem.outside import Outside, is_of_user, noticed
+from tisim.optimize.problem.constraint import InequalityConstraint
+from tisim.optimize.problem.faults import FaultyProblem, error_told, function_name
+from tisim.optimize.problem.objective import Objective
+from tisim.optimize.problem.outside import Outside, noticed
+from tisim.optimize.problem.problem import Problem
 
 if TYPE_CHECKING:
     from tisim import Scene
-    from tisim.optimize.problem.constraint import InequalityConstraint
-    from tisim.optimize.problem.objective import Objective
-    from tisim.optimize.problem.problem import Problem
 
 
 def make_scene(problem: Problem, design: Mapping[str, float], seed: int) -> Scene:
@@ -74,23 +72,6 @@ def constraint_value(constraint: InequalityConstraint, of: Any, problem: Problem
     return _number(what, _called(what, "a number", constraint.of, of, problem))
 
 
-def call_function(of: Callable[..., Any], *arguments: Any) -> tuple[Any, Outside]:
-    """Return the value of a plain function of a design, or the InputError with which it refuses the design;
-    and the files and programs that it used.
-
-    FaultyProblem if it fails.
-    """
-    try:
-        with noticed() as read:
-            value = of(*arguments)
-    except InputError as error:
-        return error, read
-    except Exception as error:
-        rule = f"function {function_name(of)} must return numbers, or raise InputError to refuse a design"
-        raise FaultyProblem(f"{rule}; received {error_told(error)}") from error
-    return value, read
-
-
 def check_reads(what: str, read: Outside, problem: Problem) -> None:
     """Raise FaultyProblem if a function has read anything else than the files of the problem."""
     known = {Path(file).resolve() for file in problem.files}
@@ -112,13 +93,6 @@ def check_refusal(result: Any, problem: Problem) -> None:
     are not called for a refused design."""
     if problem.function is not None and isinstance(read := getattr(result, "read", None), Outside):
         check_reads(f"function {function_name(problem.function.of)}", read, problem)
-
-
-def function_name(of: Callable[..., Any]) -> str:
-    """Return the name of a function, of the function in a partial, or of the class of an object."""
-    while isinstance(of, functools.partial):
-        of = of.func
-    return getattr(of, "__name__", type(of).__name__).strip("<>")
 
 
 def _called(what: str, wanted: str, of: Callable[[Any], Any], argument: Any, problem: Problem) -> Any:
@@ -148,15 +122,3 @@ def _number(what: str, value: Any) -> float:
         return float(value)
     except OverflowError:
         raise FaultyProblem(f"{rule} of 64 bits; received {abbreviated(value)}") from None
-
-
-class FaultyProblem(InputError):
-    """A function of a problem fails: the search ends, and its results so far are kept."""
-
-
-def error_told(error: Exception) -> str:
-    """Return an error in a user's function as one line, with its place in the user's file."""
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [one for one in frames if is_of_user(Path(one.filename))]
-    place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
-    return printable(f"{type(error).__name__}: {' '.join(str(error).split())}") + printable(place)

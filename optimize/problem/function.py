@@ -19,7 +19,7 @@ import numpy as np
 
 from tisim.engine.result import Status
 from tisim.errors import InputError, abbreviated, must
-from tisim.optimize.problem.calls import FaultyProblem, call_function
+from tisim.optimize.problem.faults import FaultyProblem, call_function
 from tisim.optimize.problem.outside import Outside
 
 

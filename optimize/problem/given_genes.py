@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from tisim.errors import InputError, abbreviated, must
-from tisim.optimize.problem.calls import FaultyProblem, error_told
+from tisim.optimize.problem.faults import FaultyProblem, error_told
 from tisim.optimize.problem.gene_values import Named, Value, check_name, plain_value
 
 

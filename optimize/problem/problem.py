@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from tisim.errors import InputError, must
 from tisim.files import python_file, regular_file
 from tisim.files.python_file import sha256
-from tisim.optimize.problem.calls import function_name
 from tisim.optimize.problem.constraint import DesignConstraint, InequalityConstraint, ResultConstraint
+from tisim.optimize.problem.faults import function_name
 from tisim.optimize.problem.fingerprint import fingerprint
 from tisim.optimize.problem.function import PlainFunction, ValueOf
 from tisim.optimize.problem.gene_values import Value

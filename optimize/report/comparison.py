@@ -18,7 +18,8 @@ from tisim import RunError
 from tisim.console import plain_table
 from tisim.errors import must
 from tisim.files import output_folder
-from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
+from tisim.optimize.evaluation.ensemble import Ensemble
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.evaluation.runs import Evaluator
 from tisim.optimize.outcome import Outcome, Progress

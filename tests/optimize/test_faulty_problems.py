@@ -6,7 +6,7 @@ import pytest
 from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError, RunError
 from tisim.optimize import Gene, Problem
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.search import search
 from tisim.optimize.settings import Settings

@@ -8,7 +8,8 @@ import pytest
 
 from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
 from tisim import InputError, RunError
-from tisim.optimize.evaluation.ensemble import FRESH, EnsembleSettings
+from tisim.optimize.evaluation.ensemble import FRESH
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.methods.operators import GeneticOperator
 from tisim.optimize.search import search

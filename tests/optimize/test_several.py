@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.hall_of_fame import HallOfFame, compromise
 from tisim.optimize.methods.individual import Individual

@@ -10,7 +10,7 @@ from deap import tools
 
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError, optimize
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.generation_log import statistics
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.objective import Objective

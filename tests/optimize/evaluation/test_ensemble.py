@@ -6,7 +6,8 @@ import pytest
 from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
 from tisim import InputError, RunError
 from tisim.numerics.skewed import interval
-from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
+from tisim.optimize.evaluation.ensemble import Ensemble
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.estimate import converged_after
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.settings import Settings

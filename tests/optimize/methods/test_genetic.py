@@ -9,7 +9,7 @@ from deap import base, tools
 
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.base import find
 from tisim.optimize.methods.individual import Individual

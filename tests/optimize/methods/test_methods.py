@@ -5,7 +5,7 @@ import pytest
 
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tisim import InputError
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
 from tisim.optimize.methods.base import every, find
 from tisim.optimize.methods.cma_es import EDGE, drawn_of, folded, within

@@ -48,7 +48,7 @@ def test_a_constraint_is_described_in_words():
     ("make", "message"),
     [
         (lambda: ResultConstraint("", len, at_most=1), "constraint name must be a non-empty string"),
-        (lambda: ResultConstraint("m", 1.0, at_most=1), "of of constraint m must be a function"),
+        (lambda: ResultConstraint("m", 1.0, at_most=1), "function 'of' of constraint m must be a function"),
         (lambda: ResultConstraint("m", len), "constraint m must be at_most or at_least a number, or both"),
         (
             lambda: ResultConstraint("m", len, at_most=math.inf),

@@ -14,7 +14,7 @@ from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
 from tisim.files import atomic
 from tisim.files.checksum import frame
-from tisim.optimize.evaluation.ensemble import EnsembleSettings
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.problem.genome import Gene, Genome
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.search import search

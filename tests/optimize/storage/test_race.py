@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, fake_problem
-from tisim.optimize.evaluation.ensemble import Ensemble, EnsembleSettings
+from tisim.optimize.evaluation.ensemble import Ensemble
+from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.problem.objective import Objective
 from tisim.optimize.search import search
