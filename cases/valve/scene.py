@@ -13,14 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from tisim import Box, Cloud, GrainClass, Scene
+from tisim import Box, Cloud, GrainClass, Particles, Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.common import magnetorheological_fluid as fluid
 from tisim.cases.valve import published
 from tisim.cases.valve.duct import Duct
 from tisim.effects import CARBONYL_IRON, MutualInducedMoment, StokesDrag, TruncatedDipoleDipole
 from tisim.errors import must
+from tisim.scene.initial_state import Arrays
 from tisim.sources import MagneticField
+from tisim.sources.uniform import NO_END
 from tisim.steppers import FixedStep, Verlet
 
 TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"
@@ -129,6 +131,18 @@ def speed_of(pressure: float, duct: Duct, grains: Sequence[GrainClass], fraction
     return float(pressure * duct.area / drag)
 
 
+def continued(state: Arrays) -> Particles:
+    """Return the grains of a state as the start of another run of the same structure, in the order of their
+    ids.
+
+    Contact springs and moments are those at the end of the first run.
+    """
+    order = np.argsort(state["id"])
+    core = {name: state[name][order] for name in ("position", "velocity", "radius", "mass")}
+    made_anew = {*core, "id", "force", "torque"}
+    return Particles(**core, quantities={name: state[name][order] for name in state if name not in made_anew})
+
+
 def scene(
     throat: float = THROATS[0],
     grains: Sequence[GrainClass] = COARSE,
@@ -143,6 +157,8 @@ def scene(
     length: float = LENGTH,
     flowing: float = FLOWING,
     lasting: float = LASTING,
+    reopened: float = 0.0,
+    state: Arrays | None = None,
     young: float = published.YOUNG,
     dt: float | None = None,
     friction: float = published.FRICTION,
@@ -157,7 +173,10 @@ def scene(
     straight : length of the constriction, m; by default a quarter of its diameter.
     slope : length of the cones before and after it divided by the decrease of the radius. length : of the
     duct, m.
-    flowing, lasting : durations without a field and with it, s. young : Pa.
+    flowing, lasting : durations without a field and with it, s.
+    reopened : duration after the field has been switched off again, s; with 0 the field has no end.
+    state : a state of this structure to begin from, by name, instead of a random start.
+    young : Pa.
     dt : s; by default L21's step scaled to this size and modulus. friction : coefficient of sliding friction.
 
     All are values of one structure: valves that differ in them run as one batch.
@@ -173,11 +192,15 @@ def scene(
             number=fluid.number_of(grains, fraction, shape.filling().volume()),
             grains=tuple(grains),
             placement=shape.filling(),
-        ),
+        )
+        if state is None
+        else continued(state),
         materials={"iron": fluid.iron(young, friction=friction)},
         domain=Box(low=(-half[0], -half[1], -half[2]), high=half, periodic=(False, False, True)),
         effects=(
-            MagneticField(constant=(flux, 0.0, 0.0), begin=flowing),
+            MagneticField(
+                constant=(flux, 0.0, 0.0), begin=flowing, end=flowing + lasting if reopened > 0 else NO_END
+            ),
             # One sweep a step, as in L21 (section 2.2.3).
             MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, cutoff=CUTOFF),
             TruncatedDipoleDipole(cutoff=CUTOFF),
@@ -187,7 +210,7 @@ def scene(
             StokesDrag(viscosity=published.OIL_VISCOSITY),
         ),
         stepper=Verlet(control=FixedStep(dt=step(fluid.smallest(grains), young) if dt is None else dt)),
-        duration=flowing + lasting,
+        duration=flowing + lasting + reopened,
         seed=seed,
     )
 
