@@ -363,13 +363,13 @@ TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
 @pytest.mark.parametrize(
     "kinds",
     [
-        TOGETHER,
         [Capture, Virial],
-        HOLDING,
-        [PermanentMoment],
-        *(pytest.param(kinds, marks=pytest.mark.slow) for kinds in (DIPOLES, IMAGED)),
+        *(
+            pytest.param(kinds, marks=pytest.mark.slow)
+            for kinds in (TOGETHER, HOLDING, [PermanentMoment], DIPOLES, IMAGED)
+        ),
     ],
-    ids=["all that go together", "capture", "constraints", "permanent moments", "dipoles", "Ewald sums"],
+    ids=["capture", "all that go together", "constraints", "permanent moments", "dipoles", "Ewald sums"],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))
