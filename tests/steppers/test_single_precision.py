@@ -6,6 +6,7 @@ import pytest
 
 import tisim
 from tisim import effects as laws
+from tisim.engine.loading import check_rounding
 from tisim.steppers import (
     Boris,
     Collocation,
@@ -135,7 +136,7 @@ ASKED = {
 
 
 def refusals():
-    """Return the message for each requested error when a scene is loaded, empty if it is accepted."""
+    """Return the message for each requested error, empty if it is accepted."""
     said = {}
     for name, asked in ASKED.items():
         scene = tisim.Scene(
@@ -145,10 +146,13 @@ def refusals():
             **asked,
         )
         try:
-            tisim.Simulation(scene).load(scene)
+            check_rounding(scene)
             said[name] = ""
         except tisim.InputError as refused:
             said[name] = str(refused)
+    with pytest.raises(tisim.InputError, match=r"at least 1e-06 in f32"):
+        # A run makes this check before it starts.
+        tisim.run(scene.replace({"stepper": ASKED["tolerance"]["stepper"]}))
     return said
 
 

@@ -43,6 +43,7 @@ PLACES = {
     "fast": lambda: places(launched, 40, 40, True, hydrodynamics="rotne-prager", noise="fast"),
 }
 
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PLACES)
 def test_same_bits_with_one_thread_and_two(name, tmp_path):
