@@ -327,9 +327,13 @@ PAIR_FORCES = [kind for kind in known_effects() if issubclass(kind, PairForce)]
 
 
 @pytest.mark.long
+def test_a_valid_pair_force_passes():
+    assert_pair_forces(two(InverseSquare()))
+
+
+@pytest.mark.slow
 def test_pair_forces_write_nothing_and_are_the_same_by_the_inverse():
     assert {kind.kind() for kind in PAIR_FORCES if kind.offers_inverse()}
-    assert_pair_forces(two(InverseSquare()))
     assert_pair_forces(joined(PAIR_FORCES))
 
 
@@ -363,13 +367,12 @@ TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
 @pytest.mark.parametrize(
     "kinds",
     [
-        TOGETHER,
         [Capture, Virial],
         HOLDING,
         [PermanentMoment],
-        *(pytest.param(kinds, marks=pytest.mark.slow) for kinds in (DIPOLES, IMAGED)),
+        *(pytest.param(kinds, marks=pytest.mark.slow) for kinds in (TOGETHER, DIPOLES, IMAGED)),
     ],
-    ids=["all that go together", "capture", "constraints", "permanent moments", "dipoles", "Ewald sums"],
+    ids=["capture", "constraints", "permanent moments", "all that go together", "dipoles", "Ewald sums"],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))

@@ -198,7 +198,7 @@ VARIABLES = (
     ("warnings are errors", "PYTHONWARNINGS=error $RUN"),
     ("threads of other libraries", "OMP_NUM_THREADS=x OPENBLAS_NUM_THREADS=x $RUN", {"says": ""}),
     ("all at once", ALL_AT_ONCE.format("taichi"), {"quick": True}),
-    ("all at once, quadrants", ALL_AT_ONCE.format("quadrants"), {"quick": True}),
+    ("all at once, quadrants", ALL_AT_ONCE.format("quadrants")),
 )  # fmt: skip
 PICTURES = (
     ("backend of a notebook", f"MPLBACKEND=module://matplotlib_inline.backend_inline $RUN && {DRAWN}"),
@@ -266,7 +266,7 @@ PYTHONS = (
     ("forked by an executor after a run", "from concurrent.futures import ProcessPoolExecutor\n"
      "    print(work()); print(ProcessPoolExecutor(1, fork).submit(refused).result(60))", {"prints": SPAWN}),
     ("forked by hand after a run", "print(work()); assert child(sys.exit) == 0; print(work())",
-     {"prints": SPAWN, "quick": True}),
+     {"prints": SPAWN}),
     ("forked by hand after a run, quadrants", "print(work()); assert child(sys.exit) == 0; print(work())",
      {"prints": SPAWN}),
     ("forked after a run, to read", "tisim.run(tisim.Scene.from_toml('tiny.toml'), "

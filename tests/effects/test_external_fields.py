@@ -45,7 +45,7 @@ def lorentz_twin(setup, state, t=0.0):
     [
         (ElectricField, MagneticField),
         pytest.param((ElectricField,), marks=pytest.mark.slow),
-        pytest.param((MagneticField,), marks=pytest.mark.long),
+        pytest.param((MagneticField,), marks=pytest.mark.slow),
     ],
 )
 def test_lorentz_force(kinds, rng):
@@ -75,7 +75,7 @@ def test_the_electric_field_alone_acts_without_a_magnetic_one(rng):
     assert Lorentz().gyrates(setup.effects)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_fields_oscillate_in_time(rng):
     """Heavy charges keep their velocity: the force after some steps is the force in the field at
     that time."""

@@ -179,6 +179,7 @@ def test_a_finished_world_cannot_be_changed(simulation):
         _ = simulation.states[0]["speed"]
 
 
+@pytest.mark.slow
 def test_an_impossible_write_gives_a_clear_failure():
     """Two particles in one place: the force between them is not finite."""
     simulation = compiled(crystal(), 2)

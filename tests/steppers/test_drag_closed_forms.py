@@ -32,8 +32,15 @@ def stokes(r, factor, v):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", STEPPERS)
-@pytest.mark.parametrize("form", [constant, stokes])
+@pytest.mark.parametrize(
+    ("form", "name"),
+    [
+        (constant, "trapezoid"),
+        (stokes, "boris"),
+        pytest.param(constant, "boris", marks=pytest.mark.slow),
+        pytest.param(stokes, "trapezoid", marks=pytest.mark.slow),
+    ],
+)
 def test_distance_and_its_order(form, name):
     """All parameters at once with four step lengths each: order 2, along a direction that is not an axis."""
     along = np.array([2.0, -1.0, 2.0]) / 3

@@ -84,6 +84,7 @@ def test_40_scenes_of_each_kind(name, stepper, per, capsys):
     assert found.max() < LARGEST[per][name]
 
 
+@pytest.mark.slow
 def test_fields_with_and_without_a_start_time_run_in_one_batch():
     """Each has the error estimate that suits it, and the bits equal separate runs."""
     scenes = [

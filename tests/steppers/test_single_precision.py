@@ -6,6 +6,7 @@ import pytest
 
 import tisim
 from tisim import effects as laws
+from tisim.engine.loading import check_rounding
 from tisim.steppers import (
     Boris,
     Collocation,
@@ -66,19 +67,31 @@ def fast_flights():
     return flights()
 
 
-@pytest.mark.parametrize("function", ["flights", pytest.param("fast_flights", marks=pytest.mark.slow)])
-def test_a_slow_particle_moves_the_right_distance(single, function):
-    ends = single("steppers.test_single_precision", function)
+@pytest.fixture(scope="module")
+def measured(single):
+    """The result of ``everything`` from one process of single precision."""
+    return single("steppers.test_single_precision", "everything")
+
+
+def right_distance(ends):
+    """Assert that particles of ``flights`` have moved by the exact distance in the exact number of steps."""
     for place, steps in ends.values():
         assert steps == STEPS
         exact = np.array([0.1, 1.0, -0.1]) + SPEED * DT * STEPS * np.array([1, 1, -1])
         assert np.abs(np.array(place) - exact).max() < 2e-7
 
 
-def test_the_requested_number_of_steps_is_taken(single):
-    assert single("steppers.test_single_precision", "counts") == [
-        n for n in (1, 7, 2000, 100_001) for _ in "abc"
-    ]
+def test_a_slow_particle_moves_the_right_distance(measured):
+    right_distance(measured["flights"])
+
+
+@pytest.mark.slow
+def test_a_slow_particle_moves_the_right_distance_in_fast_arithmetic(single):
+    right_distance(single("steppers.test_single_precision", "fast_flights"))
+
+
+def test_the_requested_number_of_steps_is_taken(measured):
+    assert measured["counts"] == [n for n in (1, 7, 2000, 100_001) for _ in "abc"]
 
 
 def restarts():
@@ -109,8 +122,8 @@ def restarts():
     return straight == simulation.results()[0].state["position"].tolist()
 
 
-def test_a_checkpoint_includes_rounding_remainders(single):
-    assert single("steppers.test_single_precision", "restarts")
+def test_a_checkpoint_includes_rounding_remainders(measured):
+    assert measured["restarts"]
 
 
 ASKED = {
@@ -133,17 +146,24 @@ def refusals():
             **asked,
         )
         try:
-            tisim.run(scene)
+            check_rounding(scene)
             said[name] = ""
         except tisim.InputError as refused:
             said[name] = str(refused)
+    with pytest.raises(tisim.InputError, match=r"at least 1e-06 in f32"):
+        # A run makes this check before it starts.
+        tisim.run(scene.replace({"stepper": ASKED["tolerance"]["stepper"]}))
     return said
 
 
-def test_unreachable_errors_are_refused(single):
-    said = single("steppers.test_single_precision", "refusals")
+def everything():
+    """Results of the functions above, by their names."""
+    return {function.__name__: function() for function in (flights, counts, restarts, refusals)}
+
+
+def test_unreachable_errors_are_refused(measured):
     rule = "must be at least {} in f32, which rounds positions by 1.2e-07; received {}"
-    assert said == {
+    assert measured["refusals"] == {
         "scene.accuracy": f"scene.accuracy {rule.format('2e-05', '1e-05')}",
         "stages": f"stepper.control.error {rule.format('1e-06', '1e-07')}",
         "tolerance": f"stepper.control.tolerance {rule.format('1e-06', '1e-09')}",

@@ -158,9 +158,23 @@ def test_contact_equals_its_numpy_twin(name, rng):
         assert 40 < counts["bonded"] < counts["touch"] - 40
 
 
+def rubbing(contact, **friction):
+    """Contact with friction alone: softening, dissipation and bonds, which the test of all laws has compiled,
+    have no effect."""
+    return (
+        Contact(stiffness=contact),
+        ContactSoftening(sensitivity=0.0, reference_temperature=400.0, floor=0.0),
+        ContactDissipation(damping=0.0),
+        ContactFriction(**friction),
+        ContactBond(stiffness=10.0, exponent=3, grip_stiffness=500.0, threshold=0.999),
+    )
+
+
 def pair(effects, gap, radius, velocity=(0, 0), spin=None):
     """Two grains on the x axis, the second at a distance of ``gap``, moving along y."""
     quantities = {} if spin is None else {"spin": spin}
+    if any(isinstance(effect, ContactSoftening) for effect in effects):
+        quantities["temperature"] = 300.0
     return scene(
         [[0, 0, 0], [gap, 0, 0]],
         [[0, velocity[0], 0], [0, velocity[1], 0]],
@@ -184,7 +198,7 @@ def test_a_grain_inside_another_is_not_pushed():
 def test_light_contact_keeps_its_digits():
     """At an overlap of 1e-9 radii, to all digits of the overlap itself."""
     gap = 2.0 - 1e-9
-    law = Contact(stiffness=1.0), ContactFriction(stiffness=10.0, static=1e3, dynamic=1.0)
+    law = rubbing(1.0, stiffness=10.0, static=1e3, dynamic=1.0)
     (state,) = loads([pair(law, gap, 1.0)])
     delta = 2.0 - gap
     expected = (delta / 2) ** 2 * np.pi * delta * (4 - delta) / 4
@@ -209,14 +223,9 @@ def test_friction_of_grains_that_roll_on_each_other():
 @pytest.mark.long
 def test_grains_that_just_touch_at_rest_rub_with_no_force():
     """Without pressure and speed there is no direction of friction, and no NaN; nor without any friction."""
-    smooth = ContactFriction(stiffness=10.0, static=0.0, dynamic=0.0)
-    rough = ContactFriction(stiffness=10.0, static=1e3, dynamic=1.0)
-    law = Contact(stiffness=1e3)
-    scenes = [
-        pair((law, rough), 2.0, 1.0),
-        pair((law, smooth), 1.8, 1.0),
-        pair((law, rough), 2.0, 1.0, (1, -1)),
-    ]
+    smooth = rubbing(1e3, stiffness=10.0, static=0.0, dynamic=0.0)
+    rough = rubbing(1e3, stiffness=10.0, static=1e3, dynamic=1.0)
+    scenes = [pair(rough, 2.0, 1.0), pair(smooth, 1.8, 1.0), pair(rough, 2.0, 1.0, (1, -1))]
     for state in loads(scenes, dt=DT):
         np.testing.assert_array_equal(state["force"][:, 1:], 0)
         np.testing.assert_array_equal(state["torque"], 0)
@@ -225,7 +234,7 @@ def test_grains_that_just_touch_at_rest_rub_with_no_force():
 @pytest.mark.long
 def test_stick_vanishes_with_the_time_step():
     """The docstring's statement on the paper's regularisation."""
-    friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))
+    friction = rubbing(1e3, stiffness=10.0, static=1e3, dynamic=0.0)
     scenes = [pair(friction, 1.8, 1.0, (1.0, -1.0))]
     at = [loads(scenes, dt)[0]["force"][0, 1] for dt in (1e-3, 1e-6, 0.0)]
     assert at[1] == pytest.approx(at[0] / 1e3)

@@ -129,7 +129,7 @@ def test_the_same_bits_on_all_schedules(usual, monkeypatch, schedule):
     simulation.close()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_removing_a_grain_keeps_the_history_of_others(simulation):
     """In NumPy, a row and a column are deleted; here indices change and lists are rebuilt."""
     made = [bed(5, after=(60 - 0.5) * DT, which=which) for which in (0, 77, 149)]

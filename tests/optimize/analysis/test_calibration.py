@@ -28,7 +28,7 @@ def holds(inside, sets=SETS):
     return np.all(np.abs(inside - 0.95) < 3 * deviation) and abs(inside.mean() - 0.95) < 1.75 * deviation
 
 
-@pytest.mark.parametrize("number", [4, 3])
+@pytest.mark.parametrize("number", [4, pytest.param(3, marks=pytest.mark.slow)])
 def test_intervals_contain_the_truth_and_have_the_right_width(number):
     inside, width = coverage(SETS, number=number)
     assert holds(inside)

@@ -42,13 +42,10 @@ PLACES = {
     "exact": lambda: places(launched, 40, 40, hydrodynamics="rotne-prager"),
     "fast": lambda: places(launched, 40, 40, True, hydrodynamics="rotne-prager", noise="fast"),
 }
-slow = pytest.mark.slow
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name", ["by themselves", pytest.param("exact", marks=slow), pytest.param("fast", marks=slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PLACES)
 def test_same_bits_with_one_thread_and_two(name, tmp_path):
     file = tmp_path / "places.npy"
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file), name]
