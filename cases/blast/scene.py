@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tisim import Blast, Cloud, Particles, RandomInBall, Scene
+from tisim import Blast, Cloud, Particles, RandomInBall, Result, Scene
 from tisim.cases.blast.closed_forms import viscosity_for
 from tisim.cases.case import Size, size_named
 from tisim.effects import (
@@ -33,6 +33,7 @@ from tisim.effects import (
     StokesDrag,
     TruncatedNearField,
 )
+from tisim.operators import AtRest
 from tisim.packing import EqualSizes, GrainClass
 from tisim.sources import MagneticField
 from tisim.steppers import Collocation, IterationControl, StageControl, Stepper, Trapezoid
@@ -64,6 +65,15 @@ MIXED_FLUX = 0.5
 NEIGHBOURS = 3 * RADIUS
 """Cut-off distance of the near field in the size "clumps", m: half a diameter between surfaces."""
 
+NEAR: dict[str, Any] = {"alpha1": 0.5, "beta1": 1, "alpha2": 0.01, "beta2": 2, "strength": "mass"}
+"""The near field of Z16 section 9, with (7.23)."""
+PAIR_ATTRACTION = MASS**2 * (
+    NEAR["alpha1"] / (2 * RADIUS) ** NEAR["beta1"] - NEAR["alpha2"] / (2 * RADIUS) ** NEAR["beta2"]
+)
+"""The near field of two touching particles, N."""
+RELAXATION: dict[str, Any] = {"contact": True, "near": True, "relaxes": True, "duration": 30.0}
+"""Settings of a ball that relaxes before the blast; contact dissipates its energy."""
+
 SEARCH_SETTINGS = {
     "generations": 24, "ensemble": {"confirm": 8},
 }  # fmt: skip
@@ -94,6 +104,10 @@ SIZES = {
         "the same without the field",
         {"contact": True, "near": True, "cutoff": NEIGHBOURS, "flux": 0.0},
     ),
+    "relaxation": Size(
+        "2000 particles before the blast, that relax by contact and the near field of neighbours to rest",
+        {**RELAXATION, "cutoff": NEIGHBOURS},
+    ),
 }
 
 
@@ -120,8 +134,7 @@ def interaction(contact: bool, near: bool, cutoff: float | None = None) -> tuple
         ContactDissipation(damping=1e5),
         ContactFriction(stiffness=1e7, static=0.4, dynamic=0.3),
     )
-    law: dict[str, Any] = {"alpha1": 0.5, "beta1": 1, "alpha2": 0.01, "beta2": 2, "strength": "mass"}
-    field = NearField(**law) if cutoff is None else TruncatedNearField(**law, cutoff=cutoff)
+    field = NearField(**NEAR) if cutoff is None else TruncatedNearField(**NEAR, cutoff=cutoff)
     return (*(touching if contact else ()), *((field,) if near else ()))
 
 
@@ -135,34 +148,58 @@ def scene(
     seed: int = 0,
     viscosity: float | None = None,
     mixed: bool = False,
+    relaxes: bool = False,
+    start: Result | None = None,
+    energy: float = ENERGY,
     **control: Any,
 ) -> Scene:
     """Return the blast. flux : along x, or of shape (3,), T.
 
     A smaller ``number`` keeps the speed and the density. With a ``viscosity`` (Pa s) the drag is Stokes drag,
     otherwise Chow's in air. If ``mixed``, each particle has one sign of charge or the other, at random (Z16
-    3.2). ``control`` is passed to the step control of the papers.
+    3.2). If it ``relaxes``, there is no blast and no field: particles start at rest, and the run ends when
+    they are at rest again (Z16 9). start : a ball that has relaxed, which is blasted in place of a random
+    one. energy : of the blast of 2000 particles, J. ``control`` is passed to the step control of the papers.
     """
     b = np.asarray(flux, float)
+    blast = Blast(energy=energy * number / NUMBER)
+    cloud = Cloud(
+        number=number,
+        **(OF_EITHER_SIGN if mixed else OF_ONE_SIGN),
+        placement=RandomInBall(radius=BALL * (number / NUMBER) ** (1 / 3)),
+        pulse=None if relaxes else blast,
+    )
+    field = MagneticField(constant=tuple(b.tolist()) if b.ndim else (float(b), 0.0, 0.0))
     return Scene(
-        name="blast",
-        particles=Cloud(
-            number=number,
-            **(OF_EITHER_SIGN if mixed else OF_ONE_SIGN),
-            placement=RandomInBall(radius=BALL * (number / NUMBER) ** (1 / 3)),
-            pulse=Blast(energy=ENERGY * number / NUMBER),
-        ),
+        name="relaxation" if relaxes else "blast",
+        particles=cloud if start is None else blasted(start, blast),
         effects=(
-            Lorentz(),
-            MagneticField(constant=tuple(b.tolist()) if b.ndim else (float(b), 0.0, 0.0)),
+            *(() if relaxes else (Lorentz(), field)),
             ChowDrag(density=AIR, viscosity=VISCOSITY)
             if viscosity is None
             else StokesDrag(viscosity=viscosity),
             *interaction(contact, near, cutoff),
+            *((AtRest(time=0.1, reference_acceleration=PAIR_ATTRACTION / MASS),) if relaxes else ()),
         ),
         stepper=Trapezoid(control=IterationControl(**control)),
         duration=duration,
         seed=seed,
+    )
+
+
+def blasted(relaxed: Result, blast: Blast) -> Particles:
+    """Return the particles of a ball that has relaxed, with the pulse of a blast (Z16 3.3)."""
+    state = relaxed.state
+    pulse = blast.velocity(state["position"], state["mass"])
+    return Particles(
+        position=state["position"],
+        velocity=state["velocity"] + pulse,
+        radius=state["radius"],
+        mass=state["mass"],
+        quantities={
+            "charge": SPECIFIC_CHARGE * state["mass"],
+            **{name: state[name] for name in ("spin", "temperature") if name in state},
+        },
     )
 
 

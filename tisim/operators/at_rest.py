@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Constraint
+from tisim.effects.base import Constraint, SceneParts
 from tisim.effects.external.gravity import Gravity
+from tisim.errors import must
 from tisim.numerics.ieee import finite
 from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.base import parameter
@@ -19,12 +20,14 @@ LOOKS = 10
 
 
 class AtRest(AtIntervals):
-    """A world ends when its grains have been at rest under gravity for a given time.
+    """A world ends when its grains have been at rest for a given time.
 
         sum_i (m_i v_i^2 + 2/5 m_i R_i^2 w_i^2) / 2  <=  energy * g sum_i m_i R_i
         sum_i |F_i|                                  <=  unbalanced * g sum_i m_i
 
-    The first ratio is the kinetic energy over the energy of a fall by one radius. The second is the
+    g is the acceleration of gravity. A scene without gravity has no weight, so g must be given, as
+    ``reference_acceleration``: for instance the attraction of two touching grains over their mass. The first
+    ratio is the kinetic energy over the energy of a fall by one radius. The second is the
     unbalanced force, summed over the grains as the magnitude of the resultant on each, over the weight. (YADE
     and PFC divide by the mean contact force, which in a deep bed is larger than the weight; here a grain at
     the top has the same weight in the sum as one below.) Each criterion alone can be met by grains that move:
@@ -47,7 +50,6 @@ class AtRest(AtIntervals):
     )
     any_order: ClassVar[bool] = True
     terms: ClassVar = 4
-    requires: ClassVar = (Gravity,)
     ends: ClassVar = "grains are at rest"
 
     energy: float = parameter(
@@ -55,6 +57,17 @@ class AtRest(AtIntervals):
     )
     unbalanced: float = parameter("", "unbalanced force at rest, over the weight", 1e-2, gt=0)
     time: float = parameter("s", "time for which grains must be at rest", gt=0, examples=[0.05])
+    reference_acceleration: float = parameter(
+        "m/s^2", "acceleration g that sets the weight; 0 for the acceleration of gravity", 0.0, ge=0
+    )
+
+    def check(self, scene: SceneParts) -> None:
+        must(
+            self.reference_acceleration > 0 or any(isinstance(one, Gravity) for one in scene.effects),
+            f"effects.{self.label}.reference_acceleration",
+            "greater than 0 in a scene without gravity",
+            self.reference_acceleration,
+        )
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {
@@ -82,7 +95,9 @@ class AtRest(AtIntervals):
         acceleration = 0.0 * s.position[w, 0]
         for gravity in ti.static(self.gravity):
             acceleration += gravity.acceleration(w)
-        total, g = self.sums.total(w), ti.cast(acceleration.norm(), ti.f64)
+        total, g = self.sums.total(w), ti.cast(self.reference_acceleration(w), ti.f64)
+        if g == 0.0:
+            g = ti.cast(acceleration.norm(), ti.f64)
         kinetic, unbalanced, weight, depth = total[0], total[1], g * total[2], g * total[3]
         calm = weight > 0.0 and kinetic <= self.energy(w) * depth
         calm = calm and unbalanced <= self.unbalanced(w) * weight
