@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from contextlib import closing
 
 import numpy as np
@@ -11,12 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tisim import MeasureSeries, Simulation
-from tisim.analysis import Mean
 from tisim.cases.blast import scene as blast
 from tisim.cases.blast.figures import NO_BOX, NO_GRAVITY, snapshot
-from tisim.cases.blast.relaxation import BLASTS, Relaxation, Shape, mean, relaxing
+from tisim.cases.blast.relaxation import BLASTS, Relaxation, mean, relaxing
 from tisim.plotting.cloud import common, directions
-from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain
+from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 RANDOM, RELAXED = "random", "relaxed, neighbours"
 COLOURS = {RANDOM: AXIS_COLOURS[0], RELAXED: AXIS_COLOURS[1], "relaxed, all pairs": AXIS_COLOURS[2]}

@@ -9,7 +9,7 @@ import typer
 from rich.text import Text
 
 from tisim.backend import runtime
-from tisim.cli.describe import VERDICTS
+from tisim.cli.check import VERDICTS
 from tisim.cli.options import Device, Out, Overwrite, Threads
 from tisim.console import err, out, plain_table, progress_bar
 from tisim.errors import RunError, must
