@@ -13,7 +13,7 @@ import numpy as np
 from tisim.errors import must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file
-from tisim.optimize.designs_csv import GENERATION, WHETHER_ASKED, naming, rows
+from tisim.optimize.designs_csv import GENERATION, WHETHER_ASKED, Row, naming, rows
 from tisim.optimize.experiments import Values
 from tisim.optimize.problem.problem import Problem
 from tisim.optimize.tables import error_of
@@ -34,7 +34,7 @@ class CampaignFile:
         self.lines: list[list[str]] = []
         self._content = b""
 
-    def rows(self) -> Iterator[tuple[str, dict[str, str]]]:
+    def rows(self) -> Iterator[Row]:
         """Yield the place and the values by column of each line of an existing file.
 
         InputError if it is not the file of a campaign.

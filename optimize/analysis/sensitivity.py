@@ -43,6 +43,9 @@ intervals."""
 _DRAWN, _SETS, _RESAMPLED = 4, 3, 8
 """Number of functions drawn from a process; number of such draws, with their own points, from the process of
 all designs; number of processes refitted to resampled designs."""
+_NEAR, _SHORT = 5, 0.05
+"""Number of designs near the best one that show how rough the objective is there; moves shorter than this
+fraction of a range are short."""
 _NORMAL_95 = 1.96
 """Half width of the 95 % interval of a normal variable, in standard deviations."""
 
@@ -170,7 +173,7 @@ def _predicted(model: GaussianProcess, genome: Genome) -> Between:
     drawn = qmc.Sobol(len(genome), rng=np.random.default_rng(3)).random_base2(12)
     _, nearest = cKDTree(model.points).query(genome.features(drawn))
     weight = np.bincount(nearest, minlength=len(model.points)) / len(drawn)
-    missed = (model.left_out() / model.scale) ** 2 - model.noise
+    missed = (model.left_out()[0] / model.scale) ** 2 - model.noise
     there = (model.values - weight @ model.values) ** 2 - model.noise
     if weight @ there <= 0.0:
         return Between(0.0, 0.0, 1.0)
@@ -186,7 +189,7 @@ def _changes(
     """Return the changes of an objective when gene j moves from the best design.
 
     The half width of an interval is 1.96 times the root mean square deviation of the other processes'
-    functions from the value.
+    functions from the value, times the factor of ``_roughness``.
     """
     gene = genome.searched[j]
     if gene.kind == "category":
@@ -198,6 +201,7 @@ def _changes(
     change, _ = _differences(model, at)
     means, variances = zip(*(_differences(one, at) for one in others), strict=True)
     half = _NORMAL_95 * np.sqrt(np.mean((np.array(means) - change) ** 2 + np.array(variances), axis=0))
+    half *= _roughness(model, at[0])
     # At the end of a range the move is cut short.
     whole = np.abs(np.abs(moved[:, j] - best[j]) - np.abs(MOVES)) < 1e-9
     whole |= (gene.kind != "real") & (moved[:, j] != best[j])
@@ -205,6 +209,27 @@ def _changes(
         move: Between(float(c), float(c - h), float(c + h)) if there else UNKNOWN
         for move, c, h, there in zip(MOVES, change, half, whole, strict=True)
     }
+
+
+def _roughness(model: GaussianProcess, best: Array) -> Array:
+    """Return the factor by which each interval of ``_changes`` is widened, (moves,).
+
+    A process has the same length scales and the same variance everywhere. Where the function is steeper than
+    elsewhere, as in a narrow minimum, the process is too sure. Its leave-one-out residuals show this: in
+    units of their own standard deviations they are larger than 1. The factor is the root of the mean square
+    of these residuals for the designs nearest to the best one, and 1 or more. A move that is short against
+    the distance of the designs depends on the steepest place among them: its factor is the largest of the
+    residuals.
+
+    Source: GPML section 5.4.2; inflation of the variance by residuals: R. T. Birge, Phys. Rev. 40 (1932)
+    207-227.
+    """
+    residuals, deviations = model.left_out()
+    distances = np.linalg.norm((model.points - best) / model.parameters.lengths, axis=1)
+    near = np.argsort(distances, kind="stable")[:_NEAR]
+    squares = (residuals[near] / deviations[near]) ** 2
+    short = np.abs(MOVES) < _SHORT
+    return np.sqrt(np.maximum(np.where(short, squares.max(), squares.mean()), 1.0))
 
 
 def _differences(model: GaussianProcess, at: Array) -> tuple[Array, Array]:

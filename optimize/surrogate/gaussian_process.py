@@ -115,11 +115,12 @@ class GaussianProcess:
         across = _matern(self.points, np.atleast_2d(points), self.parameters)
         return solve_triangular(self._factor[0], across, lower=True, check_finite=False)
 
-    def left_out(self) -> Array:
-        """Return the leave-one-out residual of each value, shape (n,), with the parameters of all (GPML Eq.
-        5.12)."""
+    def left_out(self) -> tuple[Array, Array]:
+        """Return the leave-one-out residual of each value and its standard deviation, both (n,), with the
+        parameters of all (GPML Eq. 5.10 to 5.12)."""
         inverse = cho_solve(self._factor, np.eye(len(self.points)), check_finite=False)
-        return self.scale * (inverse @ self.values) / np.diag(inverse)
+        precision = np.diag(inverse)
+        return self.scale * (inverse @ self.values) / precision, self.scale / np.sqrt(precision)
 
     def conditioned(self, across: Array, values: Array) -> Array:
         """Return the means of a process with other values at its points, shape (m, draws).

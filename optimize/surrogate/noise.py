@@ -100,5 +100,5 @@ def _missed(features: Array, costs: Array, noise: Array) -> Array:
     """Return the leave-one-out residual of each cost, minus the mean of these residuals."""
     if not np.any(noise):
         return np.zeros(len(costs))
-    missed = GaussianProcess(features, costs, noise).left_out()
+    missed, _ = GaussianProcess(features, costs, noise).left_out()
     return missed - missed.mean()

@@ -24,11 +24,20 @@ def valley(x):
     return (u - 0.4) ** 2 + 2 * (v - 0.3 - u**2 / 2) ** 2
 
 
+def pits(x):
+    """A narrow and deep minimum and a wide one, on a slope; x in 0..1, (..., 3)."""
+    x = np.asarray(x)
+    narrow, wide = (np.sum((x - centre) ** 2, axis=-1) for centre in (0.3, 0.75))
+    return 0.2 * x[..., 0] - np.exp(-narrow / 0.02) - 0.6 * np.exp(-wide / 0.08)
+
+
 FUNCTIONS = {
     "ishigami": (ishigami, 3, 0.0, 150),
     "ishigami with noise": (ishigami, 3, 0.5, 150),
     "valley": (valley, 2, 0.0, 60),
     "valley with noise": (valley, 2, 0.1, 60),
+    "narrow minimum": (pits, 3, 0.0, 150),
+    "narrow minimum with noise": (pits, 3, 0.03, 150),
 }
 """Function, number of genes, standard deviation of the noise, and number of designs."""
 
@@ -105,7 +114,7 @@ if __name__ == "__main__":
     for name in names or FUNCTIONS:
         parts = zip(("1 %", "10 %", "indices"), *coverage(name, int(number)), strict=True)
         print(
-            f"{name:20s}",
+            f"{name:26s}",
             *(f"{kind}: {part:.3f} +- {1.96 * error:.3f}" for kind, part, error in parts),
             flush=True,
         )
