@@ -21,15 +21,16 @@ from scipy.stats import binomtest
 from tisim.analysis import Mean
 from tisim.cases.valve import published
 from tisim.cases.valve.runs import ARRESTED, Flow, Settings, flows
-from tisim.cases.valve.scene import GRADIENT, LENGTH, scene
+from tisim.cases.valve.scene import FLOWING, GRADIENT, LENGTH, scene
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.plotting.style import empty, legend_above, letters, plain
 
-STARTS = 12
+OPENED_STARTS = 12
 """Number of starts of each setting."""
-FLOWING, LASTING, REOPENED = 0.1e-3, 0.4e-3, 0.3e-3
-"""Durations of the three phases, without a field, with it and without it again, s."""
+SHUT, REOPENED = 0.4e-3, 0.3e-3
+"""Durations of the second phase, with the field, and of the third, without it again, s. The first lasts
+FLOWING."""
 NOMINAL = GRADIENT * LENGTH
 """Drag on grains at rest over the cross-section of the small valve, Pa: L21's 100 kPa over the length."""
 HIGHER = 4 * NOMINAL
@@ -43,7 +44,7 @@ HELD = 0.15e-3
 """Duration of the flow at the raised pressure, s."""
 SMOOTH = 5
 """Number of samples over which rates are averaged in times to arrest."""
-COLOURS = ("#4477aa", "#cc6677", "#999999")
+GROUP_COLOURS = ("#4477aa", "#cc6677", "#999999")
 """Colours of valves whose field ends, stays on, and of valves without a field."""
 MILLI, MICRO = 1e-3, 1e-6
 """A millisecond and a microsecond, s."""
@@ -82,7 +83,7 @@ class Opening:
 
     flow: Flow
     begin: float = FLOWING
-    end: float = FLOWING + LASTING
+    end: float = FLOWING + SHUT
 
     @property
     def before(self) -> float:
@@ -155,10 +156,10 @@ class Reopening:
 
 
 def three_phases(
-    starts: int = STARTS,
+    starts: int = OPENED_STARTS,
     progress: Progress = lambda part: None,
     flowing: float = FLOWING,
-    lasting: float = LASTING,
+    lasting: float = SHUT,
     reopened: float = REOPENED,
     **settings: Any,
 ) -> Reopening:
@@ -175,10 +176,10 @@ def three_phases(
 
 
 def arrests(
-    wanted: Sequence[Settings], starts: int = STARTS, progress: Progress = lambda part: None
+    wanted: Sequence[Settings], starts: int = OPENED_STARTS, progress: Progress = lambda part: None
 ) -> list[list[Opening]]:
     """Return the first two phases of valves with some settings, a list of starts for each."""
-    phases = {"flowing": FLOWING, "lasting": LASTING}
+    phases = {"flowing": FLOWING, "lasting": SHUT}
     scenes = [scene(**phases, **one, seed=seed) for one in wanted for seed in range(starts)]
     done = [Opening(one) for one in flows(scenes, progress)]
     return [done[k : k + starts] for k in range(0, len(done), starts)]
@@ -258,7 +259,7 @@ def report(
     opening = [one.opening_time / MICRO for one in found.opened if one.flows_again]
     if opening:
         lines.append(f"  longest time to half of the final flow: {max(opening):.0f} µs")
-    lines.append(f"arrested {LASTING / MILLI:.1f} ms after the field is switched on:")
+    lines.append(f"arrested {SHUT / MILLI:.1f} ms after the field is switched on:")
     rows = {
         **{f"{fraction:.1%} iron": mix for fraction, mix in zip(FRACTIONS, mixes, strict=True)},
         f"{published.FRACTION:.1%} iron, {NOMINAL / 1e3:.0f} kPa": found.closed,
@@ -288,7 +289,7 @@ def picture(found: Reopening) -> Figure:
     first = found.opened[0]
     rates.axvspan(first.begin / MILLI, first.end / MILLI, color="0.93", lw=0)
     rates.text((first.begin + first.end) / 2 / MILLI, 1.12, "field on", ha="center", color="0.4")
-    for row, (colour, (name, group)) in enumerate(zip(COLOURS, found.groups.items(), strict=True)):
+    for row, (colour, (name, group)) in enumerate(zip(GROUP_COLOURS, found.groups.items(), strict=True)):
         curves = np.array([one.flow.rates / one.before for one in group])
         times = group[0].flow.times / MILLI
         # One group is drawn as single starts too: more lines hide each other.
@@ -315,7 +316,7 @@ def picture(found: Reopening) -> Figure:
 def main() -> None:
     """Run the valves, print the numbers and draw the picture."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--starts", type=int, default=STARTS, help="number of starts of each setting")
+    parser.add_argument("--starts", type=int, default=OPENED_STARTS, help="number of starts of each setting")
     parser.add_argument("--out", type=Path, help="file of the picture")
     options = parser.parse_args()
     must(options.starts >= 2, "starts", "at least 2, for an interval", options.starts)
