@@ -3,6 +3,8 @@
 import csv
 import datetime
 
+import pytest
+
 from tisim.analysis import Mean
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Check, Claim, Shown
@@ -19,11 +21,15 @@ def test_cases_explain_and_version(tisim):
     assert code == 0
     assert "60 particles" in out
     assert "hardness = 265480 Pa" in out
+    assert tisim("--version")[1].startswith("tisim 0.")
+
+
+@pytest.mark.slow
+def test_explain_describes_a_variant(tisim):
     code, out, _ = tisim("explain", "agglomeration", "--size", "small", "--variant", "fields")
     assert code == 0
     assert "near_field" in out
     assert "constant = (0.5, 0, 0) T" in out
-    assert tisim("--version")[1].startswith("tisim 0.")
 
 
 def test_check_detects_failures(tisim, monkeypatch):

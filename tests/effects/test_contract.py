@@ -113,6 +113,7 @@ def test_unused_fields_are_not_allocated():
     bare.close()
 
 
+@pytest.mark.long
 def test_other_designs_compile_nothing():
     """Loading and running a second design takes a small part of the time of the first."""
     first = scene([[1, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), dt=1e-3, steps=3)
@@ -130,6 +131,7 @@ def test_other_designs_compile_nothing():
     simulation.close()
 
 
+@pytest.mark.long
 def test_a_scene_of_another_structure_is_refused():
     simulation = Simulation(scene([[0, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),)))
     with pytest.raises(InputError, match="scene must be of the structure compiled; received"):

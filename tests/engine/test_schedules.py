@@ -69,10 +69,8 @@ def test_a_launch_for_each_phase(usual):
         same_result(a, b)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("worlds", "times"), [(4, 8), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((4, 0), (1, 8)))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("worlds", "times"), [(4, 8), (4, 0), (1, 8)])
 def test_a_team_of_threads(usual, monkeypatch, worlds, times):
     """All threads share a world, here one world after another; in one case they part after each step. Each
     thread must see the work of the others: events of two grains in different shares, lists, failures."""

@@ -48,7 +48,13 @@ def test_ask_gives_the_designs_of_a_search(method):
     assert [one.values["fitness"] for one in campaign.designs] == pytest.approx(values, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "method",
+    [
+        name if name in ("genetic", "zohdi") else pytest.param(name, marks=pytest.mark.slow)
+        for name in METHODS
+    ],
+)
 def test_a_campaign_continues_from_its_file(tmp_path, method):
     """A new object after every answer continues, in another order, with designs that were not asked for."""
 

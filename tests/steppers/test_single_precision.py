@@ -152,7 +152,7 @@ def refusals():
             said[name] = str(refused)
     with pytest.raises(tisim.InputError, match=r"at least 1e-06 in f32"):
         # A run makes this check before it starts.
-        tisim.run(scene.replace({"stepper": ASKED["tolerance"]["stepper"]}))
+        tisim.run(scene.model_copy(update=ASKED["tolerance"]))
     return said
 
 

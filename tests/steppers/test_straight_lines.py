@@ -44,7 +44,9 @@ ALL = [
     for schedule in ("world", "particle")
 ]
 CASES = [
-    case if case[0] in QUICK and case[1:] == (False, "world") else pytest.param(*case, marks=pytest.mark.slow)
+    pytest.param(*case, marks=pytest.mark.long)
+    if case[0] in QUICK and case[1:] == (False, "world")
+    else pytest.param(*case, marks=pytest.mark.slow)
     for case in ALL
 ]
 DECADES = 10.0 ** np.arange(-15, 4)

@@ -156,7 +156,7 @@ def test_two_charges_meet_at_the_time_of_the_closed_form_and_merge_to_zero_charg
     assert late.state["mass"] == pytest.approx([2 * field_checks.MASS])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_merging_conserves_charge_mass_and_momentum():
     checks = list(field_checks.conservation())
     assert all(check.ok for check in checks), checks

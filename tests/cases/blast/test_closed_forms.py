@@ -127,7 +127,7 @@ def test_displacement_without_drag_is_the_chord_of_a_circle():
     np.testing.assert_allclose(displacement(time, SPEED, 1e20, 1e-20), SPEED * time, rtol=1e-15)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_chow_gives_a_smaller_blast_than_the_constant_coefficient():
     """Z16 4.2 says larger. Its own coefficients are at least 0.5 for any Reynolds number up to 3e5."""
     chow, constant = blast_radii()

@@ -38,8 +38,9 @@ def driven(motion, place, velocity=None, group=(1,), effects=(), **more):
 @pytest.mark.parametrize(
     "motion",
     [
-        pytest.param("oscillation", marks=pytest.mark.long),
-        *("rotation", "translation", "translation later", "translation after"),
+        "rotation",
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("oscillation", "translation")),
+        *(pytest.param(f"translation {when}", marks=pytest.mark.long) for when in ("later", "after")),
     ],
 )
 def test_a_driven_group_follows_its_motion(motion):

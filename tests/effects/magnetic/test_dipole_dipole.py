@@ -152,6 +152,7 @@ def solved(one, r, radius):
     return m, -0.5 * (m * b).sum()
 
 
+@pytest.mark.long
 def test_two_touching_spheres():
     """For mu_r -> infinity the attraction in line is 16/9 of the attraction of fixed moments, the repulsion
     side by side is 64/81 of it (L21 section 4.2). In general the moments are 1/(1 - 2a) and 1/(1 + a) times
@@ -177,6 +178,7 @@ def test_two_touching_spheres():
         np.testing.assert_allclose(state["moment"], [expected, expected], rtol=1e-11, atol=1e-14)
 
 
+@pytest.mark.long
 def test_induced_moments_and_forces_follow_from_their_energy(rng):
     """A bent chain of three, and clouds of five; in a non-uniform field, with all its forces.
 

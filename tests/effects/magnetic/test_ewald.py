@@ -177,7 +177,9 @@ def test_lattices_have_their_known_energies():
     assert energy == pytest.approx(-2.676, abs=1e-3)
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize(
+    "accuracy", [1e-6, *(pytest.param(error, marks=pytest.mark.long) for error in (1e-2, 1e-4))]
+)
 def test_the_error_of_forces_is_as_requested(accuracy, rng):
     """Random moments of one magnitude; the estimate of the error is accurate to about 15 %."""
     domain, n = box((6.0, 6.0, 6.0)), 200

@@ -84,6 +84,7 @@ STEPPERS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stepper", STEPPERS)
 def test_every_stepper_solves_moments_before_forces(stepper):
     """In B = (y, x, 0), T, the force on a moment k B is k r in the plane: r = r_0 cosh wt + v_0/w sinh wt,

@@ -133,6 +133,7 @@ def angular_momentum(state):
     return np.cross(state["position"], state["velocity"]).sum(axis=0) + 0.4 * state["spin"].sum(axis=0)
 
 
+@pytest.mark.long
 def test_two_free_magnets_conserve_energy_and_angular_momentum():
     """Energy to the order of Verlet in the step; momentum and angular momentum to rounding."""
     errors = []
