@@ -85,12 +85,14 @@ def _heading(work: Publication) -> str:
 
 def _publication(work: Publication) -> Iterator[str]:
     yield from (f"## {_heading(work)}", "", *_paragraph(f"{work.title}."))
-    head = (work.name, "subject", "status", "number here", "published", "read, use, run")
+    head = (work.name, "subject", "status", "number here, and *published*", "read, use, run")
     rows = []
     for row in work.rows:
         subject = f"{row.title}. {row.reason}" if row.reason else row.title
         numbers = "; ".join(_numbers(row))
-        rows.append((row.source, subject, STATUS[row.status], numbers, row.published, _place(row)))
+        beside = f"*published: {row.published}*" if row.published else ""
+        both = "<br>".join(filter(None, (numbers, beside)))
+        rows.append((row.source, subject, STATUS[row.status], both, _place(row)))
     yield from _table(head, rows)
 
 
@@ -110,7 +112,7 @@ def _numbers(row: Row) -> Iterator[str]:
 def _place(row: Row) -> str:
     """The page, the parts of a scene and the command of a row."""
     lines = [f"[{_title(row.page)}]({row.page})" if row.page else ""]
-    lines.append(", ".join(f"{{ref}}`{name}`" for name in row.parts))
+    lines += [f"{{ref}}`{name}`" for name in row.parts]
     lines.append(f"`{row.command}`" if row.command else "")
     return "<br>".join(filter(None, lines))
 
