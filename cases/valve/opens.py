@@ -179,7 +179,7 @@ def arrests(
     wanted: Sequence[Settings], starts: int = OPENED_STARTS, progress: Progress = lambda part: None
 ) -> list[list[Opening]]:
     """Return the first two phases of valves with some settings, a list of starts for each."""
-    phases = {"flowing": FLOWING, "lasting": SHUT}
+    phases: Settings = {"flowing": FLOWING, "lasting": SHUT}
     scenes = [scene(**phases, **one, seed=seed) for one in wanted for seed in range(starts)]
     done = [Opening(one) for one in flows(scenes, progress)]
     return [done[k : k + starts] for k in range(0, len(done), starts)]
