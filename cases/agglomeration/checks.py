@@ -17,6 +17,7 @@ from tisim import Particles, Result, Scene
 from tisim.accuracy import Quantity
 from tisim.cases.agglomeration import field_checks
 from tisim.cases.agglomeration import scene as agglomeration
+from tisim.cases.agglomeration.self_gravity import self_gravity_checks
 from tisim.cases.case import Check
 from tisim.effects import Agglomeration, Effect, Heating, Impact, SelfGravity
 from tisim.operators import Fragmentation
@@ -211,6 +212,7 @@ def conservation() -> Iterator[Check]:
 def check() -> Iterator[Check]:
     """Yield the closed forms, then the conservation laws, first without charges and then with charges."""
     yield from closed_forms()
+    yield from self_gravity_checks()
     yield from conservation()
     yield from field_checks.closed_forms()
     yield from field_checks.conservation()

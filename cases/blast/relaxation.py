@@ -51,10 +51,10 @@ def relaxing(number: int, seed: int, law: Mapping[str, Any]) -> Scene:
     return blast.scene(number=number, seed=seed, **blast.RELAXATION, **law)
 
 
-def largest(state: Arrays) -> float:
-    """Return the fraction of all particles in the largest cluster of touching ones."""
+def largest(state: Arrays) -> int:
+    """Return the number of particles in the largest cluster of touching ones."""
     pairs = contacts(state["position"], state["radius"])
-    return float(np.bincount(labels(len(state["mass"]), pairs)).max() / len(state["mass"]))
+    return int(np.bincount(labels(len(state["mass"]), pairs)).max())
 
 
 def near_energy(state: Arrays, cutoff: float = np.inf) -> float:
@@ -110,12 +110,12 @@ class Shape:
     """A cloud after the blast.
 
     along, across : half axes along and across the field, m; across : root mean square of the two.
-    largest : fraction of all particles in the largest cluster.
+    largest : number of particles in the largest cluster.
     """
 
     along: float
     across: float
-    largest: float
+    largest: int
 
     @classmethod
     def of(cls, result: Result) -> "Shape":
@@ -158,17 +158,30 @@ def blasts(
     return sound(run(scenes))
 
 
-def study(number: int, seeds: Sequence[int], energies: Sequence[float] = ENERGIES) -> Relaxation:
-    """Relax balls, and blast them and the random balls from which they came."""
-    relaxed = {name: relaxed_balls(number, seeds, law) for name, law in BALLS.items() if law is not None}
+def study(
+    number: int,
+    seeds: Sequence[int],
+    energies: Sequence[float] = ENERGIES,
+    kinds: Mapping[str, tuple[Mapping[str, Any], tuple[str, ...]]] = BLASTS,
+) -> Relaxation:
+    """Relax balls, and blast them and the random balls from which they came.
+
+    energies : of the blasts with the near field of neighbours, J. kinds : blasts and their balls, as BLASTS.
+    """
+    used = {start for _, starts in kinds.values() for start in starts}
+    relaxed = {
+        name: relaxed_balls(number, seeds, law)
+        for name, law in BALLS.items()
+        if law is not None and name in used
+    }
     ends = {
-        (name, ball): blasts(number, seeds, relaxed.get(ball), settings)
-        for name, (settings, balls) in BLASTS.items()
-        for ball in balls
+        (kind, start): blasts(number, seeds, relaxed.get(start), settings)
+        for kind, (settings, starts) in kinds.items()
+        for start in starts
     }
     by_energy = {
-        (ball, energy): blasts(number, seeds, relaxed.get(ball), {**NEAR_NEIGHBOURS, "energy": energy})
-        for ball in BLASTS["near field of neighbours"][1]
+        (start, energy): blasts(number, seeds, relaxed.get(start), {**NEAR_NEIGHBOURS, "energy": energy})
+        for start in BLASTS["near field of neighbours"][1]
         for energy in energies
     }
     cutoffs = {name: float((law or {}).get("cutoff", np.inf)) for name, law in BALLS.items()}
@@ -190,8 +203,8 @@ def mean(ones: Sequence[Any], name: str) -> Mean:
 def tables(found: Relaxation) -> str:
     """Return the tables of docs/blast.md."""
     lines = [
-        "| ball | half axis, m | at rest after, s | contacts of a particle | kinetic energy over W | force on a"
-        " particle over the attraction of two | work of the near field over W |",
+        "| ball | half axis, m | at rest after, s | contacts of a particle | kinetic energy over W"
+        " | force on a particle over the attraction of two | work of the near field over W |",
         "|---|---|---|---|---|---|---|",
     ]
     for name, balls in found.balls.items():
@@ -200,15 +213,17 @@ def tables(found: Relaxation) -> str:
             for one in ("half_axis", "time", "coordination", "kinetic", "unbalanced", "bound")
         )
         lines.append(f"| {name} | {' | '.join(map(str, measures))} |")
-    lines += ["", "| blast | ball | along the field, m | across, m | largest cluster |", "|---|---|---|---|---|"]
-    for (name, ball), shapes in found.shapes.items():
+    lines += [
+        "",
+        f"| blast | ball | along the field, m | across, m | largest cluster, of {found.number} |",
+        "|---|---|---|---|---|",
+    ]
+    for (name, start), shapes in found.shapes.items():
         measures = (mean(shapes, one) for one in ("along", "across", "largest"))
-        lines.append(f"| {name} | {ball} | {' | '.join(map(str, measures))} |")
+        lines.append(f"| {name} | {start} | {' | '.join(map(str, measures))} |")
     lines += ["", "| W, kJ | ball | along the field, m | largest cluster |", "|---|---|---|---|"]
-    for (ball, energy), shapes in found.by_energy.items():
-        lines.append(
-            f"| {energy / 1e3:g} | {ball} | {mean(shapes, 'along')} | {mean(shapes, 'largest')} |"
-        )
+    for (start, energy), shapes in found.by_energy.items():
+        lines.append(f"| {energy / 1e3:g} | {start} | {mean(shapes, 'along')} | {mean(shapes, 'largest')} |")
     return "\n".join(lines)
 
 
@@ -221,6 +236,8 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=10, help="number of random starts")
     parser.add_argument("--out", type=Path, help="file of the figure")
     options = parser.parse_args()
+    if options.starts < 2:
+        parser.error(f"--starts must be at least 2 for an interval; received {options.starts}")
     found = study(options.number, range(options.starts))
     print(tables(found))
     if options.out is not None:

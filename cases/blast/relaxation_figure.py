@@ -27,7 +27,8 @@ def relaxation_figure(found: Relaxation) -> Figure:
     """Draw a ball before and after it has relaxed, the clouds after their blasts, the residuals during
     relaxation, and half axes over kinds and energies of blasts with 95 % intervals."""
     figure = empty(11.6, 7.4)
-    grid = figure.add_gridspec(2, 12, height_ratios=(0.8, 1.0))
+    upper, lower = figure.add_gridspec(2, 1, height_ratios=(0.75, 1.0))
+    upper, lower = upper.subgridspec(1, 4), lower.subgridspec(1, 3)
     relaxed = found.relaxed[RELAXED]
     before = (relaxed.start, relaxed.state)
     after = (found.clouds[CLUMPS, RANDOM], found.clouds[CLUMPS, RELAXED])
@@ -37,14 +38,14 @@ def relaxation_figure(found: Relaxation) -> Figure:
     )  # fmt: skip
     tops = []
     for k, (state, title) in enumerate(zip((*before, *after), titles, strict=True)):
-        axis = figure.add_subplot(grid[0, 3 * k : 3 * k + 3])
+        axis = figure.add_subplot(upper[k])
         square = common(before if k < 2 else after, NO_BOX)
         snapshot(axis, state, square)
         axis.set_title(title)
         tops.append(axis)
         if k % 2:
             directions(axis, square, NO_GRAVITY, share=0.1)
-    residuals, kinds, energies = (figure.add_subplot(grid[1, 4 * k : 4 * k + 4]) for k in range(3))
+    residuals, kinds, energies = (figure.add_subplot(lower[k]) for k in range(3))
     history(residuals, found.number)
     by_kind(kinds, found)
     by_energy(energies, found)
@@ -69,7 +70,9 @@ def history(axis: Axes, number: int) -> None:
     ):
         axis.plot(values["time"], values[name], color=colour, lw=1.4, label=label)
         axis.axhline(bound, color=colour, lw=0.9, ls=":")
-    axis.set(xlabel="time (s)", ylabel="over the attraction of touching particles", yscale="log")
+    axis.set(
+        xlabel="time (s)", ylabel="over the attraction of touching particles", yscale="log", ylim=(1e-6, None)
+    )
     axis.set_title("relaxation; dotted: at rest")
     axis.legend(frameon=False, fontsize=8)
 
@@ -81,15 +84,17 @@ def by_kind(axis: Axes, found: Relaxation) -> None:
         balls = [ball for name, ball in found.shapes if name == kind]
         for k, ball in enumerate(balls):
             y = row + 0.22 * (k - (len(balls) - 1) / 2)
-            for name, fill in (("along", COLOURS[ball]), ("across", "white")):
+            for name, fill, size in (("along", COLOURS[ball], 5), ("across", "none", 8)):
                 one = mean(found.shapes[kind, ball], name)
                 label = ball if name == "along" and ball not in labelled else None
                 axis.errorbar(
-                    one.value, y, xerr=one.half, fmt=MARKERS[ball], ms=5, capsize=3, color=COLOURS[ball],
+                    one.value, y, xerr=one.half, fmt=MARKERS[ball], ms=size, capsize=3, color=COLOURS[ball],
                     mfc=fill, label=label,
                 )  # fmt: skip
             labelled.add(ball)
-    axis.set_yticks(range(len(BLASTS)), [name.replace("near field of ", "near field\nof ") for name in BLASTS])
+    axis.set_yticks(
+        range(len(BLASTS)), [name.replace("near field of ", "near field\nof ") for name in BLASTS]
+    )
     axis.set(ylim=(len(BLASTS) - 0.4, -0.6), xlim=(0, None))
     axis.set_xlabel("half axis along (filled) and across the field (m)")
     axis.set_title(f"after {_kilojoules(blast.ENERGY)}, 1 s")
