@@ -3,14 +3,12 @@
 Two grains of radius b_0 meet head-on, each at speed v. With a_0 = 0, a_f = 1 (Z04 4.13-4.15, 5.4, 5.5):
 e = 1 - v / v*, v* = sqrt(3 H beta / (2 rho)), and the grains bond above v*. A grain breaks into eight grains
 of half its radius at v = sqrt(6 gamma / (rho b_0 (1 - e^2))). At v*, grains larger than 4 gamma / (a_f H
-beta) break. Touching grains of b = 3/rho sqrt(H/(2 pi G)) press on each other by their gravity with 2 H pi
-b^2, the force at which they bond (4.16).
+beta) break. The size at which gravity bonds grains is in self_gravity.py.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from scipy.constants import G
 
 import tisim
 from tisim import Particles, Result, Scene
@@ -19,7 +17,7 @@ from tisim.cases.agglomeration import field_checks
 from tisim.cases.agglomeration import scene as agglomeration
 from tisim.cases.agglomeration.self_gravity import self_gravity_checks
 from tisim.cases.case import Check
-from tisim.effects import Agglomeration, Effect, Heating, Impact, SelfGravity
+from tisim.effects import Agglomeration, Effect, Heating, Impact
 from tisim.operators import Fragmentation
 from tisim.scene.initial_state import Arrays
 from tisim.steppers import FixedStep, Verlet
@@ -66,32 +64,6 @@ def breaking(surface_energy: float, radius: float = RADIUS) -> Fragmentation:
 def adhesion_speed(final: float = 1.0) -> float:
     """Return the speed (m/s) of each grain above which equal grains bond (Z04 4.14)."""
     return float(np.sqrt(3 * final * HARDNESS * LENGTH / (2 * DENSITY)))
-
-
-def self_gravity_radius(hardness: float, density: float) -> float:
-    """Return the radius (m) from which the gravity of two touching equal grains bonds them (Z04 4.16).
-
-    hardness : H, Pa. density : kg/m^3. It solves G (2/3 pi rho b^2)^2 = 2 H pi b^2.
-    """
-    return float(3 / density * np.sqrt(hardness / (2 * np.pi * G)))
-
-
-def pressed_by_gravity(radius: float) -> float:
-    """Return the gravity of two touching grains over the force at which they bond, 2 H pi b^2, from a run."""
-    scene = Scene(
-        name="pair",
-        particles=Particles(
-            position=((-radius, 0, 0), (radius, 0, 0)),
-            velocity=np.zeros((2, 3)),
-            radius=radius,
-            density=DENSITY,
-        ),
-        effects=(SelfGravity(),),
-        stepper=Verlet(control=FixedStep(dt=1e-3)),
-        duration=1e-3,
-    )
-    (result,) = _run([scene])
-    return float(result.state["force"][0, 0] / (2 * HARDNESS * np.pi * radius**2))
 
 
 def restitution(speed: np.ndarray, initial: float, final: float) -> np.ndarray:
@@ -166,10 +138,6 @@ def closed_forms() -> Iterator[Check]:
     expected = 4 * gamma / (HARDNESS * LENGTH)
     size = onset(breaks, 0.3 * expected, 3 * expected)
     yield Check("largest radius of grains that bond (m)", size, expected, CLOSED_FORM_BOUND * expected)
-
-    pressed = pressed_by_gravity(self_gravity_radius(HARDNESS, DENSITY))
-    name = "self-gravity of two touching grains of the radius (4.16) over 2 H pi b^2"
-    yield Check(name, pressed, 1.0, CLOSED_FORM_BOUND)
 
 
 def energy(result: Result) -> tuple[float, float]:

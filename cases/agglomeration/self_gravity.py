@@ -94,7 +94,8 @@ def self_gravity_checks() -> Iterator[Check]:
     force = float(np.linalg.norm(near.state["force"][0]))
     distance = float(np.linalg.norm(near.state["position"][1] - near.state["position"][0]))
     ratio = force * (distance / (2 * radius)) ** 2 / (2 * HARDNESS * np.pi * radius**2)
-    yield Check("gravity over 2 H pi b^2 at the radius of (4.16)", ratio, 1.0, ATTRACTION_BOUND)
+    name = "self-gravity of two touching grains of the radius (4.16) over 2 H pi b^2"
+    yield Check(name, ratio, 1.0, ATTRACTION_BOUND)
     exact = bonding_radius(HARDNESS, DENSITY, APART)
     low, high = 0.9 * exact, 1.1 * exact
     while high - low > 1e-5 * exact:

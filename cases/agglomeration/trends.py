@@ -70,7 +70,7 @@ def growth(result: Result) -> float:
 
 
 @dataclass(frozen=True)
-class Found:
+class SeenTrend:
     """Runs of one trend.
 
     sizes : final over initial mean radius, shape (values, starts). broken : breakages over mergers, (values,
@@ -107,7 +107,7 @@ def study(
     surface_energy: float = SURFACE_ENERGY,
     trends: Sequence[Trend] = TRENDS,
     design: Mapping[str, float] = BEST,
-) -> list[Found]:
+) -> list[SeenTrend]:
     """Run the flow of a design with each value of each parameter, from the same starts."""
     base = scene({**design, "surface_energy": surface_energy}, 0, grains)
     found = []
@@ -117,11 +117,11 @@ def study(
         shape = (len(flows), len(seeds))
         sizes = np.reshape([growth(one) for one in results], shape)
         broken = np.reshape([one.work["fractures"] / max(one.work["merges"], 1) for one in results], shape)
-        found.append(Found(trend, sizes, broken))
+        found.append(SeenTrend(trend, sizes, broken))
     return found
 
 
-def table(found: Sequence[Found]) -> str:
+def table(found: Sequence[SeenTrend]) -> str:
     """Return the table of docs/agglomeration.md."""
     lines = [
         f"| larger grains by | b_f/b_0 from | to | exponent, {CONFIDENCE:.0%} | in (5.5) | seen |",
@@ -139,7 +139,7 @@ def table(found: Sequence[Found]) -> str:
     return "\n".join(lines)
 
 
-def trends_figure(found: Sequence[Found]) -> Figure:
+def trends_figure(found: Sequence[SeenTrend]) -> Figure:
     """Draw the mean size, and breakages per merger, against each parameter with 95 % intervals."""
     figure = empty(11.6, 5.6)
     axes = figure.subplots(2, len(found), sharey="row", sharex="col", squeeze=False)

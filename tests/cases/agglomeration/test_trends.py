@@ -7,7 +7,7 @@ import pytest
 
 from tisim.analysis import Mean
 from tisim.cases.agglomeration.scene import BEST, scene
-from tisim.cases.agglomeration.trends import TRENDS, Found, study, table, trends_figure
+from tisim.cases.agglomeration.trends import TRENDS, SeenTrend, study, table, trends_figure
 
 GAMMA, HARDNESS, LENGTH, AREA = TRENDS
 
@@ -16,7 +16,7 @@ def power_law(trend, exponent, noise=0.0):
     rng = np.random.default_rng(1)
     x = np.array(trend.values)[:, None]
     sizes = 2.0 * x**exponent * np.exp(noise * rng.standard_normal((len(x), 12)))
-    return Found(trend, sizes, np.full_like(sizes, 0.5))
+    return SeenTrend(trend, sizes, np.full_like(sizes, 0.5))
 
 
 def test_exponent_of_a_power_law():

@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 from tisim.cases.blast import scene as blast
-from tisim.cases.blast.relaxation import (
+from tisim.cases.blast.relaxation import CLUMPS, RANDOM, RELAXED, relaxation_figure
+from tisim.cases.blast.relaxed_ball import (
     BALLS,
     BLASTS,
     NEAR_NEIGHBOURS,
@@ -19,7 +20,6 @@ from tisim.cases.blast.relaxation import (
     study,
     tables,
 )
-from tisim.cases.blast.relaxation_figure import CLUMPS, RANDOM, RELAXED, relaxation_figure
 
 NUMBER, SEEDS = 60, range(2)
 KINDS = {"no interaction": ({}, (RANDOM, RELAXED)), CLUMPS: BLASTS[CLUMPS]}
