@@ -46,7 +46,7 @@ class Trend:
     exponent: int
 
 
-FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
+RATIOS = (0.25, 0.5, 1.0, 2.0, 4.0)
 TRENDS = (
     Trend(
         "(i) larger surface energy", r"\gamma", "J/m²", "effects.fragmentation.surface_energy",
@@ -56,9 +56,9 @@ TRENDS = (
         "(ii) smaller hardness", "H", "Pa", "effects.impact.hardness", (1e5, 1.8e5, 3.2e5, 5.6e5, 1e6), -1
     ),
     Trend(
-        "(iii) smaller compression length", r"\beta", "", "effects.impact.deformation_length", FACTORS, -1
+        "(iii) smaller compression length", r"\beta", "", "effects.impact.deformation_length", RATIOS, -1
     ),
-    Trend("(iv) smaller contact area", "a_f", "", "effects.impact.final_area", FACTORS, -1),
+    Trend("(iv) smaller contact area", "a_f", "", "effects.impact.final_area", RATIOS, -1),
 )  # fmt: skip
 """The statements of Z04 remark 5.1; hardness over its search range, the other two about 1, their value in
 Z04."""

@@ -19,20 +19,20 @@ from tisim.cases.blast.shape import ball, half_axes, moments
 from tisim.cases.common.runs import sound
 from tisim.scene.initial_state import Arrays
 
-NEIGHBOURS: dict[str, Any] = {"cutoff": blast.NEIGHBOURS}
-NEAR: dict[str, Any] = {"contact": True, "near": True}
-NEAR_NEIGHBOURS: dict[str, Any] = {**NEAR, **NEIGHBOURS}
+OF_NEIGHBOURS: dict[str, Any] = {"cutoff": blast.NEIGHBOURS}
+WITH_NEAR_FIELD: dict[str, Any] = {"contact": True, "near": True}
+NEAR_FIELD_OF_NEIGHBOURS: dict[str, Any] = {**WITH_NEAR_FIELD, **OF_NEIGHBOURS}
 BALLS: Mapping[str, Mapping[str, Any] | None] = {
     "random": None,
-    "relaxed, neighbours": NEIGHBOURS,
+    "relaxed, neighbours": OF_NEIGHBOURS,
     "relaxed, all pairs": {},
 }
 """Balls before the blast: settings of the near field by which they relax; None for one that does not."""
 BLASTS: Mapping[str, tuple[Mapping[str, Any], tuple[str, ...]]] = {
     "no interaction": ({}, tuple(BALLS)),
     "contact": ({"contact": True}, ("random", "relaxed, neighbours")),
-    "near field of neighbours": (NEAR_NEIGHBOURS, ("random", "relaxed, neighbours")),
-    "near field of all pairs": (NEAR, ("random", "relaxed, all pairs")),
+    "near field of neighbours": (NEAR_FIELD_OF_NEIGHBOURS, ("random", "relaxed, neighbours")),
+    "near field of all pairs": (WITH_NEAR_FIELD, ("random", "relaxed, all pairs")),
 }
 """Settings of the blasts of Z16 Figs 5, 8 and 9, and the balls from which they start.
 
@@ -64,7 +64,7 @@ def near_energy(state: Arrays, cutoff: float = np.inf) -> float:
     d = np.linalg.norm(state["position"][i] - state["position"][j], axis=1)
     near = d < cutoff
     d, m2 = d[near], (state["mass"][i] * state["mass"][j])[near]
-    work = blast.NEAR["alpha1"] * np.log(far / d) - blast.NEAR["alpha2"] * (1 / d - 1 / far)
+    work = blast.NEAR_FIELD["alpha1"] * np.log(far / d) - blast.NEAR_FIELD["alpha2"] * (1 / d - 1 / far)
     return float((m2 * work).sum())
 
 
@@ -176,7 +176,9 @@ def study(
         for start in starts
     }
     by_energy = {
-        (start, energy): blasts(number, seeds, relaxed.get(start), {**NEAR_NEIGHBOURS, "energy": energy})
+        (start, energy): blasts(
+            number, seeds, relaxed.get(start), {**NEAR_FIELD_OF_NEIGHBOURS, "energy": energy}
+        )
         for start in BLASTS["near field of neighbours"][1]
         for energy in energies
     }

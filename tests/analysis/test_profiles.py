@@ -65,7 +65,7 @@ def test_the_radial_distribution_of_a_lattice_counts_its_neighbours():
         ([0.0, 5.0], None, "edges must be at most half a side of the box"),
         ([1.0, 0.5], None, "edges must be rising distances"),
         ([0.0, 1.0], (3.0, 8.0, 8.0), "high - low must be the sides along which the box is periodic"),
-        ([0.0, 3.9], None, "particles must be farther than the last edge"),
+        ([0.0, 3.9], None, "particles must be at least one that is farther than the last edge"),
     ],
 )
 def test_invalid_radial_distributions_are_refused(edges, sides, text):

@@ -6,10 +6,11 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.scenes import Agglomeration, Cooling, Heating, Impact
 from tisim import Box, Cloud, InputError, RunError, Scene, Simulation
+from tisim.effects import Agglomeration, Heating, Impact
 from tisim.engine.checkpoint import restore, save, snapshot
 from tisim.files import checksum
+from tisim.operators import Cooling
 
 
 def flow(seed=3, number=100, heat_capacity=500.0):

@@ -230,7 +230,7 @@ def _trajectory_file(path: Path) -> Path:
             raise InputError(
                 f"folder must be one of a run; received the folder of {what}, with the pictures: {pictures}"
             )
-    raise InputError(f"folder must contain a trajectory.h5 or result.h5; received {str(path)!r}{why}")
+    raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from tisim.cases.blast.relaxation import CLUMPS, RANDOM, RELAXED, relaxation_fig
 from tisim.cases.blast.relaxed_ball import (
     BALLS,
     BLASTS,
-    NEAR_NEIGHBOURS,
+    NEAR_FIELD_OF_NEIGHBOURS,
     Ball,
     largest,
     mean,
@@ -116,7 +116,7 @@ def test_a_relaxed_ball_holds_together(found):
 @pytest.mark.slow
 def test_the_pulse_is_added_to_a_relaxed_ball(found):
     relaxed = found.relaxed[RELAXED]
-    scene = blast.scene(number=NUMBER, start=relaxed, **NEAR_NEIGHBOURS)
+    scene = blast.scene(number=NUMBER, start=relaxed, **NEAR_FIELD_OF_NEIGHBOURS)
     start = scene.particles.arrays(scene.domain, scene.seed)
     np.testing.assert_array_equal(start["position"], relaxed.state["position"])
     pulse = start["velocity"] - relaxed.state["velocity"]
