@@ -31,9 +31,9 @@ from tisim.steppers import FixedStep, Verlet
 
 HARDNESS, DENSITY = 3e5, 2000.0
 """Hardness (Pa) and density (kg/m^3) of the grains in the checks."""
-APART = 6.0
+FALL_DISTANCE = 6.0
 """Distance of the centres of two grains at rest at the start, over their radius."""
-STEPS = 16000
+FALL_STEPS = 16000
 """Number of steps of a fall."""
 ATTRACTION_BOUND, FALL_BOUND = 1e-10, 1e-3
 """Largest relative differences between runs and closed forms; impacts are found at the end of a step."""
@@ -59,7 +59,7 @@ def bonding_radius(
     return float(3 / density * np.sqrt(area * length * hardness / (8 * np.pi * G * (0.5 - 1 / apart))))
 
 
-def falling(radius: float, apart: float = APART, part: float = 1.02) -> Scene:
+def falling(radius: float, apart: float = FALL_DISTANCE, part: float = 1.02) -> Scene:
     """Return two grains at rest that fall together, until ``part`` of the time at which they meet.
 
     radius : m. apart : distance of their centres over the radius.
@@ -77,7 +77,7 @@ def falling(radius: float, apart: float = APART, part: float = 1.02) -> Scene:
             density=DENSITY,
         ),
         effects=(Impact(hardness=HARDNESS), SelfGravity(), Agglomeration()),
-        stepper=Verlet(control=FixedStep(dt=time / STEPS)),
+        stepper=Verlet(control=FixedStep(dt=time / FALL_STEPS)),
         duration=part * time,
     )
 
@@ -95,7 +95,7 @@ def self_gravity_checks() -> Iterator[Check]:
     distance = float(np.linalg.norm(near.state["position"][1] - near.state["position"][0]))
     ratio = force * (distance / (2 * radius)) ** 2 / (2 * HARDNESS * np.pi * radius**2)
     yield Check("gravity over 2 H pi b^2 at the radius of (4.16)", ratio, 1.0, ATTRACTION_BOUND)
-    exact = bonding_radius(HARDNESS, DENSITY, APART)
+    exact = bonding_radius(HARDNESS, DENSITY, FALL_DISTANCE)
     low, high = 0.9 * exact, 1.1 * exact
     while high - low > 1e-5 * exact:
         radii = np.linspace(low, high, 32)

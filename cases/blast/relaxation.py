@@ -23,12 +23,12 @@ from tisim.cases.blast.shape import ball, half_axes, moments
 from tisim.cases.common.runs import sound
 from tisim.scene.initial_state import Arrays
 
-NEIGHBOURS: dict[str, Any] = {"cutoff": blast.NEIGHBOURS}
-NEAR: dict[str, Any] = {"contact": True, "near": True}
-NEAR_NEIGHBOURS: dict[str, Any] = {**NEAR, **NEIGHBOURS}
+NEIGHBOURS_ONLY: dict[str, Any] = {"cutoff": blast.NEIGHBOURS}
+WITH_NEAR_FIELD: dict[str, Any] = {"contact": True, "near": True}
+NEAR_NEIGHBOURS: dict[str, Any] = {**WITH_NEAR_FIELD, **NEIGHBOURS_ONLY}
 BALLS: Mapping[str, Mapping[str, Any] | None] = {
     "random": None,
-    "relaxed, neighbours": NEIGHBOURS,
+    "relaxed, neighbours": NEIGHBOURS_ONLY,
     "relaxed, all pairs": {},
 }
 """Balls before the blast: settings of the near field by which they relax; None for one that does not."""
@@ -36,7 +36,7 @@ BLASTS: Mapping[str, tuple[Mapping[str, Any], tuple[str, ...]]] = {
     "no interaction": ({}, tuple(BALLS)),
     "contact": ({"contact": True}, ("random", "relaxed, neighbours")),
     "near field of neighbours": (NEAR_NEIGHBOURS, ("random", "relaxed, neighbours")),
-    "near field of all pairs": (NEAR, ("random", "relaxed, all pairs")),
+    "near field of all pairs": (WITH_NEAR_FIELD, ("random", "relaxed, all pairs")),
 }
 """Settings of the blasts of Z16 Figs 5, 8 and 9, and the balls from which they start.
 
@@ -68,12 +68,12 @@ def near_energy(state: Arrays, cutoff: float = np.inf) -> float:
     d = np.linalg.norm(state["position"][i] - state["position"][j], axis=1)
     near = d < cutoff
     d, m2 = d[near], (state["mass"][i] * state["mass"][j])[near]
-    work = blast.NEAR["alpha1"] * np.log(far / d) - blast.NEAR["alpha2"] * (1 / d - 1 / far)
+    work = blast.NEAR_FIELD["alpha1"] * np.log(far / d) - blast.NEAR_FIELD["alpha2"] * (1 / d - 1 / far)
     return float((m2 * work).sum())
 
 
 @dataclass(frozen=True)
-class Ball:
+class RelaxedBall:
     """A ball before the blast.
 
     half_axis : of the ball with the same second moments, m. time : until it is at rest, s. coordination :
@@ -90,7 +90,7 @@ class Ball:
     bound: float
 
     @classmethod
-    def of(cls, result: Result, cutoff: float = np.inf) -> "Ball":
+    def of(cls, result: Result, cutoff: float = np.inf) -> "RelaxedBall":
         """Measure the final state of a ball that has relaxed."""
         state, number = result.state, len(result.state["mass"])
         energy = blast.ENERGY * number / blast.NUMBER
@@ -106,7 +106,7 @@ class Ball:
 
 
 @dataclass(frozen=True)
-class Shape:
+class CloudShape:
     """A cloud after the blast.
 
     along, across : half axes along and across the field, m; across : root mean square of the two.
@@ -118,7 +118,7 @@ class Shape:
     largest: int
 
     @classmethod
-    def of(cls, result: Result) -> "Shape":
+    def of(cls, result: Result) -> "CloudShape":
         axes = half_axes(result.state)
         return cls(float(axes[0]), float(np.sqrt((axes[1:] ** 2).mean())), largest(result.state))
 
@@ -135,10 +135,10 @@ class Relaxation:
 
     number: int
     relaxed: Mapping[str, Result]
-    balls: Mapping[str, Sequence[Ball]]
-    shapes: Mapping[tuple[str, str], Sequence[Shape]]
+    balls: Mapping[str, Sequence[RelaxedBall]]
+    shapes: Mapping[tuple[str, str], Sequence[CloudShape]]
     clouds: Mapping[tuple[str, str], Arrays]
-    by_energy: Mapping[tuple[str, float], Sequence[Shape]]
+    by_energy: Mapping[tuple[str, float], Sequence[CloudShape]]
 
 
 def relaxed_balls(number: int, seeds: Sequence[int], law: Mapping[str, Any]) -> list[Result]:
@@ -188,10 +188,10 @@ def study(
     return Relaxation(
         number,
         {name: ones[0] for name, ones in relaxed.items()},
-        {name: [Ball.of(one, cutoffs[name]) for one in ones] for name, ones in relaxed.items()},
-        {key: [Shape.of(one) for one in ones] for key, ones in ends.items()},
+        {name: [RelaxedBall.of(one, cutoffs[name]) for one in ones] for name, ones in relaxed.items()},
+        {key: [CloudShape.of(one) for one in ones] for key, ones in ends.items()},
         {key: ones[0].state for key, ones in ends.items()},
-        {key: [Shape.of(one) for one in ones] for key, ones in by_energy.items()},
+        {key: [CloudShape.of(one) for one in ones] for key, ones in by_energy.items()},
     )
 
 

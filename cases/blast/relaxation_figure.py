@@ -17,7 +17,7 @@ from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 RANDOM, RELAXED = "random", "relaxed, neighbours"
 COLOURS = {RANDOM: AXIS_COLOURS[0], RELAXED: AXIS_COLOURS[1], "relaxed, all pairs": AXIS_COLOURS[2]}
-MARKERS = {RANDOM: "o", RELAXED: "s", "relaxed, all pairs": "^"}
+BALL_MARKERS = {RANDOM: "o", RELAXED: "s", "relaxed, all pairs": "^"}
 CLUMPS = "near field of neighbours"
 INTERVAL = 0.02
 """Time between points of the history of a relaxation, s."""
@@ -88,8 +88,8 @@ def by_kind(axis: Axes, found: Relaxation) -> None:
                 one = mean(found.shapes[kind, ball], name)
                 label = ball if name == "along" and ball not in labelled else None
                 axis.errorbar(
-                    one.value, y, xerr=one.half, fmt=MARKERS[ball], ms=size, capsize=3, color=COLOURS[ball],
-                    mfc=fill, label=label,
+                    one.value, y, xerr=one.half, fmt=BALL_MARKERS[ball], ms=size, capsize=3,
+                    color=COLOURS[ball], mfc=fill, label=label,
                 )  # fmt: skip
             labelled.add(ball)
     axis.set_yticks(
@@ -108,7 +108,7 @@ def by_energy(axis: Axes, found: Relaxation) -> None:
         means = [mean(found.by_energy[ball, one], "along") for one in energy]
         axis.errorbar(
             energy / 1e3, [one.value for one in means], yerr=[one.half for one in means],
-            fmt=MARKERS[ball] + "-", ms=5, capsize=3, color=COLOURS[ball], label=ball,
+            fmt=BALL_MARKERS[ball] + "-", ms=5, capsize=3, color=COLOURS[ball], label=ball,
         )  # fmt: skip
     bound = mean(found.balls[RELAXED], "bound").value * blast.ENERGY / 1e3
     axis.axvline(bound, color="0.4", ls=":", label="work of the near field")

@@ -65,10 +65,10 @@ MIXED_FLUX = 0.5
 NEIGHBOURS = 3 * RADIUS
 """Cut-off distance of the near field in the size "clumps", m: half a diameter between surfaces."""
 
-NEAR: dict[str, Any] = {"alpha1": 0.5, "beta1": 1, "alpha2": 0.01, "beta2": 2, "strength": "mass"}
+NEAR_FIELD: dict[str, Any] = {"alpha1": 0.5, "beta1": 1, "alpha2": 0.01, "beta2": 2, "strength": "mass"}
 """The near field of Z16 section 9, with (7.23)."""
 PAIR_ATTRACTION = MASS**2 * (
-    NEAR["alpha1"] / (2 * RADIUS) ** NEAR["beta1"] - NEAR["alpha2"] / (2 * RADIUS) ** NEAR["beta2"]
+    NEAR_FIELD["alpha1"] / (2 * RADIUS) ** NEAR_FIELD["beta1"] - NEAR_FIELD["alpha2"] / (2 * RADIUS) ** NEAR_FIELD["beta2"]
 )
 """The near field of two touching particles, N."""
 RELAXATION: dict[str, Any] = {"contact": True, "near": True, "relaxes": True, "duration": 30.0}
@@ -134,7 +134,7 @@ def interaction(contact: bool, near: bool, cutoff: float | None = None) -> tuple
         ContactDissipation(damping=1e5),
         ContactFriction(stiffness=1e7, static=0.4, dynamic=0.3),
     )
-    field = NearField(**NEAR) if cutoff is None else TruncatedNearField(**NEAR, cutoff=cutoff)
+    field = NearField(**NEAR_FIELD) if cutoff is None else TruncatedNearField(**NEAR_FIELD, cutoff=cutoff)
     return (*(touching if contact else ()), *((field,) if near else ()))
 
 

@@ -8,8 +8,8 @@ from scipy.integrate import quad
 from tisim import run
 from tisim.cases.agglomeration.problem import GENES
 from tisim.cases.agglomeration.self_gravity import (
-    APART,
     DENSITY,
+    FALL_DISTANCE,
     HARDNESS,
     bonded,
     bonding_radius,
@@ -38,7 +38,7 @@ def test_the_ranges_of_the_paper_need_kilometres():
     assert most == pytest.approx(293e3, rel=1e-3)
 
 
-@pytest.mark.parametrize("apart", [3.0, APART, 50.0])
+@pytest.mark.parametrize("apart", [3.0, FALL_DISTANCE, 50.0])
 def test_grains_that_fall_from_rest_meet_at_the_adhesion_speed(apart):
     """The work of gravity, by quadrature, gives each grain sqrt(3 H/(2 rho)) (Z04 4.15)."""
     b = bonding_radius(HARDNESS, DENSITY, apart)
@@ -54,16 +54,16 @@ def test_from_far_away_it_is_smaller_by_root_two():
 
 
 def test_grains_bond_above_this_radius_only():
-    b = bonding_radius(HARDNESS, DENSITY, APART)
+    b = bonding_radius(HARDNESS, DENSITY, FALL_DISTANCE)
     np.testing.assert_array_equal(bonded(b * np.array([0.5, 0.99, 1.01, 2.0])), [False, False, True, True])
 
 
 def test_the_fall_is_the_one_of_newton():
     """The separation halfway in time, by an independent solution of the fall."""
-    b = bonding_radius(HARDNESS, DENSITY, APART)
+    b = bonding_radius(HARDNESS, DENSITY, FALL_DISTANCE)
     (result,) = run([falling(b, part=0.5)])
     d = np.linalg.norm(np.diff(result.state["position"], axis=0))
-    u, start = d / (APART * b), APART * b
+    u, start = d / (FALL_DISTANCE * b), FALL_DISTANCE * b
     time = np.sqrt(start**3 / (4 * G * mass_of(b))) * (np.arccos(np.sqrt(u)) + np.sqrt(u * (1 - u)))
     assert time == pytest.approx(result.time, rel=1e-6)
 

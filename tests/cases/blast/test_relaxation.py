@@ -11,7 +11,7 @@ from tisim.cases.blast.relaxation import (
     BALLS,
     BLASTS,
     NEAR_NEIGHBOURS,
-    Ball,
+    RelaxedBall,
     largest,
     mean,
     near_energy,
@@ -132,8 +132,8 @@ def test_tables_and_figure_have_the_means(found):
     figure = relaxation_figure(found)
     *_, residuals, kinds, energies = figure.axes
     assert len(figure.axes) == 7
-    assert residuals.lines[0].get_ydata()[-1] < 1e-4
+    assert residuals.lines[0].get_ydata(orig=False)[-1] < 1e-4
     assert len(kinds.get_yticks()) == len(BLASTS)
-    drawn = energies.containers[1].lines[0].get_ydata()
+    drawn = energies.containers[1].lines[0].get_ydata(orig=False)
     np.testing.assert_allclose(drawn, [mean(found.by_energy[RELAXED, w], "along").value for w in (1e4, 2e5)])
-    assert isinstance(found.balls[RELAXED][0], Ball)
+    assert isinstance(found.balls[RELAXED][0], RelaxedBall)
