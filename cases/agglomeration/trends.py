@@ -46,7 +46,7 @@ class Trend:
     exponent: int
 
 
-RATIOS = (0.25, 0.5, 1.0, 2.0, 4.0)
+AROUND_ONE = (0.25, 0.5, 1.0, 2.0, 4.0)
 TRENDS = (
     Trend(
         "(i) larger surface energy", r"\gamma", "J/m²", "effects.fragmentation.surface_energy",
@@ -56,9 +56,9 @@ TRENDS = (
         "(ii) smaller hardness", "H", "Pa", "effects.impact.hardness", (1e5, 1.8e5, 3.2e5, 5.6e5, 1e6), -1
     ),
     Trend(
-        "(iii) smaller compression length", r"\beta", "", "effects.impact.deformation_length", RATIOS, -1
+        "(iii) smaller compression length", r"\beta", "", "effects.impact.deformation_length", AROUND_ONE, -1
     ),
-    Trend("(iv) smaller contact area", "a_f", "", "effects.impact.final_area", RATIOS, -1),
+    Trend("(iv) smaller contact area", "a_f", "", "effects.impact.final_area", AROUND_ONE, -1),
 )  # fmt: skip
 """The statements of Z04 remark 5.1; hardness over its search range, the other two about 1, their value in
 Z04."""
@@ -70,7 +70,7 @@ def growth(result: Result) -> float:
 
 
 @dataclass(frozen=True)
-class SeenTrend:
+class FoundTrend:
     """Runs of one trend.
 
     sizes : final over initial mean radius, shape (values, starts). broken : breakages over mergers, (values,
@@ -107,7 +107,7 @@ def study(
     surface_energy: float = SURFACE_ENERGY,
     trends: Sequence[Trend] = TRENDS,
     design: Mapping[str, float] = BEST,
-) -> list[SeenTrend]:
+) -> list[FoundTrend]:
     """Run the flow of a design with each value of each parameter, from the same starts."""
     base = scene({**design, "surface_energy": surface_energy}, 0, grains)
     found = []
@@ -117,11 +117,11 @@ def study(
         shape = (len(flows), len(seeds))
         sizes = np.reshape([growth(one) for one in results], shape)
         broken = np.reshape([one.work["fractures"] / max(one.work["merges"], 1) for one in results], shape)
-        found.append(SeenTrend(trend, sizes, broken))
+        found.append(FoundTrend(trend, sizes, broken))
     return found
 
 
-def table(found: Sequence[SeenTrend]) -> str:
+def table(found: Sequence[FoundTrend]) -> str:
     """Return the table of docs/agglomeration.md."""
     lines = [
         f"| larger grains by | b_f/b_0 from | to | exponent, {CONFIDENCE:.0%} | in (5.5) | seen |",
@@ -139,7 +139,7 @@ def table(found: Sequence[SeenTrend]) -> str:
     return "\n".join(lines)
 
 
-def trends_figure(found: Sequence[SeenTrend]) -> Figure:
+def trends_figure(found: Sequence[FoundTrend]) -> Figure:
     """Draw the mean size, and breakages per merger, against each parameter with 95 % intervals."""
     figure = empty(11.6, 5.6)
     axes = figure.subplots(2, len(found), sharey="row", sharex="col", squeeze=False)

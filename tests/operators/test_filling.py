@@ -428,7 +428,7 @@ WRONG = {
             effects=(AtRest(time=1.0),),
             duration=1.0,
         ),
-        "at_rest.reference_acceleration must be greater than 0 in a scene without gravity; received 0",
+        "effects.at_rest must be used together with effects.gravity",
     ),
     "a number beside a vector": (
         lambda: poured({"origin": 1.0}, {"origin": (1.0, 2.0, 3.0)}),

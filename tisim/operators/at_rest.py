@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Constraint, SceneParts
+from tisim.components.component import Component
+from tisim.effects.base import Constraint
 from tisim.effects.external.gravity import Gravity
-from tisim.errors import must
 from tisim.numerics.ieee import finite
 from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.base import parameter
@@ -27,12 +27,12 @@ class AtRest(AtIntervals):
 
     g is the acceleration of gravity. A scene without gravity has no weight, so g must be given, as
     ``reference_acceleration``: for instance the attraction of two touching grains over their mass. The first
-    ratio is the kinetic energy over the energy of a fall by one radius. The second is the
-    unbalanced force, summed over the grains as the magnitude of the resultant on each, over the weight. (YADE
-    and PFC divide by the mean contact force, which in a deep bed is larger than the weight; here a grain at
-    the top has the same weight in the sum as one below.) Each criterion alone can be met by grains that move:
-    the first by grains that have just been released, the second by grains that fall at a steady speed. A
-    rigid clump has the kinetic energy of the body and the resultant on the body.
+    ratio is the kinetic energy over the energy of a fall by one radius. The second is the unbalanced force,
+    summed over the grains as the magnitude of the resultant on each, over the weight. (YADE and PFC divide by
+    the mean contact force, which in a deep bed is larger than the weight; here a grain at the top has the
+    same weight in the sum as one below.) Each criterion alone can be met by grains that move: the first by
+    grains that have just been released, the second by grains that fall at a steady speed. A rigid clump has
+    the kinetic energy of the body and the resultant on the body.
 
     The grains are checked ten times in ``time`` and must be at rest each time. Grains that are fixed, or that
     move as prescribed, do not count; without other grains nothing is at rest. Nothing is at rest either until
@@ -50,6 +50,7 @@ class AtRest(AtIntervals):
     )
     any_order: ClassVar[bool] = True
     terms: ClassVar = 4
+    requires: ClassVar = (Gravity,)
     ends: ClassVar = "grains are at rest"
 
     energy: float = parameter(
@@ -61,13 +62,9 @@ class AtRest(AtIntervals):
         "m/s^2", "acceleration g that sets the weight; 0 for the acceleration of gravity", 0.0, ge=0
     )
 
-    def check(self, scene: SceneParts) -> None:
-        must(
-            self.reference_acceleration > 0 or any(isinstance(one, Gravity) for one in scene.effects),
-            f"effects.{self.label}.reference_acceleration",
-            "greater than 0 in a scene without gravity",
-            self.reference_acceleration,
-        )
+    def required_effects(self) -> tuple[type[Component], ...]:
+        # With a given acceleration it does not need gravity.
+        return () if self.reference_acceleration > 0 else super().required_effects()
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {

@@ -7,7 +7,7 @@ import pytest
 
 from tisim.analysis import Mean
 from tisim.cases.agglomeration.scene import BEST, scene
-from tisim.cases.agglomeration.trends import TRENDS, SeenTrend, study, table, trends_figure
+from tisim.cases.agglomeration.trends import TRENDS, FoundTrend, study, table, trends_figure
 
 GAMMA, HARDNESS, LENGTH, AREA = TRENDS
 
@@ -16,7 +16,7 @@ def power_law(trend, exponent, noise=0.0):
     rng = np.random.default_rng(1)
     x = np.array(trend.values)[:, None]
     sizes = 2.0 * x**exponent * np.exp(noise * rng.standard_normal((len(x), 12)))
-    return SeenTrend(trend, sizes, np.full_like(sizes, 0.5))
+    return FoundTrend(trend, sizes, np.full_like(sizes, 0.5))
 
 
 def test_exponent_of_a_power_law():
@@ -56,9 +56,9 @@ def test_a_study_of_few_starts_is_drawn_and_tabulated():
     assert found.seen
     assert f"| {found.means[0]} | {found.means[1]} | {found.exponent} | +1 | yes |" in table([found])
     top, below = trends_figure([found]).axes
-    np.testing.assert_allclose(top.lines[0].get_ydata(), [one.value for one in found.means])
+    np.testing.assert_allclose(top.lines[0].get_ydata(orig=False), [one.value for one in found.means])
     np.testing.assert_allclose(
-        below.lines[0].get_ydata(), [Mean.of(one).value for one in found.broken]
+        below.lines[0].get_ydata(orig=False), [Mean.of(one).value for one in found.broken]
     )  # fmt: skip
 
 
