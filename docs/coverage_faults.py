@@ -58,8 +58,7 @@ def _missing(row: Row) -> Iterator[str]:
             yield f"there is no section {row.page}"
         text = " ".join((DOCS / file).read_text(encoding="utf-8").split())
         yield from (f"{one!r} is not on {file}" for one in row.here if one not in text)
-    names = {entry.name for entry in reference.entries()}
-    yield from (f"there is no part {name}" for name in row.parts if name not in names)
+    yield from (f"there is no part {name}" for name in row.parts if name not in _parts())
     yield from (f"there is no {path}" for path in row.code if not (ROOT / path).exists())
     for one in row.tests:
         path, _, name = one.partition("::")
@@ -76,6 +75,12 @@ def _missing(row: Row) -> Iterator[str]:
 
 
 @cache
+def _parts() -> frozenset[str]:
+    """The names of all parts of scenes."""
+    return frozenset(entry.name for entry in reference.entries())
+
+
+@cache
 def _tests(path: Path) -> frozenset[str]:
     """The names of the tests of a file, without importing it."""
     if not path.is_file():
@@ -86,6 +91,7 @@ def _tests(path: Path) -> frozenset[str]:
     )
 
 
+@cache
 def command_fault(command: str) -> str:
     """Return why a command could not be run; empty if it could.
 
