@@ -19,6 +19,7 @@ from tisim import MeasureSeries, Simulation
 from tisim.cases.blast import scene as blast
 from tisim.cases.blast.figures import NO_BOX, NO_GRAVITY, snapshot
 from tisim.cases.blast.relaxed_ball import BLASTS, Relaxation, mean, relaxing, study, tables
+from tisim.operators import AtRest
 from tisim.plotting.cloud import common, directions
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
@@ -34,8 +35,8 @@ def relaxation_figure(found: Relaxation) -> Figure:
     """Draw a ball before and after it has relaxed, the clouds after their blasts, the residuals during
     relaxation, and half axes over kinds and energies of blasts with 95 % intervals."""
     figure = empty(11.6, 7.4)
-    upper, lower = figure.add_gridspec(2, 1, height_ratios=(0.75, 1.0))
-    upper, lower = upper.subgridspec(1, 4), lower.subgridspec(1, 3)
+    rows = figure.add_gridspec(2, 1, height_ratios=(0.75, 1.0))
+    upper, lower = rows[0].subgridspec(1, 4), rows[1].subgridspec(1, 3)
     relaxed = found.relaxed[RELAXED]
     before = (relaxed.start, relaxed.state)
     after = (found.clouds[CLUMPS, RANDOM], found.clouds[CLUMPS, RELAXED])
@@ -65,12 +66,12 @@ def relaxation_figure(found: Relaxation) -> Figure:
 def history(axis: Axes, number: int) -> None:
     """Draw the two ratios of ``at_rest`` over time for the ball of the first start, and their bounds."""
     scene = relaxing(number, 0, {"cutoff": blast.NEIGHBOURS})
-    (rest,) = (effect for effect in scene.effects if effect.kind() == "at_rest")
+    (rest,) = (effect for effect in scene.effects if isinstance(effect, AtRest))
     series = MeasureSeries(INTERVAL)
     with closing(Simulation(scene, 1, number)) as simulation:
         simulation.load([scene])
         simulation.run(observers=[series])
-    (values,) = series
+    values = series[0]
     for name, bound, colour, label in (
         ("kinetic_ratio", rest.energy, AXIS_COLOURS[0], "kinetic energy"),
         ("unbalanced_ratio", rest.unbalanced, AXIS_COLOURS[1], "unbalanced force"),
