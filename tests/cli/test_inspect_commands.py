@@ -63,7 +63,7 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 
 def test_a_folder_without_data_to_draw_is_refused(tisim, tmp_path):
     (tmp_path / "out").mkdir()
-    rule = "folder must contain a trajectory.h5 or result.h5; received 'out', with"
+    rule = "folder must be one with a trajectory.h5 or result.h5; received 'out', with"
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "search.h5").touch()
