@@ -29,7 +29,7 @@ from tisim.effects import (
 from tisim.sources import MagneticField
 
 SOFT_IRON = 1e6 - 1
-"""Of a material with mu_r = 1e6."""
+"""Susceptibility of a material with a relative permeability of 1e6."""
 
 
 def magnetised(place, **options):

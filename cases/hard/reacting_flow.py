@@ -23,11 +23,11 @@ from tisim.steppers import Stepper, Verlet
 STONE = 2000.0
 """Density of the grains, kg/m^3."""
 STONE_RADIUS = 1e-3
-"""Of a grain, m."""
+"""Radius of a grain, m."""
 STONE_MASS = STONE * 4 / 3 * np.pi * STONE_RADIUS**3
-"""Of a grain of this radius, kg."""
+"""Mass of a grain of this density and radius, kg."""
 STONE_HEAT_CAPACITY = 500.0
-"""J/(kg K)."""
+"""Heat capacity of the grains, J/(kg K)."""
 BONDING_HARDNESS = 1.0
 """A hardness at which all grains bond, Pa."""
 

@@ -1,4 +1,4 @@
-"""Calls of the user's functions of a problem, and checks of what they return and read."""
+"""Calls of the functions that a user gives to a problem, with checks of their values and their files."""
 
 from __future__ import annotations
 

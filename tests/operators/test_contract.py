@@ -7,10 +7,11 @@ import pytest
 
 from tests.scenes import by_id, scene, usual
 from tests.throwaway import SoftShell, SoftShellOfAll
-from tisim import Box, Simulation, run
+from tisim import Box, InputError, Simulation, run
 from tisim.backend.taichi import ti
 from tisim.effects import Agglomeration, Impact
 from tisim.operators import Operator
+from tisim.operators.base import adding
 from tisim.state.fields import Field, WorldField
 from tisim.steppers import ApproachTime, Verlet
 
@@ -42,6 +43,20 @@ def test_a_field_that_could_not_be_merged_is_refused(wrong):
     would be lost."""
     with pytest.raises(TypeError, match="field tag"):
         Field("tag", "", **wrong)
+
+
+def test_an_operator_with_a_capacity_must_add_particles():
+    """Without the base class it would get no memory, and would append nothing."""
+
+    class Crowd:
+        label = "crowd"
+
+        def capacity(self, masses):
+            return 2 * len(masses)
+
+    rule = "effects.crowd must be of a class derived from AddsParticles, because it defines capacity"
+    with pytest.raises(InputError, match=f"^{rule}; received Crowd$"):
+        adding([Census(), Crowd()])
 
 
 def test_an_operator_sees_every_world_once_a_step():

@@ -17,6 +17,7 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
+from tisim.errors import Words, must
 from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound
 from tisim.state.state import State
@@ -108,8 +109,25 @@ class AddsParticles(Operator):
 
 
 def adding(effects: Iterable[Effect]) -> list[AddsParticles]:
-    """Return the effects that add particles."""
-    return [effect for effect in effects if isinstance(effect, AddsParticles)]
+    """Return the effects that add particles.
+
+    Raises InputError for one that defines ``capacity`` without the base class: it would get no memory for its
+    particles.
+    """
+    added = []
+    for effect in effects:
+        if isinstance(effect, AddsParticles):
+            added.append(effect)
+        else:
+            rule = "of a class derived from AddsParticles, because it defines capacity"
+            kind = type(effect)
+            must(
+                not callable(getattr(kind, "capacity", None)),
+                f"effects.{effect.label}",
+                rule,
+                Words(kind.__name__),
+            )
+    return added
 
 
 def largest_inserted(effects: Iterable[Effect]) -> Mapping[str, np.ndarray]:

@@ -38,7 +38,7 @@ def lodged(number, radius=0.8, slope=1.2, friction=0.0, aside=(2e-7, 3e-7), sunk
 
 
 def run(made):
-    """Result of a scene; scenes with the same ring share what is compiled."""
+    """Return the result of a scene. Scenes with the same ring run in one compiled simulation."""
     return simulate([made], capacity=1)[0]
 
 
