@@ -197,7 +197,8 @@ def test_code_that_is_a_formula_is_set():
 
 def test_a_page_has_its_formulas_set():
     """In sentences and lists; not in headings, code, links and names of parameters."""
-    nodes, core = load("equation_nodes"), pytest.importorskip("docutils.core")
+    core = pytest.importorskip("docutils.core", reason="docutils comes with the extra docs")
+    nodes = load("equation_nodes")
     doctree = core.publish_doctree(
         "Page\n#####\n\nx = y\n=====\n\nA mass m of 2 rho, ``w + 1/2``, ``rho`` and `F = m <a>`__ "
         "with F = m g.\n\n- phi : the angle phi\n\nx = z\n=====\n\nNothing\n"
