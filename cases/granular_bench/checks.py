@@ -52,7 +52,7 @@ def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
     """Yield tests 1 to 3: Hertz's force, depth and duration, the rebound, and coefficients of restitution."""
     elastic = particle_tests.ELASTIC + particle_tests.ELASTIC_PLANE
     for impact, curve in zip(elastic, force_curves(elastic), strict=True):
-        what = f"{impact.substance}, {'two spheres' if impact.partner == 'twin' else 'at a plane'}"
+        what = f"{impact.substance}, {'two spheres' if impact.partner == 'equal' else 'at a plane'}"
         _, radius, _, modulus = impact.hertz
         depth = float(hertz_depth(*impact.hertz))
         peak = float(hertz_force(depth, radius, modulus))

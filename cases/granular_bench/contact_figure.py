@@ -135,7 +135,7 @@ def tangential_speeds(axis: Axes, found: Found) -> None:
 
 def spins(axis: Axes, found: Found) -> None:
     """Draw tests 6 to 8: the tangential velocity that results from a spin, over the normal speed."""
-    tests = particle_tests.SPINNING_PLANE + particle_tests.SPINNING_TWINS + particle_tests.UNEQUAL
+    tests = particle_tests.SPINNING_PLANE + particle_tests.SPINNING_EQUAL + particle_tests.UNEQUAL
     e, mu = particle_tests.SPINNING["restitution"], particle_tests.SPINNING["friction"]
     speed, radius = particle_tests.SPINNING["speed"], particle_tests.SPINNING["radius"]
     before = np.linspace(0.0, 11.0, 100)
@@ -144,7 +144,7 @@ def spins(axis: Axes, found: Found) -> None:
     axis.plot(
         before, oblique_impacts(curve, CURVE_POINTS)[0] / speed, **LAW_LINE, label="law in NumPy, e = 0.5"
     )
-    label = {"plane": "6: at a plane", "twin": "7: twins", "large": "8: 1 to 5",
+    label = {"plane": "6: at a plane", "equal": "7: equal spheres", "large": "8: 1 to 5",
              "large rigid": "8: 1 to 5, rigid"}  # fmt: skip
     for k, partner in enumerate(label):
         group = [found[one] for one in tests if one.partner == partner]

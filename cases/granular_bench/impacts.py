@@ -66,7 +66,7 @@ class ParticleImpact:
 
     sideways : velocity along x, m/s. spin : about y, rad/s; the surface at the contact moves by -R spin along
     x.
-    partner : "plane", rigid; "twin", an equal sphere that approaches at the same speed with the same spin; or
+    partner : "plane", rigid; "equal", an equal sphere that approaches at the same speed with the same spin;
     "large" or "large rigid", a sphere at rest, five times as wide and a thousand times as dense.
     """
 
@@ -82,7 +82,7 @@ class ParticleImpact:
     @property
     def other_radius(self) -> float:
         """Return the radius of the partner, m; infinite for a plane."""
-        return {"plane": np.inf, "twin": self.radius}.get(self.partner, 5 * self.radius)
+        return {"plane": np.inf, "equal": self.radius}.get(self.partner, 5 * self.radius)
 
     @property
     def mass(self) -> float:
@@ -92,7 +92,7 @@ class ParticleImpact:
     @property
     def mass_ratio(self) -> float:
         """Return the mass of the partner divided by the mass of the sphere; infinite for a plane."""
-        return {"plane": np.inf, "twin": 1.0}.get(self.partner, 1000.0 * 5**3)
+        return {"plane": np.inf, "equal": 1.0}.get(self.partner, 1000.0 * 5**3)
 
     @property
     def share(self) -> float:
@@ -102,7 +102,7 @@ class ParticleImpact:
     @property
     def approach(self) -> float:
         """Return the speed at which the two approach, m/s."""
-        return self.speed * (2 if self.partner == "twin" else 1)
+        return self.speed * (2 if self.partner == "equal" else 1)
 
     @property
     def modulus(self) -> float:
@@ -132,10 +132,10 @@ class ParticleImpact:
         position, velocity, spin = [[0.0, 0.0, r]], [[self.sideways, 0.0, -self.speed]], [[0, self.spin, 0.0]]
         radius, mass, floor = [r], [self.mass], 0.0
         if self.partner != "plane":
-            twin = self.partner == "twin"
+            equal = self.partner == "equal"
             position.append([0.0, 0.0, -other])
-            velocity.append([0.0, 0.0, self.speed if twin else 0.0])
-            spin.append([0.0, self.spin if twin else 0.0, 0.0])
+            velocity.append([0.0, 0.0, self.speed if equal else 0.0])
+            spin.append([0.0, self.spin if equal else 0.0, 0.0])
             radius.append(other)
             mass.append(self.mass * self.mass_ratio)
             floor = -1e4 * other

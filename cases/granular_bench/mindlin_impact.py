@@ -31,8 +31,8 @@ def oblique_impacts(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the velocities along x (m/s) and the spins about y (rad/s) after impacts, shape (impacts,) each.
 
-    The partners are planes or twins. The integration is a leapfrog with ``steps`` in the duration of an
-    elastic impact.
+    The partners are planes or equal spheres. The integration is a leapfrog with ``steps`` in the duration
+    of an elastic impact.
     """
     r, m, e, friction, vx, spin = (
         np.array([getattr(one, name) for one in impacts])
@@ -41,8 +41,8 @@ def oblique_impacts(
     speed, radius, mass, modulus = np.array([one.hertz for one in impacts]).T
     shear = np.array([shear_modulus(one) for one in impacts])
     dt = np.array([one.duration for one in impacts]) / steps
-    # Twins have the same motion and spin, so the surfaces slide past each other at twice the speed.
-    both = np.array([2.0 if one.partner == "twin" else 1.0 for one in impacts])
+    # Equal spheres have the same motion and spin, so the surfaces slide past each other at twice the speed.
+    both = np.array([2.0 if one.partner == "equal" else 1.0 for one in impacts])
     logarithm = np.log(e)
     loss = -2 * np.sqrt(5 / 6) * logarithm / np.hypot(logarithm, np.pi)
     closing, overlap = speed.copy(), np.zeros(len(r))

@@ -45,7 +45,7 @@ def spinning(substance: str, spin: float, partner: str) -> ParticleImpact:
     return ParticleImpact(substance, spin=spin, partner=partner, **SPINNING)
 
 
-ELASTIC = tuple(ParticleImpact(one, 0.01, 10.0, partner="twin") for one in ("glass", "limestone"))
+ELASTIC = tuple(ParticleImpact(one, 0.01, 10.0, partner="equal") for one in ("glass", "limestone"))
 ELASTIC_PLANE = tuple(ParticleImpact(one, 0.1, 0.2) for one in ("aluminium alloy", "magnesium alloy"))
 DAMPED = tuple(
     ParticleImpact(one, 2.5e-3, 3.9, restitution=e)
@@ -57,8 +57,8 @@ SIDEWAYS = tuple(sideways(one, s) for one in ("steel", "polyethylene") for s in 
 SPINNING_PLANE = tuple(
     spinning(one, spin, "plane") for one in ("aluminium alloy 2", "nylon") for spin in SPINS
 )
-SPINNING_TWINS = tuple(
-    spinning(one, spin, "twin") for one in ("aluminium alloy 2", "copper") for spin in SPINS
+SPINNING_EQUAL = tuple(
+    spinning(one, spin, "equal") for one in ("aluminium alloy 2", "copper") for spin in SPINS
 )
 UNEQUAL = tuple(
     spinning(one, spin, partner)
@@ -67,7 +67,7 @@ UNEQUAL = tuple(
     for spin in SPINS
 )
 TESTS = {
-    1: ELASTIC, 2: ELASTIC_PLANE, 3: DAMPED, 4: OBLIQUES, 5: SIDEWAYS, 6: SPINNING_PLANE, 7: SPINNING_TWINS,
+    1: ELASTIC, 2: ELASTIC_PLANE, 3: DAMPED, 4: OBLIQUES, 5: SIDEWAYS, 6: SPINNING_PLANE, 7: SPINNING_EQUAL,
     8: UNEQUAL,
 }  # fmt: skip
 """The impacts of each test, by its number."""

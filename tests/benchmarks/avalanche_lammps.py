@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT))
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
-from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tests.effects.contact.granular_reference import ReferenceLaw  # noqa: E402
 from tisim.cases.avalanche.measures import grains_volume, heap_volume, repose  # noqa: E402
 from tisim.cases.avalanche.scene import (  # noqa: E402
     DIAMETERS,
@@ -51,7 +51,7 @@ D = DIAMETERS[0]
 CELL = Cell(number=300, column=8.0, width=4.0, length=40.0, height=20.0)
 OPENS, DURATION = 25.0, 50.0
 """Times at which the gate opens and at which the slope is measured, in sqrt(d/g)."""
-LAW = TwinLaw(
+LAW = ReferenceLaw(
     (
         {
             **{"young": young(D), "poisson": POISSON, "restitution": RESTITUTION},

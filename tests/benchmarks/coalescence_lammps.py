@@ -31,7 +31,7 @@ sys.path.insert(0, str(ROOT))
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
-from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tests.effects.contact.granular_reference import ReferenceLaw  # noqa: E402
 from tisim import Scene, Simulation  # noqa: E402
 from tisim.cases.coalescence import scene as cloud  # noqa: E402
 from tisim.cases.coalescence.runs import Gathering  # noqa: E402
@@ -43,7 +43,7 @@ LOOKS = (5000.0, 10_000.0)
 """Times of comparison, s: during the collapse and at the end."""
 SIDE = 400.0
 """The side of LAMMPS's box, m, which contains all grains; no pair is beyond its cut-off."""
-LAW = TwinLaw(
+LAW = ReferenceLaw(
     (cloud.rubble(cloud.scale_of(cloud.DEFAULT["number"])).model_dump(exclude_none=True),),
     rolling="rolling_sds",
 )

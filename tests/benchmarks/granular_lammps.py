@@ -33,7 +33,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from tests.benchmarks import lammps_peer  # noqa: E402
-from tests.effects.contact.granular_twin import Grains, TwinLaw  # noqa: E402
+from tests.effects.contact.granular_reference import Grains, ReferenceLaw  # noqa: E402
 
 if TYPE_CHECKING:
     from tisim import Scene
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 SIDE, STEP = 8, 5e-4
 """Grains along an edge, which is also the edge's length in m; s."""
 SOFT = {"young": 1e5, "poisson": 0.3, "restitution": 0.6, "friction": 0.3, "damping": 300.0}
-LAW = TwinLaw((SOFT,))
+LAW = ReferenceLaw((SOFT,))
 """Hertz and Mindlin."""
 TSUJI = 0.5
 """Coefficient of restitution given to ``damping tsuji``."""
@@ -64,25 +64,27 @@ ROLLS = {"rolling_stiffness": 4e3, "rolling_damping": 20.0, "rolling_friction": 
 TWISTS = {"twisting_stiffness": 400.0, "twisting_damping": 5.0, "twisting_friction": 0.1}
 LAWS = {
     "hertz, mindlin": LAW,
-    "hooke, linear, rolling, twisting": TwinLaw(
+    "hooke, linear, rolling, twisting": ReferenceLaw(
         ({**SOFT, **ROLLS, **TWISTS, "stiffness": 1e4},),
         normal="hooke",
         tangential="linear_spring",
         rolling="rolling_sds",
         twisting="twisting_sds",
     ),
-    "hertz, tsuji, mindlin": TwinLaw(({**SOFT, "restitution": as_tsuji(TSUJI)},), options={"tsuji": TSUJI}),
-    "hertz, constant damping, mindlin's displacement": TwinLaw(
+    "hertz, tsuji, mindlin": ReferenceLaw(
+        ({**SOFT, "restitution": as_tsuji(TSUJI)},), options={"tsuji": TSUJI}
+    ),
+    "hertz, constant damping, mindlin's displacement": ReferenceLaw(
         (SOFT,), damping="constant_damping", tangential="mindlin_displacement"
     ),
-    "hertz, no history": TwinLaw((SOFT,), tangential="viscous_friction"),
-    "dmt, rolling": TwinLaw(
+    "hertz, no history": ReferenceLaw((SOFT,), tangential="viscous_friction"),
+    "dmt, rolling": ReferenceLaw(
         ({**SOFT, **ROLLS, "surface_energy": 50.0},),
         damping="constant_damping",
         rolling="rolling_sds",
         cohesion="dmt",
     ),
-    "jkr, twisting": TwinLaw(
+    "jkr, twisting": ReferenceLaw(
         ({**SOFT, **TWISTS, "surface_energy": 50.0},),
         normal="jkr",
         damping="constant_damping",
@@ -117,7 +119,7 @@ def planes(walls: bool) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
     return low + high if walls else []
 
 
-def by_numpy(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
+def by_numpy(at: dict[str, np.ndarray], law: ReferenceLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """The state of the NumPy reference after some steps."""
     grains = Grains(law, *at.values(), planes=planes(walls))
     grains.run(steps, STEP)
@@ -137,7 +139,7 @@ def end_of(scene: Scene, steps: int, schedule: str | None = None) -> dict[str, n
     return end
 
 
-def composed(law: TwinLaw) -> Granular:
+def composed(law: ReferenceLaw) -> Granular:
     """The law of the package."""
     from tisim.components import serialization
     from tisim.effects import Granular
@@ -149,7 +151,9 @@ def composed(law: TwinLaw) -> Granular:
     return serialization.from_dict(Granular, {"kind": "granular", **given}, "law")
 
 
-def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
+def by_package(
+    at: dict[str, np.ndarray], law: ReferenceLaw, walls: bool, steps: int
+) -> dict[str, np.ndarray]:
     """The state of the package."""
     from tisim import Material, Particles, Scene
     from tisim.effects import Walls
@@ -170,7 +174,7 @@ def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int)
     return end_of(scene, steps, "particle")
 
 
-def lammps_model(law: TwinLaw) -> str:
+def lammps_model(law: ReferenceLaw) -> str:
     """The text of a law for pair_style granular."""
     of = law.materials[0]
     damping = {"restitution_damping": "coeff_restitution", "constant_damping": "velocity"}[str(law.damping)]
@@ -205,7 +209,7 @@ def lammps_model(law: TwinLaw) -> str:
     return text
 
 
-def by_lammps(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
+def by_lammps(at: dict[str, np.ndarray], law: ReferenceLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """The state of LAMMPS, from a separate process."""
     return lammps_peer.apart(__file__, law=lammps_model(law), walls=walls, steps=steps, **at)
 
@@ -248,11 +252,11 @@ def main() -> None:
     for walls in (False, True):
         for steps in (1, 100):
             there = by_lammps(start(), LAW, walls, steps)
-            here, twin = by_package(start(), LAW, walls, steps), by_numpy(start(), LAW, walls, steps)
+            here, reference = by_package(start(), LAW, walls, steps), by_numpy(start(), LAW, walls, steps)
             as_theirs = by_numpy(start(), theirs, walls, steps)
             for name, a, b in (
                 ("package - LAMMPS", here, there),
-                ("package - NumPy", here, twin),
+                ("package - NumPy", here, reference),
                 ("NumPy with LAMMPS's points - LAMMPS", as_theirs, there),
             ):
                 row = " | ".join(f"{value:.1e}" for value in apart(a, b).values())

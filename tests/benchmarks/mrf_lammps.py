@@ -35,7 +35,7 @@ sys.path.insert(0, str(ROOT))
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
-from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tests.effects.contact.granular_reference import ReferenceLaw  # noqa: E402
 from tisim.cases.common.magnetorheological_fluid import TABLE_2_1  # noqa: E402
 from tisim.cases.common.runs import sound  # noqa: E402
 from tisim.cases.mrf_shear import published  # noqa: E402
@@ -62,7 +62,7 @@ SETTINGS = {**SEARCHED, "before": BEFORE, "strain": STRAIN, "still": True, "dt":
 """Settings of the case, with a time step (s) of which all times are whole multiples."""
 SHORT = {"magnetising": 8e-6, "before": 0.01, "strain": 0.03}
 """Settings of a short experiment, in which trajectories have not yet diverged but grains have met."""
-LAW = TwinLaw(
+LAW = ReferenceLaw(
     (
         {
             "young": published.YOUNG,

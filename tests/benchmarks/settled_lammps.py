@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT))
 from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.benchmarks.granular_lammps import LAWS, SIDE, composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
-from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tests.effects.contact.granular_reference import ReferenceLaw  # noqa: E402
 
 STEP, GRAVITY, LATTICE = 5e-4, 0.5, 1.12
 """s, m/s2, m between neighbouring positions at the start."""
@@ -41,7 +41,7 @@ STIFFER = {
 """A hundred times the stiffness of granular_lammps.py, because these grains carry others."""
 
 
-def bulk_law(name: str) -> TwinLaw:
+def bulk_law(name: str) -> ReferenceLaw:
     """One of LAWS, for stiffer grains."""
     law = LAWS[name]
     given = law.materials[0]
@@ -66,7 +66,7 @@ def random_start(seed: int) -> State:
     }
 
 
-def by_package(law: TwinLaw, starts: list[State]) -> list[list[State]]:
+def by_package(law: ReferenceLaw, starts: list[State]) -> list[list[State]]:
     """Positions, velocities and spins of each start at TIMES, all starts side by side."""
     from tisim import Material, Particles, Scene, Simulation
     from tisim.effects import Gravity, Walls
@@ -104,7 +104,7 @@ def by_package(law: TwinLaw, starts: list[State]) -> list[list[State]]:
     return found
 
 
-def by_lammps(law: TwinLaw, starts: list[State]) -> list[list[State]]:
+def by_lammps(law: ReferenceLaw, starts: list[State]) -> list[list[State]]:
     """The same in LAMMPS, in a separate process."""
     stacked = {name: np.stack([at[name] for at in starts]) for name in starts[0]}
     found = lammps_peer.apart(__file__, law=lammps_model(law), **stacked)

@@ -150,11 +150,11 @@ def main() -> None:
     print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
     for steps in (1, 300):
         made = scene()
-        there, here, twin = by_lammps(made, steps), end_of(made, steps), by_numpy(made, steps)
+        there, here, reference = by_lammps(made, steps), end_of(made, steps), by_numpy(made, steps)
         as_theirs = by_numpy(made, steps, "radius", STEP)
         rows = {
             "package - LAMMPS": (here, there),
-            "package - NumPy": (here, twin),
+            "package - NumPy": (here, reference),
             "NumPy with LAMMPS's levers and images - LAMMPS": (as_theirs, there),
         }
         for name, (a, b) in rows.items():

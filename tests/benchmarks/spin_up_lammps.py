@@ -30,7 +30,7 @@ from tests.benchmarks import coalescence_lammps, lammps_peer  # noqa: E402
 from tests.benchmarks.coalescence_lammps import FIELDS, run_each, state_of  # noqa: E402
 from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.lammps_peer import State  # noqa: E402
-from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+from tests.effects.contact.granular_reference import ReferenceLaw  # noqa: E402
 from tisim import Scene, Simulation  # noqa: E402
 from tisim.cases.coalescence import scene as cloud  # noqa: E402
 from tisim.cases.coalescence.published import DIAMETERS  # noqa: E402
@@ -43,7 +43,7 @@ from tisim.effects import SelfGravity  # noqa: E402
 SPINS = (0.0, *RATES)
 """The successive angular velocities of a pile, rad/s; 0 while it settles."""
 MATERIAL = cloud.rubble(cloud.scale_of(DEFAULT["number"], NUMBERS[DIAMETERS[1]]), DEFAULT["softened"])
-LAW = TwinLaw((MATERIAL.model_dump(exclude_none=True),), rolling="rolling_sds")
+LAW = ReferenceLaw((MATERIAL.model_dump(exclude_none=True),), rolling="rolling_sds")
 
 
 def scenes(seeds: Sequence[int]) -> list[Scene]:

@@ -20,7 +20,7 @@ def run(scenes, steps=None):
     return simulate(scenes, worlds=24, capacity=64, steps=steps)
 
 
-class Twin:
+class Reference:
     """One step in NumPy: drift, list the pairs in contact, then resolve them one after another."""
 
     def __init__(self, start, hardness):
@@ -97,10 +97,10 @@ def jam(rng, hardness, grains=60, sizes=2.0):
     )
 
 
-def agree(result, expected, twin):
+def agree(result, expected, reference):
     state = by_id(result)
     np.testing.assert_array_equal(state["id"], expected["id"])
-    assert (result.work["impacts"], result.work["merges"]) == (twin.impacts, twin.merges)
+    assert (result.work["impacts"], result.work["merges"]) == (reference.impacts, reference.merges)
     for name, size in (("velocity", 50), ("position", 1e-2), ("mass", None), ("radius", None)):
         scale = size or expected[name].max()
         np.testing.assert_allclose(state[name], expected[name], rtol=0, atol=1e-12 * scale, err_msg=name)
@@ -113,9 +113,9 @@ def test_many_impacts_equal_serial_resolution(rng, hardness):
     scenes = [jam(rng, hardness) for _ in range(8)]
     impacts = 0
     for result in run(scenes):
-        twin = Twin(result.start, hardness)
-        agree(result, twin.step(), twin)
-        impacts += twin.impacts
+        reference = Reference(result.start, hardness)
+        agree(result, reference.step(), reference)
+        impacts += reference.impacts
         scale = np.abs(result.start["mass"][:, None] * result.start["velocity"]).sum()
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=0, atol=1e-15 * scale)
         assert result.state["mass"].sum() == pytest.approx(result.start["mass"].sum(), rel=1e-15)
@@ -126,10 +126,10 @@ def test_the_order_of_impacts_matters_in_these_worlds(rng):
     """Makes sure that the test above can fail: reverse order gives a different result."""
     start = jam(rng, 1e8)
     (result,) = run([start])
-    twin = Twin(result.start, 1e8)
-    backwards = twin.order
-    twin.order = lambda: backwards()[::-1]
-    difference = np.abs(twin.step()["velocity"] - by_id(result)["velocity"]).max()
+    reference = Reference(result.start, 1e8)
+    backwards = reference.order
+    reference.order = lambda: backwards()[::-1]
+    difference = np.abs(reference.step()["velocity"] - by_id(result)["velocity"]).max()
     assert difference > 0.1
 
 
@@ -146,8 +146,8 @@ def test_grain_hit_by_twelve_at_once(rng):
         scenes.append(scene(position, velocity, laws(1e8), dt=DT))
     for result in run(scenes):
         assert result.work["impacts"] >= 12
-        twin = Twin(result.start, 1e8)
-        agree(result, twin.step(), twin)
+        reference = Reference(result.start, 1e8)
+        agree(result, reference.step(), reference)
         scale = np.abs(result.start["mass"][:, None] * result.start["velocity"]).sum()
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=0, atol=1e-15 * scale)
 

@@ -15,7 +15,7 @@ from tisim.describe.explain import known_effects
 from tisim.effects import Agglomeration, ContactFriction, Force, Impact, PairForce, Tether
 
 
-def test_forces_equal_their_numpy_twin(rng):
+def test_forces_equal_their_numpy_reference(rng):
     """Random charges in a trap: the force on each, at the start and after a step."""
     scenes = []
     for _ in range(10):

@@ -30,7 +30,7 @@ def oscillating(kind, rng):
     return kind(constant=vector(rng), amplitude=vector(rng), omega=vector(rng, 3), phase=vector(rng))
 
 
-def lorentz_twin(setup, state, t=0.0):
+def lorentz_reference(setup, state, t=0.0):
     b = e = np.zeros(3)
     for source in setup.effects:
         if isinstance(source, ElectricField):
@@ -59,7 +59,7 @@ def test_lorentz_force(kinds, rng):
         for _ in range(WORLDS)
     ]
     for one, state in zip(scenes, loads(scenes), strict=True):
-        close(state["force"], lorentz_twin(one, state))
+        close(state["force"], lorentz_reference(one, state))
 
 
 @pytest.mark.long
@@ -91,7 +91,7 @@ def test_fields_oscillate_in_time(rng):
         for k in range(WORLDS)
     ]
     for one, result in zip(scenes, simulate(scenes, worlds=WORLDS, capacity=16), strict=True):
-        close(result.state["force"], lorentz_twin(one, result.state, result.time), 1e-7)
+        close(result.state["force"], lorentz_reference(one, result.state, result.time), 1e-7)
         assert result.time > 0.3
 
 
@@ -104,7 +104,7 @@ def test_zero_amplitude_is_a_constant_field(rng):
         for field in (still, oscillating(ElectricField, rng))
     ]
     for one, state in zip(scenes, loads(scenes), strict=True):
-        close(state["force"], lorentz_twin(one, state))
+        close(state["force"], lorentz_reference(one, state))
 
 
 def test_magnetic_body_force_is_the_gradient_of_gamma_b_squared(rng):

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from tests.effects.pair.test_mie import crowd, twin
+from tests.effects.pair.test_mie import crowd, reference
 from tests.scenes import scene, simulate
 from tests.throwaway import RandomKicks, SoftShell, Trap
 from tisim import InputError, Scene
@@ -38,8 +38,8 @@ def test_named_effects_have_their_own_parameters(rng):
     for other in (CORE, Mie(epsilon=2.0)):
         setup = crowd(rng, SHELL).model_copy(update={"effects": (other, SHELL)})
         (result,) = simulate([setup])
-        expected = twin(other, result.state) + twin(SHELL, result.state)
-        alone = twin(SHELL, result.state)
+        expected = reference(other, result.state) + reference(SHELL, result.state)
+        alone = reference(SHELL, result.state)
         assert np.abs(expected - alone).max() > 0.1 * np.abs(alone).max()
         np.testing.assert_allclose(
             result.state["force"], expected, rtol=0, atol=1e-7 * np.abs(expected).max()

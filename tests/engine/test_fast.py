@@ -6,7 +6,7 @@ from scipy.constants import mu_0
 
 import tisim
 from tests.effects.contact import sheared
-from tests.effects.contact.grains import grains, heap, twin
+from tests.effects.contact.grains import grains, heap, reference
 from tests.scenes import by_id, fixed, scene, simulate
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -94,7 +94,7 @@ def numbers():
     return out.tolist(), total[0]
 
 
-def twins():
+def references():
     """The largest errors of forces over all pairs, against NumPy, over the largest force."""
     rng, n, errors = np.random.default_rng(3), 100, []
     position, charge, moment = rng.uniform(0, 1, (n, 3)), rng.normal(size=n), rng.normal(size=(n, 3))
@@ -164,7 +164,7 @@ def piled():
     pile = heap(np.random.default_rng(5), steps=GRANULAR_STEPS)
     couple = grains([[0, 0, 9], [1.9, 0, 9]], np.zeros((2, 3)), law={"young": 1e10}, dt=1e-3)
     result, deep = simulate([pile, couple], worlds=2)
-    known = twin(pile)
+    known = reference(pile)
     known.run(GRANULAR_STEPS, pile.stepper.control.dt)
     return [error(result, known.x, known.v, known.w), int(known.sliding), deep.status.reason, deep.time]
 
@@ -182,7 +182,7 @@ def flowing():
 def everything():
     """Results of the functions above, from one process."""
     settings = tisim.run(scene([[0.0, 0, 0]], [[1.0, 0, 0]])).settings
-    return [settings["arithmetic"], numbers(), twins(), failure(), beside_a_long_cylinder()]
+    return [settings["arithmetic"], numbers(), references(), failure(), beside_a_long_cylinder()]
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +202,7 @@ def test_non_finite_values_are_found_and_sums_are_compensated(fast):
     assert total == 10_000.0
 
 
-def test_forces_equal_their_twins(fast):
+def test_forces_equal_their_references(fast):
     assert max(fast[2]) < CLOSE
 
 
@@ -233,7 +233,7 @@ def test_the_field_beside_a_long_cylinder_keeps_its_digits(fast):
 
 
 @pytest.mark.slow
-def test_a_heap_equals_its_twin_and_deep_overlaps_are_reported(in_fast_arithmetic):
+def test_a_heap_equals_its_reference_and_deep_overlaps_are_reported(in_fast_arithmetic):
     off, sliding, reason, time = in_fast_arithmetic("engine.test_fast", "piled")
     assert off < CLOSE
     assert sliding > 1000
@@ -243,7 +243,7 @@ def test_a_heap_equals_its_twin_and_deep_overlaps_are_reported(in_fast_arithmeti
 
 
 @pytest.mark.slow
-def test_a_crowd_in_shear_equals_its_twin(in_fast_arithmetic):
+def test_a_crowd_in_shear_equals_its_reference(in_fast_arithmetic):
     off, sliding = in_fast_arithmetic("engine.test_fast", "flowing")
     assert off < CLOSE
     assert sliding > 1000

@@ -49,7 +49,7 @@ PARTS_OF_LAWS = {
     ),
     "rolling_epsd": (
         f"{LAW}/rolling.py", "2.25 * friction", "2.0 * friction",
-        "tests/effects/contact/test_compositions.py::test_steps_equal_the_twin[jkr]",
+        "tests/effects/contact/test_compositions.py::test_steps_equal_the_reference[jkr]",
     ),
     "rolling_sds": (
         f"{LAW}/rolling.py", "return grip, known / spring", "return grip, drawn",
@@ -74,22 +74,22 @@ PARTS_OF_LAWS = {
 """For each part of a composed law: a file, a text that occurs in it once, its replacement, and the test that
 must then fail."""
 CONTACT = "tisim/effects/contact"
-TWIN = "tests/effects/contact/test_contact.py::test_contact_equals_its_numpy_twin"
+LAWS = "tests/effects/contact/test_contact.py::test_contact_equals_its_numpy_reference"
 SOFT_GRAINS = {
-    "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{TWIN}[contact]"),
-    "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{TWIN}[hertz]"),
+    "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{LAWS}[contact]"),
+    "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{LAWS}[hertz]"),
     "contact_softening": (
-        f"{CONTACT}/softening.py", "ti.max(stiffness", "ti.min(stiffness", f"{TWIN}[softening]",
+        f"{CONTACT}/softening.py", "ti.max(stiffness", "ti.min(stiffness", f"{LAWS}[softening]",
     ),
     "contact_dissipation": (
-        f"{CONTACT}/dissipation.py", "* opening *", "* ti.max(opening, 0.0) *", f"{TWIN}[dissipation]",
+        f"{CONTACT}/dissipation.py", "* opening *", "* ti.max(opening, 0.0) *", f"{LAWS}[dissipation]",
     ),
     "contact_friction": (
         f"{CONTACT}/friction.py", "self.dynamic(w) * pressed", "self.static(w) * pressed",
-        f"{TWIN}[friction]",
+        f"{LAWS}[friction]",
     ),
     "contact_bond": (
-        f"{CONTACT}/bond.py", "if e >= self.threshold(w)", "if e >= 0.9 * self.threshold(w)", f"{TWIN}[bond]",
+        f"{CONTACT}/bond.py", "if e >= self.threshold(w)", "if e >= 0.9 * self.threshold(w)", f"{LAWS}[bond]",
     ),
 }  # fmt: skip
 """Mutations of the laws of Z16."""
@@ -141,7 +141,7 @@ SHARED = {
     ),
     "turned": (
         f"{LAW}/spring.py", "known *= ti.sqrt(size / flat)", "known *= 1.0",
-        "tests/effects/contact/test_turning_springs.py::test_projected_springs_equal_the_twin",
+        "tests/effects/contact/test_turning_springs.py::test_projected_springs_equal_the_reference",
     ),
     "carried": (
         f"{LAW}/spring.py", "remembered.dot(normal) * (normal + tilt)", "remembered.dot(normal) * normal",
@@ -149,7 +149,7 @@ SHARED = {
     ),
     "carried_about_the_normal": (
         f"{LAW}/spring.py", "turn * (normal.cross(known)", "turn * (0.99 * normal.cross(known)",
-        f"{HERTZ_MINDLIN}steps_equal_the_twin",
+        f"{HERTZ_MINDLIN}steps_equal_the_reference",
     ),
     "slipping": (
         f"{LAW}/spring.py", "known = grip - drag", "known = elastic",
@@ -202,18 +202,18 @@ SHARED = {
     ),
     "force_of_a_pair": (
         f"{LAW}/contact.py", "back = (distance - arm) * moment", "back = arm * moment",
-        "tests/effects/contact/test_compositions.py::test_steps_equal_the_twin[jkr]",
+        "tests/effects/contact/test_compositions.py::test_steps_equal_the_reference[jkr]",
     ),
     "force_of_a_wall": (
         f"{LAW}/contact.py", "arm, radius = s.radius[w, i] - 0.5 * overlap", "arm, radius = s.radius[w, i]",
-        "tests/effects/contact/test_compositions.py::test_steps_equal_the_twin[jkr]",
+        "tests/effects/contact/test_compositions.py::test_steps_equal_the_reference[jkr]",
     ),
     "memory_at_surfaces": (
         f"{MOTION}/wall_contacts.py", "STILL_THE_SAME = 0.9", "STILL_THE_SAME = 1.1",
         "tests/effects/contact/test_surfaces.py::test_a_sphere_that_rolls_downhill_over_seams_keeps_its_grip",
     ),
     "arm": (
-        f"{CONTACT}/normal.py", "0.5 * (distance + (a - b)", "0.5 * (distance - (a - b)", f"{TWIN}[friction]",
+        f"{CONTACT}/normal.py", "0.5 * (distance + (a - b)", "0.5 * (distance - (a - b)", f"{LAWS}[friction]",
     ),
 }  # fmt: skip
 """Mutations of code that several laws share."""
@@ -235,7 +235,7 @@ SUMS = {
     ),
     "exports_of_two_sorts_of_laws": (
         "tisim/pairs/listed_pairs.py", "self.exported.read(w, m) + term", "term",
-        "tests/pairs/test_short_ranged.py::test_contacts_within_a_far_cut_off_equal_the_twin",
+        "tests/pairs/test_short_ranged.py::test_contacts_within_a_far_cut_off_equal_the_reference",
     ),
     "shifted_cut_off": (
         f"{MAGNETIC}/dipole_pairs.py", "slope = 12.0 * x", "slope = 11.9 * x",
@@ -265,7 +265,7 @@ SUMS = {
     ),
     "virial": (
         "tisim/forces/loads.py", "= -0.5 * separation[a]", "= 0.5 * separation[a]",
-        "tests/effects/pair/test_virial.py::test_contacts_in_shear_have_the_virial_of_their_twin",
+        "tests/effects/pair/test_virial.py::test_contacts_in_shear_have_the_virial_of_their_reference",
     ),
     "gravity_by_a_tree": (
         "tisim/effects/gravitation/tree_gravity.py", "return s.mass[w, i] * self.sum",

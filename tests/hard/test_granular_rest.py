@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.effects.contact.granular_twin import law_of
+from tests.effects.contact.granular_reference import law_of
 from tests.hard.granular_scenes import ELASTIC, LAWS, grains, kinetic, loaded, lossy, push, stored
 from tests.scenes import by_id, roundoff
 

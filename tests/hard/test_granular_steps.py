@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.effects.contact.grains import AWAY, twin
-from tests.effects.contact.granular_twin import law_of
+from tests.effects.contact.grains import AWAY, reference
+from tests.effects.contact.granular_reference import law_of
 from tests.hard.granular_scenes import ELASTIC, grains, loaded, push
 from tests.scenes import by_id, scene, simulate
 from tests.throwaway import Trap
@@ -137,7 +137,7 @@ def test_motion_grows_beyond_the_limit(name, way):
     assert grows > 0
     for part in (0.98, 1.02):
         made, _ = nearly_at_rest(name, way, part * dt, 1)
-        known = twin(made)
+        known = reference(made)
         first, most = fastest(known.v, known.w), 0.0
         for _ in range(500):
             known.run(1, part * dt)

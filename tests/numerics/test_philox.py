@@ -71,7 +71,7 @@ def numbers(words):
     return uniform, normal
 
 
-def twin(counter, key):
+def reference(counter, key):
     """Reference implementation of Philox4x32-10 with Python integers (Salmon et al. 2011, section 3.3)."""
     c, (a, b) = [int(x) for x in counter], (int(x) for x in key)
     for _ in range(10):
@@ -97,13 +97,13 @@ def test_known_answers_of_random123(counter, key, expected):
     """The known-answer vectors distributed with Random123 (kat_vectors, philox4x32 10)."""
     words = [int(text, 16) for text in expected.split()]
     assert words_of([counter], [key])[0].tolist() == words
-    assert twin(counter, key) == words
+    assert reference(counter, key) == words
 
 
-def test_philox_is_its_twin_in_python_integers(rng):
+def test_philox_is_its_reference_in_python_integers(rng):
     counters = rng.integers(0, 2**32, (500, 4), dtype=np.uint32)
     keys = rng.integers(0, 2**32, (500, 2), dtype=np.uint32)
-    assert words_of(counters, keys).tolist() == [twin(c, k) for c, k in zip(counters, keys, strict=True)]
+    assert words_of(counters, keys).tolist() == [reference(c, k) for c, k in zip(counters, keys, strict=True)]
 
 
 def test_the_counter_contains_every_coordinate_of_a_draw(rng):
@@ -117,7 +117,7 @@ def test_the_counter_contains_every_coordinate_of_a_draw(rng):
     _bits(where, out)
     for (seed, stream, particle, step, draw), words in zip(where.tolist(), out.tolist(), strict=True):
         counter = (step & ONES, (step >> 32) ^ (draw << 16), particle, stream)
-        assert words == twin(counter, (seed & ONES, seed >> 32))
+        assert words == reference(counter, (seed & ONES, seed >> 32))
 
 
 def test_neighbouring_draws_are_independent():

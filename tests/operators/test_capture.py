@@ -62,7 +62,7 @@ def flying(rng, magnets, n=60, **more):
     )
 
 
-def twin(setup):
+def reference(setup):
     """Reference implementation: the magnet that each particle touches first (-1 for none), the time, and the
     final position."""
     solids = [*setup.effects[0].cylinders, *setup.effects[1].spheres]
@@ -78,7 +78,7 @@ def twin(setup):
 
 
 @pytest.mark.long
-def test_against_the_twin(rng):
+def test_against_the_reference(rng):
     """Captured particles, their magnets and times agree, and they lie on the surface, in worlds with
     different numbers of magnets."""
     worlds = [flying(rng, bodies(rng, *numbers)) for numbers in ((1, 0), (3, 2), (0, 6), (8, 5))]
@@ -86,7 +86,7 @@ def test_against_the_twin(rng):
     caught = 0
     for setup, result in zip(worlds, results, strict=True):
         assert result.status.ok, result.status.reason
-        by, at, r = twin(setup)
+        by, at, r = reference(setup)
         np.testing.assert_array_equal(result.state["captured_by"], by)
         np.testing.assert_array_equal(result.state["fixed"], by >= 0)
         np.testing.assert_allclose(result.state["captured_at"], at, rtol=1e-12)

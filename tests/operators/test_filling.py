@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.judged import check_message
-from tests.numerics.test_philox import twin
+from tests.numerics.test_philox import reference
 from tests.scenes import by_id, compiled, fixed, scene
 from tisim import GrainClass, InputError, Material, MeasureSeries, Particles, Recording, Scene, Simulation
 from tisim.backend.taichi import ti
@@ -174,7 +174,7 @@ def uniforms(seed, stream, k):
     """The six random numbers of grain k."""
     numbers = []
     for draw in range(3):
-        a, b, c, d = twin((0, draw << 16, k, stream), (seed, 0))
+        a, b, c, d = reference((0, draw << 16, k, stream), (seed, 0))
         numbers += [((x >> 5) * 2**26 + (y >> 6) + 0.5) / 2**53 for x, y in ((a, b), (c, d))]
     return numbers
 

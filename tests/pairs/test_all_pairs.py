@@ -41,7 +41,7 @@ def usual():
     return simulate([cloud(n, n) for n in NUMBERS], worlds=len(NUMBERS), capacity=CAPACITY, schedule="world")
 
 
-def test_forces_in_every_tile_are_their_numpy_twin(usual):
+def test_forces_in_every_tile_are_their_numpy_reference(usual):
     for result in usual:
         expected = forces(result.state)
         np.testing.assert_allclose(

@@ -125,7 +125,7 @@ def grains(seed=5, n=160, steps=150, grip=300.0, others=(), stepper=None):
     )
 
 
-def twin(start, steps, stiffness, grip, shell=(0.0, 0.0)):
+def reference(start, steps, stiffness, grip, shell=(0.0, 0.0)):
     """Reference implementation in NumPy: all pairs, history in a matrix, velocity Verlet.
 
     shell : stiffness and width of additional shells.
@@ -170,7 +170,7 @@ def twin(start, steps, stiffness, grip, shell=(0.0, 0.0)):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["world", "particle"])
-def test_contacts_with_history_are_their_numpy_twin(schedule, tmp_path):
+def test_contacts_with_history_are_their_numpy_reference(schedule, tmp_path):
     """After many list rebuilds velocity and spin agree, and a restart half-way gives the same bits."""
     setup = grains()
     simulation = compiled(setup, capacity=160, schedule=schedule)
@@ -179,14 +179,14 @@ def test_contacts_with_history_are_their_numpy_twin(schedule, tmp_path):
     checkpoint.save(simulation, tmp_path / "half")
     simulation.run()
     (result,) = simulation.results()
-    v, spin = twin(result.start, 150, 500.0, 300.0)
+    v, spin = reference(result.start, 150, 500.0, 300.0)
     state = by_id(result)
     np.testing.assert_allclose(state["velocity"], v, rtol=0, atol=1e-9)
     np.testing.assert_allclose(state["spin"], spin, rtol=0, atol=1e-8)
     momentum = (state["mass"][:, None] * (state["velocity"] - result.start["velocity"])).sum(axis=0)
     np.testing.assert_allclose(momentum, 0, atol=1e-12 * len(v))
     # The history matters here: without the tangential springs the result differs.
-    assert np.abs(twin(result.start, 150, 500.0, 0.0)[0] - v).max() > 0.1
+    assert np.abs(reference(result.start, 150, 500.0, 0.0)[0] - v).max() > 0.1
     assert np.abs(spin).max() > 1
 
     simulation.load([setup])
@@ -230,19 +230,19 @@ SHELL = {"stiffness": 5.0, "width": 0.25}
 
 
 @pytest.mark.slow
-def test_contacts_within_a_far_cut_off_equal_the_twin(monkeypatch):
+def test_contacts_within_a_far_cut_off_equal_the_reference(monkeypatch):
     """Grains that lose contact within the cut-off of another law lose their history.
 
     Some pairs extend over two chunks.
     """
     result = run_in_chunks(grains(others=(CutOff(**SHELL),), steps=75), 64, monkeypatch)
     state, shell = by_id(result), tuple(SHELL.values())
-    v, spin = twin(result.start, 75, 500.0, 300.0, shell)
+    v, spin = reference(result.start, 75, 500.0, 300.0, shell)
     np.testing.assert_allclose(state["velocity"], v, rtol=0, atol=1e-9)
     np.testing.assert_allclose(state["spin"], spin, rtol=0, atol=1e-8)
     # Both laws act.
-    assert np.abs(twin(result.start, 75, 500.0, 300.0)[0] - v).max() > 0.1
-    assert np.abs(twin(result.start, 75, 500.0, 0.0, shell)[0] - v).max() > 0.1
+    assert np.abs(reference(result.start, 75, 500.0, 300.0)[0] - v).max() > 0.1
+    assert np.abs(reference(result.start, 75, 500.0, 0.0, shell)[0] - v).max() > 0.1
 
 
 @pytest.mark.slow

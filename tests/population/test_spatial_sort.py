@@ -195,7 +195,7 @@ def test_both_schedules_have_the_same_bits(usual):
 
 
 @pytest.mark.slow
-def test_grains_in_shear_equal_the_twin(rng):
+def test_grains_in_shear_equal_the_reference(rng):
     """Face crossings and images of particles in shear follow the repeatedly sorted particles."""
     crowd = sheared.crowd(rng, n=GRAINS, sides=1.5 * sheared.SIDES)
     with pytest.MonkeyPatch.context() as patch:
@@ -203,14 +203,14 @@ def test_grains_in_shear_equal_the_twin(rng):
     (result,) = ends(simulation, [crowd])
     assert (np.diff(simulation.s.read("id")[0]) < 0).any()
     simulation.close()
-    twin = sheared.ShearedGrains(crowd)
-    twin.run(sheared.STEPS, sheared.DT)
-    place, velocity = sheared.inside(crowd.domain, twin.x, twin.v, result.time)
+    reference = sheared.ShearedGrains(crowd)
+    reference.run(sheared.STEPS, sheared.DT)
+    place, velocity = sheared.inside(crowd.domain, reference.x, reference.v, result.time)
     sides = np.subtract(crowd.domain.high, crowd.domain.low)
     off = result.state["position"] - place
     # On a face one image may stand for the other.
     assert np.abs(off - sides * np.round(off / sides)).max() < 1e-10
-    for name, values in {"velocity": velocity, "spin": twin.w}.items():
+    for name, values in {"velocity": velocity, "spin": reference.w}.items():
         scale = np.abs(values).max()
         np.testing.assert_allclose(result.state[name], values, rtol=0, atol=1e-10 * scale, err_msg=name)
 

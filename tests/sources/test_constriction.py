@@ -55,13 +55,13 @@ def test_gradient_is_the_derivative_and_its_trace_is_not_zero_in_the_transitions
     flow = ConstrictionFlow(**SHAPE, transition=0.8)
     _, gradient = sample((flow,), "flow_velocity", points)
 
-    def twin(r):
+    def reference(r):
         along = (r - CENTRE) @ AXIS
         return profile(along, np.linalg.norm(r - CENTRE - along[:, None] * AXIS, axis=1), 0.8)
 
     for axis in range(3):
         step = h * np.eye(3)[axis]
-        difference = (twin(points + step) - twin(points - step)) / (2 * h)
+        difference = (reference(points + step) - reference(points - step)) / (2 * h)
         np.testing.assert_allclose(gradient[..., axis], difference[:, None] * AXIS, atol=1e-5)
     divergence = np.trace(gradient, axis1=1, axis2=2)
     inside = (np.abs(z) > 1.5) & (np.abs(z) < 2.3) & (rho < 1.0)

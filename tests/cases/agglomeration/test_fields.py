@@ -43,7 +43,7 @@ def moment(flux, radius):
     return 4 / 3 * np.pi * radius**3 * brentq(excess, 0.0, min(saturation, 3 * flux / mu_0), xtol=1e-6)
 
 
-def forces_twin(design, state, t):
+def forces_reference(design, state, t):
     """Coulomb and dipole forces of every pair with its nearest image, and the force of the electric field."""
     wave = np.sin(2 * np.pi * t * np.array([design["electric_frequency"], design["magnetic_frequency"]]))
     electric = design["electric_field"] + design["electric_amplitude"] * wave[0]
@@ -62,12 +62,12 @@ def forces_twin(design, state, t):
 
 
 @pytest.mark.long
-def test_the_forces_agree_with_a_numpy_twin():
+def test_the_forces_agree_with_a_numpy_reference():
     setup = scene(DESIGN, 3, GRAINS, duration=1e-12)
     (result,) = simulate([setup.model_copy(update={"stepper": fixed(1e-12)})])
     assert result.work["impacts"] == 0
-    twin = forces_twin(DESIGN, result.state, result.time)
-    assert np.abs(result.state["force"] - twin).max() <= 1e-10 * np.abs(twin).max()
+    reference = forces_reference(DESIGN, result.state, result.time)
+    assert np.abs(result.state["force"] - reference).max() <= 1e-10 * np.abs(reference).max()
 
 
 @pytest.mark.long
@@ -76,10 +76,10 @@ def test_the_fields_oscillate():
     setup = scene({**DESIGN, "relative_velocity": 20.0, "length_ratio": 0.2}, 3, GRAINS, duration=8e-5)
     (result,) = simulate([setup.model_copy(update={"stepper": fixed(2e-5)})])
     assert (result.work["steps"], result.work["impacts"]) == (4, 0)
-    twin = forces_twin(DESIGN, result.state, result.time)
-    still = forces_twin(DESIGN, result.state, 0.0)
-    assert np.abs(result.state["force"] - twin).max() <= 1e-9 * np.abs(twin).max()
-    assert np.abs(still - twin).max() > 1e-2 * np.abs(twin).max()
+    reference = forces_reference(DESIGN, result.state, result.time)
+    still = forces_reference(DESIGN, result.state, 0.0)
+    assert np.abs(result.state["force"] - reference).max() <= 1e-9 * np.abs(reference).max()
+    assert np.abs(still - reference).max() > 1e-2 * np.abs(reference).max()
 
 
 def test_grains_are_of_two_classes_that_differ_in_charge_alone():

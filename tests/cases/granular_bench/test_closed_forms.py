@@ -36,8 +36,8 @@ def test_an_impact_in_numpy_slides_or_sticks_as_rigid_spheres_do():
     """A sliding impact loses mu (1 + e) v, energy never grows, and equal spheres collide as with a plane."""
     slides = ParticleImpact("glass", 0.01, 0.01, friction=0.1, sideways=0.1)
     sticks = ParticleImpact("glass", 0.01, 0.01, friction=5.0, sideways=0.005)
-    twins = ParticleImpact("glass", 0.01, 0.005, friction=5.0, spin=0.5, partner="twin")
-    velocity, spin = oblique_impacts([slides, sticks, twins], 2000)
+    pairs = ParticleImpact("glass", 0.01, 0.005, friction=5.0, spin=0.5, partner="equal")
+    velocity, spin = oblique_impacts([slides, sticks, pairs], 2000)
     assert velocity[0] == pytest.approx(0.1 - 2 * 0.1 * 0.01, rel=1e-6)
     assert spin[0] == pytest.approx(2.5 * 2 * 0.1 * 0.01 / 0.01, rel=1e-3)
     assert abs(velocity[1] - 0.01 * spin[1]) < 0.005

@@ -51,7 +51,7 @@ def clumps(shape, place, effects=(), dt=1e-5, steps=1, **more):
     )
 
 
-def twin(scene, stiffness, times, acceleration=0.0):
+def reference(scene, stiffness, times, acceleration=0.0):
     """One clump on springs from its members to their initial positions, in NumPy: position, velocity,
     quaternion and angular momentum at some times."""
     start = scene.start()
@@ -90,7 +90,7 @@ def turned_apart(q, p):
 
 def test_a_free_top_turns_to_second_order_and_keeps_its_momentum():
     errors, energies, time = [], [], 0.02
-    (expected,) = twin(spun(1e-4, 200), 0.0, [time])
+    (expected,) = reference(spun(1e-4, 200), 0.0, [time])
     for steps in (100, 200, 400):
         made = spun(time / steps, steps)
         (result,) = simulate([made], worlds=TOPS, capacity=4)
@@ -132,7 +132,7 @@ def test_a_top_spun_about_its_intermediate_axis_flips():
     assert max(along) > 0.99
     assert np.ptp(energy) < 2e-5 * np.mean(energy)
     times = np.linspace(0, 0.4, 101)[1:]
-    expected = twin(made, 0.0, times)
+    expected = reference(made, 0.0, times)
     turns = Turn.from_quat(np.roll(expected[:, 6:10], -1, axis=1)).inv().apply(expected[:, 10:])
     np.testing.assert_allclose(along, turns[:, 1] / PEAR.body.moments[1] / 500, atol=0.02)
 
@@ -179,11 +179,11 @@ def test_the_energy_of_a_free_top_is_bounded_as_documented(rng, capsys):
 
 
 @pytest.mark.long
-def test_a_clump_on_springs_equals_its_numpy_twin():
+def test_a_clump_on_springs_equals_its_numpy_reference():
     """Forces on the members give the force and torque on the body: convergence is second order."""
     stiffness, time, errors = 0.2, 0.02, []
     springs = (Tether(stiffness=(stiffness,) * 3), Gravity(acceleration=(0, 3, -9.81)))
-    (expected,) = twin(spun(1e-4, 1), stiffness, [time], np.array([0, 3, -9.81]))
+    (expected,) = reference(spun(1e-4, 1), stiffness, [time], np.array([0, 3, -9.81]))
     for steps in (1000, 2000):
         (result,) = simulate([spun(time / steps, steps, effects=springs)], capacity=4)
         body = clump_bodies(result.state)

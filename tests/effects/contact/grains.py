@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.effects.contact.granular_twin import Grains, law_of
+from tests.effects.contact.granular_reference import Grains, law_of
 from tests.scenes import scene, simulate
 from tisim import Material
 from tisim.effects import Granular, Gravity, HertzMaterial, MindlinForce, RestitutionDamping, Walls
@@ -65,7 +65,7 @@ def heap(rng, n=40, side=1.6, dt=2e-4, steps=300, **law):
     )
 
 
-def twin(made):
+def reference(made):
     """The same grains in NumPy, at their start."""
     start = made.start()
     planes = [plane for one in made.effects if isinstance(one, Walls) for plane in one.planes]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.effects.contact.grains import HERTZ_MINDLIN
-from tests.effects.contact.granular_twin import Grains, law_of
+from tests.effects.contact.granular_reference import Grains, law_of
 from tests.scenes import scene
 from tisim import Material, ShearedBox
 

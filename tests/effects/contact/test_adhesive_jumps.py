@@ -4,7 +4,7 @@ meet."""
 import numpy as np
 import pytest
 
-from tests.effects.contact.granular_twin import spread
+from tests.effects.contact.granular_reference import spread
 from tests.scenes import fixed, scene, simulate
 from tisim import Material
 from tisim.effects import DMT, JKR, Granular

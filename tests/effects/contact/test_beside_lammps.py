@@ -38,8 +38,8 @@ def test_common_laws_are_equal(name):
     at, law = bench.start(), bench.LAWS[name]
     theirs = replace(law, levers="radius")
     for steps in (1, 100):
-        ours, twin = (by(at, law, False, steps) for by in (bench.by_package, bench.by_numpy))
-        assert max(bench.apart(ours, twin).values()) < ROUNDING
+        ours, reference = (by(at, law, False, steps) for by in (bench.by_package, bench.by_numpy))
+        assert max(bench.apart(ours, reference).values()) < ROUNDING
         there = bench.by_lammps(at, law, False, steps)
         assert max(bench.apart(bench.by_numpy(at, theirs, False, steps), there).values()) < ROUNDING
 
@@ -59,8 +59,8 @@ def test_numpy_with_lammps_options_equals_lammps(walls, steps):
 
 def test_without_lammps_options_numpy_equals_the_package():
     at = bench.start()
-    ours, twin = (by(at, bench.LAW, True, 100) for by in (bench.by_package, bench.by_numpy))
-    assert max(bench.apart(ours, twin).values()) < ROUNDING
+    ours, reference = (by(at, bench.LAW, True, 100) for by in (bench.by_package, bench.by_numpy))
+    assert max(bench.apart(ours, reference).values()) < ROUNDING
 
 
 def test_the_package_equals_lammps_if_levers_do_not_matter():
@@ -74,8 +74,8 @@ def test_in_a_sheared_box_the_package_is_numpy_and_numpy_is_lammps():
     """With the lever arms of LAMMPS, and with images that lag a step behind as in LAMMPS, NumPy equals
     LAMMPS."""
     made, steps = sheared_lammps.scene(), 300
-    ours, twin = (by(made, steps) for by in (bench.end_of, sheared_lammps.by_numpy))
-    assert max(sheared_lammps.apart(ours, twin).values()) < ROUNDING
+    ours, reference = (by(made, steps) for by in (bench.end_of, sheared_lammps.by_numpy))
+    assert max(sheared_lammps.apart(ours, reference).values()) < ROUNDING
     theirs = sheared_lammps.by_numpy(made, steps, "radius", sheared_lammps.STEP)
     assert max(sheared_lammps.apart(theirs, sheared_lammps.by_lammps(made, steps)).values()) < ROUNDING
 
@@ -84,10 +84,10 @@ def test_the_levers_cause_the_difference():
     """With the package's lever arm, NumPy differs from LAMMPS exactly as the package does."""
     at = bench.start()
     there = bench.by_lammps(at, bench.LAW, False, 1)
-    ours, twin = (
+    ours, reference = (
         bench.apart(by(at, bench.LAW, False, 1), there) for by in (bench.by_package, bench.by_numpy)
     )
-    assert ours["torque"] == pytest.approx(twin["torque"], rel=1e-6)
+    assert ours["torque"] == pytest.approx(reference["torque"], rel=1e-6)
     assert 0.05 < ours["torque"] < 0.5
 
 

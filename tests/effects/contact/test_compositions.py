@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.effects.contact.compositions import LAWS, TWO, grains, heap
-from tests.effects.contact.grains import run, twin
+from tests.effects.contact.grains import reference, run
 from tests.effects.contact.test_granular_impacts import couple_energies
 from tests.scenes import by_id
 
@@ -20,13 +20,13 @@ EACH = [name if name == "jkr" else pytest.param(name, marks=pytest.mark.slow) fo
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_steps_equal_the_twin(name, rng):
+def test_steps_equal_the_reference(name, rng):
     """Every part of a law acts, stores history, sticks and slides; pairs of materials follow their rules, or
     a table."""
     made = [heap(name, rng), heap(name, rng, pairs=True)]
     for steps in (1, 100):
         for one, result in zip(made, run(made, steps=steps), strict=True):
-            known, state = twin(one), by_id(result)
+            known, state = reference(one), by_id(result)
             known.run(steps, 1e-4)
             for field, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
                 np.testing.assert_allclose(

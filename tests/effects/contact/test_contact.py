@@ -44,7 +44,7 @@ def heap(rng, kinds):
     )
 
 
-class Twin:
+class Reference:
     """All pairs [i, j] of a state at once, as printed in Z16; forces on i by j."""
 
     def __init__(self, setup, state):
@@ -132,14 +132,14 @@ COMBINATIONS = {
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name == "all" else pytest.mark.slow) for name in COMBINATIONS]
 )
-def test_contact_equals_its_numpy_twin(name, rng):
+def test_contact_equals_its_numpy_reference(name, rng):
     """Random heaps, all worlds of one batch; forces and torques; momentum and angular momentum."""
     kinds = COMBINATIONS[name]
     scenes = [heap(rng, kinds) for _ in range(WORLDS)]
     counts = dict.fromkeys(("touch", "apart", "slips", "sticks", "bonded", "softest", "stiffer"), 0)
     for one, state in zip(scenes, loads(scenes, dt=DT), strict=True):
-        twin = Twin(one, state)
-        force, torque = twin.loads()
+        reference = Reference(one, state)
+        force, torque = reference.loads()
         close(state["force"], force)
         turning = ContactFriction in kinds or ContactBond in kinds
         assert ("torque" in state) == turning
@@ -147,7 +147,7 @@ def test_contact_equals_its_numpy_twin(name, rng):
             close(state["torque"], torque)
             assert np.abs(torque).max() > 1e-3 * np.abs(force).max()
         balanced(state)
-        counts = {key: count + np.sum(getattr(twin, key, 0)) for key, count in counts.items()}
+        counts = {key: count + np.sum(getattr(reference, key, 0)) for key, count in counts.items()}
     # The states cover many examples of every branch of the laws.
     assert min(counts["touch"], counts["apart"]) > 100
     if ContactSoftening in kinds:

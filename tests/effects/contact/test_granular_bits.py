@@ -9,7 +9,7 @@ import pytest
 
 from tests.compare import same_arrays
 from tests.device.launches import assert_launches
-from tests.effects.contact.grains import heap, twin
+from tests.effects.contact.grains import heap, reference
 from tests.scenes import by_id
 from tisim import RunError, Simulation
 from tisim.backend import memory, runtime
@@ -134,7 +134,7 @@ def test_removing_a_grain_keeps_the_history_of_others(simulation):
     """In NumPy, a row and a column are deleted; here indices change and lists are rebuilt."""
     made = [bed(5, after=(60 - 0.5) * DT, which=which) for which in (0, 77, 149)]
     for which, one, found in zip((0, 77, 149), made, ends(simulation, made), strict=True):
-        known = twin(one)
+        known = reference(one)
         known.run(60, DT)
         assert (known.past[which] != 0).any() or (known.past[:, which] != 0).any()
         known.remove(which)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.effects.contact.grains import CAPACITY, USUAL, WORLDS, grains, heap, run, twin
+from tests.effects.contact.grains import CAPACITY, USUAL, WORLDS, grains, heap, reference, run
 from tests.scenes import by_id, compiled
 from tisim import Material
 from tisim.backend.taichi import ti
@@ -57,12 +57,12 @@ def along(normal, overlap, moved, **law):
 
 
 @pytest.mark.long
-def test_steps_equal_the_twin(rng):
+def test_steps_equal_the_reference(rng):
     """Unlike grains that overlap, spin and slide, in a cell; many stick, many slide."""
     made = [heap(rng, friction=0.1 + 0.2 * k, restitution=0.3 + 0.2 * k) for k in range(4)]
     for steps in (1, 300):
         for one, result in zip(made, run(made, steps=steps), strict=True):
-            known, state = twin(one), by_id(result)
+            known, state = reference(one), by_id(result)
             known.run(steps, 2e-4)
             for name, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
                 np.testing.assert_allclose(state[name], values, rtol=0, atol=1e-11 * np.abs(values).max())
@@ -134,7 +134,7 @@ def test_the_history_is_stored_on_the_smaller_grain(rng):
     made = grains(place, 0.01 * rng.normal(size=place.shape), rng.normal(size=place.shape),
                   law={"young": 1e5}, radius=radius, mass=30 * radius**3, dt=1e-4, steps=20)  # fmt: skip
     (result,) = run([made])
-    known, state = twin(made), by_id(result)
+    known, state = reference(made), by_id(result)
     known.run(20, 1e-4)
     for name, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
         np.testing.assert_allclose(state[name], values, rtol=0, atol=1e-11 * np.abs(values).max())

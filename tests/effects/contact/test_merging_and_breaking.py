@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.effects.contact.grains import heap, twin
+from tests.effects.contact.grains import heap, reference
 from tests.scenes import by_id, simulate
 from tisim.backend.taichi import ti
 from tisim.effects import parameter
@@ -75,7 +75,7 @@ def test_other_grains_are_not_affected(which):
     made = bed(5, taken=taken, taker=taker, broken=broken)
     (result,) = simulate([made], capacity=GRAINS + 4)
     assert result.status.ok, result.status.reason
-    found, known = by_id(result), twin(made)
+    found, known = by_id(result), reference(made)
     known.run(BEFORE, DT)
     slid = np.abs(known.past).reshape(GRAINS, GRAINS, -1).max(axis=2)
     assert (np.delete(np.delete(slid, which, axis=0), which, axis=1) > 0).sum() > 50

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation as Turn
 
-from tests.effects.contact.grains import heap, twin
-from tests.effects.contact.granular_twin import carrying
+from tests.effects.contact.grains import heap, reference
+from tests.effects.contact.granular_reference import carrying
 from tests.effects.contact.loads import close
 from tests.scenes import by_id, compiled, scene
 from tisim import Clump, Material, Particles, Scene
@@ -273,12 +273,12 @@ def test_rotating_a_spring_keeps_its_length():
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
 
 
-def test_projected_springs_equal_the_twin(rng):
+def test_projected_springs_equal_the_reference(rng):
     """Grains that stick, slide and spin in a cell."""
     made = heap(rng)
     law, *others = made.effects
     made = made.model_copy(update={"effects": (law.model_copy(update={"frame": "projected"}), *others)})
-    known = twin(made)
+    known = reference(made)
     known.run(200, 2e-4)
     assert min(known.sliding, known.sticking) > 500
     simulation = compiled(made, 1, 64)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.effects.contact.grains import WORLDS
-from tests.effects.contact.granular_twin import Grains, law_of
+from tests.effects.contact.granular_reference import Grains, law_of
 from tests.effects.contact.loads import close
 from tests.scenes import by_id, compiled, scene
 from tisim import Material
@@ -97,7 +97,7 @@ class WetGrains(Grains):
         self.force -= pull[:, None] * normal
 
 
-def twin(made, rate=RATE, tension=0.0):
+def reference(made, rate=RATE, tension=0.0):
     start = made.start()
     columns = (start[name] for name in ("position", "velocity", "spin", "radius", "mass"))
     WetGrains.tension = tension
@@ -122,11 +122,11 @@ def thrown():
     return [on_table(place, velocity, spin, liquid=tension, **more) for tension in (0.0, 5.0)]
 
 
-def test_a_turning_table_with_liquid_equals_the_twin(thrown):
+def test_a_turning_table_with_liquid_equals_the_reference(thrown):
     """Slip, rolling and twisting depend on the spin relative to the table."""
     states = ended(thrown)
     for made, state, tension in zip(thrown, states, (0.0, 5.0), strict=True):
-        grains = twin(made, tension=tension)
+        grains = reference(made, tension=tension)
         grains.run(1000, 1e-4)
         assert grains.sliding > 50 < grains.sticking
         for name, values in (("position", grains.x), ("velocity", grains.v), ("spin", grains.w)):

@@ -26,7 +26,7 @@ class Shear(Source):
         return self.mean(w) + self.rate(w) * r.yzx
 
     @staticmethod
-    def twin(source, r):
+    def reference(source, r):
         return np.array(source.mean) + np.array(source.rate) * r[:, [1, 2, 0]]
 
 
@@ -47,7 +47,7 @@ def schiller_naumann_coefficient(re):
 COEFFICIENTS = {ChowDrag: chow_coefficient, SchillerNaumannDrag: schiller_naumann_coefficient}
 
 
-def drag_twin(law, state, flow=0.0):
+def drag_reference(law, state, flow=0.0):
     u = flow - state["velocity"]
     speed, radius = np.linalg.norm(u, axis=1), state["radius"]
     if isinstance(law, StokesDrag):
@@ -86,7 +86,7 @@ def test_drag_in_a_fluid_at_rest(kind, rng):
     else:
         scenes = [cloud(rng, (drags(rng, kind),)) for _ in range(WORLDS)]
     for one, state in zip(scenes, loads(scenes), strict=True):
-        expected = drag_twin(one.effects[0], state)
+        expected = drag_reference(one.effects[0], state)
         np.testing.assert_allclose(state["force"], expected, rtol=1e-12)
         assert ((state["force"] * state["velocity"]).sum(axis=1) < 0).all()
 
@@ -109,7 +109,7 @@ def test_drag_in_a_flow(kind, rng):
     for one, state in zip(scenes, loads(scenes), strict=True):
         flow, law = one.effects
         np.testing.assert_allclose(
-            state["force"], drag_twin(law, state, Shear.twin(flow, state["position"])), rtol=1e-12
+            state["force"], drag_reference(law, state, Shear.reference(flow, state["position"])), rtol=1e-12
         )
 
 
@@ -118,7 +118,7 @@ def test_chow_meets_stokes_at_small_reynolds_numbers(rng):
     (state,) = loads([setup])
     slow = REYNOLDS <= 1
     assert slow.sum() == 2
-    stokes = drag_twin(StokesDrag(viscosity=1.8e-5), state)
+    stokes = drag_reference(StokesDrag(viscosity=1.8e-5), state)
     np.testing.assert_allclose(state["force"][slow], stokes[slow], rtol=1e-12)
 
 

@@ -16,7 +16,7 @@ CAPACITY = 64
 """Capacity of all scenes, so that each law is compiled once."""
 
 
-def twin(law, state):
+def reference(law, state):
     """F_i = G sum_j m_i m_j d / (d^2 + eps^2)^(3/2) n_ij."""
     n, d = pairs(state)
     soft = getattr(law, "softening_length", 0.0)
@@ -25,12 +25,12 @@ def twin(law, state):
 
 
 @pytest.mark.parametrize("kind", [SelfGravity, pytest.param(SoftenedSelfGravity, marks=pytest.mark.slow)])
-def test_forces_equal_the_twin_and_sum_to_zero(kind, rng):
+def test_forces_equal_the_reference_and_sum_to_zero(kind, rng):
     """Forces and torques sum to zero; and sum r.F is the energy (Clausius's virial)."""
     options = [{"softening_length": float(rng.uniform(0.1, 1))} for _ in range(WORLDS)]
     scenes = [random_cloud(rng, (kind(**one if kind is SoftenedSelfGravity else {}),)) for one in options]
     for one, state in zip(scenes, loads(scenes, capacity=CAPACITY), strict=True):
-        close(state["force"], twin(one.effects[0], state))
+        close(state["force"], reference(one.effects[0], state))
         balanced(state)
         if kind is SelfGravity:
             virial = (state["position"] * state["force"]).sum()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.effects.impact.impact_twin import COMBINATIONS, DT, PAIRS, as_scene, draw, twin
+from tests.effects.impact.impact_reference import COMBINATIONS, DT, PAIRS, as_scene, draw, reference
 from tests.scenes import energy, momentum, simulate
 from tisim.effects import DeformationWork, Friction, Heating, Reaction
 
@@ -26,11 +26,11 @@ def impacts(request):
 
 
 @pytest.mark.long
-def test_impact_equals_its_twin(impacts):
+def test_impact_equals_its_reference(impacts):
     kinds, pairs, results = impacts
     bond_outcomes = set()
     for pair, result in zip(pairs, results, strict=True):
-        expected = twin(pair, kinds)
+        expected = reference(pair, kinds)
         speed = np.abs(pair["velocity"][0] - pair["velocity"][1]).max()
         np.testing.assert_allclose(
             result.state["velocity"], expected["velocity"], rtol=1e-12, atol=1e-10 * speed

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.effects.impact.impact_twin import COMBINATIONS, PAIRS, draw, effects
+from tests.effects.impact.impact_reference import COMBINATIONS, PAIRS, draw, effects
 from tests.scenes import head_on, scene, simulate
 from tisim.effects import Impact
 

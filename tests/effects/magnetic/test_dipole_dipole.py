@@ -57,7 +57,7 @@ def energy(r, m):
     return -0.5 * (m * field).sum()
 
 
-def test_forces_equal_the_twin_and_sum_to_zero(rng):
+def test_forces_equal_the_reference_and_sum_to_zero(rng):
     """Nearest images in a periodic box."""
     scenes = [magnets(rng, DipoleDipole()) for _ in range(WORLDS)]
     states = loads(scenes)

@@ -31,7 +31,7 @@ def potential(law, d, sigma):
     return n / (n - m) * (n / m) ** (m / (n - m)) * law.epsilon * ((sigma / d) ** n - (sigma / d) ** m)
 
 
-def twin(law, state):
+def reference(law, state):
     """The derivative of the potential, by a central difference of fourth order, within the cut-off."""
     n, d = pairs(state)
     sigma, h = state["radius"][:, None] + state["radius"], 1e-4 * d
@@ -44,7 +44,7 @@ def twin(law, state):
 def check(scenes):
     for one, state in zip(scenes, loads(scenes), strict=True):
         law, force = one.effects[0], state["force"]
-        expected = twin(law, state)
+        expected = reference(law, state)
         assert np.abs(expected).max() > 0
         close(force, expected, 1e-8)
         balanced(state)
@@ -67,7 +67,7 @@ def test_over_the_pair_list(rng):
     """With enough particles for the pair list to be used."""
     many = crowd(rng, Mie(epsilon=1.0, cutoff=1.8), n=400)
     (state,) = loads([many], capacity=400)
-    close(state["force"], twin(many.effects[0], state), 1e-8)
+    close(state["force"], reference(many.effects[0], state), 1e-8)
     balanced(state)
 
 

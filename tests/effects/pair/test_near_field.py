@@ -30,7 +30,7 @@ def cloud(rng, effect, n=12, **more):
     )
 
 
-def twin(law, state):
+def reference(law, state):
     """Z16 (7.23) and the text after it."""
     radius = state["radius"]
     own = {
@@ -51,7 +51,7 @@ def twin(law, state):
 
 def check(scenes):
     for one, state in zip(scenes, loads(scenes), strict=True):
-        expected = twin(one.effects[0], state)
+        expected = reference(one.effects[0], state)
         assert np.abs(expected).max() > 0
         close(state["force"], expected)
         balanced(state)
@@ -103,8 +103,8 @@ def test_near_pairs_only(rng):
     check(scenes)
     many = cloud(rng, TruncatedNearField(alpha1=1.0, alpha2=0.5, cutoff=0.15, beta2=3), n=400)
     (state,) = loads([many], capacity=400)
-    expected = twin(many.effects[0], state)
-    assert np.abs(expected - twin(NearField(alpha1=1.0, alpha2=0.5, beta2=3), state)).max() > 1
+    expected = reference(many.effects[0], state)
+    assert np.abs(expected - reference(NearField(alpha1=1.0, alpha2=0.5, beta2=3), state)).max() > 1
     close(state["force"], expected)
 
 

@@ -84,14 +84,14 @@ def run(*scenes):
 
 
 @pytest.mark.slow
-def test_contacts_in_shear_have_the_virial_of_their_twin(rng):
+def test_contacts_in_shear_have_the_virial_of_their_reference(rng):
     """Forces with history, between images that slide past each other."""
     made = crowd(rng)
     made = made.model_copy(update={"effects": (*made.effects, Virial())})
     (result,) = run(made)
-    twin = ShearedGrains(made)
-    twin.run(STEPS, DT)
-    close(by_id(result)["virial"].sum(axis=0).reshape(3, 3), twin.virial, 1e-11)
+    reference = ShearedGrains(made)
+    reference.run(STEPS, DT)
+    close(by_id(result)["virial"].sum(axis=0).reshape(3, 3), reference.virial, 1e-11)
 
 
 @pytest.mark.parametrize(

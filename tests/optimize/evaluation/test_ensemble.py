@@ -21,7 +21,7 @@ def ensemble(tmp_path, evaluator, problem=None, seed=4, **settings):
     return Ensemble(problem or fake_problem(2), evaluator, cache, EnsembleSettings(**settings), seed)
 
 
-def twin(values, tolerance, min_starts):
+def reference(values, tolerance, min_starts):
     """Z04 Eq. (8.1), written out literally."""
     for e in range(1, len(values)):
         now, before = np.mean(values[: e + 1]), np.mean(values[:e])
@@ -30,14 +30,14 @@ def twin(values, tolerance, min_starts):
     return None
 
 
-def test_the_ensemble_converges_like_its_twin():
+def test_the_ensemble_converges_like_its_reference():
     rng = np.random.default_rng(0)
     counts = set()
     for _ in range(500):
         values = rng.normal(1.0, rng.uniform(0.001, 0.3), 40)
         tolerance, least = rng.choice([5e-4, 5e-3, 0.05]), int(rng.integers(1, 8))
         means = np.cumsum(values) / np.arange(1, 41)
-        assert converged_after(means, tolerance, least) == twin(values, tolerance, least)
+        assert converged_after(means, tolerance, least) == reference(values, tolerance, least)
         counts.add(converged_after(means, tolerance, least))
     assert len(counts) > 10
     assert converged_after([0.0, 0.0], 1e-3, 2) == 2
@@ -52,7 +52,7 @@ def test_the_estimate_is_the_mean_up_to_convergence_for_any_block_size(tmp_path,
     )
     for design, (estimate,) in zip(DESIGNS, result, strict=True):
         values = [evaluator.function(design, start_seed(4, k)) for k in range(60)]
-        n = twin(values, 2e-3, 3)
+        n = reference(values, 2e-3, 3)
         assert (estimate.starts, estimate.converged) == (n, True)
         assert estimate.mean == pytest.approx(np.mean(values[:n]), rel=1e-14)
         assert estimate.std == pytest.approx(np.std(values[:n], ddof=1), rel=1e-12)

@@ -352,13 +352,13 @@ def test_nsga2_equals_the_genetic_method_without_a_surrogate():
     kind = find("nsga2")
     costs = {1: lambda x: x, 2: lambda x: np.append(x, 1 - x)}
     for objectives, population in ((1, 20), (2, 40)):
-        twins = (
+        references = (
             kind(Genome((Gene("x", "", 0.0, 1.0),)), objectives, kind.Options(), 5),
             method(objectives, Genome((Gene("x", "", 0.0, 1.0),)), 5, surrogate=False),
         )
         for _ in range(3):
-            asked = [one.ask() for one in twins]
+            asked = [one.ask() for one in references]
             assert asked[0] == asked[1]
             assert len(asked[0]) == population
-            for one, individuals in zip(twins, asked, strict=True):
+            for one, individuals in zip(references, asked, strict=True):
                 one.tell(told(individuals, costs[objectives]), [])

@@ -55,12 +55,12 @@ def test_methods_are_found_in_their_package():
 
 @pytest.mark.parametrize("name", METHODS)
 def test_asks_within_the_unit_cube_and_by_its_seed_alone(name):
-    twins = [method_named(name), method_named(name), method_named(name, seed=4)]
+    references = [method_named(name), method_named(name), method_named(name, seed=4)]
     for _ in range(4 if name in SURROGATE else 12):
-        populations = [method.ask() for method in twins]
+        populations = [method.ask() for method in references]
         assert [list(one) for one in populations[0]] == [list(one) for one in populations[1]]
         assert [list(one) for one in populations[0]] != [list(one) for one in populations[2]]
-        for individuals, method in zip(populations, twins, strict=True):
+        for individuals, method in zip(populations, references, strict=True):
             assert all(isinstance(individual, Individual) for individual in individuals)
             assert np.all((np.array(individuals) >= 0) & (np.array(individuals) <= 1))
             assert 0 < method.width <= 1

@@ -32,7 +32,7 @@ def ensemble(function=noisy, problem=None, budget=None, **settings):
     return made
 
 
-def twin(first, second):
+def reference(first, second):
     """The paired t test of SciPy: whether the first is significantly lower, two-sided 95 %."""
     test = stats.ttest_rel(second, first)
     return test.statistic > 0 and test.pvalue < 0.05
@@ -59,7 +59,7 @@ def test_losers_of_the_paired_test_are_out():
     racing, used = list(costs), dict.fromkeys(costs, 4)
     while True:
         samples = {x: costs[x][: used[x]] for x in racing}
-        racing = [x for x in samples if not any(twin(samples[y], samples[x]) for y in samples if y != x)]
+        racing = [x for x in samples if not any(reference(samples[y], samples[x]) for y in samples if y != x)]
         if len(racing) < 2 or used[racing[0]] == 60:
             break
         for x in racing:

@@ -28,7 +28,7 @@ def matern(a, b):
     return PARAMETERS.signal * (1 + 5**0.5 * r + 5 * r**2 / 3) * np.exp(-(5**0.5) * r)
 
 
-def test_predictions_equal_a_dense_twin():
+def test_predictions_equal_a_dense_reference():
     process = GaussianProcess(POINTS, VALUES, NOISE, PARAMETERS)
     new = RNG.random((4, 3))
     z = (VALUES - VALUES.mean()) / VALUES.std()

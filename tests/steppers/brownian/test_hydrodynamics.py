@@ -15,7 +15,7 @@ from tests.steppers.brownian.colloids import (
     Stop,
     colloids,
 )
-from tests.steppers.brownian.mobility_twin import expansion, matrix, oseen, rotne_prager
+from tests.steppers.brownian.mobility_reference import expansion, matrix, oseen, rotne_prager
 from tisim import Box, InputError, Simulation
 from tisim.accuracy.quantity import reference_runs, usual
 from tisim.accuracy.sweep import methods

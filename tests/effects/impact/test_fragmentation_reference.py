@@ -17,7 +17,7 @@ DT, STEPS, WORLDS = 1e-6, 200, 6
 HARDNESS, GAMMA, THRESHOLD = 6e6, 2.0, 0.7
 
 
-class Twin:
+class Reference:
     """Grains as arrays: positions r, velocities v, masses m, radii b, temperatures T, energy of new
     surface."""
 
@@ -120,7 +120,7 @@ def swarm(rng):
 
 
 @pytest.mark.long
-def test_every_step_has_the_same_pieces_as_the_twin(rng):
+def test_every_step_has_the_same_pieces_as_the_reference(rng):
     """Numbers, positions, velocities, masses, heat and energy of new surface; differences are 2e-14
     (measured)."""
     if runtime.current().precision != "f64":
@@ -128,20 +128,20 @@ def test_every_step_has_the_same_pieces_as_the_twin(rng):
     scenes = [swarm(rng) for _ in range(WORLDS)]
     simulation = compiled(scenes[0], WORLDS, capacity=128)
     simulation.load(scenes)
-    twins = [Twin(result.start) for result in simulation.results()]
+    references = [Reference(result.start) for result in simulation.results()]
     for step in range(STEPS):
         simulation.run(steps=1)
-        for w, (twin, result) in enumerate(zip(twins, simulation.results(), strict=True)):
-            twin.step()
+        for w, (reference, result) in enumerate(zip(references, simulation.results(), strict=True)):
+            reference.step()
             where = f"world {w}, step {step}"
-            assert result.work["fractures"] == twin.fractures, where
-            assert len(result.state["mass"]) == len(twin.m), where
-            for name, values in twin.state().items():
+            assert result.work["fractures"] == reference.fractures, where
+            assert len(result.state["mass"]) == len(reference.m), where
+            for name, values in reference.state().items():
                 bound = 1e-11 * np.abs(values).max()
                 np.testing.assert_allclose(
                     result.state[name], values, rtol=0, atol=bound, err_msg=f"{name} in {where}"
                 )
-    assert sum(twin.fractures for twin in twins) > 80
-    assert min(len(twin.m) for twin in twins) > 4 * 14
+    assert sum(reference.fractures for reference in references) > 80
+    assert min(len(reference.m) for reference in references) > 4 * 14
     for result in simulation.results():
         check_sums(result)

@@ -16,7 +16,7 @@ SERIES = ("stiffness", "rolling_stiffness", "twisting_stiffness")
 
 
 @dataclass
-class TwinLaw:
+class ReferenceLaw:
     """A contact law: the names of its parts, its materials, and values given for pairs of materials.
 
     levers : with "contact", spins move the surfaces at R - delta / 2 from the centres, where forces act.
@@ -315,13 +315,13 @@ def law_of(scene, levers="contact"):
         for name in ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
     }
     materials = tuple(material.model_dump(exclude_none=True) for material in scene.materials.values())
-    return TwinLaw(materials, given, **kinds, options=options, levers=levers, frame=law.frame)
+    return ReferenceLaw(materials, given, **kinds, options=options, levers=levers, frame=law.frame)
 
 
 def hertz_mindlin(young, poisson, restitution, friction, levers="contact"):
     """The law of Hertz and Mindlin between grains of one material; young in Pa."""
     material = {"young": young, "poisson": poisson, "restitution": restitution, "friction": friction}
-    return TwinLaw((material,), levers=levers)
+    return ReferenceLaw((material,), levers=levers)
 
 
 class Grains:

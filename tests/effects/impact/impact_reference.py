@@ -82,7 +82,7 @@ def as_scene(pair, kinds):
     )
 
 
-def twin(pair, kinds):
+def reference(pair, kinds):
     """The impact by Z04's equations in e itself; the coupled e-T problem is solved by bracketing, not by
     iteration."""
     m, b, v, t = pair["mass"], pair["radius"], pair["velocity"], pair["temperature"]
