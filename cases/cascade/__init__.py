@@ -1,12 +1,12 @@
 """Capture by successive fibres: the cascade of B16 section 6.4.5."""
 
 from tisim.cases.capture import CASE as CAPTURE
-from tisim.cases.cascade.scene import SIZES, scene_for
+from tisim.cases.cascade.scene import SIZES, TITLE, scene_for
 from tisim.cases.case import Case, Late
 
 CASE = Case(
     name="cascade",
-    title="Magnetic colloids captured by successive fibres (B16)",
+    title=TITLE,
     source="R. J. Baars, thesis, Utrecht University (2016), section 6.4.5",
     sizes=SIZES,
     scene=scene_for,
@@ -14,5 +14,7 @@ CASE = Case(
     # A stage is a run of capture.
     quantities=CAPTURE.quantities,
     pictures=CAPTURE.pictures,
+    problem=Late("tisim.cases.cascade.problem", "problem"),
+    variants=("soonest",),
     figures=Late("tisim.cases.cascade.figures", "figures"),
 )

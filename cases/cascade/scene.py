@@ -23,11 +23,14 @@ from tisim.cases.case import Size, size_named
 from tisim.sources import MagneticCylinders
 
 Orientation = Literal["optimal", "directions", "angles"]
+TITLE = "Magnetic colloids captured by successive fibres (B16)"
 STAGE = {25: 10.0, 125: 0.5}
 """The time of a stage, Delta t_run, s, by radius in nm (B16 section 6.4.5)."""
 
+SEARCH = {"generations": 100, "max_evaluations": 200}
+"""Settings of the search."""
 SIZES = {
-    "default": Size("100 particles of 125 nm about a random cylinder of L/D 20, 0.5 s", {}),
+    "default": Size("100 particles of 125 nm about a random cylinder of L/D 20, 0.5 s", {}, SEARCH),
     "optimal": Size("the same about a transverse cylinder", {"orientation": "optimal"}),
     "25nm": Size("100 particles of 25 nm, 10 s", {"nanometres": 25, "stage": 10.0}),
 }
@@ -48,8 +51,12 @@ class Cascade:
     gap: float = 0.0
     number: int = capture.NUMBER
 
-    def angle(self, generator: np.random.Generator) -> float:
-        """Return the angle of the next cylinder to the field, degrees."""
+    def begin(self, passed: int) -> float:
+        """Return the time after a number of stages, s."""
+        return passed * self.stage
+
+    def angle(self, generator: np.random.Generator, passed: int = 0) -> float:
+        """Return the angle to the field, degrees, of the cylinder after a number of stages."""
         uniform = generator.uniform()
         return {
             "optimal": 90.0,
@@ -57,14 +64,14 @@ class Cascade:
             "angles": 90.0 * uniform,
         }[self.orientation]
 
-    def scene(self, number: int, generator: np.random.Generator) -> Scene:
-        """Return one stage: ``number`` particles about the next cylinder."""
+    def scene(self, number: int, generator: np.random.Generator, passed: int = 0) -> Scene:
+        """Return one stage: ``number`` particles about the cylinder after a number of stages."""
         scene = capture.scene(
             nanometres=self.nanometres,
-            angle=self.angle(generator),
+            angle=self.angle(generator, passed),
             aspect=self.aspect,
             number=number,
-            duration=self.stage,
+            duration=self.begin(passed + 1) - self.begin(passed),
             seed=int(generator.integers(2**62)),
         )
         (body,) = next(e for e in scene.effects if isinstance(e, MagneticCylinders)).cylinders
@@ -77,6 +84,24 @@ class Cascade:
         )
         cloud = scene.particles.model_copy(update={"placement": layer})
         return scene.model_copy(update={"name": "cascade", "particles": cloud})
+
+
+@dataclass(frozen=True)
+class PlannedCascade(Cascade):
+    """A cascade with a given angle of each cylinder, and a given time about each.
+
+    angles : to the field, degrees. stages : s, as many. After the last, they are repeated in the same order.
+    """
+
+    angles: tuple[float, ...] = (90.0,)
+    stages: tuple[float, ...] = (0.5,)
+
+    def begin(self, passed: int) -> float:
+        turns, rest = divmod(passed, len(self.stages))
+        return turns * sum(self.stages) + sum(self.stages[:rest])
+
+    def angle(self, generator: np.random.Generator, passed: int = 0) -> float:
+        return self.angles[passed % len(self.angles)]
 
 
 def scene_for(size: str, seed: int) -> Scene:

@@ -39,12 +39,14 @@ def captured_at(
     share: float = CAPTURED_SHARE,
     seed: int = 0,
     progress: Progress | None = None,
+    longest: float = np.inf,
 ) -> list[np.ndarray]:
     """Return the capture time of each particle, s from the start of the cascade.
 
     The result is one array (repeats, number) for each cascade, with sorted rows. Particles that are still
-    free when ``share`` has been captured, or after MAX_STAGES, have inf. Each stage of all unfinished
-    cascades and repeats is one batch of worlds. RunError if a run fails.
+    free when ``share`` has been captured, at the end of the first stage that ends after ``longest`` (s), or
+    after MAX_STAGES, have inf. Each stage of all unfinished cascades and repeats is one batch of worlds.
+    RunError if a run fails.
     """
     times = [np.full((repeats, one.number), np.inf) for one in cascades]
     rows = [
@@ -53,16 +55,18 @@ def captured_at(
         for repeat in range(repeats)
     ]
     for passed in range(MAX_STAGES):
-        going = [row for row in rows if np.isfinite(row[1]).mean() < share]
+        going = [row for row in rows if np.isfinite(row[1]).mean() < share and row[0].begin(passed) < longest]
         if not going:
             break
-        results = sound(run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going]))
+        results = sound(
+            run([one.scene(int(np.isinf(at).sum()), generator, passed) for one, at, generator in going])
+        )
         for (one, at, _), result in zip(going, results, strict=True):
             when = result.state["captured_at"]
             # Particles keep no identity between stages, so capture times fill the row from its start.
             first = int(np.isfinite(at).sum())
             caught = np.sort(when[when >= 0])
-            at[first : first + len(caught)] = passed * one.stage + caught
+            at[first : first + len(caught)] = one.begin(passed) + caught
         if progress:
             progress(min(1.0, float(np.mean([np.isfinite(at).mean() for _, at, _ in rows])) / share))
     return times

@@ -11,5 +11,7 @@ CASE = Case(
     scene=scene_for,
     check=Late("tisim.cases.spin_up.checks", "check"),
     quantities=Late("tisim.cases.spin_up.stages", "quantities"),
+    problem=Late("tisim.cases.spin_up.problem", "problem"),
+    variants=("elongated",),
     figures=Late("tisim.cases.spin_up.figures", "figures"),
 )

@@ -26,8 +26,13 @@ SETTLED = 7500.0
 """Time at which the pile of the default size is at rest, s: three free-fall times."""
 DEFAULT: Mapping[str, Any] = {"number": 80, "spacing": 1.3, "softened": 10.0, "duration": SETTLED}
 
+SEARCH = {"generations": 100, "max_evaluations": 80}
+"""Settings of the search."""
+
 SIZES = {
-    "default": Size("80 grains of 100 cm, magnetised to 1190 A/m, in a scaled copy of L21's pile", DEFAULT),
+    "default": Size(
+        "80 grains of 100 cm, magnetised to 1190 A/m, in a scaled copy of L21's pile", DEFAULT, SEARCH
+    ),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
     "l21": Size("L21's 4088 grains of 100 cm, gravity by a tree", {"tree": True}),
     "l21_50cm": Size("L21's 33,220 grains of 50 cm", {"diameter": published.DIAMETERS[0], "tree": True}),

@@ -140,13 +140,25 @@ def spin_ups(
     holds: tuple[float, float] = HOLDS,
     **settings: Any,
 ) -> list[SpinUp]:
-    """Spin up piles of each magnetisation (A/m), each from several starts, all as one batch.
+    """Spin up piles of each magnetisation (A/m), each from several starts, all as one batch; see
+    ``spun_up``."""
+    wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
+    return spun_up(wanted, progress, rates, holds, **settings)
+
+
+def spun_up(
+    wanted: Sequence[tuple[float, int]],
+    progress: Progress = lambda part: None,
+    rates: Sequence[float] = RATES,
+    holds: tuple[float, float] = HOLDS,
+    **settings: Any,
+) -> list[SpinUp]:
+    """Spin up piles, given the magnetisation (A/m) and the seed of each, all as one batch.
 
     rates : rad/s, rising. holds : hold times up to QUICK and beyond it, s.
     settings : of ``scene``; the pile settles for its duration.
     progress : receives the completed fraction, 0..1. RunError if a run fails.
     """
-    wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
     clouds = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]
     settled = clouds[0].duration
     ends = stage_ends(settled, rates, holds)
